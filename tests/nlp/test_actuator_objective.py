@@ -122,6 +122,10 @@ def test_a_case_with_an_objective_is_the_same_when_it_is_written_and_read_again(
     assert again.to_toml() == case.to_toml()
     assert again.tasks[0].measure == "actuator_force"
     assert not again.tasks[0].is_stated
+    # A task beside the objective changes nothing.
+    both = CORNERS.replace("[objective]", TASK + "[objective]")
+    one, other = (solve(case_from(text)) for text in (CORNERS, both))
+    assert pytest.approx(one.F, rel=1e-9) == other.F
 
 
 @pytest.mark.parametrize(
@@ -139,12 +143,6 @@ def test_a_case_with_an_objective_is_the_same_when_it_is_written_and_read_again(
 def test_objectives_that_mean_nothing_are_refused(change: tuple[str, str], sentence: str) -> None:
     with pytest.raises(CaseError, match=re.escape(sentence)):
         case_from(edited(CORNERS, change))
-
-
-def test_a_task_beside_an_objective_changes_nothing() -> None:
-    both = CORNERS.replace("[objective]", TASK + "[objective]")
-    one, other = (solve(case_from(text)) for text in (CORNERS, both))
-    assert pytest.approx(one.F, rel=1e-9) == other.F
 
 
 def test_a_proof_file_states_the_root_of_what_its_tree_bounds(cli: Run, tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from builders import Run, edited, refusal_of, saved
+from builders import Patch, Run, edited, refusal_of, saved
 
 from screwsynth.nlp import CaseError, InputError, formulate, load_case
 
@@ -422,9 +422,7 @@ def test_the_library_refuses_with_an_input_error(broken: Broken, written: Path) 
 
 @pytest.mark.parametrize("broken", [*NOT_TOML, *UNKNOWN[:2], *LINES, *LIMBS], ids=lambda broken: broken.name)
 @pytest.mark.parametrize("command", ["solve", "evaluate"])
-def test_commands_say_the_same_sentence_and_write_nothing(
-    command: str, broken: Broken, written: Path, cli: Run
-) -> None:
+def test_commands_say_the_same_and_write_nothing(command: str, broken: Broken, written: Path, cli: Run) -> None:
     check_sentence(broken, refusal_of(cli(command, str(written), "--json", str(written.parent / "result.json"))))
     assert [path.name for path in written.parent.iterdir()] == [NAME]
 
@@ -473,9 +471,7 @@ NO_FILE = {
 
 
 @pytest.mark.parametrize(("name", "words"), NO_FILE.values(), ids=NO_FILE)
-def test_what_is_no_file(
-    name: str, words: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Run
-) -> None:
+def test_what_is_no_file(name: str, words: tuple[str, ...], tmp_path: Path, monkeypatch: Patch, cli: Run) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "folder").mkdir()
     (tmp_path / "file.txt").write_text("a file", encoding="utf-8")

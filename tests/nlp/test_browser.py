@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import Run, saved, soaked
+from builders import Run, assert_words, saved, soaked
 from pages import Page, displaced, number, posed, rates_of_lines
 
 
@@ -98,9 +98,7 @@ def test_page_of_another_robot_loads_clean(opened: Callable[..., Any]) -> None:
 
 @pytest.mark.browser
 @pytest.mark.parametrize("case", soaked(["paper-4.1-helical", "hexapod-machining"], ["hexapod-machining"]))
-def test_page_loads_clean_and_its_slider_moves_the_platform(
-    opened: Callable[..., Any], page: Callable[..., Page], case: str
-) -> None:
+def test_a_page_loads_clean_and_moves(opened: Callable[..., Any], page: Callable[..., Page], case: str) -> None:
     chrome, data = opened(case), page(case).data
     check_clean(chrome)
     check_view(chrome)
@@ -349,8 +347,7 @@ def test_several_tasks_maps_and_the_copied_text(opened: Callable[..., Any], page
 def test_browser_is_where_ci_installs_it() -> None:
     """The table of `.ci/run` has what the tests marked ``browser`` start."""
     text = (Path(__file__).parents[2] / ".ci" / "run").read_text(encoding="utf-8")
-    assert "[chromium]=chromium" in text
-    assert "[chromedriver]=chromium-driver" in text
+    assert_words(text, "[chromium]=chromium", "[chromedriver]=chromium-driver")
     assert shutil.which("bash")
 
 

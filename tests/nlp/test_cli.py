@@ -14,7 +14,7 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
-from builders import EACH_KIND, Run, edited, output_of, refusal_of, saved, soaked, starter_text, unbroken
+from builders import EACH_KIND, Run, assert_words, edited, output_of, refusal_of, saved, soaked, starter_text, unbroken
 
 import screwsynth.cases
 from screwsynth.models import model_names
@@ -71,14 +71,12 @@ def check_state(result: dict[str, Any], *, rows: int = 6, length: float = 1.0) -
     assert {"position", "axis", "angle", "rotation_matrix"} <= set(pose)
     assert {"twist", "axis", "point", "pitch"} <= set(task)
     J, twist, rates = np.array(result["jacobian"]), np.array(task["twist"]), np.array(result["rates"])
-    assert J.shape == (rows, 6)
-    assert twist.shape == (6,)
+    assert (J.shape, twist.shape) == ((rows, 6), (6,))
     # Rows are force then moment, a twist is angular velocity then velocity.
     np.testing.assert_allclose(rates, J[:, :3] @ twist[3:] + J[:, 3:] @ twist[:3], rtol=1e-9, atol=1e-9)
     forces = np.linalg.norm(J[:, :3], axis=1) > 0
-    np.testing.assert_allclose(
-        np.linalg.norm(np.where(forces[:, None], J[:, :3], J[:, 3:] / length), axis=1), 1, rtol=1e-12
-    )
+    units = np.where(forces[:, None], J[:, :3], J[:, 3:] / length)
+    np.testing.assert_allclose(np.linalg.norm(units, axis=1), 1, rtol=1e-12)
     R, axis = np.array(pose["rotation_matrix"]), np.array(pose["axis"])
     np.testing.assert_allclose(R.T @ R, np.eye(3), atol=1e-12)
     np.testing.assert_allclose(R @ axis, axis, atol=1e-9)
@@ -111,8 +109,7 @@ def test_help_lists_each_command_by_the_first_line_of_its_own_help(name: str) ->
 
 def test_a_solve_as_a_process_prints_only_its_table(solved: Solved) -> None:
     ended, _ = solved
-    assert ended.returncode == 0
-    assert ended.stderr == ""
+    assert (ended.returncode, ended.stderr) == (0, "")
     title, task, axis, found, *_ = unbroken(ended.stdout).splitlines()
     assert title == "Pose of a given 6-6 platform for a screw motion of pitch 1"
     assert task.startswith("task  drive the screw, max F: screw of pitch 1 cm about (0.6667, 0.6667, 0.3333)")
@@ -120,9 +117,7 @@ def test_a_solve_as_a_process_prints_only_its_table(solved: Solved) -> None:
     assert axis == "task's axis  nearest to the origin at (-1.556, -0.5556, 4.222)"
     assert found.startswith("largest F = 407.2107")
     assert "4 of 4 converged" in ended.stdout
-    for foreign in ("Ipopt", "IPOPT", "EXIT:", "CasADi", "Eclipse", "coin-or", "nlp_f", "solver", "****"):
-        assert foreign not in ended.stdout
-    assert "\x1b" not in ended.stdout
+    assert not re.search(r"Ipopt|IPOPT|EXIT:|CasADi|Eclipse|coin-or|nlp_f|solver|\*\*\*\*|\x1b", ended.stdout)
 
 
 def test_the_result_has_the_documented_keys(solved: Solved) -> None:
@@ -135,15 +130,13 @@ def test_the_result_has_the_documented_keys(solved: Solved) -> None:
     assert result["parameters"] == {"x1": 12, "x2": 8, "x3": 30, "x4": 8}
     assert result["pose"]["position"] == pytest.approx([-10, -10, 50], abs=1e-6)
     assert abs(result["pose"]["angle"]) <= 30 + 1e-9
-    assert result["task"]["axis"] == pytest.approx([2 / 3, 2 / 3, 1 / 3])
-    assert result["task"]["pitch"] == pytest.approx(1)
+    assert [*result["task"]["axis"], result["task"]["pitch"]] == pytest.approx([2 / 3, 2 / 3, 1 / 3, 1])
     evidence = result["optimality"]
     assert evidence["kind"] == "strict local maximum"
     assert max(evidence[key] for key in ("stationarity", "feasibility", "complementarity")) < 1e-6
     sides = [(side["name"], side["bound"]) for side in evidence["active"]]
     assert sides == [("p_x", "min"), ("p_y", "min"), ("p_z", "max")]
-    for side in evidence["active"]:
-        assert set(side) == {"name", "bound", "value", "unit", "multiplier"}
+    assert all(set(side) == {"name", "bound", "value", "unit", "multiplier"} for side in evidence["active"])
     assert all(isinstance(number, float) for number in evidence["reduced_hessian_eigenvalues"])
     starts = result["starts"]
     assert (starts["run"], starts["converged"]) == (4, 4)
@@ -165,14 +158,11 @@ def test_json_to_standard_output_is_alone_there(tmp_path: Path, cli: Run, solved
     assert list(tmp_path.iterdir()) == []
 
 
-def test_seed_and_starts_replace_those_of_the_case(tmp_path: Path, cli: Run) -> None:
+def test_seed_starts_and_radians_are_those_of_the_case_or_the_options(tmp_path: Path, cli: Run) -> None:
     path = case_file(tmp_path, search="starts = 7\nseed = 5")
     for options, seed, starts in ((("--starts", "2", "--seed", "11"), 11, 2), (("--starts", "1"), 5, 1)):
         result = strict(output_of(cli("solve", path, "--json", "-", *options)))
         assert (result["seed"], result["starts"]["run"]) == (seed, starts)
-
-
-def test_radians_stay_radians(tmp_path: Path, cli: Run) -> None:
     path = case_file(
         tmp_path,
         ('length = "cm"', 'length = "mm"\nangle = "rad"'),
@@ -191,12 +181,9 @@ def test_radians_stay_radians(tmp_path: Path, cli: Run) -> None:
 def test_an_infinite_pitch_is_a_string(tmp_path: Path, cli: Run) -> None:
     path = case_file(tmp_path, (MOTION, "axis = [0, 0, 5]\npitch = inf\n"))
     for command in ("solve", "evaluate"):
-        code, out, _ = cli(command, path, "--json", "-")
-        result = strict(out)
+        result = strict(output_of(cli(command, path, "--json", "-")))
         check_state(result)
-        assert code == 0
-        assert result["task"]["pitch"] == "inf"
-        assert result["task"]["twist"] == [0, 0, 0, 0, 0, 1]
+        assert (result["task"]["pitch"], result["task"]["twist"]) == ("inf", [0, 0, 0, 0, 0, 1])
 
 
 def test_a_case_with_nothing_free(tmp_path: Path, cli: Run) -> None:
@@ -368,10 +355,10 @@ def test_an_axis_has_any_length_but_zero(tmp_path: Path, cli: Run) -> None:
         assert result["task"]["axis"] == pytest.approx([2 / 3, 2 / 3, 1 / 3])
 
 
-@pytest.mark.parametrize("label", ["[cm]", "[/cm]", "[bold]", ":ruler:", "µm", "in"])
-def test_a_length_label_is_shown_as_it_is(label: str, tmp_path: Path, cli: Run) -> None:
-    path = case_file(tmp_path, ('"cm"', f'"{label}"'), ("Pose of a", f"Pose {label} of a"))
-    for command in ("solve", "evaluate"):
+@pytest.mark.parametrize("command", ["solve", "evaluate"])
+def test_a_length_label_is_shown_as_it_is(command: str, tmp_path: Path, cli: Run) -> None:
+    for label in ("[cm]", "[/cm]", "[bold]", ":ruler:", "µm", "in"):
+        path = case_file(tmp_path, ('"cm"', f'"{label}"'), ("Pose of a", f"Pose {label} of a"))
         out = output_of(cli(command, path, "--all"))
         assert next(line for line in out.splitlines() if line.startswith("x1")).split()[2] == label
         assert f"Pose {label} of a" in out
@@ -456,9 +443,8 @@ def test_models_lists_the_shipped_robots_and_shows_one(cli: Run) -> None:
     rows = [line.split()[0] for line in output_of(cli("models", "--all")).splitlines() if line[0] != " "]
     assert rows[rows.index("robot") :][1:3] == ["stewart-gough", "hexapod"]
     words = ("x1", "x4", "layout", '"octahedral"', "length", "angle", "leg_length", ">= 0, <= 30", "1-", "3+")
-    for name, shown in (("stewart-gough", words), ("hexapod", ("base_1_x", "platform_6_z", "leg_length", "any"))):
-        out = output_of(cli("models", name, "--all"))
-        assert all(word in out for word in shown)
+    assert_words(output_of(cli("models", "stewart-gough", "--all")), *words)
+    assert_words(output_of(cli("models", "hexapod", "--all")), "base_1_x", "platform_6_z", "leg_length", "any")
 
 
 def test_commands_that_do_not_exist_or_lack_something(cli: Run) -> None:
@@ -505,11 +491,9 @@ def test_help(cli: Run) -> None:
         assert "..." not in out.partition("Commands:")[2], "a command's summary is cut off"
 
 
-@pytest.mark.parametrize("arguments", [("solve", "paper-4.3", "--starts", "2", "--json", "-"), ("models",)])
-def test_a_reader_that_goes_away(arguments: tuple[str, ...], tmp_path: Path) -> None:
-    command = [sys.executable, "-P", "-m", "screwsynth.nlp", *arguments]
-    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:
-        running.stdout.close()
-        err = running.stderr.read()
-    assert "Traceback" not in err
-    assert "Exception" not in err
+def test_a_reader_that_goes_away(tmp_path: Path) -> None:
+    for arguments in ("solve paper-4.3 --starts 2 --json -", "models"):
+        command, pipe = [sys.executable, "-P", "-m", "screwsynth.nlp", *arguments.split()], subprocess.PIPE
+        with subprocess.Popen(command, cwd=tmp_path, stdout=pipe, stderr=pipe, text=True) as running:
+            running.stdout.close()
+            assert not re.search("Traceback|Exception", running.stderr.read())

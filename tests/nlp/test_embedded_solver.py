@@ -252,9 +252,6 @@ def test_the_other_sense_and_another_task(embedded: EmbeddedCase) -> None:
     least = c.solve(p=nlp.arguments, maximise=0)
     assert least.status == OK
     assert least.F < 0.9 * other.F
-
-
-def test_a_saddle_is_left(embedded: EmbeddedCase) -> None:
     # Park's own axes are stationary for 4.4's maximum and no maximum.
     c, nlp = shipped(embedded, "paper-4.4-max")
     violation, residual = kkt(nlp, nlp.start)

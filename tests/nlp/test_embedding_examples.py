@@ -416,7 +416,7 @@ def image(case: str, folder: Path) -> Path:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", ["paper-4.1-helical", "paper-4.2-rotation", "paper-4.4-max"])
-def test_the_self_test_passes_and_solves_are_counted(
+def test_self_test_and_counted_solves(
     case: str, tmp_path: Path, record_property: Callable[[str, object], None]
 ) -> None:
     for program in (COMPILER, EMULATOR):

@@ -223,9 +223,7 @@ FAULTS: list[tuple[str, str | bytes, tuple[str, ...], str]] = [
 ]  # fmt: skip
 
 
-def test_each_fault_is_one_sentence_and_nothing_is_written(
-    tmp_path: Path, cli: Run, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_each_fault_is_one_sentence_and_no_file(tmp_path: Path, cli: Run, capfd: pytest.CaptureFixture[str]) -> None:
     for number, (name, text, arguments, words) in enumerate(FAULTS):
         folder = tmp_path / str(number)
         folder.mkdir()

@@ -51,9 +51,7 @@ MEANINGS = {
 
 def test_sentences_mean_what_they_mean_in_mathematics() -> None:
     assert {text: difference(text) for text in MEANINGS} == pytest.approx(MEANINGS, abs=1e-15)
-
-
-def test_sine_and_cosine_take_the_angles_of_the_case() -> None:
+    # Sine and cosine take the angles of the case.
     assert difference("sin(angle) >= cos(60)", math.radians(1)) == pytest.approx(0, abs=1e-15)
     assert difference("x1 >= sqrt(sin(150))", math.radians(1)) == pytest.approx(3 - math.sqrt(0.5), abs=1e-15)
     with pytest.raises(ExpressionError, match="without a finite value"):

@@ -93,17 +93,14 @@ def test_the_same_robot_gives_the_same_bytes() -> None:
         assert first.startswith(head)
 
 
-def test_every_parameter_of_a_robot_is_named_in_its_picture() -> None:
-    for model in map(build_model, DRAWN_BY_HAND):
-        words = {text.get_text() for text in figure_of([drawing_of_model(model)]).axes[0].texts}
-        assert {parameter.name for parameter in model.parameters} <= words
-
-
-def test_words_do_not_cover_each_other() -> None:
+def test_words_name_parameters_and_do_not_cover_each_other() -> None:
     figure = figure_of([drawing("hexapod-machining")])
     figure.canvas.draw()
     boxes = [text.get_window_extent() for text in figure.axes[0].texts if text.get_text()]
     assert not [1 for one, other in itertools.combinations(boxes, 2) if one.overlaps(other)]
+    for model in map(build_model, DRAWN_BY_HAND):
+        words = {text.get_text() for text in figure_of([drawing_of_model(model)]).axes[0].texts}
+        assert {parameter.name for parameter in model.parameters} <= words
 
 
 def crosses_box(a: np.ndarray, b: np.ndarray, box: tuple[float, float, float, float]) -> bool:
@@ -380,23 +377,18 @@ def test_a_line_is_within_a_box_where_cutting_by_each_side_leaves_a_part(segment
     expected = [[crosses_box(line[:2], line[2:], tuple(box)) for line in segments] for box in boxes]
     assert np.array_equal(segments_in_boxes(segments, boxes), expected)
     assert 0 < np.count_nonzero(expected) < np.size(expected)
-
-
-def test_a_line_that_ends_at_a_side_is_within_the_box_and_a_line_just_beside_it_is_not() -> None:
+    # A line that ends at a side is within the box, and one just beside it is not.
     box = np.array([[10.0, 10.0, 20.0, 20.0]])
     ends = np.array([[0.0, 15, 10, 15], [0, 15, 9.999, 15], [0, 20, 30, 20], [0, 20.001, 30, 20.001], [12, 12, 13, 14]])
     assert segments_in_boxes(ends, box).tolist() == [[True, False, True, False, True]]
     assert segments_in_boxes(np.zeros((0, 4)), box).shape == (1, 0)
 
 
-def test_lines_cross_where_they_have_a_point_in_common(segments: Array) -> None:
+def test_lines_cross_and_points_are_as_far_as_from_the_nearest_point(segments: Array) -> None:
     askew, lines = segments[:10], segments[35:]
     expected = [[cross(line.reshape(2, 2), each.reshape(2, 2)) for each in askew] for line in lines]
     assert np.array_equal(segments_cross(askew, lines), expected)
     assert 0 < np.count_nonzero(expected) < np.size(expected)
-
-
-def test_a_point_is_as_far_from_a_line_as_from_its_nearest_point(segments: Array) -> None:
     points, lines = segments[:30, :2], segments[35:]
     for line, row in zip(lines, distances_to_segments(points, lines), strict=True):
         a, b = line[:2], line[2:]

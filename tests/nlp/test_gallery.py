@@ -15,29 +15,8 @@ import numpy as np
 import pytest
 from builders import EACH_KIND, Run, case_from, case_of, output_of, saved, soaked, starter, starter_tables, starter_text
 
+import screwsynth.nlp as sn
 from screwsynth.models import Model, WrenchKind, constraint_rows, model_names, robot, robot_function, three_upu
-from screwsynth.nlp import (
-    Case,
-    Free,
-    Limits,
-    Method,
-    Nlp,
-    OverPoses,
-    Pose,
-    QuantityLimit,
-    RateShare,
-    Search,
-    Sense,
-    Status,
-    Task,
-    evaluate,
-    formulate,
-    load_case,
-    report,
-    result_of,
-    sensitivities,
-    solve,
-)
 from screwsynth.nlp.case.robotfile import model_of_definition, read_definition
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.conventions import dependence_of
@@ -75,7 +54,7 @@ def with_workspace(text: str) -> str:
     return f"{before}[workspace]{table.replace('# position', 'position').replace('# rotation', 'rotation')}\n\n{after}"
 
 
-def fixed(case: Case) -> Case:
+def fixed(case: sn.Case) -> sn.Case:
     """A case at the typical dimensions."""
     return replace(case, parameters={item.name: item.starter or item.typical for item in case.model.parameters})
 
@@ -94,7 +73,7 @@ def test_a_starter_follows_the_size_of_a_robot_without_dimensions(tmp_path: Path
     saved(tmp_path / "large.toml", 'name = "large"\nhome = [0, 0, 0]\n' + "".join(limbs))
     model = model_of_definition(read_definition("large.toml", tmp_path), "large.toml")
     assert not model.parameters
-    z = load_case(str(saved(tmp_path / "case.toml", starter_case(model, "large.toml")))).position[2]
+    z = sn.load_case(str(saved(tmp_path / "case.toml", starter_case(model, "large.toml")))).position[2]
     # Six telescoping legs, 40 to 60 m from the middle, without dimensions.
     # 0.3 times the distance of the joints on the base from its origin, sqrt(60^2 + 40^2) = 72.1, as a round number.
     assert z.upper == 20  # type: ignore[union-attr]
@@ -112,12 +91,12 @@ def test_every_starter_is_solved_to_a_machine_that_makes_its_task(given: str | M
     freedoms, task = TASKS.get(model.name, (6, "screw motion"))
     assert f"this robot has {freedoms} freedoms" in text
     assert case.tasks[0].name == task
-    has_turn = isinstance(case.rotation.angle, Free)
+    has_turn = isinstance(case.rotation.angle, sn.Free)
     assert has_turn == (model.name not in UPRIGHT)
     assert (has_turn and case.rotation.axis is not None) == (model.name in ONE_AXIS)
 
-    own = solve(case, starts=2).outcomes[0].own
-    assert own.status is Status.OPTIMAL
+    own = sn.solve(case, starts=2).outcomes[0].own
+    assert own.status is sn.Status.OPTIMAL
     assert own.state.rank == 6
     assert loops_are_closed(own.nlp, own.x)
     assert len(list(case.limits)) >= 2
@@ -132,9 +111,9 @@ def test_every_starter_is_solved_to_a_machine_that_makes_its_task(given: str | M
 
     judged = fixed(case_from(with_workspace(text)))
     assert judged.workspace is not None
-    assert any(isinstance(value, Free) for value in (*judged.workspace.position, *judged.workspace.turns.angles))
+    assert any(isinstance(value, sn.Free) for value in (*judged.workspace.position, *judged.workspace.turns.angles))
     for value, home in zip(judged.workspace.position, model.home, strict=True):
-        lower, upper = (value.lower, value.upper) if isinstance(value, Free) else (value, value)
+        lower, upper = (value.lower, value.upper) if isinstance(value, sn.Free) else (value, value)
         assert lower - 1e-9 <= home <= upper + 1e-9
 
 
@@ -171,14 +150,14 @@ def test_a_robot_of_ones_own_has_the_motion_of_its_joint(
 SIX = ("3-rps", "6-rus", "delta", "delta-parallelogram", "3-upu", "planar-3-rrr")
 
 
-def narrow(case: Case) -> Case:
+def narrow(case: sn.Case) -> sn.Case:
     """The case with its free numbers in a fifth of their ranges, where every robot stays in its own assembly."""
 
-    def less(value: float | Free) -> float | Free:
-        if not isinstance(value, Free):
+    def less(value: float | sn.Free) -> float | sn.Free:
+        if not isinstance(value, sn.Free):
             return value
         middle, half = (value.lower + value.upper) / 2, (value.upper - value.lower) / 10
-        return Free(middle - half, middle + half)
+        return sn.Free(middle - half, middle + half)
 
     parameters = {name: [less(value) for value in case.components(name)] for name in case.parameters}
     rotation = replace(case.rotation, angle=less(case.rotation.angle))
@@ -191,8 +170,8 @@ def test_evaluate_writes_json_and_csv_with_the_values_of_the_program(tmp_path: P
         data_file, csv_file = tmp_path / f"{name}.json", tmp_path / f"{name}.csv"
         out = output_of(cli("evaluate", str(path), "--json", str(data_file), "--csv", str(csv_file)))
         data = json.loads(data_file.read_text(encoding="utf-8"))
-        nlp = formulate(case_from(starter_text(name)))
-        state = evaluate(nlp, closed_start(nlp))
+        nlp = sn.formulate(case_from(starter_text(name)))
+        state = sn.evaluate(nlp, closed_start(nlp))
         assert data["F"] == pytest.approx(state.F, rel=1e-12)
         assert len(data["jacobian"]) == len(data["limbs"]) == len(nlp.program.model.rows)
         assert np.sum(np.square(data["rates"])) == pytest.approx(state.F, rel=1e-12)
@@ -209,35 +188,37 @@ def test_tasks_poses_and_limits_together(names: tuple[str, ...]) -> None:
         (own,) = case.tasks
         both = replace(
             case,
-            tasks=[own, replace(own, name="second", sense=Sense.MAX, twist=np.array([0, 0, 0, 0, 0, 1.0]))],
-            further=[Pose(case.position, case.rotation)],
-            over_poses=OverPoses.MEAN,
-            method=Method.AVERAGE,
-            limits=Limits(RateShare(0.95), QuantityLimit(quantity.name, min=-largest, max=largest)),
-            search=Search(starts=2),
+            tasks=[own, replace(own, name="second", sense=sn.Sense.MAX, twist=np.array([0, 0, 0, 0, 0, 1.0]))],
+            further=[sn.Pose(case.position, case.rotation)],
+            over_poses=sn.OverPoses.MEAN,
+            method=sn.Method.AVERAGE,
+            limits=sn.Limits(sn.RateShare(0.95), sn.QuantityLimit(quantity.name, min=-largest, max=largest)),
+            search=sn.Search(starts=2),
         )
-        solution = solve(both)
+        solution = sn.solve(both)
         assert solution.status.is_answer, name
         for outcome in solution.outcomes:
             found = outcome.own
-            assert found.status is Status.OPTIMAL, name
+            assert found.status is sn.Status.OPTIMAL, name
             assert loops_are_closed(found.nlp, found.x)
-            F = np.mean([evaluate(found.nlp, found.x, pose).F for pose in range(2)])
+            F = np.mean([sn.evaluate(found.nlp, found.x, pose).F for pose in range(2)])
             assert pytest.approx(F, rel=1e-12) == found.F
 
 
 @pytest.mark.parametrize("names", soaked([SIX[:1], SIX[1:]], [SIX[:1]]), ids=["one", "others"])
 def test_sensitivities_are_those_of_solved_neighbours(names: tuple[str, ...]) -> None:
     for name in names:
-        case = replace(narrow(starter(name)), search=Search(starts=1))
-        fixed = next(item.name for item in case.model.parameters if not isinstance(case.components(item.name)[0], Free))
+        case = replace(narrow(starter(name)), search=sn.Search(starts=1))
+        fixed = next(
+            item.name for item in case.model.parameters if not isinstance(case.components(item.name)[0], sn.Free)
+        )
         value = float(case.components(fixed)[0])
-        own = solve(case).outcomes[0].own
-        (found,) = [each for each in sensitivities(own.nlp, own.x) if each.name == fixed]
+        own = sn.solve(case).outcomes[0].own
+        (found,) = [each for each in sn.sensitivities(own.nlp, own.x) if each.name == fixed]
         step = 1e-5 * value
 
-        def best(number: float, case: Case = case, fixed: str = fixed) -> float:
-            return solve(replace(case, parameters={**case.parameters, fixed: number})).F
+        def best(number: float, case: sn.Case = case, fixed: str = fixed) -> float:
+            return sn.solve(replace(case, parameters={**case.parameters, fixed: number})).F
 
         slope = (best(value + step) - best(value - step)) / (2 * step)
         assert found.derivative == pytest.approx(slope, rel=1e-4, abs=1e-5 * abs(own.F / value)), name
@@ -248,8 +229,8 @@ def test_a_number_that_the_robot_has_no_choice_of_has_no_sensitivity() -> None:
     # The planar robot has the choice of its rotation.
     for name, angle in (("delta", 0), ("planar-3-rrr", 3)):
         pose = starter_tables(name)["pose"] | {"rotation": {"axis": [0, 0, 1], "angle": angle}}
-        solution = solve(case_of(name, pose=pose, solve={"starts": 1}))
-        rows = {row.name: row for row in sensitivities(solution.nlp, solution.x)}
+        solution = sn.solve(case_of(name, pose=pose, solve={"starts": 1}))
+        rows = {row.name: row for row in sn.sensitivities(solution.nlp, solution.x)}
         if name == "delta":
             assert {name for name, row in rows.items() if row.derivative is None} == {"angle"}
             assert rows["angle"].hindrance is Hindrance.NO_CHOICE
@@ -272,9 +253,9 @@ def test_report_and_check_and_codegen_write_what_they_say(tmp_path: Path, cli: R
 @pytest.mark.slow
 # The others compile for a minute.
 @pytest.mark.parametrize("name", soaked(["3-rps", "6-rus", "delta", "planar-3-rrr"], ["3-rps", "delta"]))
-def test_c_has_the_values_of_the_program(name: str, embed: Callable[[Case], Any]) -> None:
+def test_c_has_the_values_of_the_program(name: str, embed: Callable[[sn.Case], Any]) -> None:
     case = starter(name)
-    c, nlp = embed(case, "-O0"), formulate(case)
+    c, nlp = embed(case, "-O0"), sn.formulate(case)
     p, n, count = np.ascontiguousarray(nlp.arguments), nlp.n, len(nlp.program.constraints)
     k, work = np.zeros(c.macro("K") + 1), np.zeros(c.macro("WORK"))
     F, gradient, g, dg = np.zeros(1), np.zeros(n), np.zeros(count), np.zeros((count, n))
@@ -294,7 +275,7 @@ def test_a_case_of_the_gallery_is_written_and_read_again() -> None:
         case = starter(name)
         again = case_from(case.to_toml(), name)
         assert again.model.name == name
-        one, other = (formulate(each) for each in (case, again))
+        one, other = (sn.formulate(each) for each in (case, again))
         assert other.evaluate(other.start).F == one.evaluate(one.start).F
 
 
@@ -303,20 +284,20 @@ NAMES = ("3-rps", "6-rus", "3-upu", "delta-parallelogram", "planar-3-rrr", "sphe
 
 
 @cache
-def at_home(name: str) -> Nlp:
+def at_home(name: str) -> sn.Nlp:
     model = robot_function(name)()
     values = {item.name: item.typical[0] for item in model.parameters}
     length = 0.7 * float(np.linalg.norm(model.home)) or 0.7
-    return formulate(Case(model, values, model.home, [Task(GENERAL)], characteristic_length=length))
+    return sn.formulate(sn.Case(model, values, model.home, [sn.Task(GENERAL)], characteristic_length=length))
 
 
-def with_twist(nlp: Nlp, twist: np.ndarray) -> Nlp:
+def with_twist(nlp: sn.Nlp, twist: np.ndarray) -> sn.Nlp:
     arguments = np.array(nlp.arguments)
     arguments[nlp.program.places.twists[0]] = twist
     return replace(nlp, arguments=arguments)
 
 
-def feasible(nlp: Nlp) -> np.ndarray:
+def feasible(nlp: sn.Nlp) -> np.ndarray:
     """The general twist, projected on the twists that the platform can make with free actuators."""
     numbers = nlp.program.kernels.robot_state(nlp.start, nlp.arguments)
     rows = constraint_rows(nlp.program.model, velocities_at(nlp, nlp.start, numbers), numbers.position)
@@ -350,7 +331,7 @@ def test_the_derivative_by_the_length_is_that_of_f() -> None:
     values = []
     for part in (0.999, 1.001):
         changed = replace(nlp.case, characteristic_length=part * nlp.case.characteristic_length)
-        values.append(formulate(changed).evaluate(nlp.start)[0])
+        values.append(sn.formulate(changed).evaluate(nlp.start)[0])
     slope = (values[1] - values[0]) / 0.002 / nlp.evaluate(nlp.start)[0]
     assert found.length == pytest.approx(slope, rel=1e-5)
 
@@ -359,7 +340,7 @@ def test_the_derivative_by_the_length_is_that_of_f() -> None:
 def test_actuation_and_constraints_of_limbs_sum_to_f(name: str) -> None:
     nlp = at_home(name)
     for each, is_feasible in ((nlp, False), (with_twist(nlp, feasible(nlp)), True)):
-        state = evaluate(each, each.start)
+        state = sn.evaluate(each, each.start)
         found = mobility_of(each, each.start, state)
         parts = found.parts
         assert sum(sum(part) for part in parts.values()) == pytest.approx(state.F, rel=1e-9)
@@ -376,7 +357,7 @@ def test_actuation_and_constraints_of_limbs_sum_to_f(name: str) -> None:
 
 def test_results_have_f_by_limb_and_name_conventions() -> None:
     case = starter("planar-3-rrr")
-    result = result_of(solve(case, starts=1))
+    result = sn.result_of(sn.solve(case, starts=1))
     joints = result.robot.joints
     assert joints.feasible is False
     assert sum(each.F for each in joints.limb_parts) == pytest.approx(result.F)
@@ -391,10 +372,14 @@ def test_results_have_f_by_limb_and_name_conventions() -> None:
     assert [item.name for item in case_tables(case, result)].count("actuation") == 1
     # A motion that is possible: the table is a file's only, and no convention is named.
     case = starter("6-ups")
-    result = result_of(solve(case, starts=1))
+    result = sn.result_of(sn.solve(case, starts=1))
     assert result.robot.joints.feasible is True
     assert not [item for item in case_summary(case, result) if isinstance(item, TextTable) and item.name == "actuation"]
     assert [item.name for item in case_tables(case, result)].count("actuation") == 1
+    # The page shows notes and parts by limb.
+    page = sn.report(sn.solve(starter("five-bar"), starts=1))
+    assert "Note: member 1 resists with 5 wrenches or more" in page
+    assert "Actuation and constraints in F, limb by limb" in page
 
 
 def test_members_of_which_f_says_little_are_named() -> None:
@@ -411,19 +396,13 @@ def test_members_of_which_f_says_little_are_named() -> None:
     assert arm.startswith("the robot has one member only")
 
 
-def test_the_page_shows_notes_and_parts_by_limb() -> None:
-    page = report(solve(starter("five-bar"), starts=1))
-    assert "Note: member 1 resists with 5 wrenches or more" in page
-    assert "Actuation and constraints in F, limb by limb" in page
-
-
 def test_rows_have_the_names_of_their_members() -> None:
     model = robot_function("delta")()
     members = [each.name for each in model.structure]
     assert [row.member for row in model.rows] == members == ["1.1", "1.2", "2.1", "2.2", "3.1", "3.2"]
     values = {item.name: item.typical[0] for item in model.parameters}
-    case = Case(model, values, (0, 0, Free(-1.3, -1.2)), [Task(np.array([0, 0, 0, 0, 0, 1.0]))])
-    result = result_of(solve(case, starts=1))
+    case = sn.Case(model, values, (0, 0, sn.Free(-1.3, -1.2)), [sn.Task(np.array([0, 0, 0, 0, 0, 1.0]))])
+    result = sn.result_of(sn.solve(case, starts=1))
     assert list(result.robot.members) == members
     assert [name.partition(".")[0] for name in members] == list(result.robot.limbs)
     tables = {item.name: item for item in case_tables(case, result)}

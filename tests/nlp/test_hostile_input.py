@@ -297,20 +297,17 @@ def test_input_without_an_end(command: str, tmp_path: Path, cli: Run, monkeypatc
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_largest_case_file(tmp_path: Path, cli: Run) -> None:
-    path = tmp_path / "case.toml"
-    for size, status in ((4 * 2**20, 0), (4 * 2**20 + 1, 2)):
-        path.write_bytes(TEXT.encode() + b"#" * (size - len(TEXT.encode())))
-        assert cli("evaluate", str(path))[0] == status
-
-
-def test_a_byte_order_mark(tmp_path: Path, cli: Run) -> None:
+def test_a_byte_order_mark_and_the_largest_case_file(tmp_path: Path, cli: Run) -> None:
     path = tmp_path / "paper-4.1-helical.toml"
     path.write_bytes(b"\xef\xbb\xbf" + TEXT.replace("\n", "\r\n").encode())
     assert cli("evaluate", str(path)) == cli("evaluate", "paper-4.1-helical")
     page = tmp_path / "page.html"
     assert cli("report", str(path), "--starts", "1", "--out", str(page))[0] == 0
     assert "\ufeff" not in page.read_text(encoding="utf-8")
+    path = tmp_path / "case.toml"
+    for size, status in ((4 * 2**20, 0), (4 * 2**20 + 1, 2)):
+        path.write_bytes(TEXT.encode() + b"#" * (size - len(TEXT.encode())))
+        assert cli("evaluate", str(path))[0] == status
 
 
 @pytest.mark.parametrize(
@@ -335,11 +332,6 @@ def test_constants_without_a_value(relation: str, words: str, tmp_path: Path, cl
 
 def with_relation(relation: str) -> str:
     return edited(TEXT, ("[[task]]", f'[limits]\ncustom = ["{relation}"]\n[[task]]'))
-
-
-def test_powers_that_stay(tmp_path: Path) -> None:
-    for relation in ("x1^100 >= 0", "x1^0.5 >= 1", "2^x1 >= 0.5", "x1^(3-1)/(4/2) >= -1e3", "-cos(30) <= x1"):
-        assert load_case(str(saved(tmp_path / "case.toml", with_relation(relation)))).limits
 
 
 def case_with(**changed: Any) -> Case:  # noqa: ANN401 - wrong values of any type
@@ -380,9 +372,11 @@ def test_what_is_no_number_in_python(key: str, make: Callable[[object], object],
     assert "\n" not in str(caught.value)
 
 
-def test_what_is_a_number_in_python() -> None:
+def test_numbers_and_powers_that_are_taken(tmp_path: Path) -> None:
     for number in (np.float32(12), np.int64(12), np.array(12.0), 12):
         assert case_with(numbers={"x1": number}).parameters["x1"] == (12.0,)
+    for relation in ("x1^100 >= 0", "x1^0.5 >= 1", "2^x1 >= 0.5", "x1^(3-1)/(4/2) >= -1e3", "-cos(30) <= x1"):
+        assert load_case(str(saved(tmp_path / "case.toml", with_relation(relation)))).limits
 
 
 ROBOT = (Path(__file__).parents[2] / "models" / "robots" / "3-rps.toml").read_text(encoding="utf-8")

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import Array, Run, edited, output_of, refusal_of
+from builders import Array, Run, assert_words, edited, output_of, refusal_of
 
 from screwsynth.models import robot
 from screwsynth.models.mechanism import (
@@ -209,8 +209,7 @@ def test_snap_reads_legs_as_straight_ones(tmp_path: Path, cli: Run) -> None:
     model.write_text(legs_of_decimals(8e-7))
     text = output_of(cli("import", str(model), "--platform", "top", "--out", str(out)))
     words = " ".join(text.split())
-    assert "nearly meet: off by 8e-07" in words
-    assert "they stay as they are; --snap" in words
+    assert_words(words, "nearly meet: off by 8e-07", "they stay as they are; --snap")
     plain = import_robot(Request(model, Ends("top")))
     found = import_robot(Request(model, Ends("top"), snap=3e-6))
     assert [[joint["type"] for joint in each["joints"]] for each in plain.tables["limb"]] == [list("RRPRRR")] * 6

@@ -244,9 +244,7 @@ def test_poses_and_tasks_from_csv_files_are_those_of_tables(tmp_path: Path, cli:
         ("\0", ("trajectory.csv",)),
     ],
 )
-def test_faults_of_a_csv_file_name_file_row_and_column(
-    text: str, words: tuple[str, ...], tmp_path: Path, cli: Run
-) -> None:
+def test_faults_of_a_csv_file_name_row_and_column(text: str, words: tuple[str, ...], tmp_path: Path, cli: Run) -> None:
     written(tmp_path, text, "trajectory.csv")
     refusal_of(cli("evaluate", written(tmp_path, 'poses = "trajectory.csv"\n' + HEAD + TASK)), *words)
 
@@ -394,14 +392,6 @@ def test_degrees_in_the_place_of_radians_are_refused_in_both(make: Callable[[], 
     assert found.value.value == pytest.approx(angle * 180 / pi)
 
 
-def test_numbers_that_are_no_angles_and_angles_up_to_a_turn_are_taken() -> None:
-    assert plain(rotation=Rotation((0, 0, 1), 2 * pi)).rotation.angle == 2 * pi
-    assert delta(parameters={"tilt": -2 * pi}).parameters["tilt"] == (-2 * pi,)
-    with pytest.raises(CaseError) as found:
-        plain(parameters=OWN | {"x1": -1.0})
-    assert "rad" not in str(found.value)
-
-
 def test_a_file_has_degrees_and_no_word_of_radians() -> None:
     tables = starter_tables("delta")
     tables["robot"]["parameters"]["tilt"] = 400
@@ -410,3 +400,9 @@ def test_a_file_has_degrees_and_no_word_of_radians() -> None:
     tables["pose"]["rotation"] = {"angle": 400}
     with pytest.raises(CaseError, match=r"must be at most 179 deg in size with the axis free$"):
         case_from(tables, "delta")
+    # Numbers that are no angles, and angles up to a turn, are taken.
+    assert plain(rotation=Rotation((0, 0, 1), 2 * pi)).rotation.angle == 2 * pi
+    assert delta(parameters={"tilt": -2 * pi}).parameters["tilt"] == (-2 * pi,)
+    with pytest.raises(CaseError) as found:
+        plain(parameters=OWN | {"x1": -1.0})
+    assert "rad" not in str(found.value)

@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 import reachy
-from builders import Run, case_from, rows_of, saved
+from builders import Run, assert_words, case_from, rows_of, saved
 from hexapods import SMALL as SMALL_WORKSPACE
 
 import screwsynth.nlp
@@ -205,8 +205,7 @@ def test_an_interrupted_solve_shows_its_best_answer(case: str, tmp_path: Path) -
     ended = interrupted(", best ", "solve", case, "--json", str(result))
     assert ended.status == 130
     words = plain(ended.shown)
-    for word in ("stopped before the end: best F so far = ", "verdict", "evidence", "base_1_x"):
-        assert word in words
+    assert_words(words, "stopped before the end: best F so far = ", "verdict", "evidence", "base_1_x")
     assert '"status": "interrupted"' in result.read_text(encoding="utf-8")
 
 

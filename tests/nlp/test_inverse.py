@@ -122,9 +122,7 @@ def test_each_pose_that_cannot_be_taken_is_flagged_and_the_others_stay() -> None
     far = inverse(typical_case("delta"), [[0.0, 0.0, -9.0], [*build_model("delta").home]])
     assert far.closed.tolist() == [False, True]
     assert inverse(case, np.zeros((0, 3))).coordinates.shape == (0, 3)
-
-
-def test_a_singular_pose_is_closed_and_flagged() -> None:
+    # A singular pose is closed and flagged.
     case = load_case("hexapod-linuxcnc")
     turns = np.array([turn_about([0, 0, 1], angle) for angle in np.radians([0, 30, 90, 90.001])])
     found = inverse(case, np.tile([0.0, 0.0, 20.0], (4, 1)), turns)

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import casadi as ca
 import numpy as np
 import pytest
+from builders import Patch
 from limb_cases import machine, poses, separated
 from numpy_engine.bounding import NumpyEngine
 from numpy_engine.limb_models import NumpyLimbEngine
@@ -75,6 +76,11 @@ def test_independent_limbs_are_proved_by_themselves() -> None:
     free = certify_program(formulate(load_case("paper-4.4-min")), gap=1e-4)
     assert free.status is CertificateStatus.PROVED
     assert abs(free.bound) < 1e-5
+    # A search that stops has a bound.
+    solution = solve(machine(5.0), starts=2)
+    found = certify_program(solution.nlp, solution.x, gap=1e-9, time_limit=0.05)
+    assert found.status is CertificateStatus.INCOMPLETE
+    assert found.bound >= solution.F
 
 
 def test_a_limb_without_a_feasible_point_makes_the_whole_infeasible() -> None:
@@ -89,13 +95,6 @@ def test_a_limb_without_a_feasible_point_makes_the_whole_infeasible() -> None:
     assert found.status is CertificateStatus.INFEASIBLE
     proof = ProofClaim("none", "", "program", None, fingerprint(nlp), recorder.tree())
     assert check_proof(proof, nlp).bound == -math.inf
-
-
-def test_an_independent_search_that_stops_has_a_bound() -> None:
-    solution = solve(machine(5.0), starts=2)
-    found = certify_program(solution.nlp, solution.x, gap=1e-9, time_limit=0.05)
-    assert found.status is CertificateStatus.INCOMPLETE
-    assert found.bound >= solution.F
 
 
 def test_limbs_that_leave_nothing_of_their_parts_meet_the_target() -> None:
@@ -322,9 +321,7 @@ def test_pieces_cover_every_box_once_and_the_last_ones_are_small() -> None:
             assert (sizes[:-1] >= sizes[-1] // 2).all()
             # The piece that a thread may be waited for.
             assert sizes[-1] < max(2 * 64, count // jobs)
-
-
-def test_results_keep_the_order_of_the_items_and_faults_are_passed_on() -> None:
+    # Results keep the order of the items, and faults are passed on.
     for jobs in (1, 3):
         threads = Threads(jobs)
         assert threads.map(lambda item: item * item, range(20)) == [item * item for item in range(20)]
@@ -341,9 +338,7 @@ def test_results_keep_the_order_of_the_items_and_faults_are_passed_on() -> None:
     ],
     ids=["whole box", "limbs", "limbs with shared variables"],
 )
-def test_boxes_and_bounds_do_not_depend_on_the_number_of_threads(
-    case: Case, gap: float, whole: int, least: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_searches_do_not_depend_on_threads(case: Case, gap: float, whole: int, least: int, monkeypatch: Patch) -> None:
     monkeypatch.setattr(branch_and_bound, "_WHOLE_BOX", whole)
     nlp = formulate(case)
     found = [certify_program(nlp, gap=gap, jobs=jobs) for jobs in (1, 2, 3)]

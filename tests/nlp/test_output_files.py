@@ -66,10 +66,11 @@ def test_an_output_that_is_the_case_file(command: tuple[str, ...], way: str, cas
     assert case.read_text(encoding="utf-8") == TEXT
 
 
-def test_a_picture_that_is_the_case_file(tmp_path: Path, cli: Run) -> None:
+def test_a_picture_that_is_the_case_file_and_a_device_for_two_outputs(tmp_path: Path, cli: Run, case: Path) -> None:
     path = saved(tmp_path / "case.svg", TEXT)
     refusal_of(cli("solve", str(path), "--starts", "1", "--plot", str(path)), "--plot", "is the case file")
     assert path.read_text(encoding="utf-8") == TEXT
+    output_of(cli("check", str(case), "--json", os.devnull, "--junit", os.devnull))
 
 
 # A robot whose poses and tasks stand in files of their own; the ending is that of a picture.
@@ -139,10 +140,6 @@ def test_two_outputs_in_one_file(command: tuple[str, ...], linked: bool, case: P
         two.symlink_to(one)
     refusal_of(cli(*with_names(command, CASE=case, ONE=one, TWO=two)), command[-2], command[-4])
     assert not one.exists()
-
-
-def test_a_device_takes_two_outputs(case: Path, cli: Run) -> None:
-    output_of(cli("check", str(case), "--json", os.devnull, "--junit", os.devnull))
 
 
 @pytest.mark.parametrize("command", COMMANDS, ids=" ".join)

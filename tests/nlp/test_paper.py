@@ -259,15 +259,9 @@ def test_json_and_junit(tmp_path: Path, cli: Run) -> None:
     # What a case says is escaped.
     path = changed(tmp_path, "paper-4.3-axis-x", ('source = "Section 4.3"', 'source = "<a> & b"'))
     ElementTree.fromstring(checks_as_junit([check_case(path)]))
-
-
-def test_a_quantity_that_is_no_number_of_the_result_is_a_fault_of_the_case(tmp_path: Path, cli: Run) -> None:
+    # A quantity that is no number of the result is a fault of the case.
     wrong = ('quantity = "parameters.x4"\nvalue = 21.1\n', 'quantity = "parameters.x9"\nvalue = 21.1\n')
     refusal_of(cli("check", changed(tmp_path, "paper-4.3-axis-x", wrong)), "parameters.x9")
-
-
-def test_printed_decimals() -> None:
-    assert [decimals_of(value) for value in (12.0, -13.5, 0.866, 0.0003, 400.3, -10.0)] == [0, 1, 3, 4, 1, 0]
 
 
 def test_every_case_has_a_title_and_something_to_hold() -> None:
@@ -275,3 +269,4 @@ def test_every_case_has_a_title_and_something_to_hold() -> None:
         case = load_case(name)
         assert case.title
         assert case.expect.F is not None or case.expect.values
+    assert [decimals_of(value) for value in (12.0, -13.5, 0.866, 0.0003, 400.3, -10.0)] == [0, 1, 3, 4, 1, 0]

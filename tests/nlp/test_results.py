@@ -111,9 +111,7 @@ def test_the_schema_is_one(cli: Run, schema: Json) -> None:
 
 
 @pytest.mark.parametrize("name", soaked([*EACH_CASE, *WRITTEN], (*FEW_CASES, *WRITTEN)))
-def test_solves_and_evaluations_keep_to_the_schema(
-    name: str, cli: Run, schema: Json, case_path: Callable[[str], str]
-) -> None:
+def test_answers_keep_to_the_schema(name: str, cli: Run, schema: Json, case_path: Callable[[str], str]) -> None:
     for command in (("solve", case_path(name), "--starts", "2"), ("evaluate", case_path(name))):
         code, out, err = cli(*command, "--json", "-")
         assert (code in (0, 1), err) == (True, "")
@@ -140,9 +138,7 @@ def test_checks_keep_to_the_schema(cli: Run, schema: Json) -> None:
 
 
 @pytest.mark.parametrize("name", ["tolerance", "poses", "worst-case", "infeasible"])
-def test_the_schema_refuses_what_is_more_or_less_than_a_result(
-    name: str, cli: Run, schema: Json, case_path: Callable[[str], str]
-) -> None:
+def test_the_schema_refuses_more_and_less(name: str, cli: Run, schema: Json, case_path: Callable[[str], str]) -> None:
     _, out, _ = cli("solve", case_path(name), "--json", "-")
     result = json.loads(out)
     kind = "CombinedResult" if "combined" in result else "SolveResult"
@@ -248,13 +244,6 @@ def outer(**changes: object) -> Outer:
     return Outer(**values | changes)
 
 
-def test_json_has_the_fields_in_the_order_of_the_type() -> None:
-    found = json_data(outer())
-    assert list(found) == ["a", "b", "null", "status", "numbers", "named"]
-    assert found == {"a": 1, "b": 2.0, "null": None, "status": "optimal", "numbers": [[1.0, 2.0]], "named": {"x": 3.0}}
-    assert json_data(outer(absent="here", none=None))["absent"] == "here"
-
-
 def test_values_are_frozen_and_whole() -> None:
     value = outer()
     for change in (lambda: setattr(value, "a", 2), lambda: delattr(value, "a")):
@@ -273,6 +262,11 @@ def test_values_are_frozen_and_whole() -> None:
         kinds = [each for each in vars(module).values() if isinstance(each, type) and issubclass(each, JsonObject)]
         assert len(kinds) > 5
         assert not any(getattr(kind, "__hash__", None) is None for kind in kinds)
+    # JSON has the fields in the order of the type.
+    found = json_data(outer())
+    assert list(found) == ["a", "b", "null", "status", "numbers", "named"]
+    assert found == {"a": 1, "b": 2.0, "null": None, "status": "optimal", "numbers": [[1.0, 2.0]], "named": {"x": 3.0}}
+    assert json_data(outer(absent="here", none=None))["absent"] == "here"
 
 
 def test_words_need_neither_terminal_nor_page() -> None:
@@ -355,9 +349,7 @@ def test_versions_in_words() -> None:
         ("proofs", "proof.json", "verify-proof FILE"),
     ],
 )
-def test_a_file_of_another_version_is_refused_by_name(
-    kind: str, name: str, command: str, tmp_path: Path, cli: Run
-) -> None:
+def test_a_file_of_another_version_is_refused(kind: str, name: str, command: str, tmp_path: Path, cli: Run) -> None:
     path = tmp_path / name
     if name.endswith("toml"):
         saved(path, f"schema = 1\n{DELTA if kind == 'robot files' else starter_text('3-rps')}")

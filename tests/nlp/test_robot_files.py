@@ -270,13 +270,6 @@ def test_every_broken_robot_file_is_refused_in_one_sentence(
         assert len(sentence) < 300
 
 
-def test_an_open_chain_of_links_is_refused(tmp_path: Path) -> None:
-    chain = LINKS[: LINKS.index('[[joint]]\nname = "pivot"')].replace(', "rod", "bar"', "")
-    chain += LINKS[LINKS.index('[[joint]]\nname = "hand"') : LINKS.index('[[joint]]\nname = "slide"')]
-    with pytest.raises(CaseError, match=r"platform: is at the end of an open chain \(motor, knee, wrist, hand\)"):
-        load_case(saved_with_robot(tmp_path, chain, LINKS_CASE))
-
-
 def test_a_robot_file_that_cannot_be_read_is_refused_with_status_2(tmp_path: Path, cli: Run) -> None:
     """The command line has no traceback, and one line, for faults of every stage: file, form, words and geometry."""
     (tmp_path / "folder.toml").mkdir()
@@ -367,9 +360,7 @@ rotation = { angle = { min = -30, max = 30 } }
 
 
 @pytest.mark.parametrize(("robot_text", "case_text", "F"), [(RPS, RPS_CASE, 1.158234), (DELTA, DELTA_CASE, 3.926943)])
-def test_a_robot_file_beside_a_case_is_solved(
-    tmp_path: Path, cli: Run, robot_text: str, case_text: str, F: float
-) -> None:
+def test_a_robot_file_of_a_case_is_solved(tmp_path: Path, cli: Run, robot_text: str, case_text: str, F: float) -> None:
     name = saved_with_robot(tmp_path, robot_text, case_text)
     result = tmp_path / "result.json"
     out = output_of(cli("solve", name, "--starts", "6", "--json", str(result)))
@@ -507,7 +498,7 @@ def test_the_default_home_is_written_too() -> None:
     assert case_from(case.to_toml(), "legs").model.home == (0, 0, 0)
 
 
-def test_a_driven_limb_that_resists_nothing_is_refused_in_one_sentence() -> None:
+def test_a_driven_limb_that_resists_nothing_is_refused_in_one_sentence(tmp_path: Path) -> None:
     hinges = [{"type": "C", "at": "z", "axis": "x"}, {"type": "P", "at": "z", "axis": "y"}]
     with pytest.raises(ValueError, match="no limb resists the platform"):
         robot(name="floating", limb=[{"joints": [{"type": "S", "at": "0*x"}, *hinges]}])
@@ -528,6 +519,11 @@ def test_a_driven_limb_that_resists_nothing_is_refused_in_one_sentence() -> None
     }
     with pytest.raises(ValueError, match=r"^limb 2: has an actuated joint that drives nothing, .* remove actuated"):
         robot("idle", home=(0, 0, 1), limb=[leg, idle])
+    # An open chain of links.
+    chain = LINKS[: LINKS.index('[[joint]]\nname = "pivot"')].replace(', "rod", "bar"', "")
+    chain += LINKS[LINKS.index('[[joint]]\nname = "hand"') : LINKS.index('[[joint]]\nname = "slide"')]
+    with pytest.raises(CaseError, match=r"platform: is at the end of an open chain \(motor, knee, wrist, hand\)"):
+        load_case(saved_with_robot(tmp_path, chain, LINKS_CASE))
 
 
 def test_a_driven_parallelogram_has_a_way_and_a_rate_in_length() -> None:

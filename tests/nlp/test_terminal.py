@@ -16,7 +16,9 @@ import pytest
 from builders import (
     EACH_CASE,
     FEW_CASES,
+    Patch,
     Run,
+    assert_words,
     case_from,
     commands_in,
     output_of,
@@ -420,11 +422,6 @@ def test_no_number_of_a_solve_or_an_evaluation_is_split_at_any_width(name: str) 
     check_widths(tuple(evaluation_summary(case, evaluated(case))))
 
 
-def test_no_word_about_a_robot_is_split_at_any_width() -> None:
-    for name in model_names():
-        check_widths(tuple(model_words(name, build_model(name), model_options(name))))
-
-
 def test_a_narrow_table_goes_on_below_with_the_names_of_its_rows() -> None:
     numbers = [f"{k}.123456" for k in range(9)]
     table = TextTable(("leg", *(f"column {k}\nmm" for k in range(9))), (("1-", *numbers), ("1+", *numbers)))
@@ -433,15 +430,23 @@ def test_a_narrow_table_goes_on_below_with_the_names_of_its_rows() -> None:
     assert sum(line.startswith("1- ") for line in lines) == 2
     assert all(len(re.findall(re.escape(each), "\n".join(lines))) == 2 for each in numbers)
     assert printed([TextTable(("", ""), (("x", "y" * 90),))], 60).count("y") == 90
+    # No word about a robot is split at any width.
+    for name in model_names():
+        check_widths(tuple(model_words(name, build_model(name), model_options(name))))
 
 
-def test_no_rounding_noise_on_a_page() -> None:
+def test_no_rounding_noise_and_no_plural_of_one_on_a_page() -> None:
     case = load_case("paper-4.4-min")
     solution = solve(case, starts=2)
     page = page_of(report_of("", solution, result_of(solution)))
     assert re.search(r"\de-[23]\d", page), "the JSON has the noise as it is"
     words = re.sub(r"<script.*?</script>|<p><span class=.label.>evidence:.*?</p>", "", page, flags=re.DOTALL)
     assert not re.findall(r".{40}\de-[1-3]\d", words)
+    solution = solve(load_case("paper-4.1-helical"), starts=1)
+    table = optimum_table(solution.outcomes[0].own)
+    assert [str(row[0]).partition(", ")[2] for row in table.rows] == ["1 start"]
+    page = page_of(report_of("", solution, result_of(solution)))
+    assert not re.search(r"\b1 (starts|starting points|times|optima)\b", page)
 
 
 @pytest.mark.parametrize("name", soaked(shipped_cases(), (*FEW_CASES, "paper-4.4-snu", "paper-4.4-min", "paper-4.2")))
@@ -514,8 +519,7 @@ def test_the_table_shows_the_angles_that_the_limits_speak_of() -> None:
     case = load_case("hexapod-machining", {"p_x": 2, "p_y": -1, "p_z": 21})
     result = evaluated(case)
     limbs = table_of(case, "limbs")
-    assert "base joint angle\nfrom home, deg" in limbs.headers
-    assert "platform joint angle\nfrom home, deg" in limbs.headers
+    assert_words(limbs.headers, "base joint angle\nfrom home, deg", "platform joint angle\nfrom home, deg")
     robot, home = result.robot, np.array([0.0, 0.0, 20.0])
     J = np.array(robot.jacobian)
     position = np.array(robot.pose.position)
@@ -563,9 +567,7 @@ def test_a_table_as_csv_has_every_digit(tmp_path: Path, cli: Run) -> None:
 
 
 @pytest.mark.parametrize("command", ["solve", "evaluate"])
-def test_csv_that_cannot_be_is_refused_before_the_work(
-    command: str, tmp_path: Path, cli: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_csv_that_cannot_be_is_refused_first(command: str, tmp_path: Path, cli: Run, monkeypatch: Patch) -> None:
     monkeypatch.chdir(tmp_path)
     for options, words in (
         ("--table limbs", "--table limbs: needs --csv FILE"),
@@ -601,14 +603,6 @@ def test_the_stated_point_of_a_task_is_echoed_beside_the_nearest_one() -> None:
     stated = Task.screw("max", axis=[0, 0, 1], point=[1, 2, 3], pitch=0)
     assert list(np.asarray(stated.point)) == [1, 2, 3]
     assert Task.screw("max", axis=[0, 0, 1], point=[1, 2, 3], pitch=math.inf).point is None
-
-
-def test_one_start_is_no_starts() -> None:
-    solution = solve(load_case("paper-4.1-helical"), starts=1)
-    table = optimum_table(solution.outcomes[0].own)
-    assert [str(row[0]).partition(", ")[2] for row in table.rows] == ["1 start"]
-    page = page_of(report_of("", solution, result_of(solution)))
-    assert not re.search(r"\b1 (starts|starting points|times|optima)\b", page)
 
 
 def test_a_singular_answer_that_nobody_asked_for_is_no_green_bar() -> None:

@@ -58,7 +58,7 @@ def test_the_example_of_each_command_can_be_read(command: str) -> None:
         assert context.params
 
 
-def test_one_meaning_has_one_word() -> None:
+def test_one_meaning_has_one_word(cli: Run) -> None:
     helps: dict[str, set[str]] = {}
     for command in SUMMARIES:
         for name, each in options_of(command).items():
@@ -66,9 +66,7 @@ def test_one_meaning_has_one_word() -> None:
     assert {words: names for words, names in helps.items() if len(names) > 1 and words} == {
         key: names for key, names in helps.items() if names == {"-h", "--help"}
     }
-
-
-def test_commands_stand_in_groups(cli: Run) -> None:
+    # Commands stand in groups.
     text = output_of(cli("--help"))
     places = [text.index(f"{title}:") for title in GROUPS]
     assert places == sorted(places)
@@ -97,21 +95,6 @@ def test_an_earlier_name_does_what_the_new_one_does(tmp_path: Path, cli: Run) ->
     )
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("solve", "nowhere.toml"), "nowhere.toml: no such file"),
-        (("solve", "paper-4.1-helical.toml"), "did you mean 'paper-4.1-helical'? this case comes with screwsynth"),
-        (("compare", "drilling-spindle", "case", "robot.toml"), "robot.toml: no such robot file"),
-        (("sweep", "paper-4.1-helical", "--over", "x1=1,2"), "--out: is missing: FILE"),
-        (("solve", "paper-4.1-helical", "--json"), "--json: needs a value, FILE"),
-        (("certify", "paper-4.1-helical", "--all-assemblies=3"), "--all-assemblies: takes no value"),
-    ],
-)
-def test_what_is_missing_is_said_in_one_sentence(arguments: tuple[str, ...], words: str, cli: Run) -> None:
-    refusal_of(cli(*arguments), words)
-
-
 CASE = find_case("paper-4.1-helical").read_text(encoding="utf-8")
 ROBOTS = Path(__file__).parents[2] / "cases" / "robots"
 ROBOT = (ROBOTS / "reachy-mini-head.toml").read_text(encoding="utf-8")
@@ -129,6 +112,12 @@ ROBOT = (ROBOTS / "reachy-mini-head.toml").read_text(encoding="utf-8")
         (("workspace", "stewart-gough"), "is a robot, not a case"),
         (("models", "paper-4.2"), 'robot.model = "paper-4.2": no such robot; this is a case'),
         (("compare", "paper-4.2", "case", "paper-4.3"), "and no such robot file; this is a case"),
+        (("solve", "nowhere.toml"), "nowhere.toml: no such file"),
+        (("solve", "paper-4.1-helical.toml"), "did you mean 'paper-4.1-helical'? this case comes with screwsynth"),
+        (("compare", "drilling-spindle", "case", "robot.toml"), "robot.toml: no such robot file"),
+        (("sweep", "paper-4.1-helical", "--over", "x1=1,2"), "--out: is missing: FILE"),
+        (("solve", "paper-4.1-helical", "--json"), "--json: needs a value, FILE"),
+        (("certify", "paper-4.1-helical", "--all-assemblies=3"), "--all-assemblies: takes no value"),
         (("help",), "help: no such command; write screwsynth --help"),
         (("help", "solve"), "help: no such command; write screwsynth solve --help"),
         (("version",), "version: no such command; write screwsynth --version"),
