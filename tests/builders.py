@@ -52,6 +52,7 @@ FEW_CASES = ("camera-mount", "flight-simulator", "haptic-device", "paper-4.1-hel
 PUSH_UP = {"sense": "max", "axis": [0, 0, 1], "pitch": math.inf}
 #: The command line in this process: exit status, standard output, standard error.
 Run = Callable[..., tuple[int, str, str]]
+Patch = pytest.MonkeyPatch
 # Six legs with one free height. Of unit forces along z, x and y the sums of squares are F of the translations along
 # these axes, so that F up + F side + F of the third axis = 6, and the last two are equal by the symmetry of the robot.
 TWO_GOALS = """
@@ -232,6 +233,12 @@ def unpacked(proof: Proof) -> Proof:
     return replace(proof, claims=plain(proof.claims), lemmas=plain(proof.lemmas))
 
 
+def assert_words(text: str, *words: str) -> None:
+    """Assert that a text has each of some words."""
+    for word in words:
+        assert word in text
+
+
 def refusal_of(ended: tuple[int, str, str], *words: str) -> str:
     """The one sentence, with some words, by which a command refused, having printed nothing else."""
     code, out, err = ended
@@ -239,6 +246,5 @@ def refusal_of(ended: tuple[int, str, str], *words: str) -> str:
     assert err.startswith("screwsynth: ")
     assert err.endswith("\n")
     assert len(err.splitlines()) == 1
-    for word in words:
-        assert word in err
+    assert_words(err, *words)
     return err

@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 from builders import Run
 from generated import COMPILERS, OPTIMISED, STRICT
+from pages import page, page_file  # noqa: F401 - fixtures of all tests of pages
 
 from screwsynth.nlp import Case, Nlp, generate_c, load_case
 from screwsynth.nlp.cli.main import run as command_line

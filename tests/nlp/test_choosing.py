@@ -186,7 +186,7 @@ def tables_of(name: str) -> dict[str, Any]:
     return tomllib.loads(find_case(name).read_text(encoding="utf-8"))
 
 
-def test_units_leave_f_of_a_translation_and_square_that_of_a_rotation() -> None:
+def test_f_with_other_units_and_speeds() -> None:
     for name, power in (("drilling-spindle", 0), ("free-wrist", 2)):
         tables = tables_of(name)
         tables["units"]["length"] = "m"
@@ -199,9 +199,6 @@ def test_units_leave_f_of_a_translation_and_square_that_of_a_rotation() -> None:
         assert "point" not in tables["task"][0] or not any(tables["task"][0]["point"])
         found = solve(case_from(tables, name))
         assert pytest.approx(solved(name).F * 1e-3**power, rel=1e-7) == found.F
-
-
-def test_a_twist_twice_as_fast_has_four_times_the_f() -> None:
     for per, factor in ((2.0, 4.0), (math.radians(1), math.radians(1) ** 2)):
         tables = tables_of("free-wrist")
         tables["task"][0] = {"sense": "min", "twist": [0, 0, per, 0, 0, 0]}

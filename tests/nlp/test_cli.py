@@ -14,7 +14,7 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
-from builders import Run, edited, output_of, refusal_of, saved, unbroken
+from builders import EACH_KIND, Run, assert_words, edited, output_of, refusal_of, saved, soaked, starter_text, unbroken
 
 import screwsynth.cases
 from screwsynth.models import model_names
@@ -71,14 +71,12 @@ def check_state(result: dict[str, Any], *, rows: int = 6, length: float = 1.0) -
     assert {"position", "axis", "angle", "rotation_matrix"} <= set(pose)
     assert {"twist", "axis", "point", "pitch"} <= set(task)
     J, twist, rates = np.array(result["jacobian"]), np.array(task["twist"]), np.array(result["rates"])
-    assert J.shape == (rows, 6)
-    assert twist.shape == (6,)
+    assert (J.shape, twist.shape) == ((rows, 6), (6,))
     # Rows are force then moment, a twist is angular velocity then velocity.
     np.testing.assert_allclose(rates, J[:, :3] @ twist[3:] + J[:, 3:] @ twist[:3], rtol=1e-9, atol=1e-9)
     forces = np.linalg.norm(J[:, :3], axis=1) > 0
-    np.testing.assert_allclose(
-        np.linalg.norm(np.where(forces[:, None], J[:, :3], J[:, 3:] / length), axis=1), 1, rtol=1e-12
-    )
+    units = np.where(forces[:, None], J[:, :3], J[:, 3:] / length)
+    np.testing.assert_allclose(np.linalg.norm(units, axis=1), 1, rtol=1e-12)
     R, axis = np.array(pose["rotation_matrix"]), np.array(pose["axis"])
     np.testing.assert_allclose(R.T @ R, np.eye(3), atol=1e-12)
     np.testing.assert_allclose(R @ axis, axis, atol=1e-9)
@@ -111,8 +109,7 @@ def test_help_lists_each_command_by_the_first_line_of_its_own_help(name: str) ->
 
 def test_a_solve_as_a_process_prints_only_its_table(solved: Solved) -> None:
     ended, _ = solved
-    assert ended.returncode == 0
-    assert ended.stderr == ""
+    assert (ended.returncode, ended.stderr) == (0, "")
     title, task, axis, found, *_ = unbroken(ended.stdout).splitlines()
     assert title == "Pose of a given 6-6 platform for a screw motion of pitch 1"
     assert task.startswith("task  drive the screw, max F: screw of pitch 1 cm about (0.6667, 0.6667, 0.3333)")
@@ -120,9 +117,7 @@ def test_a_solve_as_a_process_prints_only_its_table(solved: Solved) -> None:
     assert axis == "task's axis  nearest to the origin at (-1.556, -0.5556, 4.222)"
     assert found.startswith("largest F = 407.2107")
     assert "4 of 4 converged" in ended.stdout
-    for foreign in ("Ipopt", "IPOPT", "EXIT:", "CasADi", "Eclipse", "coin-or", "nlp_f", "solver", "****"):
-        assert foreign not in ended.stdout
-    assert "\x1b" not in ended.stdout
+    assert not re.search(r"Ipopt|IPOPT|EXIT:|CasADi|Eclipse|coin-or|nlp_f|solver|\*\*\*\*|\x1b", ended.stdout)
 
 
 def test_the_result_has_the_documented_keys(solved: Solved) -> None:
@@ -135,15 +130,13 @@ def test_the_result_has_the_documented_keys(solved: Solved) -> None:
     assert result["parameters"] == {"x1": 12, "x2": 8, "x3": 30, "x4": 8}
     assert result["pose"]["position"] == pytest.approx([-10, -10, 50], abs=1e-6)
     assert abs(result["pose"]["angle"]) <= 30 + 1e-9
-    assert result["task"]["axis"] == pytest.approx([2 / 3, 2 / 3, 1 / 3])
-    assert result["task"]["pitch"] == pytest.approx(1)
+    assert [*result["task"]["axis"], result["task"]["pitch"]] == pytest.approx([2 / 3, 2 / 3, 1 / 3, 1])
     evidence = result["optimality"]
     assert evidence["kind"] == "strict local maximum"
     assert max(evidence[key] for key in ("stationarity", "feasibility", "complementarity")) < 1e-6
     sides = [(side["name"], side["bound"]) for side in evidence["active"]]
     assert sides == [("p_x", "min"), ("p_y", "min"), ("p_z", "max")]
-    for side in evidence["active"]:
-        assert set(side) == {"name", "bound", "value", "unit", "multiplier"}
+    assert all(set(side) == {"name", "bound", "value", "unit", "multiplier"} for side in evidence["active"])
     assert all(isinstance(number, float) for number in evidence["reduced_hessian_eigenvalues"])
     starts = result["starts"]
     assert (starts["run"], starts["converged"]) == (4, 4)
@@ -165,14 +158,11 @@ def test_json_to_standard_output_is_alone_there(tmp_path: Path, cli: Run, solved
     assert list(tmp_path.iterdir()) == []
 
 
-def test_seed_and_starts_replace_those_of_the_case(tmp_path: Path, cli: Run) -> None:
+def test_seed_starts_and_radians_are_those_of_the_case_or_the_options(tmp_path: Path, cli: Run) -> None:
     path = case_file(tmp_path, search="starts = 7\nseed = 5")
     for options, seed, starts in ((("--starts", "2", "--seed", "11"), 11, 2), (("--starts", "1"), 5, 1)):
         result = strict(output_of(cli("solve", path, "--json", "-", *options)))
         assert (result["seed"], result["starts"]["run"]) == (seed, starts)
-
-
-def test_radians_stay_radians(tmp_path: Path, cli: Run) -> None:
     path = case_file(
         tmp_path,
         ('length = "cm"', 'length = "mm"\nangle = "rad"'),
@@ -191,21 +181,17 @@ def test_radians_stay_radians(tmp_path: Path, cli: Run) -> None:
 def test_an_infinite_pitch_is_a_string(tmp_path: Path, cli: Run) -> None:
     path = case_file(tmp_path, (MOTION, "axis = [0, 0, 5]\npitch = inf\n"))
     for command in ("solve", "evaluate"):
-        code, out, _ = cli(command, path, "--json", "-")
-        result = strict(out)
+        result = strict(output_of(cli(command, path, "--json", "-")))
         check_state(result)
-        assert code == 0
-        assert result["task"]["pitch"] == "inf"
-        assert result["task"]["twist"] == [0, 0, 0, 0, 0, 1]
+        assert (result["task"]["pitch"], result["task"]["twist"]) == ("inf", [0, 0, 0, 0, 0, 1])
 
 
 def test_a_case_with_nothing_free(tmp_path: Path, cli: Run) -> None:
-    path = case_file(tmp_path, (POSITION, "position = [1, 2, 35]"), (ROTATION, ""))
-    result = strict(output_of(cli("solve", path, "--json", "-")))
+    path, target = case_file(tmp_path, (POSITION, "position = [1, 2, 35]"), (ROTATION, "")), tmp_path / "result.json"
+    assert "evaluated" in output_of(cli("solve", path, "--json", str(target)))
+    result = strict(target.read_text(encoding="utf-8"))
     check_state(result)
     assert (result["status"], result["starts"]["run"]) == ("evaluated", 0)
-    out = output_of(cli("solve", path))
-    assert "evaluated" in out
 
 
 def test_a_solve_that_stops_early_is_no_answer(tmp_path: Path, cli: Run) -> None:
@@ -218,11 +204,8 @@ def test_a_solve_that_stops_early_is_no_answer(tmp_path: Path, cli: Run) -> None
     assert (result["starts"]["converged"], result["starts"]["optima"]) == (0, [])
     assert sum(result["starts"]["failed"].values()) == 3
     check_state(result)
-    assert "not converged" in out
-    assert "max_iterations" in out
-    assert "0 of 3 converged" in out
-    for words in ("largest F", "smallest F", "(optimal)", "local maximum", "local minimum"):
-        assert words not in out
+    assert all(words in out for words in ("not converged", "max_iterations", "0 of 3 converged"))
+    assert not re.search(r"largest F|smallest F|\(optimal\)|local maximum|local minimum", out)
     code, out, _ = cli("solve", path, "--json", "-")
     assert (code, strict(out)["status"]) == (1, "not converged")
 
@@ -243,17 +226,23 @@ def test_output_files_are_whole_or_absent(tmp_path: Path, cli: Run) -> None:
     fresh = saved(tmp_path / "fresh", "")
     assert stat.S_IMODE(target.stat().st_mode) == stat.S_IMODE(fresh.stat().st_mode)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["fresh", "result.json"]
+    # Through a link they reach its target.
+    link = tmp_path / "link.json"
+    saved(target, "older")
+    link.symlink_to(target)
+    assert cli("evaluate", "paper-4.1-helical", "--json", str(link))[0] == 0
+    assert link.is_symlink()
+    check_state(strict(target.read_text(encoding="utf-8")))
 
 
-@pytest.mark.parametrize("command", ["solve", "evaluate"])
-@pytest.mark.parametrize("target", ["nowhere/result.json", "folder", "file/result.json", "x" * 300, ""])
-def test_output_that_cannot_be_written(
-    command: str, target: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Run
-) -> None:
+def test_output_that_cannot_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Run) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "folder").mkdir()
-    (tmp_path / "file").write_text("a file", encoding="utf-8")
-    refusal_of(cli(command, case_file(tmp_path, search="starts = 1"), "--json", target), "cannot be written")
+    saved(tmp_path / "file", "a file")
+    case = case_file(tmp_path, search="starts = 1")
+    for target in ("nowhere/result.json", "folder", "file/result.json", "x" * 300, ""):
+        for command in ("solve", "evaluate"):
+            refusal_of(cli(command, case, "--json", target), "cannot be written")
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["case.toml", "file", "folder"]
 
 
@@ -274,15 +263,6 @@ def test_output_to_a_pipe_or_device_does_not_replace_it(tmp_path: Path, cli: Run
         os.close(reader)
 
 
-def test_output_through_a_link_reaches_its_target(tmp_path: Path, cli: Run) -> None:
-    target, link = tmp_path / "real.json", tmp_path / "link.json"
-    target.write_text("older", encoding="utf-8")
-    link.symlink_to(target)
-    assert cli("evaluate", "paper-4.1-helical", "--json", str(link))[0] == 0
-    assert link.is_symlink()
-    check_state(strict(target.read_text(encoding="utf-8")))
-
-
 def test_evaluate_stands_in_the_middle_or_at_the_start(tmp_path: Path, cli: Run) -> None:
     result = strict(output_of(cli("evaluate", "paper-4.1-helical", "--json", "-")))
     check_state(result)
@@ -295,25 +275,17 @@ def test_evaluate_stands_in_the_middle_or_at_the_start(tmp_path: Path, cli: Run)
     )
     result = strict(cli("evaluate", path, "--json", "-")[1])
     check_state(result)
-    assert result["parameters"]["x2"] == 5
-    assert result["pose"]["position"] == [0, 0, 41]
+    assert (result["parameters"]["x2"], result["pose"]["position"]) == (5, [0, 0, 41])
     assert result["pose"]["angle"] == pytest.approx(12, rel=1e-12)
+    # A start of the angle counts with a free axis too.
+    for angle in ("{ min = -30, max = 30, start = 12 }", "{ min = 10, max = 30, start = 12 }", "-12"):
+        path = case_file(tmp_path, (ROTATION, f"rotation = {{ angle = {angle} }}"))
+        result = strict(cli("evaluate", path, "--json", "-")[1])
+        check_state(result)
+        assert result["pose"]["angle"] == pytest.approx(12, rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("angle", "expected"),
-    [("{ min = -30, max = 30, start = 12 }", 12), ("{ min = 10, max = 30, start = 12 }", 12), ("-12", 12)],
-)
-def test_a_start_of_the_angle_counts_with_a_free_axis_too(
-    angle: str, expected: float, tmp_path: Path, cli: Run
-) -> None:
-    path = case_file(tmp_path, (ROTATION, f"rotation = {{ angle = {angle} }}"))
-    result = strict(cli("evaluate", path, "--json", "-")[1])
-    check_state(result)
-    assert result["pose"]["angle"] == pytest.approx(expected, rel=1e-9)
-
-
-def test_evaluate_with_settings(cli: Run) -> None:
+def test_evaluate_with_settings(tmp_path: Path, cli: Run) -> None:
     def at(*settings: str, case: str = "paper-4.1-helical") -> dict[str, Any]:
         result = strict(output_of(cli("evaluate", case, "--json", "-", *(f"--set={setting}" for setting in settings))))
         check_state(result)
@@ -331,50 +303,11 @@ def test_evaluate_with_settings(cli: Run) -> None:
     assert at("axis=1,-1,0", "angle=10")["pose"]["axis"] == pytest.approx([math.sqrt(0.5), -math.sqrt(0.5), 0])
     assert at("angle=10", case="paper-4.2-rotation")["pose"]["axis"] == [0, 0, 1]
     assert at("x1=3", case="paper-4.2-rotation")["parameters"]["x1"] == 3
-
-
-def test_evaluate_with_one_coordinate_of_a_joint(tmp_path: Path, cli: Run) -> None:
-    path = saved(tmp_path / "hexapod.toml", cli("new", "hexapod")[1])
-    result = strict(cli("evaluate", str(path), "--json", "-", "--set", "base_1_x=10", "--set", "platform_6_z=1")[1])
-    check_state(result)
-    assert result["parameters"]["base_1"][0] == 10
-    assert result["parameters"]["platform_6"][2] == 1
-
-
-@pytest.mark.parametrize(
-    ("setting", "words"),
-    [
-        ("y1=3", ("y1", "cannot be set", "x1")),
-        ("x_1=3", ("x_1", "cannot be set", "did you mean 'x1'?")),
-        ("angel=3", ("angel", "cannot be set", "did you mean 'angle'?")),
-        ("axs=0,0,1", ("axs", "cannot be set", "did you mean 'axis'?")),
-        ("pz=3", ("pz", "cannot be set", "did you mean 'p_z'?")),
-        ("seed=3", ("seed", "cannot be set")),
-        ("x1", ("--set x1", "NAME=NUMBER")),
-        ("=3", ("--set =3", "NAME=NUMBER")),
-        ("", ("--set", "NAME=NUMBER")),
-        ("x1=abc", ("--set x1=abc", "NAME=NUMBER")),
-        ("x1=3,", ("--set x1=3,", "NAME=NUMBER")),
-        ("x1==3", ("--set x1==3", "NAME=NUMBER")),
-        ("axis=0 0 1", ("--set axis=0 0 1", "axis=X,Y,Z")),
-        ("x1=nan", ("robot.parameters.x1", "finite")),
-        ("p_x=inf", ("pose.position[0]", "finite")),
-        ("x1=1,2", ("--set x1=1,2", "must be NAME=NUMBER", "write 1.2: a decimal number has a point")),
-        ("x1=1,2,3", ("robot.parameters.x1", "must be a number")),
-        ("x3=40", ("robot.parameters.x3", "between 0 deg and 30 deg")),
-        ("p_y=1,2,3", ("pose.position[1]", "must be a number")),
-        ("axis=0,0,0", ("pose.rotation.axis", "zero")),
-        ("axis=1", ("pose.rotation.axis", "list")),
-        ("axis=1,2", ("pose.rotation.axis", "3 entries")),
-        ("angle=180", ("pose.rotation.angle", "at most 179 deg")),
-        ("angle=1,2,3", ("pose.rotation.angle", "must be a number")),
-    ],
-)
-def test_settings_that_are_not_allowed(setting: str, words: tuple[str, ...], cli: Run) -> None:
-    refusal_of(cli("evaluate", "paper-4.1-helical", "--set", setting, "--json", "-"), *words)
-
-
-def test_evaluate_where_a_leg_has_no_length(tmp_path: Path, cli: Run) -> None:
+    # One coordinate of a joint.
+    path = str(saved(tmp_path / "hexapod.toml", cli("new", "hexapod")[1]))
+    joints = at("base_1_x=10", "platform_6_z=1", case=path)["parameters"]
+    assert (joints["base_1"][0], joints["platform_6"][2]) == (10, 1)
+    # Where a leg has no length.
     path = case_file(tmp_path, *COINCIDING)
     for setting in ((), ("--set", "x1=8")):
         refusal_of(cli("evaluate", path, *setting), "case.toml", "zero length")
@@ -400,11 +333,9 @@ EXTREMES = {
 
 
 @pytest.mark.parametrize("command", ["solve", "evaluate"])
-@pytest.mark.parametrize("edits", EXTREMES.values(), ids=EXTREMES)
-def test_extreme_numbers_are_answered_or_refused_in_a_sentence(
-    edits: tuple[tuple[str, str], ...], command: str, tmp_path: Path, cli: Run
-) -> None:
-    path, target = case_file(tmp_path, *edits, search="starts = 1"), tmp_path / "result.json"
+@pytest.mark.parametrize("name", EXTREMES)
+def test_extreme_numbers_are_answered_or_refused(name: str, command: str, tmp_path: Path, cli: Run) -> None:
+    path, target = case_file(tmp_path, *EXTREMES[name], search="starts = 1"), tmp_path / "result.json"
     code, _, err = cli(command, path, "--json", str(target))
     assert code in (0, 1, 2)
     if code == 2:
@@ -417,30 +348,31 @@ def test_extreme_numbers_are_answered_or_refused_in_a_sentence(
         strict(target.read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize("name", ["rotation-axis-large", "rotation-axis-small", "task-axis-large", "task-axis-small"])
-def test_an_axis_has_any_length_but_zero(name: str, tmp_path: Path, cli: Run) -> None:
-    result = strict(output_of(cli("evaluate", case_file(tmp_path, *EXTREMES[name]), "--json", "-")))
-    check_state(result)
-    assert result["task"]["axis"] == pytest.approx([2 / 3, 2 / 3, 1 / 3])
+def test_an_axis_has_any_length_but_zero(tmp_path: Path, cli: Run) -> None:
+    for name in ("rotation-axis-large", "rotation-axis-small", "task-axis-large", "task-axis-small"):
+        result = strict(output_of(cli("evaluate", case_file(tmp_path, *EXTREMES[name]), "--json", "-")))
+        check_state(result)
+        assert result["task"]["axis"] == pytest.approx([2 / 3, 2 / 3, 1 / 3])
 
 
-@pytest.mark.parametrize("label", ["[cm]", "[/cm]", "[bold]", ":ruler:", "µm", "in"])
-def test_a_length_label_is_shown_as_it_is(label: str, tmp_path: Path, cli: Run) -> None:
-    path = case_file(tmp_path, ('"cm"', f'"{label}"'), ("Pose of a", f"Pose {label} of a"))
-    for command in ("solve", "evaluate"):
+@pytest.mark.parametrize("command", ["solve", "evaluate"])
+def test_a_length_label_is_shown_as_it_is(command: str, tmp_path: Path, cli: Run) -> None:
+    for label in ("[cm]", "[/cm]", "[bold]", ":ruler:", "µm", "in"):
+        path = case_file(tmp_path, ('"cm"', f'"{label}"'), ("Pose of a", f"Pose {label} of a"))
         out = output_of(cli(command, path, "--all"))
         assert next(line for line in out.splitlines() if line.startswith("x1")).split()[2] == label
         assert f"Pose {label} of a" in out
 
 
-@pytest.mark.parametrize("json_options", [("--json", "-"), ()], ids=["json", "table"])
-def test_a_title_in_any_script_on_a_terminal_without_it(json_options: tuple[str, ...], tmp_path: Path) -> None:
+def test_a_title_in_any_script_on_a_terminal_without_it(tmp_path: Path) -> None:
     path = case_file(tmp_path, ("Pose of a", "Größe of a"), search="starts = 1")
-    ended = process("evaluate", path, *json_options, folder=tmp_path, PYTHONIOENCODING="ascii")
-    assert "Traceback" not in ended.stderr
-    assert ended.returncode == 0
-    if json_options:
-        assert strict(ended.stdout)["title"].startswith("Größe")
+    table, data = (
+        process("evaluate", path, *options, folder=tmp_path, PYTHONIOENCODING="ascii")
+        for options in ((), ("--json", "-"))
+    )
+    assert table.returncode == data.returncode == 0
+    assert "Traceback" not in table.stderr + data.stderr
+    assert strict(data.stdout)["title"].startswith("Größe")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="names of files are bytes on Linux only")
@@ -452,52 +384,33 @@ def test_a_file_name_that_is_no_text(tmp_path: Path, cli: Run) -> None:
     assert (tmp_path / "result.json").exists() == (code == 0)
 
 
-@pytest.fixture
-def schema(cli: Run) -> jsonschema.Draft202012Validator:
-    """The schema of case files, checked once and not for each document again."""
+@pytest.mark.parametrize("robots", soaked([EACH_KIND, model_names()], [EACH_KIND]), ids=["kinds", "all"])
+def test_the_schema_accepts_every_good_case_and_no_other(robots: tuple[str, ...], cli: Run) -> None:
     found = strict(output_of(cli("schema")))
     jsonschema.Draft202012Validator.check_schema(found)
-    return jsonschema.Draft202012Validator(found)
-
-
-def good_documents(cli: Run) -> dict[str, dict[str, Any]]:
-    texts = {name: (CASES / f"{name}.toml").read_text(encoding="utf-8") for name in shipped_cases()}
-    texts |= {f"new {name}": cli("new", name)[1] for name in model_names()}
-    texts["translation"] = edited(HELICAL, (MOTION, "axis = [0, 0, 1]\npitch = inf\n"))
-    texts["twist"] = edited(HELICAL, (MOTION, "twist = [0, 0, 1, 0, 0, 0]\n"))
-    return {name: tomllib.loads(text) for name, text in texts.items()}
-
-
-def test_the_schema_accepts_every_good_case(schema: jsonschema.Draft202012Validator, cli: Run) -> None:
+    schema = jsonschema.Draft202012Validator(found)
     assert len(shipped_cases()) >= 8
-    for document in good_documents(cli).values():
-        schema.validate(document)
-
-
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
+    texts = [(CASES / f"{name}.toml").read_text(encoding="utf-8") for name in shipped_cases()]
+    texts += map(starter_text, ("stewart-gough", "hexapod", "three-upu", *robots))
+    texts += [
+        edited(HELICAL, (MOTION, own)) for own in ("axis = [0, 0, 1]\npitch = inf\n", "twist = [0, 0, 1, 0, 0, 0]\n")
+    ]
+    for text in texts:
+        schema.validate(tomllib.loads(text))
+    for wrong in (
         ("title =", "titel ="),
-        ("x1 = 12", 'x1 = "12"'),
-        ("x1 = 12", "x1 = { min = 2 }"),
-        ("x1 = 12", "x1 = { min = 2, max = 3, strat = 2 }"),
-        (POSITION, ""),
-        (POSITION, "position = [0, 0]"),
+        *(("x1 = 12", f"x1 = {own}") for own in ('"12"', "{ min = 2 }", "{ min = 2, max = 3, strat = 2 }")),
+        *((POSITION, own) for own in ("", "position = [0, 0]")),
         (ROTATION, "rotation = { axis = [0, 0, 1] }"),
         ('sense = "max"', 'sense = "maximum"'),
         (MOTION, "twist = [0, 0, 1]\n"),
         ("pitch = 1", 'pitch = "inf"'),
         ("[[task]]", "[task]"),
-        ("[expect]", "[solve]\nstarts = 0\n[expect]"),
-        ("[expect]", "[solve]\nstarts = 2.5\n[expect]"),
+        *(("[expect]", f"[solve]\nstarts = {own}\n[expect]") for own in ("0", "2.5")),
         ('length = "cm"', 'length = ""'),
         ('model = "stewart-gough"', ""),
-    ],
-)
-def test_the_schema_refuses_what_the_reader_refuses(
-    old: str, new: str, schema: jsonschema.Draft202012Validator
-) -> None:
-    assert not schema.is_valid(tomllib.loads(edited(HELICAL, (old, new))))
+    ):
+        assert not schema.is_valid(tomllib.loads(edited(HELICAL, wrong))), wrong
 
 
 # All starters of the gallery are solved in test_starters.py.
@@ -505,6 +418,7 @@ def test_the_schema_refuses_what_the_reader_refuses(
 def test_a_new_case_solves(model: str, tmp_path: Path, cli: Run) -> None:
     text = output_of(cli("new", model))
     assert text.endswith("\n")
+    assert text == starter_text(model)
     path = saved(tmp_path / "mine.toml", text)
     target = tmp_path / "result.json"
     out = output_of(cli("solve", str(path), "--json", str(target)))
@@ -518,9 +432,7 @@ def test_a_new_case_solves(model: str, tmp_path: Path, cli: Run) -> None:
     offered = [line.removeprefix("# ") for line in pose if line.startswith("# rotation")]
     assert len(offered) == (0 if model in {"3-rps", "three-upu"} else 1)
     for line in offered:
-        path.write_text(
-            "\n".join(line if each.startswith("rotation") else each for each in lines) + "\n", encoding="utf-8"
-        )
+        saved(path, "\n".join(line if each.startswith("rotation") else each for each in lines) + "\n")
         assert cli("evaluate", str(path))[0] == 0
 
 
@@ -531,52 +443,43 @@ def test_models_lists_the_shipped_robots_and_shows_one(cli: Run) -> None:
     rows = [line.split()[0] for line in output_of(cli("models", "--all")).splitlines() if line[0] != " "]
     assert rows[rows.index("robot") :][1:3] == ["stewart-gough", "hexapod"]
     words = ("x1", "x4", "layout", '"octahedral"', "length", "angle", "leg_length", ">= 0, <= 30", "1-", "3+")
-    for name, shown in (("stewart-gough", words), ("hexapod", ("base_1_x", "platform_6_z", "leg_length", "any"))):
-        out = output_of(cli("models", name, "--all"))
-        assert all(word in out for word in shown)
+    assert_words(output_of(cli("models", "stewart-gough", "--all")), *words)
+    assert_words(output_of(cli("models", "hexapod", "--all")), "base_1_x", "platform_6_z", "leg_length", "any")
 
 
-@pytest.mark.parametrize("arguments", [("models", "hexapode"), ("new", "hexapode")])
-def test_a_robot_that_does_not_exist(arguments: tuple[str, ...], cli: Run) -> None:
-    refusal_of(cli(*arguments), "did you mean 'hexapod'?")
-
-
-@pytest.mark.parametrize(
-    "arguments", [("frobnicate",), ("solve",), ("evaluate",), ("new",), ("solve", "a", "--no"), ("solve", "a", "b"), ()]
-)
-def test_commands_that_do_not_exist_or_lack_something(arguments: tuple[str, ...], cli: Run) -> None:
-    code, out, err = cli(*arguments)
+def test_commands_that_do_not_exist_or_lack_something(cli: Run) -> None:
+    for arguments, words in (
+        ("models hexapode", "did you mean 'hexapod'?"),
+        ("new hexapode", "did you mean 'hexapod'?"),
+        ("frobnicate", "frobnicate: no such command; allowed: new, models, solve"),
+        ("solve", "CASE: is missing: a case file"),
+        ("evaluate", "CASE: is missing: a case file"),
+        ("new", "MODEL: is missing: name of a robot"),
+        ("solve a --no", "--no: no such option of solve; did you mean '--of'? allowed: --set, "),
+        ("solve a b", "it takes CASE"),
+    ):
+        refusal_of(cli(*arguments.split()), words)
+    refusal_of(cli("solve", "a", "b"), "solve: got unexpected extra argument")
+    code, out, err = cli()
     assert code == 2
-    if arguments:
-        words = {
-            "frobnicate": ("frobnicate: no such command; allowed: new, models, solve",),
-            "--no": ("--no: no such option of solve; did you mean '--of'? allowed: --set, ",),
-            "b": ("solve: got unexpected extra argument", "it takes CASE"),
-            "new": ("MODEL: is missing: name of a robot",),
-        }
-        refusal_of((code, out, err), *words.get(arguments[-1], ("CASE: is missing: a case file",)))
-    else:
-        assert "Usage: " in out + err
-        assert "Traceback" not in err
+    assert "Usage: " in out + err
+    assert "Traceback" not in err
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("solve", "--starts", "0"), "--starts 0: must be a whole number from 1 to 100000"),
-        (("solve", "--starts=100001"), "--starts 100001: must be a whole number from 1 to 100000"),
-        (("solve", "--starts=1.5"), "--starts 1.5: must be a whole number from 1 to 100000"),
-        (("solve", "--jobs=0"), "--jobs 0: must be a whole number from 1 to 256"),
-        (("report", "--out", "x.html", "--starts", "1e3"), "--starts 1e3: must be a whole number from 1 to 100000"),
-        (("tradeoff", "--over", "x1=1:2:2", "--jobs", "257"), "--jobs 257: must be a whole number from 1 to 256"),
-        (("solve", "--seed=-1"), "--seed -1: must be a whole number of at least 0"),
-        (("solve", "--pose", "0"), "--pose 0: must be a whole number of at least 1"),
-        (("certify", "--gap", "little"), "--gap little: must be a number"),
-    ],
-)
-def test_numbers_of_options_are_refused_in_one_sentence(arguments: tuple[str, ...], words: str, cli: Run) -> None:
-    command, *others = arguments
-    assert cli(command, "paper-4.3", *others) == (2, "", f"screwsynth: {words}\n")
+def test_numbers_of_options_are_refused_in_one_sentence(cli: Run) -> None:
+    for arguments, words in (
+        ("solve --starts 0", "--starts 0: must be a whole number from 1 to 100000"),
+        ("solve --starts=100001", "--starts 100001: must be a whole number from 1 to 100000"),
+        ("solve --starts=1.5", "--starts 1.5: must be a whole number from 1 to 100000"),
+        ("solve --jobs=0", "--jobs 0: must be a whole number from 1 to 256"),
+        ("report --out x.html --starts 1e3", "--starts 1e3: must be a whole number from 1 to 100000"),
+        ("tradeoff --over x1=1:2:2 --jobs 257", "--jobs 257: must be a whole number from 1 to 256"),
+        ("solve --seed=-1", "--seed -1: must be a whole number of at least 0"),
+        ("solve --pose 0", "--pose 0: must be a whole number of at least 1"),
+        ("certify --gap little", "--gap little: must be a number"),
+    ):
+        command, *others = arguments.split()
+        assert cli(command, "paper-4.3", *others) == (2, "", f"screwsynth: {words}\n")
 
 
 def test_help(cli: Run) -> None:
@@ -588,11 +491,9 @@ def test_help(cli: Run) -> None:
         assert "..." not in out.partition("Commands:")[2], "a command's summary is cut off"
 
 
-@pytest.mark.parametrize("arguments", [("solve", "paper-4.3", "--starts", "2", "--json", "-"), ("models",)])
-def test_a_reader_that_goes_away(arguments: tuple[str, ...], tmp_path: Path) -> None:
-    command = [sys.executable, "-P", "-m", "screwsynth.nlp", *arguments]
-    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:
-        running.stdout.close()
-        err = running.stderr.read()
-    assert "Traceback" not in err
-    assert "Exception" not in err
+def test_a_reader_that_goes_away(tmp_path: Path) -> None:
+    for arguments in ("solve paper-4.3 --starts 2 --json -", "models"):
+        command, pipe = [sys.executable, "-P", "-m", "screwsynth.nlp", *arguments.split()], subprocess.PIPE
+        with subprocess.Popen(command, cwd=tmp_path, stdout=pipe, stderr=pipe, text=True) as running:
+            running.stdout.close()
+            assert not re.search("Traceback|Exception", running.stderr.read())

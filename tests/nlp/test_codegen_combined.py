@@ -1,7 +1,9 @@
-"""C for several tasks and several poses: what it combines is what Python combines, and what it cannot is refused."""
+"""C for several tasks, several poses and singular values: exact, or refused by name."""
 
 from __future__ import annotations
 
+import shutil
+import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -9,9 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import Run, case_from, refusal_of, soaked
+from builders import Run, case_from, refusal_of, saved, soaked
+from generated import COMPILERS, STRICT, assert_only_mathematics_is_needed, made, needs_compiler, written
 
-from screwsynth.nlp import Case, Limits, Nlp, RateShare, formulate, load_case, solve
+from screwsynth.nlp import Case, ConditionNumber, Limits, Nlp, RateShare, formulate, load_case, solve
 from screwsynth.nlp.embedding.loops import find_loops
 from screwsynth.nlp.embedding.subject import find_subject
 from screwsynth.nlp.program.sampling import starting_points
@@ -35,22 +38,9 @@ rotation = { axis = [1, 2, 0], angle = { min = -10, max = 12 } }
 [[pose]]
 position = [0, 0, 20]
 """
-TASKS = """
-[[task]]
-name = "turn"
-sense = "max"
-axis = [1, 2, 6]
-point = [3, 1, 12]
-pitch = 0.1
-weight = 0.5
-[[task]]
-name = "push"
-sense = "min"
-axis = [0, 1, 1]
-point = [0, 1, 2]
-pitch = 2.0
-weight = 1.5
-"""
+TURN = '{ name = "turn", sense = "max", axis = [1, 2, 6], point = [3, 1, 12], pitch = 0.1, weight = 0.5 }'
+PUSH = '{ name = "push", sense = "min", axis = [0, 1, 1], point = [0, 1, 2], pitch = 2.0, weight = 1.5 }'
+TASKS, ONE = f"task = [{TURN}, {PUSH}]", f"task = [{TURN}]"
 MANY = """
 [limits]
 leg_length = { min = 5, max = 60 }
@@ -98,12 +88,11 @@ def combine(method: str, over: str) -> str:
     return f'[combine]\nmethod = "{method}"\nover_poses = "{over}"\n'
 
 
-ONE = TASKS[: TASKS.index("[[task]]", 10)]
 CASES = {
-    "worst of two senses over a mean, all limits": (ROBOT, POSES, TASKS, combine("worst-case", "mean"), MANY),
-    "weighted sum over a sum, singular values": (ROBOT, POSES, TASKS, combine("weighted-sum", "sum"), SPECTRA),
-    "worst pose": (ROBOT, POSES, ONE, '[combine]\nover_poses = "worst"\n'),
-    "couples": (UPU, TASKS, combine("weighted-sum", "mean")),
+    "worst of two senses over a mean, all limits": (TASKS, ROBOT, POSES, combine("worst-case", "mean"), MANY),
+    "weighted sum over a sum, singular values": (TASKS, ROBOT, POSES, combine("weighted-sum", "sum"), SPECTRA),
+    "worst pose": (ONE, ROBOT, POSES, '[combine]\nover_poses = "worst"\n'),
+    "couples": (TASKS, UPU, combine("weighted-sum", "mean")),
 }
 
 
@@ -175,19 +164,70 @@ def test_shipped_combinations_are_solved_as_python_solves_them(name: str, embedd
     assert abs(solved.F - own.F) <= 1e-6 * max(1.0, abs(own.F))
 
 
-@pytest.mark.parametrize(
-    ("texts", "sentence"),
-    [
-        ((ROBOT, "[pose]\nposition = [0, 0, 20]\n", TASKS, '[combine]\nmethod = "average"\n'), "combine.method"),
-        (
-            (ROBOT, *(f"[[pose]]\nposition = [{k}, 0, 22]\n" for k in range(20)), ONE, MANY),
-            "4560 constraints on pairs of poses",
-        ),
-    ],
-)
-def test_what_is_not_generated_is_refused_by_name(
-    texts: tuple[str, ...], sentence: str, tmp_path: Path, cli: Run
-) -> None:
-    (tmp_path / "case.toml").write_text("".join(texts), encoding="utf-8")
-    refusal_of(cli("codegen", str(tmp_path / "case.toml"), "--out", str(tmp_path / "made")), sentence)
-    assert not (tmp_path / "made").exists()
+def test_what_is_not_generated_is_refused_by_name(tmp_path: Path, cli: Run) -> None:
+    poses = "".join(f"[[pose]]\nposition = [{k}, 0, 22]\n" for k in range(20))
+    for text, sentence in (
+        (f'{TASKS}{ROBOT}[pose]\nposition = [0, 0, 20]\n[combine]\nmethod = "average"\n', "combine.method"),
+        (f"{ONE}{ROBOT}{poses}{MANY}", "4560 constraints on pairs of poses"),
+    ):
+        case = saved(tmp_path / "case.toml", text)
+        refusal_of(cli("codegen", str(case), "--out", str(tmp_path / "made")), sentence)
+        assert not (tmp_path / "made").exists()
+
+
+SPECTRAL = f"""
+task = [{TURN.replace(", weight = 0.5", "")}]
+solve = {{ starts = 4 }}
+{ROBOT.replace("{ min = 1,", "{ min = 0,").replace("x4 = 10", "x4 = { min = 0, max = 25 }")}
+[pose]
+position = [{{ min = -6, max = 6 }}, {{ min = -6, max = 6 }}, {{ min = 16, max = 26 }}]
+rotation = {{ angle = {{ min = -15, max = 15 }} }}
+[limits]
+leg_length = {{ min = 24, max = 34 }}
+condition_number = {{ max = 6, length = 10 }}
+smallest_singular_value = {{ min = 0.2, length = 7 }}
+"""
+
+
+@needs_compiler
+def test_singular_values_without_a_loop_over_legs_compile_without_warnings(tmp_path: Path) -> None:
+    limits = Limits(ConditionNumber(300, 10))
+    written(replace(load_case("paper-4.1-helical"), name="alone", limits=limits), tmp_path)
+    for compiler in COMPILERS:
+        command = [compiler, *STRICT.split(), "-O2", "-fsyntax-only", str(tmp_path / "screwsynth_alone-loops.c")]
+        assert subprocess.run(command, capture_output=True, text=True, check=True).stderr == ""
+
+
+@needs_compiler
+def test_limits_on_singular_values_are_small_and_exact(embed: Callable[..., Embedded], tmp_path: Path) -> None:
+    case = case_from(SPECTRAL, "spectra")
+    c, nlp = embed(case), formulate(case)
+    where = Path(shutil.copytree(c.folder, tmp_path / "c"))
+    assert sum(path.stat().st_size for path in where.glob(f"{c.prefix}*.[ch]*")) <= 400_000
+    assert "0 failed" in made(where, f"CC={COMPILERS[0]}", f"CFLAGS={STRICT} -O2 -fPIC", "test")
+    assert_only_mathematics_is_needed(where, c.prefix)
+    limits, p = len(nlp.program.constraints), np.ascontiguousarray(nlp.arguments)
+    k, work = np.zeros(c.macro("K") + 1), np.zeros(c.macro("WORK"))
+    assert c.call("prepare", p, k, work) == 0
+    generator = np.random.default_rng(5)
+    singular = [j for j, each in enumerate(nlp.program.constraints) if each.spectral is not None]
+    assert len(singular) == 2
+    for x in starting_points(nlp, 101, 7)[1:]:
+        g, dg = np.zeros(limits), np.zeros((limits, nlp.n))
+        assert c.call("limits", x, k, g, dg, work) == 0
+        _, _, constraint, slopes = nlp.program.kernels.derivatives(x, p)
+        np.testing.assert_allclose(g, constraint.ravel(), rtol=1e-10, atol=1e-12)
+        for j in range(limits):
+            np.testing.assert_allclose(dg[j], slopes[j], rtol=0, atol=1e-10 * max(1e-3, np.abs(slopes[j]).max()))
+        multipliers = generator.normal(size=limits) * (np.arange(limits) >= min(singular))
+        second = nlp.program.kernels.hessian(x, p, 0.7, multipliers)
+        H = c.curvature(x, k, multipliers, work)
+        np.testing.assert_allclose(H, second, rtol=0, atol=1e-10 * np.abs(second).max())
+
+
+@needs_compiler
+def test_limits_on_singular_values_hold_where_the_solver_ends(embed: Callable[..., Embedded]) -> None:
+    case = case_from(SPECTRAL, "spectra")
+    solved, wanted = embed(case).solve(), solve(case)
+    assert solved.status == 0
+    assert abs(solved.F - wanted.F) <= 1e-6 * wanted.F

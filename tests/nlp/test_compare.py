@@ -1,33 +1,16 @@
 """Robots compared on one case: placed, scaled, solved, and told what they lack."""
 
-import csv
-import io
 import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import Run, output_of, refusal_of, saved
+from builders import Run, output_of, refusal_of, rows_of, saved
 from jsonschema import Draft202012Validator
 
+import screwsynth.nlp as sn
 from screwsynth.models import Displacement
-from screwsynth.nlp import (
-    Case,
-    Free,
-    InputError,
-    LegLength,
-    Limits,
-    Rotation,
-    Task,
-    Workspace,
-    along_screw,
-    build_model,
-    compare,
-    evaluate,
-    load_case,
-    load_result,
-)
 from screwsynth.nlp.comparison.data import comparison_sentences
 from screwsynth.nlp.comparison.robots import placed, read_robots
 from screwsynth.nlp.output.pictures.comparisons import comparison_drawings, comparison_figure, comparison_pictures
@@ -35,21 +18,11 @@ from screwsynth.nlp.results.schema import result_schema
 
 # The twist is about an axis far from the origin, so that a frame that is moved wrongly shows.
 CASE = """
-[units]
-length = "mm"
-[robot]
-model = "stewart-gough"
-parameters = { x1 = 120, x2 = 60, x3 = 10, x4 = 10 }
-[pose]
-position = [30, -20, 150]
-[[task]]
-name = "tilt"
-sense = "max"
-axis = [1, 2, 0]
-point = [200, 10, 90]
-pitch = 3
-[limits]
-leg_length = { min = 20, max = 900 }
+units = { length = "mm" }
+robot = { model = "stewart-gough", parameters = { x1 = 120, x2 = 60, x3 = 10, x4 = 10 } }
+pose = { position = [30, -20, 150] }
+task = [{ name = "tilt", sense = "max", axis = [1, 2, 0], point = [200, 10, 90], pitch = 3 }]
+limits = { leg_length = { min = 20, max = 900 } }
 """
 #: A sum of six squares, beside one by other operations in another order.
 ROUNDING = 1e-9
@@ -60,14 +33,14 @@ def path(tmp_path: Path) -> str:
     return str(saved(tmp_path / "case.toml", CASE))
 
 
-def case() -> Case:
-    return Case(
-        model=build_model("stewart-gough"),
+def case() -> sn.Case:
+    return sn.Case(
+        model=sn.build_model("stewart-gough"),
         parameters={"x1": 120, "x2": 60, "x3": 0.2, "x4": 0.2},
-        position=(30, -20, Free(140, 170, 150)),
-        rotation=Rotation(),
-        tasks=[Task.screw("max", axis=(1, 2, 0), point=(200, 10, 90), pitch=3, name="tilt")],
-        limits=Limits(LegLength(min=20, max=900)),
+        position=(30, -20, sn.Free(140, 170, 150)),
+        rotation=sn.Rotation(),
+        tasks=[sn.Task.screw("max", axis=(1, 2, 0), point=(200, 10, 90), pitch=3, name="tilt")],
+        limits=sn.Limits(sn.LegLength(min=20, max=900)),
     )
 
 
@@ -91,7 +64,7 @@ def test_a_robot_in_the_place_of_another(path: str, tmp_path: Path, cli: Run) ->
     out = output_of(cli("compare", path, "delta", "6-sps", "case", "--part", "0", "--starts", "1", *options))
     result = json.loads(files["json"].read_text())
     Draft202012Validator(result_schema()).validate(result)
-    assert type(load_result(files["json"])).__name__ == "ComparisonResult"
+    assert type(sn.load_result(files["json"])).__name__ == "ComparisonResult"
     robots = {each["name"]: each for each in result["robots"]}
     assert [each["part"] for each in result["robots"]] == ["ranked", "ranked", "no freedom"]
     # The 6-SPS by hand, at home where the case's pose is.
@@ -109,14 +82,14 @@ def test_a_robot_in_the_place_of_another(path: str, tmp_path: Path, cli: Run) ->
     # The legs of the 6-SPS have lengths, the rods of the Delta have none that could change.
     left_out = {name: [item["key"] for item in each["limits_left_out"]] for name, each in robots.items()}
     assert (left_out["6-sps"], left_out["delta"]) == ([], ["limits.leg_length"])
-    rows = list(csv.DictReader(io.StringIO(files["csv"].read_text())))
+    rows = rows_of(files["csv"].read_text())
     assert [float(row["value"]) for row in rows] == [each["value"] for each in result["robots"]]
     assert "no freedom" in out
     assert files["html"].read_text().count("<h3>") == 3
 
 
 def test_pictures_have_units_sizes_and_one_scale(path: str) -> None:
-    found = compare(load_case(path), ["6-sps", "case"], part=0, starts=1)
+    found = sn.compare(sn.load_case(path), ["6-sps", "case"], part=0, starts=1)
     figure = comparison_figure(found)
     words = [text.get_text() for text in figure.texts]
     for entry in found.entries:
@@ -142,16 +115,16 @@ def test_pictures_have_units_sizes_and_one_scale(path: str) -> None:
 
 
 def test_dimensions_ranges_and_certificates() -> None:
-    found = compare(case(), ["6-sps", "case"], part=0.1, starts=2, certified=True)
+    found = sn.compare(case(), ["6-sps", "case"], part=0.1, starts=2, certified=True)
     sps, own = sorted(found.entries, key=lambda each: each.contender.is_own)
     assert own.solution is not None
     assert sps.solution is not None
     # Each number but the pose is free by a tenth, around the typical ones that are scaled.
     free = sps.placed.case.components("rb")[0]
-    assert isinstance(free, Free)
+    assert isinstance(free, sn.Free)
     assert (free.lower, free.upper) == pytest.approx((0.9 * 0.325 * sps.factor, 1.1 * 0.325 * sps.factor))
     position = sps.placed.case.position[2]
-    assert isinstance(position, Free)
+    assert isinstance(position, sn.Free)
     assert position.start == pytest.approx(0.5 * sps.factor)
     assert position.upper - position.lower == pytest.approx(30)
     # The better one is first, and each proof is of its own program.
@@ -161,19 +134,17 @@ def test_dimensions_ranges_and_certificates() -> None:
         assert each.value is not None
         assert each.certificate.bound >= each.value * (1 - 1e-9)
     # With wider ranges the sizes differ; the case's robot keeps its ranges with --part 0 too.
-    sentences = comparison_sentences(compare(case(), ["6-sps", "case"], part=0.2, starts=1))
+    sentences = comparison_sentences(sn.compare(case(), ["6-sps", "case"], part=0.2, starts=1))
     assert any("--part 0 for one size of all but the case's robot" in each for each in sentences)
 
 
 def test_strokes_over_several_poses() -> None:
-    moved = replace(
-        case(), displacements=(Displacement.by(np.eye(3), np.zeros(3)), Displacement.by(np.eye(3), (0, 0, 9)))
-    )
-    found = compare(moved, ["6-sps", "case"], part=0, starts=1)
+    moves = tuple(Displacement.by(np.eye(3), (0, 0, z)) for z in (0, 9))
+    found = sn.compare(replace(case(), displacements=moves), ["6-sps", "case"], part=0, starts=1)
     for entry in found.entries:
         (stroke,) = entry.strokes.values()
         nlp, x = entry.solution.nlp, entry.solution.x
-        first, last = (evaluate(nlp, x, pose) for pose in (0, 1))
+        first, last = (sn.evaluate(nlp, x, pose) for pose in (0, 1))
         lengths = [state.quantities[next(iter(entry.strokes))] for state in (first, last)]
         assert stroke.value == pytest.approx(np.abs(lengths[1] - lengths[0]).max())
         # Each leg becomes longer by less than the platform moves.
@@ -182,8 +153,8 @@ def test_strokes_over_several_poses() -> None:
 
 def test_poses_and_workspaces_stay_where_they_are_in_the_world() -> None:
     robot = read_robots(["6-sps", "delta"], case())[0]
-    moves = along_screw((0.2, 0.1, 1, 5, -3, 2), [-0.3, 0.0, 0.4])
-    workspace = Workspace((Free(20, 40), -20, Free(140, 170)), has_limits=True)
+    moves = sn.along_screw((0.2, 0.1, 1, 5, -3, 2), [-0.3, 0.0, 0.4])
+    workspace = sn.Workspace((sn.Free(20, 40), -20, sn.Free(140, 170)), has_limits=True)
     found = placed(replace(case(), displacements=moves, workspace=workspace), robot, 300.0, 0.1, 1.0)
     offset, own = found.offset, found.case
     start = np.array([30, -20, 150])
@@ -192,7 +163,7 @@ def test_poses_and_workspaces_stay_where_they_are_in_the_world() -> None:
         assert moved.rotation @ (start - offset) + moved.translation + offset == pytest.approx(expected, abs=1e-10)
         assert np.array_equal(moved.rotation, world.rotation)
     assert own.workspace is not None
-    ends = [value.lower if isinstance(value, Free) else value for value in own.workspace.position]
+    ends = [value.lower if isinstance(value, sn.Free) else value for value in own.workspace.position]
     assert np.array(ends) + offset == pytest.approx([20, -20, 140])
     # Limits hold over the workspace of every robot.
     assert own.workspace.has_limits
@@ -200,8 +171,7 @@ def test_poses_and_workspaces_stay_where_they_are_in_the_world() -> None:
 
 
 def test_bad_input_is_one_sentence(path: str, tmp_path: Path, cli: Run) -> None:
-    robot = tmp_path / "mine.toml"
-    robot.write_text("name = 1\n")
+    robot = saved(tmp_path / "mine.toml", "name = 1\n")
     taken = tmp_path / "no" / "out.json"
     for arguments, words in (
         (("6-ups",), "needs at least two robots, and 1 is given"),
@@ -217,8 +187,8 @@ def test_bad_input_is_one_sentence(path: str, tmp_path: Path, cli: Run) -> None:
         (("delta", "3-puu", "--part", "0", "--starts", "1"), "task tilt: no robot of the comparison has the freedom"),
     ):
         refusal_of(cli("compare", path, *arguments), words)
-    with pytest.raises(InputError, match="is given twice"):
-        compare(case(), ["case", build_model("6-ups"), "case"])
+    with pytest.raises(sn.InputError, match="is given twice"):
+        sn.compare(case(), ["case", sn.build_model("6-ups"), "case"])
 
 
 def test_robots_that_do_not_keep_every_limit_have_no_rank_and_what_they_lack_is_said(cli: Run, tmp_path: Path) -> None:
@@ -229,12 +199,8 @@ def test_robots_that_do_not_keep_every_limit_have_no_rank_and_what_they_lack_is_
     kept = {each["name"]: (each["part"], each["limits_kept"], each["value"]) for each in result["robots"]}
     # The six rods on rails resist the motion more, without all limits but one.
     assert kept["6-pus"][2] > kept["case"][2]
-    assert [(each["name"], each["part"]) for each in result["robots"]] == [
-        ("case", "ranked"),
-        ("6-pus", "limits not kept"),
-        ("delta", "no freedom"),
-        ("6-ups", "no answer"),
-    ]
+    parts = {"case": "ranked", "6-pus": "limits not kept", "delta": "no freedom", "6-ups": "no answer"}
+    assert [(each["name"], each["part"]) for each in result["robots"]] == list(parts.items())
     # Legs given joint by joint have the limits of legs too, but cones that are stated by joint.
     assert [kept[name][1] for name in names] == [1, 1, 7, 5]
     sentences = {each["name"]: " ".join(each["sentences"]) for each in result["robots"]}

@@ -1,11 +1,11 @@
-"""Generated C says what is so, judged by formulas that are not the program's: those of ``bench/soak``."""
+"""Generated C is judged by formulas that are not the program's: those of bench/soak."""
 
 from __future__ import annotations
 
 import importlib
+import itertools
 import re
 import sys
-import tomllib
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -13,43 +13,34 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from builders import case_from, soaked, starter_tables
-from generated import BAD_INPUT, COMPILERS, INFEASIBLE, OK, OTHER_ASSEMBLY, RANGE_END, written
+from builders import case_from, case_of, case_tables, shipped_tables, soaked, starter, starter_tables
+from generated import BAD_INPUT, COMPILERS, INFEASIBLE, OK, OTHER_ASSEMBLY, RANGE_END, needs_compiler, written
 
-from screwsynth.nlp import Case, CompiledCase, load_case, load_compiled, shipped_cases
-from screwsynth.nlp.case.source import find_case
+from screwsynth.nlp import Case, CompiledCase, formulate, load_case, load_compiled, shipped_cases
+from screwsynth.nlp.embedding.runtimelimits import held_by_fixed_numbers
 
-BENCH = Path(__file__).parents[2] / "bench" / "soak"
+ROOT = Path(__file__).parents[2]
 
 Compiled = Callable[[str], CompiledCase]
 
 
 #: Makes a case of one task a worst case of two.
-TWO_TASKS = """[combine]
-method = "worst-case"
-
-[[task]]
-name = "other"
-sense = "max"
-axis = [0, 0, 1]
-point = [0.2, 0, 0]
-pitch = 0.5
-"""
+OTHER = {"name": "other", "sense": "max", "axis": [0, 0, 1], "point": [0.2, 0, 0], "pitch": 0.5}
 
 
-def case_of(name: str) -> Case:
+def case_named(name: str) -> Case:
     """A shipped case, or the starter of a robot, after "worst of two, " with a second task."""
+    robot = name.removeprefix("worst of two, ")
     if name in shipped_cases():
         return load_case(name)
-    robot = name.removeprefix("worst of two, ")
-    starter = starter_tables(robot)
-    other = tomllib.loads(TWO_TASKS) if robot != name else {"task": []}
-    return case_from(starter | other | {"task": other["task"] + starter["task"]}, robot)
+    if robot == name:
+        return starter(robot)
+    return case_of(robot, task=[OTHER, *starter_tables(robot)["task"]], combine={"method": "worst-case"})
 
 
 @pytest.fixture(scope="module")
 def ticks() -> ModuleType:
-    sys.path.append(str(BENCH))
+    sys.path.append(str(ROOT / "bench" / "soak"))
     return importlib.import_module("ticks")
 
 
@@ -60,7 +51,7 @@ def compiled(tmp_path_factory: pytest.TempPathFactory) -> Compiled:
 
     @cache
     def made(name: str) -> CompiledCase:
-        return load_compiled(written(case_of(name), tmp_path_factory.mktemp("honest")))
+        return load_compiled(written(case_named(name), tmp_path_factory.mktemp("honest")))
 
     return made
 
@@ -128,11 +119,8 @@ def test_the_worst_case_of_other_tasks_is_theirs(name: str, compiled: Compiled, 
 
 
 def test_the_largest_of_other_tasks_to_be_minimised_is_theirs(tmp_path: Path, ticks: ModuleType) -> None:
-    tables = tomllib.loads(Path(find_case("camera-mount")).read_text(encoding="utf-8"))
-    for task in tables["task"]:
-        task["sense"] = "min"
-    del tables["expect"]
-    own = load_compiled(written(case_from(tables, "camera-mount"), tmp_path))
+    tasks_to_minimise = [each | {"sense": "min"} for each in shipped_tables("camera-mount")["task"]]
+    own = load_compiled(written(case_of("camera-mount", task=tasks_to_minimise), tmp_path))
     robot, p = ticks.Robot(own, -1.0), tasks(own, 40, 4)
     p[:, robot.twists] *= 10
     found = own.solve(p=p)
@@ -281,9 +269,116 @@ def test_ranges_that_hide_the_tolerances_are_refused(compiled: Compiled) -> None
 
 
 def test_the_page_says_what_to_do_on_each_status(compiled: Compiled) -> None:
-    root = Path(__file__).parents[2]
-    page = (root / "docs" / "embedding.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "embedding.md").read_text(encoding="utf-8")
     table = page.split("### What to do on each status")[1].split("\n#")[0]
-    assert re.findall(r"^\| `SCREWSYNTH_(\w+)`", table, flags=re.MULTILINE) == list(compiled("delta").statuses)
-    readme = (root / "nlp" / "embedding" / "c" / "README.md.in").read_text(encoding="utf-8")
-    assert re.findall(r"^\| `SCREWSYNTH_(\w+)`", readme, flags=re.MULTILINE) == list(compiled("delta").statuses)
+    readme = (ROOT / "nlp" / "embedding" / "c" / "README.md.in").read_text(encoding="utf-8")
+    for text in (table, readme):
+        assert re.findall(r"^\| `SCREWSYNTH_(\w+)`", text, flags=re.MULTILINE) == list(compiled("delta").statuses)
+
+
+PLATE = """
+task = [{ sense = "max", axis = [0, 1, 0], point = [0, 0, 0.22], pitch = 0 }]
+[robot]
+model = "stewart-gough"
+layout = "octahedral"
+parameters = { x1 = 0.2, x2 = { min = 0.05, max = 0.15 }, x3 = 10, x4 = { min = 3, max = 27 } }
+[pose]
+position = [0, 0, { min = 0.25, max = 0.4 }]
+[limits]
+joint_spacing = { min = 0.04 }
+"""
+
+
+def held_delta() -> Case:
+    """A Delta whose platform is held without rotation: three of its loop equations follow from the others."""
+    pose = starter_tables("delta")["pose"] | {"rotation": {"axis": [0, 0, 1], "angle": 0}}
+    return case_of("delta", pose=pose, solve={"starts": 2})
+
+
+def numbers(own: CompiledCase, **changed: float) -> np.ndarray:
+    """The case's fixed numbers, some of them changed."""
+    values = {each.name: each.default for each in own.parameters}
+    assert changed.keys() <= values.keys()
+    return np.array(list((values | changed).values()))
+
+
+@needs_compiler
+@pytest.mark.usefixtures("ticks")
+def test_loops_that_closed_by_a_fixed_number_are_judged(tmp_path: Path) -> None:
+    formulas = importlib.import_module("formulas")
+    own = load_compiled(written(held_delta(), tmp_path))
+    names = [each.name for each in own.variables]
+
+    def gap(x: np.ndarray, p: np.ndarray) -> float:
+        """Largest difference of a rod's length between its joints from its own, by the positions of the joints."""
+        at = dict(zip(names, x.reshape(-1, 1), strict=True))
+        at |= dict(zip([each.name for each in own.parameters], p.reshape(-1, 1), strict=True))
+        return float(np.abs(formulas.delta(at).equations).max())
+
+    for angle in (0.0, 1e-4, 0.1):
+        p = numbers(own, angle=angle)
+        for seeds in (1, 16):
+            found = own.solve(None, p, seeds=seeds)
+            assert (gap(found.x[0], p) < 1e-8) == (found.status[0] == OK), angle
+            assert (found.violation[0] <= 1e-9) == (found.status[0] == OK)
+            assert found.status[0] == (OK if angle == 0 else INFEASIBLE)
+    # All starting points of the case's own numbers still end at an optimum.
+    low, high = (np.array([getattr(each, end) for each in own.variables]) for end in ("lower", "upper"))
+    starts = low + (high - low) * np.random.default_rng(0).uniform(size=(300, len(low)))
+    assert set(own.solve(starts, numbers(own), seeds=2).status.tolist()) == {OK}
+    # An axis that is no direction gives no rotation.
+    assert own.solve(None, numbers(own, axis_z=2.0)).status[0] == INFEASIBLE
+
+
+@needs_compiler
+def test_limits_on_fixed_numbers_are_judged(tmp_path: Path) -> None:
+    own = load_compiled(written(case_from(PLATE, "plate"), tmp_path))
+
+    def spacing(x1: float, x3: float) -> float:
+        """Least distance of the base's joints: at angles x3 beside three directions on a circle of radius x1."""
+        angles = np.radians(np.array([0, 120, 240])[:, None] + np.array([-x3, x3])).ravel()
+        return min(2 * x1 * abs(np.sin((a - b) / 2)) for a, b in itertools.combinations(angles, 2))
+
+    for x1, x3 in ((0.2, 10.0), (0.2, 5.0), (0.2, 5.75), (0.1, 10.0), (0.3, 5.0)):
+        # In C an angle is in radians.
+        p = numbers(own, x1=x1, x3=np.radians(x3))
+        for least in (None, 0.045, 0.06, 0.1):
+            limit = 0.04 if least is None else least
+            found = own.solve(None, p, limits={} if least is None else {"joint_spacing.min": least})
+            assert found.status[0] == (OK if spacing(x1, x3) >= limit else INFEASIBLE), (x1, x3, least)
+
+
+@needs_compiler
+def test_pairs_of_fixed_lengths_are_judged(tmp_path: Path) -> None:
+    # Leg 1 alone is free. Of each other leg's 12 pairs of lengths, the tightest one of the case stands for all.
+    heights = {"pose1_p_z": 35.0, "pose2_p_z": 36.0, "pose3_p_z": 37.0, "pose4_p_z": 38.0}
+    poses = [{"position": [0, 0, height]} for height in heights.values()]
+    limits, mean = {"actuator": {"stroke_max": 3.5}}, {"over_poses": "mean"}
+    tables = case_tables("hexapod", pose=poses, limits=limits, combine=mean, solve={"starts": 2})
+    own = load_compiled(written(case_from(tables, "strokes"), tmp_path))
+    given = tables["robot"]["parameters"]
+
+    def stroke(leg: int, **changed: float) -> float:
+        """Longest less shortest length of a leg."""
+        across = np.subtract(given[f"platform_{leg}"], given[f"base_{leg}"])
+        lengths = [np.hypot(np.hypot(*across[:2]), across[2] + z) for z in (heights | changed).values()]
+        return float(max(lengths) - min(lengths))
+
+    verdicts = []
+    one = [{"pose2_p_z": 39.5}, {"pose2_p_z": 38.4}, {"pose3_p_z": 34.9}, {"pose3_p_z": 34.0}]
+    for changed in ({}, *one, {"pose1_p_z": 33.0, "pose4_p_z": 36.3}):
+        for limit in (3.0, 3.5, 4.0, 5.0):
+            found = own.solve(None, numbers(own, **changed), limits={"actuator.stroke_max": limit})
+            verdicts.append(max(stroke(leg, **changed) for leg in range(2, 7)) <= limit)
+            assert found.status[0] == (OK if verdicts[-1] else INFEASIBLE), (changed, limit)
+    assert 5 < sum(verdicts) < len(verdicts) - 5
+
+
+def test_what_fixed_numbers_make_hold_is_kept() -> None:
+    nlp = formulate(held_delta())
+    held = held_by_fixed_numbers(nlp)
+    loops = [each.name for each in nlp.program.constraints if each.name.startswith("loop")]
+    found = [each.constraint.name for each in held.items]
+    every = [each.name for each in nlp.case.model.closure]
+    assert sorted([*loops, *found[: held.equations]]) == sorted(every)
+    assert found[held.equations :] == ["|axis|"]

@@ -1,4 +1,4 @@
-"""The examples beside generated C: C++, a real-time loop, an S-function of Simulink, and two folders in one program."""
+"""Generated C in other programs: C++, a real-time loop, Simulink, CMake projects, and an emulated Cortex-M7."""
 
 from __future__ import annotations
 
@@ -6,15 +6,23 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
 from generated import COMPILERS, STRICT, WARNINGS, needs_compiler, run, written
 
+from screwsynth.nlp import generate_c, load_case
 from screwsynth.nlp.embedding.ctext import identifier
 
 STRICT_CPP = f"-std=c++17 {WARNINGS} -O1"
+
+
+def put(folder: Path, files: Mapping[str, str]) -> None:
+    """Write files into a folder, which is made where it does not exist."""
+    folder.mkdir(exist_ok=True)
+    for name, text in files.items():
+        (folder / name).write_text(text, encoding="utf-8")
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +45,7 @@ def test_the_cpp_header_and_its_example_compile_and_run(compiler: str, folder: P
     assert "the case: F = 407.2107, status 0" in printed
     assert re.search(r"a vertical axis: F = [\d.]+, status 0", printed)
     assert "angle.max: 0.523599 rad" in printed
-    (folder / "throws.cpp").write_text(THROWS, encoding="utf-8")
+    put(folder, {"throws.cpp": THROWS})
     run(compiler, *STRICT_CPP.split(), "throws.cpp", "-L.",
         f"-l{identifier('paper-4.1-helical')}", "-lm", "-o", "throws", where=folder)  # fmt: skip
     run("./throws", where=folder)
@@ -110,14 +118,12 @@ def test_the_real_time_loop_compiles_and_keeps_within_its_steps(folder: Path) ->
 
 @needs_compiler
 def test_the_s_function_compiles_and_solves_in_a_stub_of_simulink(folder: Path) -> None:
-    (folder / "simstruc.h").write_text(SIMSTRUC, encoding="utf-8")
-    (folder / "simulink.c").write_text(SIMULINK, encoding="utf-8")
+    put(folder, {"simstruc.h": SIMSTRUC, "simulink.c": SIMULINK})
     prefix = identifier("paper-4.1-helical")
     words = ["-DMATLAB_MEX_FILE", "sfunction.c", "-L.", f"-l{prefix}", "-lm", "-o", "sfunction"]
     run(COMPILERS[0], *STRICT.split(), *words, where=folder)
-    assert (
-        run("./sfunction", where=folder) == "4 ports, 6 1 1 9 wide: status 0, F 407.2107; again 0, 407.2107; none 3\n"
-    )
+    printed = run("./sfunction", where=folder)
+    assert printed == "4 ports, 6 1 1 9 wide: status 0, F 407.2107; again 0, 407.2107; none 3\n"
 
 
 #: As much of simstruc.h as the S-function calls.
@@ -183,23 +189,21 @@ int main(void) {
 }
 """
 
-PROJECT = """cmake_minimum_required(VERSION 3.13)
+PROGRAM = """add_executable(both both.c)
+target_link_libraries(both screwsynth_paper_4_2_rotation::screwsynth_paper_4_2_rotation
+  screwsynth_paper_4_2_translation::screwsynth_paper_4_2_translation)
+"""
+PROJECT = f"""cmake_minimum_required(VERSION 3.13)
 project(both C)
 add_compile_options(-Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror)
 add_subdirectory(one)
 add_subdirectory(two)
-add_executable(both both.c)
-target_link_libraries(both screwsynth_paper_4_2_rotation::screwsynth_paper_4_2_rotation
-  screwsynth_paper_4_2_translation::screwsynth_paper_4_2_translation)
-"""
-FOUND = """cmake_minimum_required(VERSION 3.13)
+{PROGRAM}"""
+FOUND = f"""cmake_minimum_required(VERSION 3.13)
 project(found C)
 find_package(screwsynth_paper_4_2_rotation 0.1 REQUIRED)
 find_package(screwsynth_paper_4_2_translation REQUIRED)
-add_executable(both both.c)
-target_link_libraries(both screwsynth_paper_4_2_rotation::screwsynth_paper_4_2_rotation
-  screwsynth_paper_4_2_translation::screwsynth_paper_4_2_translation)
-"""
+{PROGRAM}"""
 BOTH = """#include "screwsynth_paper_4_2_rotation.h"
 #include "screwsynth_paper_4_2_translation.h"
 #include <stdio.h>
@@ -234,8 +238,7 @@ def test_two_folders_are_one_project_are_installed_and_found(tmp_path: Path, cma
     written("paper-4.2-rotation", tmp_path / "one")
     written("paper-4.2-translation", tmp_path / "two")
     flags = f"-DCMAKE_C_COMPILER={COMPILERS[0]}"
-    for name, text in (("CMakeLists.txt", PROJECT), ("both.c", BOTH)):
-        (tmp_path / name).write_text(text, encoding="utf-8")
+    put(tmp_path, {"CMakeLists.txt": PROJECT, "both.c": BOTH})
     cmake("-S", ".", "-B", "build", flags, f"-DCMAKE_INSTALL_PREFIX={tmp_path / 'installed'}", where=tmp_path)
     cmake("--build", "build", where=tmp_path)
     assert run("build/both", where=tmp_path) == "0 0 1\n"
@@ -243,9 +246,7 @@ def test_two_folders_are_one_project_are_installed_and_found(tmp_path: Path, cma
     assert not list(tmp_path.glob("build/*/selftest"))
     cmake("--install", "build", where=tmp_path)
     user = tmp_path / "user"
-    user.mkdir()
-    for name, text in (("CMakeLists.txt", FOUND), ("both.c", BOTH)):
-        (user / name).write_text(text, encoding="utf-8")
+    put(user, {"CMakeLists.txt": FOUND, "both.c": BOTH})
     cmake("-S", ".", "-B", "build", flags, f"-DCMAKE_PREFIX_PATH={tmp_path / 'installed'}", where=user)
     cmake("--build", "build", where=user)
     assert run("build/both", where=user) == "0 0 1\n"
@@ -306,8 +307,7 @@ int main(void) {
 def test_several_tasks_are_reached_from_cpp_and_simulink(tmp_path: Path) -> None:
     where, prefix = written("peg-in-hole", tmp_path), identifier("peg-in-hole")
     run("make", f"CC={COMPILERS[0]}", f"CFLAGS={STRICT} -O1", "library", "realtime.o", where=where)
-    for name, text in (("e.cpp", EXCHANGED), ("simstruc.h", SIMSTRUC), ("simulink.c", SAMPLES)):
-        (where / name).write_text(text, encoding="utf-8")
+    put(where, {"e.cpp": EXCHANGED, "simstruc.h": SIMSTRUC, "simulink.c": SAMPLES})
     run("g++", *STRICT_CPP.split(), "e.cpp", "-L.", f"-l{prefix}", "-lm", "-o", "e", where=where)
     status, before, again, exchanged, third, differs = run("./e", where=where).split()
     assert (status, again, third, differs) == ("0", "0", "0", "1")
@@ -317,3 +317,126 @@ def test_several_tasks_are_reached_from_cpp_and_simulink(tmp_path: Path) -> None
     wide, F = re.findall(r"^(\d+) wide: status 0, F (\S+)$", run("./s", where=where))[0]
     assert int(wide) == 14
     assert float(F) == pytest.approx(float(before), rel=1e-7)
+
+
+COMPILER, EMULATOR = "arm-none-eabi-gcc", "qemu-system-arm"
+FLAGS = (
+    *("-mcpu=cortex-m7", "-mthumb", "-mfpu=fpv5-d16", "-mfloat-abi=hard"),
+    *("-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Werror"),
+)
+#: Code and data are in one memory, the stack in another.
+LINKER = """MEMORY { CODE (rwx) : ORIGIN = 0x00000000, LENGTH = 4M STACK (rw) : ORIGIN = 0x20000000, LENGTH = 4M }
+SECTIONS {
+    .text : { KEEP(*(.vectors)) *(.text*) *(.rodata*) } > CODE
+    .ARM.exidx : { *(.ARM.exidx*) } > CODE
+    .data : { *(.data*) } > CODE
+    .bss : { *(.bss*) *(COMMON) } > CODE
+    end = .;
+    stack_top = ORIGIN(STACK) + LENGTH(STACK);
+}
+"""
+START = """#include <stdint.h>
+#include <stdlib.h>
+extern uint32_t stack_top;
+extern void initialise_monitor_handles(void);
+extern int main(void);
+void _init(void);
+void _fini(void);
+void _init(void) {}
+void _fini(void) {}
+static void reset(void) {
+    *(volatile uint32_t *)0xE000ED88 |= 0xF << 20; /* switches the floating-point unit on */
+    initialise_monitor_handles();
+    exit(main());
+}
+static void fault(void) { exit(99); }
+typedef void (*handler)(void);
+__attribute__((section(".vectors"), used)) static const handler vectors[16] = {
+    (handler)&stack_top, reset, fault, fault, fault, fault, fault};
+"""
+#: SysTick's clock has 25 MHz on this machine: one tick is 40 nanoseconds, and so 40 instructions.
+MAIN = """#include "PREFIX.h"
+#include <stdint.h>
+#include <stdio.h>
+#define SYSTICK ((volatile uint32_t *)0xE000E010)
+extern int selftest(void);
+static double work[BIG_SOLVERWORK], x[BIG_N + 1];
+static int iwork[BIG_SOLVERIWORK];
+static PREFIX_problem problem;
+static PREFIX_result result;
+static void timed(const char *name) {
+    uint32_t begin = SYSTICK[2], took;
+    screwsynth_status status = PREFIX_solve(&problem, &result, work, iwork);
+    took = (begin - SYSTICK[2]) & 0xFFFFFF;
+    printf("%s: %lu instructions, %d iterations, status %d\\n", name, 40ul * (unsigned long)took, result.iterations,
+           (int)status);
+}
+int main(void) {
+    int i;
+    SYSTICK[1] = 0xFFFFFF;
+    SYSTICK[0] = 5;
+    if (selftest()) return 1;
+    PREFIX_defaults(&problem);
+    timed("all seeds");
+    for (i = 0; i < BIG_N; ++i) x[i] = result.x[i];
+    problem.x0 = x;
+    problem.seeds = 0;
+    timed("warm");
+    for (i = 0; i < BIG_N; ++i)
+        x[i] = 0.5 * (problem.lower[i] + problem.upper[i]) +
+               0.5 * PREFIX_seeds[1][i] * (problem.upper[i] - problem.lower[i]);
+    timed("cold");
+    return 0;
+}
+"""
+
+
+def image(case: str, folder: Path) -> Path:
+    """The self-test and the timed solves of a case, compiled for the machine."""
+    prefix = identifier(case)
+    files = generate_c(load_case(case), "")
+    main = MAIN.replace("PREFIX", prefix).replace("BIG", prefix.upper())
+    put(folder, files | {"main.c": main, "start.c": START, "machine.ld": LINKER})
+    library = [name for name in files if name.startswith(prefix) and name.endswith(".c") and "casadi" not in name]
+    generated = [name for name in files if name.startswith(prefix) and name.endswith("-casadi.c")]
+
+    # The address of the stack stands among functions in the table of vectors, which ISO C does not allow.
+    for flag, sources in (
+        ("-O2", library),
+        ("-Wno-unused-parameter", generated),
+        ("-Dmain=selftest", ["selftest.c"]),
+        ("-Wno-pedantic", ["start.c", "main.c"]),
+    ):
+        run(COMPILER, *FLAGS, flag, "-c", *sources, where=folder)
+    objects = [path.name for path in sorted(folder.glob("*.o"))]
+    link = ("-nostartfiles", "-T", "machine.ld", "--specs=rdimon.specs", *objects, "-lm", "-o", "image.elf")
+    run(COMPILER, *FLAGS, *link, where=folder)
+    return folder / "image.elf"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", ["paper-4.1-helical", "paper-4.2-rotation", "paper-4.4-max"])
+def test_self_test_and_counted_solves(
+    case: str, tmp_path: Path, record_property: Callable[[str, object], None]
+) -> None:
+    for program in (COMPILER, EMULATOR):
+        if shutil.which(program) is None:
+            pytest.skip(f"{program} is not installed")
+    if not Path(run(COMPILER, "-print-file-name=rdimon.specs", where=tmp_path).strip()).is_absolute():
+        pytest.skip("the C library newlib for arm-none-eabi is not installed")
+    options = ["-M", "mps2-an500", "-display", "none", "-monitor", "none", "-serial", "none", "-icount", "shift=0"]
+    semihosting = ["-semihosting-config", "enable=on,target=native", "-kernel", str(image(case, tmp_path))]
+    done = subprocess.run([EMULATOR, *options, *semihosting], capture_output=True, text=True, check=False)
+    printed = done.stdout + done.stderr
+    assert done.returncode == 0, printed
+    (passed,) = re.findall(r"(\d+) passed, 0 failed", printed)
+    assert int(passed) >= 100
+    counts = re.findall(r"(all seeds|warm|cold): (\d+) instructions, (\d+) iterations, status 0", printed)
+    instructions = {name: int(count) for name, count, _ in counts}
+    assert instructions.keys() == {"all seeds", "warm", "cold"}
+    # Counts are whole ticks. A search from the optimum only confirms it.
+    assert all(count > 0 and count % 40 == 0 for count in instructions.values())
+    assert 2 * instructions["warm"] < instructions["cold"] < instructions["all seeds"]
+    # For docs/embedding.md: `--junit-xml FILE -o junit_family=xunit1` shows them.
+    for name, count in instructions.items():
+        record_property(name, count)

@@ -1,16 +1,33 @@
-"""Solved robots in other formats: MuJoCo finds their wrenches and rates, nested loops too, and an import their J."""
+"""Solved robots in other formats: MuJoCo finds their wrenches and rates, and workshops their lengths."""
 
+import io
 import re
 import tomllib
 from dataclasses import replace
 from functools import cache
+from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 import ezdxf
 import mujoco
 import numpy as np
 import pytest
-from builders import EACH_KIND, Array, case_from, rows_of, soaked, starter, starter_text, turn_about
+from builders import (
+    EACH_KIND,
+    FEW_KINDS,
+    Array,
+    case_from,
+    case_of,
+    rows_of,
+    saved,
+    saved_with_robot,
+    soaked,
+    starter,
+    starter_tables,
+    starter_text,
+    turn_about,
+)
 from link_robots import CASE, COUPLING, ROBOT
 from mujoco_trees import Tree
 
@@ -34,15 +51,19 @@ from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.kkt import close_equations
 from screwsynth.nlp.evidence.mobility import mobility_of
 from screwsynth.nlp.evidence.state import loops_are_closed
-from screwsynth.nlp.formats.export import exported_files
+from screwsynth.nlp.formats.export import exported_files, files_at
 from screwsynth.nlp.formats.frames import quaternion_of, roll_pitch_yaw_of
-from screwsynth.nlp.formats.reading.importing import Request, import_robot
+from screwsynth.nlp.formats.reading.importing import Imported, Request, import_robot
 from screwsynth.nlp.formats.reading.reduction import Ends
 from screwsynth.nlp.formats.solved.mechanism_of import Exported, mechanism_of
 from screwsynth.nlp.formats.writing.mjcf import mjcf_text
 from screwsynth.nlp.formats.writing.urdf import urdf_of
 
 ROBOTS = (*EACH_KIND, *SHIPPED)
+#: Some of them together, and all of them in `make soak`.
+EACH = pytest.mark.parametrize(
+    "names", soaked([FEW := (*FEW_KINDS, "three-upu", "hexapod"), ROBOTS], [FEW]), ids=["few", "all"]
+)
 #: One of each kind of limb and of closing, for tests that build the robot again.
 SOME = ("3-rps", "delta-parallelogram", "three-upu")
 OTHERS = ("delta", "exechon", "spherical-3-rrr", "6-rss", "hexapod")
@@ -68,6 +89,15 @@ def exported(name: str, seed: int) -> Exported:
     return mechanism_of(*placed(name, seed))
 
 
+def tree_of(found: Exported) -> Tree:
+    return Tree(mjcf_text(found.mechanism), found.size)
+
+
+def reread(folder: Path, name: str, text: str) -> Imported:
+    """A robot's file, imported."""
+    return import_robot(Request(saved(folder / name, text), Ends("platform")))
+
+
 def work_rates(J: Array) -> Array:
     """J'J, from which F of every twist follows, in parts of its largest entry."""
     squares = J.T @ J
@@ -75,11 +105,12 @@ def work_rates(J: Array) -> Array:
 
 
 @pytest.mark.parametrize("seed", soaked([0, 1], [1]))
-def test_mujoco_finds_closed_loops_and_the_rows_of_the_result(seed: int) -> None:
-    for name in ROBOTS:
+@EACH
+def test_mujoco_finds_closed_loops_and_the_rows_of_the_result(names: tuple[str, ...], seed: int) -> None:
+    for name in names:
         nlp, x = placed(name, seed)
         found, state = exported(name, seed), evaluate(nlp, x)
-        tree = Tree(mjcf_text(found.mechanism), found.size)
+        tree = tree_of(found)
         assert tree.open <= 1e-9, name
         body = tree.data.body("platform")
         np.testing.assert_allclose(body.xpos, state.position, atol=1e-12 * found.size)
@@ -98,12 +129,13 @@ def test_mujoco_finds_closed_loops_and_the_rows_of_the_result(seed: int) -> None
         assert all(rest.shape[1] == 0 for rest in wrenches.values()), name
 
 
-def test_actuator_rates_in_mujoco_are_those_of_the_result() -> None:
+@EACH
+def test_actuator_rates_in_mujoco_are_those_of_the_result(names: tuple[str, ...]) -> None:
     chi = np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2])
-    for name in ROBOTS:
+    for name in names:
         nlp, x = placed(name, 1)
         found = exported(name, 1)
-        tree = Tree(mjcf_text(found.mechanism), found.size)
+        tree = tree_of(found)
         basis = tree.feasible_twists()
         twist = basis @ (basis.T @ chi)
         motion, rest = tree.motion(twist)
@@ -124,7 +156,7 @@ def test_actuator_rates_in_mujoco_are_those_of_the_result() -> None:
 @pytest.mark.parametrize("name", ["delta", "stewart-gough"])
 def test_position_actuators_that_follow_the_rates_move_the_platform_by_the_task(name: str) -> None:
     found = exported(name, 1)
-    tree = Tree(mjcf_text(found.mechanism), found.size)
+    tree = tree_of(found)
     basis = tree.feasible_twists()
     twist = basis @ basis.T @ np.array([0.0, 0.0, 0.1 / found.size, 0.3, 0.2, -0.4])
     motion, _ = tree.motion(twist)
@@ -142,22 +174,19 @@ def test_position_actuators_that_follow_the_rates_move_the_platform_by_the_task(
     assert tree.open <= 1e-8
 
 
-def test_export_import_export_import_keeps_the_rows_of_every_robot(tmp_path: Path) -> None:
-    for name in ROBOTS:
+@EACH
+def test_export_import_export_import_keeps_the_rows_of_every_robot(names: tuple[str, ...], tmp_path: Path) -> None:
+    for name in names:
         nlp, x = placed(name, 1)
         J = work_rates(evaluate(nlp, x).jacobian)
-        mechanism = exported(name, 1).mechanism
+        mechanism = first = exported(name, 1).mechanism
         for _ in range(2):
-            (tmp_path / "robot.xml").write_text(mjcf_text(mechanism), encoding="utf-8")
-            mechanism = import_robot(Request(tmp_path / "robot.xml", Ends("platform"))).mechanism
-        again = wrenches_of(mechanism, nlp.case.characteristic_length).jacobian
-        np.testing.assert_allclose(work_rates(again), J, atol=1e-10, err_msg=name)
-        urdf = urdf_of(exported(name, 1).mechanism)
-        (tmp_path / "robot.urdf").write_text(urdf.text, encoding="utf-8")
-        (tmp_path / "robot.yaml").write_text(urdf.loops_text(exported(name, 1).mechanism), encoding="utf-8")
-        mechanism = import_robot(Request(tmp_path / "robot.urdf", Ends("platform"))).mechanism
-        again = wrenches_of(mechanism, nlp.case.characteristic_length).jacobian
-        np.testing.assert_allclose(work_rates(again), J, atol=1e-10, err_msg=f"{name}, URDF")
+            mechanism = reread(tmp_path, "robot.xml", mjcf_text(mechanism)).mechanism
+        urdf = urdf_of(first)
+        saved(tmp_path / "robot.yaml", urdf.loops_text(first))
+        for each in (mechanism, reread(tmp_path, "robot.urdf", urdf.text).mechanism):
+            again = wrenches_of(each, nlp.case.characteristic_length).jacobian
+            np.testing.assert_allclose(work_rates(again), J, atol=1e-10, err_msg=name)
 
 
 def rebuilt(tables: dict[str, object], nlp: Nlp) -> Nlp:
@@ -176,9 +205,7 @@ def test_a_case_of_an_imported_robot_has_the_same_rows_and_is_exported_again(nam
         program, point = nlp, x
         for _ in range(2):
             text = exported_files(mechanism_of(program, point), ["mjcf"])["robot.xml"]
-            (tmp_path / "robot.xml").write_text(text, encoding="utf-8")
-            tables = import_robot(Request(tmp_path / "robot.xml", Ends("platform"))).tables
-            program = rebuilt(tables, nlp)
+            program = rebuilt(reread(tmp_path, "robot.xml", text).tables, nlp)
             point = np.zeros(program.n)
             again = evaluate(program, point)
             assert again.jacobian.shape == state.jacobian.shape
@@ -186,8 +213,9 @@ def test_a_case_of_an_imported_robot_has_the_same_rows_and_is_exported_again(nam
             assert abs(again.F - state.F) <= 1e-10 * state.size
 
 
-def test_urdf_loads_in_mujoco_and_its_loop_frames_coincide() -> None:
-    for name in ROBOTS:
+@EACH
+def test_urdf_loads_in_mujoco_and_its_loop_frames_coincide(names: tuple[str, ...]) -> None:
+    for name in names:
         found = exported(name, 1)
         urdf = urdf_of(found.mechanism)
         # MuJoCo merges links that are fixed to others, unless it is told not to.
@@ -225,22 +253,16 @@ def test_screws_couplings_and_welds_of_any_mechanism_are_written() -> None:
     np.testing.assert_allclose(model.actuator_ctrlrange, [[-1.0, 2.0]])
     assert model.body("platform").parentid == model.body("a").id
     urdf = urdf_of(Mechanism("any", links, joints, "base", "platform", couplings))
-    factors = {
-        m[1]: (m[2], float(m[3]))
-        for m in re.finditer(
-            r'<joint name="(\w+)"(?:(?!</joint>).)*<mimic joint="(\w+)" multiplier="([^"]+)"', urdf.text, re.DOTALL
-        )
-    }
-    assert factors == {"screw_slide": ("screw", 0.25), "slide": ("screw", 0.25)}
+    mimic = r'<joint name="(\w+)"(?:(?!</joint>).)*<mimic joint="(\w+)" multiplier="([^"]+)"'
+    factors = [(name, other, float(by)) for name, other, by in re.findall(mimic, urdf.text, re.DOTALL)]
+    assert sorted(factors) == [("screw_slide", "screw", 0.25), ("slide", "screw", 0.25)]
     with pytest.raises(InputError, match="'three' cannot be written as URDF: it has 3 joints"):
         urdf_of(Mechanism("any", links, joints, "base", "platform", three))
 
 
 def test_ranges_count_from_the_pose_and_reach_the_actuators() -> None:
-    text = starter_text("3-rps").replace("actuator_length", "# actuator_length")
-    tables = tomllib.loads(text)
-    tables["limits"] = {"actuator_length": {"min": -0.4, "max": 0.5}, "joint": {"1:1": {"max": 30}}}
-    nlp = formulate(case_from(tables, "rps"))
+    limits = {"actuator_length": {"min": -0.4, "max": 0.5}, "joint": {"1:1": {"max": 30}}}
+    nlp = formulate(case_from(tomllib.loads(starter_text("3-rps")) | {"limits": limits}))
     found = mechanism_of(nlp, closed_start(nlp))
     state = evaluate(nlp, closed_start(nlp))
     joints = {joint.name: joint for joint in found.mechanism.joints}
@@ -281,11 +303,9 @@ def test_tables_hold_the_joints_in_every_frame() -> None:
 
 def test_plates_are_drawn_to_scale_with_their_unit_and_their_offsets(tmp_path: Path) -> None:
     found = exported("hexapod", 1)
-    moved = [
-        replace(each, point=each.point + np.array([0, 0, 0.5])) if each.name == "joint_1_1_first" else each
-        for each in found.mechanism.joints
-    ]
-    tilted = replace(found, mechanism=replace(found.mechanism, joints=tuple(moved)))
+    up = {"joint_1_1_first": np.array([0, 0, 0.5])}
+    moved = tuple(replace(each, point=each.point + up.get(each.name, 0)) for each in found.mechanism.joints)
+    tilted = replace(found, mechanism=replace(found.mechanism, joints=moved))
     files = exported_files(tilted, ["dxf"])
     assert files == exported_files(tilted, ["dxf"])
     assert "joint centres of the base are not in one plane" in " ".join(files["README.md"].split())
@@ -293,8 +313,7 @@ def test_plates_are_drawn_to_scale_with_their_unit_and_their_offsets(tmp_path: P
     offsets = [float(row["offset from plane [cm]"]) for row in rows if row["plate"] == "base"]
     assert max(map(abs, offsets)) > 0.02
     for plate in ("base", "platform"):
-        (tmp_path / "plate.dxf").write_text(files[f"{plate}.dxf"], encoding="utf-8")
-        document = ezdxf.readfile(tmp_path / "plate.dxf")
+        document = ezdxf.readfile(saved(tmp_path / "plate.dxf", files[f"{plate}.dxf"]))
         assert document.units == 5
         assert not document.audit().errors
         circles = np.array([each.dxf.center for each in document.modelspace().query("CIRCLE")])
@@ -326,9 +345,8 @@ def test_links_that_are_limbs_are_exported_with_the_labels_of_limbs() -> None:
     found = exported("3-rps", 0)
     program = rebuilt(links_of(found.mechanism), nlp)
     again = mechanism_of(program, closed_start(program))
-    assert [(joint.label, joint.actuator) for joint in again.joints] == [
-        (joint.label, joint.actuator) for joint in found.joints
-    ]
+    one, other = ([(joint.label, joint.actuator) for joint in each.joints] for each in (again, found))
+    assert one == other
     for one, other in zip(again.mechanism.joints, found.mechanism.joints, strict=True):
         np.testing.assert_allclose(one.point, other.point, atol=1e-12)
 
@@ -346,7 +364,7 @@ def test_a_driven_parallelogram_has_the_range_of_its_way_as_an_angle() -> None:
     assert words.coordinate is not None
     assert 0.3 < words.coordinate < 0.5
     np.testing.assert_allclose(joint.range, np.array([-1.0, 1.5]) / rod - words.coordinate, atol=1e-12)
-    assert Tree(mjcf_text(found.mechanism), found.size).open <= 1e-9
+    assert tree_of(found).open <= 1e-9
 
 
 # Nested loops and coupled joints in other programs' formats: MuJoCo finds the rates of the result, an import its J.
@@ -354,26 +372,23 @@ def test_a_driven_parallelogram_has_the_range_of_its_way_as_an_angle() -> None:
 
 @pytest.mark.parametrize("coupling", ["", COUPLING])
 def test_nested_loops_and_coupled_joints_are_exported(coupling: str, tmp_path: Path) -> None:
-    (tmp_path / "robot.toml").write_text(ROBOT + coupling, encoding="utf-8")
     free = "{ min = -0.1, max = 0.1 }, { min = 0.9, max = 1.1 }, 0]\n"
     free += "rotation = { axis = [0, 0, 1], angle = { min = -10, max = 10 } }"
     limits = "[limits]\nactuator_angle = { min = -40, max = 50 }\n"
-    (tmp_path / "case.toml").write_text(CASE.replace("0, 1, 0]", free) + limits, encoding="utf-8")
-    nlp = formulate(load_case(tmp_path / "case.toml"))
+    nlp = formulate(load_case(saved_with_robot(tmp_path, ROBOT + coupling, CASE.replace("0, 1, 0]", free) + limits)))
     start = closed_start(nlp)
     x = close_equations(nlp, start + 0.05 * np.random.default_rng(1).uniform(-1, 1, nlp.n))
     state = evaluate(nlp, x)
     assert np.abs(state.position - [0, 1, 0]).max() > 1e-3
     found = mechanism_of(nlp, x)
-    tree = Tree(mjcf_text(found.mechanism), found.size)
+    tree = tree_of(found)
     assert tree.open <= 1e-9
     np.testing.assert_allclose(tree.data.body("platform").xpos, state.position, atol=1e-9)
-    J = wrenches_of(found.mechanism, nlp.case.characteristic_length).jacobian
-    np.testing.assert_allclose(work_rates(J), work_rates(state.jacobian), atol=1e-8)
+    for mechanism in (found.mechanism, reread(tmp_path, "robot.xml", mjcf_text(found.mechanism)).mechanism):
+        J = wrenches_of(mechanism, nlp.case.characteristic_length).jacobian
+        np.testing.assert_allclose(work_rates(J), work_rates(state.jacobian), atol=1e-8)
     angle = next(joint.coordinate for joint in found.joints if joint.name == "motor")
     motor = next(joint for joint in found.mechanism.joints if joint.name == "motor")
-    assert motor.range is not None
-    assert angle is not None
     np.testing.assert_allclose(motor.range, np.radians([-40, 50]) - angle, atol=1e-12)
     basis = tree.feasible_twists()
     assert basis.shape[1] == (1 if coupling else 2)
@@ -383,13 +398,118 @@ def test_nested_loops_and_coupled_joints_are_exported(coupling: str, tmp_path: P
     assert mobility is not None
     rates = [mobility.actuator_rates[joint.actuator] for joint in found.joints if joint.actuator]
     np.testing.assert_allclose(tree.motion(twist)[0][tree.driven], rates, atol=1e-7)
-    (tmp_path / "robot.xml").write_text(mjcf_text(found.mechanism), encoding="utf-8")
-    again = import_robot(Request(tmp_path / "robot.xml", Ends("platform"))).mechanism
-    J = wrenches_of(again, nlp.case.characteristic_length).jacobian
-    np.testing.assert_allclose(work_rates(J), work_rates(state.jacobian), atol=1e-8)
     # Another assembly of the four-bar has the same actuators, and is not reached from home.
-    flipped = x.copy()
-    index = [each.name for each in nlp.program.variables].index("q2_2")
-    flipped[index] += 0.5
+    flipped = x + 0.5 * np.array([each.name == "q2_2" for each in nlp.program.variables])
     with pytest.raises(InputError, match="leads to another assembly or pose than the answer's"):
         mechanism_of(nlp, flipped)
+
+
+def centres_of(files: dict[str, str], unit: str) -> dict[str, Array]:
+    """Joint centres in the frame of the base, by joint."""
+    rows = rows_of(files["joints.csv"])
+    return {row["joint"]: np.array([float(row[f"{c} in base [{unit}]"]) for c in "xyz"]) for row in rows}
+
+
+def lengths_of(row: dict[str, str], unit: str, *names: str) -> list[float]:
+    return [float(row[f"{name} [{unit}]"]) for name in names]
+
+
+@pytest.mark.parametrize("name", ["exechon", "6-rus"])
+def test_every_link_is_listed_with_the_distances_of_its_centres_and_drawn_with_them(name: str) -> None:
+    nlp = formulate(starter(name))
+    unit = nlp.case.units.length
+    files = files_at(nlp, closed_start(nlp), ["csv", "dxf"], 1)
+    centres = centres_of(files, unit)
+    links: dict[str, list[str]] = {}
+    for row in rows_of(files["joints.csv"]):
+        for link in (row["inner link"], row["outer link"]):
+            links.setdefault(link, []).append(row["joint"])
+    listed: dict[str, list[float]] = {}
+    for row in rows_of(files["cut-list.csv"]):
+        parts, ends = row["parts"].split(), [row["from joint"].split(), row["to joint"].split()]
+        assert len(parts) == int(row["quantity"])
+        if row["item"] == "link":
+            (length,) = lengths_of(row, unit, "length")
+            first, last = (centres[joints[0]] for joints in ends)
+            assert length == pytest.approx(np.linalg.norm(last - first), rel=1e-12)
+            for part in parts:
+                listed.setdefault(part, []).append(length)
+    for link, joints in links.items():
+        points = np.unique(np.round([centres[joint] for joint in joints], 9), axis=0)
+        apart = sorted(float(np.linalg.norm(b - a)) for a, b in combinations(points, 2))
+        if link in ("base", "platform"):
+            assert link not in listed
+            continue
+        np.testing.assert_allclose(sorted(listed.get(link, [])), apart, rtol=1e-7)
+        assert (f"{link}.dxf" in files) == bool(apart)
+        if apart:
+            space = ezdxf.read(io.StringIO(files[f"{link}.dxf"])).modelspace()
+            drawn = [np.array(circle.dxf.center)[:2] for circle in space.query("CIRCLE")]
+            found = sorted(float(np.linalg.norm(b - a)) for a, b in combinations(drawn, 2))
+            np.testing.assert_allclose(found, apart, rtol=1e-7)  # of these robots every link is flat
+            assert f"`{link}.dxf`: Outline" in files["README.md"]
+    assert any(int(row["quantity"]) > 1 for row in rows_of(files["cut-list.csv"]))
+
+
+def hexapod_with(limits: dict[str, Any]) -> Case:
+    """A case with limits at three poses: the stated one, a higher one, and one that is turned too."""
+    turned = {"rotation": turn_about((0, 1, 0), 0.2).tolist(), "translation": [1, 0, 2]}
+    moves = [{"translation": [0, 0, 0]}, {"translation": [0, 0, 4]}, turned]
+    pose = starter_tables("hexapod")["pose"] | {"displacements": moves}
+    return case_of("hexapod", pose=pose, limits=limits)
+
+
+def test_legs_have_their_strokes_over_all_poses_and_within_their_limits() -> None:
+    nlp = formulate(hexapod_with({"leg_length": {"min": 3, "max": 400}}))
+    unit, x = nlp.case.units.length, closed_start(nlp)
+    at_poses = []
+    for pose in (1, 2, 3):
+        files = files_at(nlp, x, ["csv"], pose)
+        centres = centres_of(files, unit)
+        legs = [name for name in centres if name.endswith("_3")]
+        at_poses.append([np.linalg.norm(centres[leg] - centres[leg.removesuffix("_3") + "_1_first"]) for leg in legs])
+        rows = [row for row in rows_of(files["cut-list.csv"]) if row["item"] == "length of a leg"]
+        slides = {name: row for row in rows for name in row["parts"].split()}
+        found = [lengths_of(slides[leg.removesuffix("_3") + "_2"], unit, "length") for leg in legs]
+        np.testing.assert_allclose(np.ravel(found), at_poses[-1], rtol=1e-12)
+    lengths = np.array(at_poses)
+    names = ("smallest used", "largest used", "stroke used", "smallest allowed", "largest allowed", "stroke allowed")
+    found = np.array([lengths_of(slides[leg.removesuffix("_3") + "_2"], unit, *names) for leg in legs])
+    np.testing.assert_allclose(found[:, 0], lengths.min(axis=0), rtol=1e-12)
+    np.testing.assert_allclose(found[:, 1], lengths.max(axis=0), rtol=1e-12)
+    np.testing.assert_allclose(found[:, 2], np.ptp(lengths, axis=0), atol=1e-12)
+    np.testing.assert_allclose(found[:, 3:], [[3, 400, 397]] * 6, rtol=1e-12)
+    assert np.ptp(lengths, axis=0).min() > 0.5
+
+
+@pytest.mark.parametrize(
+    ("least", "most", "largest", "dead"),
+    [
+        (None, None, 5.5, None), (3, 400, 5.5, None), (3, 400, 500, None), (None, None, None, 2),
+        (3, 30, None, 2), (10, 22, 500, 9), (10, 14, None, 9), (None, 24, 500, 4), (None, 24, 9, 4),
+        (None, 24, None, None),
+    ],
+)  # fmt: skip
+def test_the_stroke_allowed_is_the_largest_one_within_all_limits(
+    least: float | None, most: float | None, largest: float | None, dead: float | None
+) -> None:
+    given = {"leg_length": {"min": least, "max": most}, "actuator": {"stroke_max": largest, "dead_length": dead}}
+    limits = {name: {key: value for key, value in table.items() if value is not None} for name, table in given.items()}
+    nlp = formulate(hexapod_with({name: table for name, table in limits.items() if table}))
+    files = files_at(nlp, closed_start(nlp), ["csv"], 1)
+    rows = [row for row in rows_of(files["cut-list.csv"]) if row["item"] == "length of a leg"]
+    assert len(rows) > 1
+    unit = nlp.case.units.length
+    for row in rows:
+        (shortest,) = lengths_of(row, unit, "smallest used")
+        # Each retracted length up to the shortest one used, and the longest stroke that the limits leave from there.
+        retracted = np.linspace(0 if least is None else least, max(shortest, least or 0), 200_001)
+        ends = [np.full(retracted.size, np.inf if largest is None else largest)]
+        ends += [] if most is None else [most - retracted]
+        ends += [] if dead is None else [retracted - dead]
+        stroke = float(np.minimum.reduce(ends).max())
+        found = row[f"stroke allowed [{unit}]"]
+        if largest is None and dead is None and least is None:
+            assert found == ""
+        else:
+            assert float(found) == pytest.approx(stroke, abs=1e-3)

@@ -1,4 +1,4 @@
-"""Pictures: what is drawn stands where the model says, in true proportion, and files come whole or not at all."""
+"""Pictures: drawn where the model says, in true proportion, with words in clear places."""
 
 import itertools
 import math
@@ -11,26 +11,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import EACH_CASE, EACH_KIND, FEW_CASES, Run, case_from, output_of, refusal_of, saved, soaked
+from builders import EACH_CASE, EACH_KIND, FEW_CASES, Array, Run, case_from, output_of, refusal_of, saved, soaked
 from casadi import SX
 from matplotlib.figure import Figure
 from measures import exponential
 
 from screwsynth.models import Body, Link, Model, Point, PoseSymbols, Scene, force_along, model_names
 from screwsynth.models.catalog import gallery_names
-from screwsynth.nlp import Case, InputError, Solution, Task, evaluate, load_case, plot, result_of, solve
-from screwsynth.nlp.case.robots import build_model, model_options
-from screwsynth.nlp.output.pictures import fonts
+from screwsynth.nlp import Case, InputError, Solution, Task, build_model, evaluate, load_case, plot, result_of, solve
+from screwsynth.nlp.case.robots import model_options
+from screwsynth.nlp.output.pictures import fonts, places
 from screwsynth.nlp.output.pictures.drawing import Drawing, drawing_of_model
 from screwsynth.nlp.output.pictures.figures import figure_of, picture
+from screwsynth.nlp.output.pictures.segments import distances_to_segments, segments_cross, segments_in_boxes
 from screwsynth.nlp.output.pictures.solutions import drawings_of
 from screwsynth.nlp.output.pictures.view import clearest_view
 from screwsynth.nlp.results.robottables import robot_table
 
 #: Robots whose functions say where their parameters are in a picture; a robot file does not.
 DRAWN_BY_HAND = [name for name in model_names() if name not in gallery_names()]
-
-
 #: Shipped cases with an axis to draw; hexapod-workspace has the robot of hexapod-machining, and takes long to solve.
 PICTURED = [name for name in EACH_CASE if name not in {"paper-4.2", "hexapod-workspace"}]
 
@@ -40,13 +39,10 @@ def drawing(name: str) -> Drawing:
     return drawings_of(solve(load_case(name), starts=4))[0]
 
 
-def test_a_unit_is_as_long_across_as_upwards() -> None:
+def test_the_view_is_a_parallel_projection_without_stretch() -> None:
     axes = figure_of([drawing("paper-4.3")]).axes[0]
     origin, right, up = axes.transData.transform([[0, 0], [1, 0], [0, 1]])
     assert math.dist(origin, right) == pytest.approx(math.dist(origin, up), rel=1e-9)
-
-
-def test_the_view_is_a_parallel_projection_without_stretch() -> None:
     robot = drawing("paper-4.1-helical")
     view = clearest_view(robot)
     across = np.array([view.project(np.eye(3)[i]) - view.project(np.zeros(3)) for i in range(3)]).T
@@ -89,27 +85,22 @@ def test_a_helix_has_the_pitch_of_the_task() -> None:
     assert (along[1] - along[0]) / turns == pytest.approx(motion.pitch, rel=1e-9)
 
 
-@pytest.mark.parametrize("ending", [".png", ".svg", ".pdf"])
-def test_the_same_robot_gives_the_same_bytes(ending: str) -> None:
+def test_the_same_robot_gives_the_same_bytes() -> None:
     robot = drawing("paper-4.1-helical-axis-z")
-    first, second = picture([robot], ending), picture([robot], ending)
-    assert first == second
-    assert first[:4] in (b"\x89PNG", b"<?xm", b"%PDF")
+    for ending, head in ((".png", b"\x89PNG"), (".svg", b"<?xm"), (".pdf", b"%PDF")):
+        first, second = picture([robot], ending), picture([robot], ending)
+        assert first == second
+        assert first.startswith(head)
 
 
-@pytest.mark.parametrize("name", DRAWN_BY_HAND)
-def test_every_parameter_of_a_robot_is_named_in_its_picture(name: str) -> None:
-    model = build_model(name)
-    words = {text.get_text() for text in figure_of([drawing_of_model(model)]).axes[0].texts}
-    assert {parameter.name for parameter in model.parameters} <= words
-
-
-def test_words_do_not_cover_each_other() -> None:
+def test_words_name_parameters_and_do_not_cover_each_other() -> None:
     figure = figure_of([drawing("hexapod-machining")])
     figure.canvas.draw()
     boxes = [text.get_window_extent() for text in figure.axes[0].texts if text.get_text()]
-    for i, one in enumerate(boxes):
-        assert not [other for other in boxes[i + 1 :] if one.overlaps(other)]
+    assert not [1 for one, other in itertools.combinations(boxes, 2) if one.overlaps(other)]
+    for model in map(build_model, DRAWN_BY_HAND):
+        words = {text.get_text() for text in figure_of([drawing_of_model(model)]).axes[0].texts}
+        assert {parameter.name for parameter in model.parameters} <= words
 
 
 def crosses_box(a: np.ndarray, b: np.ndarray, box: tuple[float, float, float, float]) -> bool:
@@ -278,7 +269,7 @@ def test_numbers_in_a_picture_are_those_of_the_table_with_units(name: str) -> No
         assert ":" not in label, "a name that ends in a sign must not stand before a number in one line"
 
 
-def two_links() -> Case:
+def test_a_limb_of_several_links_has_one_label() -> None:
     """A limb of two links, and five limbs of one."""
     pose = PoseSymbols()
     p, points, links, rows = pose.position, [], [], []
@@ -294,11 +285,8 @@ def two_links() -> Case:
     links += [Link("B0", "K", Body.LIMB, limb="0"), Link("K", "A0", Body.LIMB, limb="0")]
     scene = Scene(tuple(points), tuple(links))
     model = Model("two-links", "a limb of two links", (), pose, (0.0, 0.0, 20.0), tuple(rows), scene=scene)
-    return Case(model=model, parameters={}, position=[0, 0, 20], tasks=[Task([0, 0, 1, 1, 2, 3])])
-
-
-def test_a_limb_of_several_links_has_one_label() -> None:
-    assert_labels_are_clear(drawings_of(solve(two_links())))
+    case = Case(model=model, parameters={}, position=[0, 0, 20], tasks=[Task([0, 0, 1, 1, 2, 3])])
+    assert_labels_are_clear(drawings_of(solve(case)))
 
 
 def test_letters_that_no_font_has_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -345,16 +333,11 @@ def test_any_pose_is_drawn_and_the_worst_is_named(tmp_path: Path, cli: Run, thre
         assert ("the worst" in robot.headline) == (values[k] == min(values))
     file = saved(tmp_path / "poses.toml", three_poses("max"))
     output_of(cli("solve", str(file), "--plot", str(tmp_path / "pose.png"), "--pose", "3"))
+    assert "F" in output_of(cli("solve", "paper-4.2", "--starts", "2", "--plot", str(tmp_path / "tasks.png")))
+    assert (tmp_path / "pose.png").read_bytes()[:4] == (tmp_path / "tasks.png").read_bytes()[:4] == b"\x89PNG"
     refusal_of(cli("solve", str(file), "--plot", str(tmp_path / "pose.png"), "--pose", "4"), "--pose 4", "3 poses")
     with pytest.raises(InputError, match="pose 4 does not exist"):
         plot(solution, tmp_path / "pose.png", pose=4)
-
-
-def test_the_command_line_draws(tmp_path: Path, cli: Run) -> None:
-    target = tmp_path / "pose.png"
-    out = output_of(cli("solve", "paper-4.2", "--starts", "2", "--plot", str(target)))
-    assert "F" in out
-    assert target.read_bytes()[:4] == b"\x89PNG"
 
 
 def test_a_failed_solve_is_drawn_as_what_it_is() -> None:
@@ -368,14 +351,58 @@ def test_a_failed_solve_is_drawn_as_what_it_is() -> None:
     assert "not" in robot.headline
 
 
-@pytest.mark.parametrize(
-    ("arguments", "fault"),
-    [
-        (("solve", "paper-4.1-helical", "--plot", "pose.jpg"), ".png"),
-        (("solve", "paper-4.1-helical", "--plot", "/no/such/folder/pose.png"), "cannot be written"),
-        (("models", "--plot", "robot.png"), "name of a robot"),
-        (("models", "stewart-gough", "--plot", "robot"), ".png"),
-    ],
-)
-def test_what_cannot_be_drawn_is_told_before_the_work(arguments: tuple[str, ...], fault: str, cli: Run) -> None:
-    refusal_of(cli(*arguments), fault)
+def test_what_cannot_be_drawn_is_told_before_the_work(cli: Run) -> None:
+    for arguments, fault in (
+        ("solve paper-4.1-helical --plot pose.jpg", ".png"),
+        ("solve paper-4.1-helical --plot /no/such/folder/pose.png", "cannot be written"),
+        ("models --plot robot.png", "name of a robot"),
+        ("models stewart-gough --plot robot", ".png"),
+    ):
+        refusal_of(cli(*arguments.split()), fault)
+
+
+@pytest.fixture
+def segments() -> Array:
+    """Lines (k, 4): askew, level, upright, and points."""
+    found = np.random.default_rng(1).uniform(0.0, 100.0, (60, 4))
+    found[10:20, 3] = found[10:20, 1]
+    found[20:30, 2] = found[20:30, 0]
+    found[30:35, 2:] = found[30:35, :2]
+    return found
+
+
+def test_a_line_is_within_a_box_where_cutting_by_each_side_leaves_a_part(segments: Array) -> None:
+    corners = np.random.default_rng(2).uniform(0.0, 100.0, (50, 2, 2))
+    boxes = np.hstack([corners.min(axis=1), corners.max(axis=1)])
+    expected = [[crosses_box(line[:2], line[2:], tuple(box)) for line in segments] for box in boxes]
+    assert np.array_equal(segments_in_boxes(segments, boxes), expected)
+    assert 0 < np.count_nonzero(expected) < np.size(expected)
+    # A line that ends at a side is within the box, and one just beside it is not.
+    box = np.array([[10.0, 10.0, 20.0, 20.0]])
+    ends = np.array([[0.0, 15, 10, 15], [0, 15, 9.999, 15], [0, 20, 30, 20], [0, 20.001, 30, 20.001], [12, 12, 13, 14]])
+    assert segments_in_boxes(ends, box).tolist() == [[True, False, True, False, True]]
+    assert segments_in_boxes(np.zeros((0, 4)), box).shape == (1, 0)
+
+
+def test_lines_cross_and_points_are_as_far_as_from_the_nearest_point(segments: Array) -> None:
+    askew, lines = segments[:10], segments[35:]
+    expected = [[cross(line.reshape(2, 2), each.reshape(2, 2)) for each in askew] for line in lines]
+    assert np.array_equal(segments_cross(askew, lines), expected)
+    assert 0 < np.count_nonzero(expected) < np.size(expected)
+    points, lines = segments[:30, :2], segments[35:]
+    for line, row in zip(lines, distances_to_segments(points, lines), strict=True):
+        a, b = line[:2], line[2:]
+        for point, found in zip(points, row, strict=True):
+            is_beside = 0 <= (point - a) @ (b - a) <= (b - a) @ (b - a)
+            ends = min(np.linalg.norm(point - a), np.linalg.norm(point - b))
+            assert found == pytest.approx(distance(point, a, b) if is_beside else ends, abs=1e-9)
+
+
+def test_words_stand_at_the_cheapest_of_all_places(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The search ends early, and no place that it leaves out is better: all places at once give the same picture."""
+    drawing = drawing_of_model(build_model("6-ups"))
+    found = []
+    for count in (5, 160, 100_000):
+        monkeypatch.setattr(places, "_AT_ONCE", count)
+        found.append([text.get_position() for text in figure_of([drawing]).axes[0].texts])
+    assert found[0] == found[1] == found[2]

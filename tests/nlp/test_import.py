@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 import pytest
 import reachy
-from builders import Array, Run, output_of, refusal_of, saved, turn_about
+from builders import Array, Run, assert_words, output_of, refusal_of, saved, turn_about
 
 from screwsynth.models import RobotError, Substitution, jacobian, robot
 from screwsynth.models.mechanism import mechanism_of, wrenches_of
@@ -185,8 +185,7 @@ def test_files_defaults_angles_hinges_of_two_connects_and_gears(tmp_path: Path) 
     assert joints["motor"].range == pytest.approx(np.radians([-40, 30]))  # counted from the configuration, at ref
     assert joints["motor"].actuated  # through the gear, which is on a side chain
     notes = " ".join(found.notes)
-    for words in ("gear", "not active", "'pull'"):
-        assert words in notes
+    assert_words(notes, "gear", "not active", "'pull'")
     assert [joint["type"] for limb in found.tables["limb"] for joint in limb["joints"]].count("U") == 1
 
 
@@ -194,8 +193,7 @@ def test_suggestions_become_dimensions(tmp_path: Path, cli: Run) -> None:
     model, out = tmp_path / "head.xml", tmp_path / "robot.toml"
     model.write_text(reachy.mjcf(names=False), encoding="utf-8")
     text = output_of(cli("import", str(model), "--platform", "head", "--close", "--suggest"))
-    for words in ("circle1", "circle2", "circle3", "limbs 1, 3, 5; 2, 4, 6 are copies by 120 deg", "mirror"):
-        assert words in text
+    assert_words(text, "circle1", "circle2", "circle3", "limbs 1, 3, 5; 2, 4, 6 are copies by 120 deg", "mirror")
     dimensions = ("--free", "fold", "circle3=rp", "stewart_1.axis")
     output_of(cli("import", str(model), "--platform", "nose", "--close", "--out", str(out), *dimensions))
     tables = tomllib.loads(out.read_text(encoding="utf-8"))

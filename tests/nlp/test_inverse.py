@@ -1,11 +1,10 @@
 """Inverse kinematics of many poses, held against distances, MuJoCo's loops, finite differences and ``evaluate``."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import Array, output_of, refusal_of, rows_of, saved, turn_about
+from builders import Array, Run, output_of, refusal_of, rows_of, saved, turn_about
 from measures import circle_joints
 from mujoco_robots import Oracle
 from robot_files import robot_of
@@ -16,11 +15,10 @@ from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.proof.statement.machine import joint_centres
 from screwsynth.nlp.units import Units
 
-Run = Callable[..., tuple[int, str, str]]
 TASK = Task(np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2]))
 
 
-def case_of(name: str, position: Array | None = None, rotation: Rotation | None = None) -> Case:
+def typical_case(name: str, position: Array | None = None, rotation: Rotation | None = None) -> Case:
     model = build_model(name)
     dimensions = {each.name: each.typical if len(each.typical) > 1 else each.typical[0] for each in model.parameters}
     place = model.home if position is None else position.tolist()
@@ -54,9 +52,8 @@ def test_straight_legs_have_the_distances_of_their_joints() -> None:
     np.testing.assert_allclose(found.coordinates, lengths, rtol=1e-13)
     units = spans / lengths[:, :, None]
     np.testing.assert_allclose(found.jacobian, np.concatenate([units, np.cross(ends, units)], axis=2), atol=1e-11)
-    np.testing.assert_allclose(
-        found.rates, np.concatenate([np.cross(ends - p[:, None], units), units], axis=2), atol=1e-11
-    )
+    rates = np.concatenate([np.cross(ends - p[:, None], units), units], axis=2)
+    np.testing.assert_allclose(found.rates, rates, atol=1e-11)
 
 
 @pytest.mark.parametrize("name", ["delta", "planar-3-rrr", "3-prs", "tricept"])
@@ -71,7 +68,7 @@ def test_actuators_are_where_mujoco_drove_them(name: str) -> None:
         twists[k] = [*chi[:3], *(chi[3:] + np.cross(chi[:3], p[k]))]
         rates.append(oracle.rates(chi))
     for follow in ("home", "previous"):
-        found = inverse(case_of(name), p, R, follow=follow)
+        found = inverse(typical_case(name), p, R, follow=follow)
         assert found.closed.all()
         np.testing.assert_allclose(found.coordinates, driven, atol=2e-7)
         np.testing.assert_allclose(np.einsum("nai,ni->na", found.rates, twists), rates, atol=2e-6)
@@ -89,7 +86,7 @@ def test_rows_joints_and_rates_are_those_of_evaluate_and_of_differences(
     name: str, shift: list[float], axis: list[float], motions: Array
 ) -> None:
     model = build_model(name)
-    case = case_of(name, np.array(model.home) + shift, Rotation(axis, 0.2))
+    case = typical_case(name, np.array(model.home) + shift, Rotation(axis, 0.2))
     nlp = formulate(case)
     x = closed_start(nlp)
     state = evaluate(nlp, x)
@@ -115,19 +112,17 @@ def test_each_pose_that_cannot_be_taken_is_flagged_and_the_others_stay() -> None
     p, R = np.tile([0.0, 0.0, 0.0], (6, 1)), np.tile(np.eye(3), (6, 1, 1))
     p[1, 0], p[2, 2], p[3, 1] = 9.0, 0.1, np.nan  # out of reach, out of the plane, no number
     R[4] = np.diag([1.0, 1.0, -1.0])
-    case = case_of("planar-3-rrr", p[0])
+    case = typical_case("planar-3-rrr", p[0])
     for follow in ("home", "previous"):
         found = inverse(case, p, R, follow=follow)
         assert found.closed.tolist() == [True, False, False, False, False, True]
         for values in (found.coordinates, found.unknowns, found.jacobian, found.rates):
             assert np.isnan(values[1:5]).all()
             assert np.isfinite(values[[0, 5]]).all()
-    far = inverse(case_of("delta"), [[0.0, 0.0, -9.0], [*build_model("delta").home]])
+    far = inverse(typical_case("delta"), [[0.0, 0.0, -9.0], [*build_model("delta").home]])
     assert far.closed.tolist() == [False, True]
     assert inverse(case, np.zeros((0, 3))).coordinates.shape == (0, 3)
-
-
-def test_a_singular_pose_is_closed_and_flagged() -> None:
+    # A singular pose is closed and flagged.
     case = load_case("hexapod-linuxcnc")
     turns = np.array([turn_about([0, 0, 1], angle) for angle in np.radians([0, 30, 90, 90.001])])
     found = inverse(case, np.tile([0.0, 0.0, 20.0], (4, 1)), turns)
@@ -136,7 +131,7 @@ def test_a_singular_pose_is_closed_and_flagged() -> None:
 
 
 def test_joints_are_followed_from_pose_to_pose_beyond_a_turn() -> None:
-    case = case_of("planar-3-rpr")
+    case = typical_case("planar-3-rpr")
     base, platform, _ = joint_centres(case)
     # The first leg turns about its joint of the base.
     turns = [turn_about([0, 0, 1], angle) for angle in np.linspace(0, 2 * np.pi, 26)[:-1]]
@@ -151,7 +146,7 @@ def test_joints_are_followed_from_pose_to_pose_beyond_a_turn() -> None:
 
 
 def test_a_robot_of_another_size_has_the_same_joints() -> None:
-    case = case_of("3-prs")
+    case = typical_case("3-prs")
     p = np.add(case.model.home, [[0.0, 0.0, 0.03], [0.0, 0.0, -0.05]])
     large = {each.name: 50 * each.typical[0] for each in case.model.parameters if each.dimension.value == "length"}
     other = Case(case.model, {**case.parameters, **large}, case.position, case.tasks)
@@ -162,7 +157,7 @@ def test_a_robot_of_another_size_has_the_same_joints() -> None:
 
 
 def test_input_that_is_none_is_refused() -> None:
-    case = case_of("delta")
+    case = typical_case("delta")
     with pytest.raises(InputError, match=r"must be arrays \(N, 3\) and \(N, 3, 3\), got \(3, 2\)"):
         inverse(case, np.zeros((3, 2)))
     with pytest.raises(InputError, match=r"got \(\) and"):
@@ -191,11 +186,9 @@ def test_the_command_writes_a_row_for_each_pose(tmp_path: Path, cli: Run) -> Non
 
 
 def test_the_command_ends_with_status_1_where_poses_are_not_closed(tmp_path: Path, cli: Run) -> None:
-    case = tmp_path / "delta.toml"
+    case, out = saved(tmp_path / "delta.toml", typical_case("delta").to_toml()), tmp_path / "out.csv"
     x, y, z = build_model("delta").home
     poses = saved(tmp_path / "poses.csv", f"x,y,z\n{x},{y},{z + 0.05}\n0,0,-9\n0,0,-8\n")
-    case.write_text(case_of("delta").to_toml(), encoding="utf-8")
-    out = tmp_path / "out.csv"
     code, text, err = cli("inverse", str(case), "--poses", str(poses), "--csv", str(out))
     assert (code, err) == (1, "")
     assert "2 of 3 poses are not closed, the first in row 3 of" in " ".join(text.split())

@@ -1,4 +1,4 @@
-"""Search by limbs: what is read off the expressions, bounds of sums, and that nothing better is ever dropped."""
+"""Search by limbs, and threads of a search: nothing better is dropped, results do not depend on threads."""
 
 import math
 from dataclasses import replace
@@ -7,12 +7,13 @@ from types import SimpleNamespace
 import casadi as ca
 import numpy as np
 import pytest
+from builders import Patch
 from limb_cases import machine, poses, separated
 from numpy_engine.bounding import NumpyEngine
 from numpy_engine.limb_models import NumpyLimbEngine
 
 from screwsynth.nlp import Case, CertificateStatus, certify_program, formulate, load_case, solve
-from screwsynth.nlp.proof.boxes.engine import Engine
+from screwsynth.nlp.proof.boxes.engine import Engine, Threads, pieces
 from screwsynth.nlp.proof.boxes.incumbent import Incumbent
 from screwsynth.nlp.proof.boxes.limbs import shared as sharedsearch
 from screwsynth.nlp.proof.boxes.limbs.decomposition import LimbBound, OwnBoxes, bound_limb
@@ -75,29 +76,25 @@ def test_independent_limbs_are_proved_by_themselves() -> None:
     free = certify_program(formulate(load_case("paper-4.4-min")), gap=1e-4)
     assert free.status is CertificateStatus.PROVED
     assert abs(free.bound) < 1e-5
+    # A search that stops has a bound.
+    solution = solve(machine(5.0), starts=2)
+    found = certify_program(solution.nlp, solution.x, gap=1e-9, time_limit=0.05)
+    assert found.status is CertificateStatus.INCOMPLETE
+    assert found.bound >= solution.F
 
 
 def test_a_limb_without_a_feasible_point_makes_the_whole_infeasible() -> None:
     case = load_case("paper-4.4-min")
     nlp = formulate(case)
     # Unit axes whose components are all small do not exist.
-    upper = nlp.upper.copy()
-    upper[:3] = 0.1
-    lower = nlp.lower.copy()
-    lower[:3] = -0.1
+    lower, upper = nlp.lower.copy(), nlp.upper.copy()
+    lower[:3], upper[:3] = -0.1, 0.1
     nlp = replace(nlp, lower=lower, upper=upper)
     recorder = TreeRecord()
     found = certify_program(nlp, gap=1e-2, recorder=recorder)
     assert found.status is CertificateStatus.INFEASIBLE
     proof = ProofClaim("none", "", "program", None, fingerprint(nlp), recorder.tree())
     assert check_proof(proof, nlp).bound == -math.inf
-
-
-def test_an_independent_search_that_stops_has_a_bound() -> None:
-    solution = solve(machine(5.0), starts=2)
-    found = certify_program(solution.nlp, solution.x, gap=1e-9, time_limit=0.05)
-    assert found.status is CertificateStatus.INCOMPLETE
-    assert found.bound >= solution.F
 
 
 def test_limbs_that_leave_nothing_of_their_parts_meet_the_target() -> None:
@@ -162,12 +159,11 @@ def test_the_bounds_of_a_limb_without_its_tilt_hold_at_every_point() -> None:
     own_low = low[m:, of] + rng.random(own_size.shape) * (size[m:, of] - own_size)
     own = OwnBoxes(own_low, own_low + own_size, of, int(of[-1]) + 1)
     good = low[m:] + 0.5 * size[m:]
-    models = engine.limb_models(
-        np.concatenate([low[:m, of], own.lower]), np.concatenate([(low + size)[:m, of], own.upper])
-    )
-    at_good = engine.limb_models(np.concatenate([low[:m], good]), np.concatenate([(low + size)[:m], good]))
+    ends = np.concatenate([low[:m, of], own.lower]), np.concatenate([(low + size)[:m, of], own.upper])
+    good_ends = np.concatenate([low[:m], good]), np.concatenate([(low + size)[:m], good])
+    models, at_good = engine.limb_models(*ends), engine.limb_models(*good_ends)
     opposite = Engine(replace(limb, functions=(-limb.functions[0],)), shared=m)
-    fall = opposite.limb_models(np.concatenate([low[:m], good]), np.concatenate([(low + size)[:m], good])).L
+    fall = opposite.limb_models(*good_ends).L
     with np.errstate(all="ignore"):
         part = bound_limb(own, good, models, at_good, fall, m)
     assert (part.reached > -np.inf).all()
@@ -189,7 +185,7 @@ def test_the_bounds_of_a_limb_without_its_tilt_hold_at_every_point() -> None:
     reached = values(s, np.repeat(good[:, :, None], points, axis=2)) - tilt
     assert (reached.min(axis=1) >= part.reached - slack).all()
     # A dropped box is worse than the good point at every shared point.
-    assert (above[~kept] <= (values(s, np.repeat(good[:, :, None], points, axis=2)) - tilt)[of][~kept] + slack).all()
+    assert (above[~kept] <= reached[of][~kept] + slack).all()
 
 
 def test_the_common_part_with_tilts_is_bounded_and_contracted() -> None:
@@ -211,16 +207,13 @@ def test_the_common_part_with_tilts_is_bounded_and_contracted() -> None:
     value += best[:, None] + np.einsum("ib,ibp->bp", g, e) + 0.5 * np.einsum("ijb,ibp,jbp->bp", Q, e, e)
     feasible, level = condition <= 0, float(np.quantile(value, 0.7))
     models = Engine(form, 1, m).limb_models(low, low + size, tilts=tilts, threshold=level)
-    slack = 1e-12 * np.abs(value).max()
-    assert (np.where(feasible, value, -np.inf).max(axis=1) <= models.L.bound() + slack).all()
-    inside = ((s >= models.lower[:, :, None]) & (s <= models.upper[:, :, None])).all(axis=0) & models.is_possible[
-        :, None
-    ]
+    bound, best_there = models.L.bound(), np.where(feasible, value, -np.inf).max(axis=1)
+    assert (best_there <= bound + 1e-12 * np.abs(value).max()).all()
+    inside = ((s >= models.lower[:, :, None]) & (s <= models.upper[:, :, None])).all(axis=0)
+    inside &= models.is_possible[:, None]
     assert not (~inside & feasible & (value >= level)).any()
     assert (~inside).any(axis=1).sum() > B // 4
-    assert (
-        models.L.bound() < np.where(feasible, value, -np.inf).max(axis=1) + 0.2 * np.ptp(value, axis=1)
-    ).sum() > B // 4
+    assert (bound < best_there + 0.2 * np.ptp(value, axis=1)).sum() > B // 4
 
 
 def both_searches(seed: int) -> tuple[float, float]:
@@ -314,3 +307,41 @@ def test_the_time_limit_ends_the_preparation_of_limbs(monkeypatch: pytest.Monkey
     assert found.reason.startswith("stopped after")
     assert certify_program(nlp, gap=0.9, time_limit=60).status is CertificateStatus.PROVED
     assert built
+
+
+def test_pieces_cover_every_box_once_and_the_last_ones_are_small() -> None:
+    for count in (1, 63, 64, 65, 127, 128, 129, 500, 4095, 4096):
+        assert list(pieces(count, 1)) == [(0, count)]
+        for jobs in (2, 3, 8, 64):
+            edges = np.array(pieces(count, jobs))
+            assert edges[0, 0] == 0
+            assert edges[-1, 1] == count
+            np.testing.assert_array_equal(edges[1:, 0], edges[:-1, 1])
+            sizes = np.diff(edges).ravel()
+            assert (sizes[:-1] >= sizes[-1] // 2).all()
+            # The piece that a thread may be waited for.
+            assert sizes[-1] < max(2 * 64, count // jobs)
+    # Results keep the order of the items, and faults are passed on.
+    for jobs in (1, 3):
+        threads = Threads(jobs)
+        assert threads.map(lambda item: item * item, range(20)) == [item * item for item in range(20)]
+        with pytest.raises(ZeroDivisionError):
+            threads.map(lambda item: 1 // item, [1, 0])
+
+
+@pytest.mark.parametrize(
+    ("case", "gap", "whole", "least"),
+    [
+        (load_case("paper-4.1-helical"), 0.1, 12, 1000),
+        (load_case("paper-4.4-max"), 0.9, 12, 1000),
+        (poses(0), 1e-4, 0, 50),
+    ],
+    ids=["whole box", "limbs", "limbs with shared variables"],
+)
+def test_searches_do_not_depend_on_threads(case: Case, gap: float, whole: int, least: int, monkeypatch: Patch) -> None:
+    monkeypatch.setattr(branch_and_bound, "_WHOLE_BOX", whole)
+    nlp = formulate(case)
+    found = [certify_program(nlp, gap=gap, jobs=jobs) for jobs in (1, 2, 3)]
+    for each in found[1:]:
+        assert (each.boxes, each.bound, each.incumbent) == (found[0].boxes, found[0].bound, found[0].incumbent)
+    assert found[0].boxes > least

@@ -1,32 +1,22 @@
-"""Trade-off curves and fronts: each point is an optimum, slopes are those of the curve, fronts those in closed form."""
+"""Trade-off curves and fronts: each point is an optimum, slopes are those of the curve; and their pages."""
 
+import base64
+import itertools
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
+import jsonschema
 import numpy as np
 import pytest
-from builders import TWO_GOALS, Run, edited, output_of, refusal_of, rows_of, saved
+from builders import TWO_GOALS, Run, assert_words, edited, output_of, refusal_of, rows_of, saved
 
+import screwsynth.nlp as sn
 from screwsynth.models import stewart_gough
-from screwsynth.nlp import (
-    Case,
-    CaseError,
-    Free,
-    InputError,
-    Rotation,
-    Status,
-    Task,
-    json_data,
-    load_case,
-    load_result,
-    pareto,
-    result_of,
-    solve,
-    tradeoff,
-    tradeoff_result,
-)
+from screwsynth.nlp.output.report.designs import changed_words
 from screwsynth.nlp.results.explorations import FrontResult
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.results.tradeoff import TradeoffResult
@@ -88,24 +78,15 @@ def test_goals_without_conflict_have_one_point(case: str, cli: Run) -> None:
 # Six parallel legs along the platform's position p: F of the translation along an axis is 6 p_i^2 / |p|^2, and each leg
 # has the length |p|. Of the points with given F x and F y, the shortest legs are those with the smallest height, so
 # that F x + F y = 6 - 6 * 10^2 / L^2 on the front, and above it is dominated.
-PARALLEL = """
-task = [
-    { name = "x", sense = "max", axis = [1, 0, 0], pitch = inf },
-    { name = "y", sense = "max", axis = [0, 1, 0], pitch = inf },
-]
-[units]
-length = "cm"
-[robot]
-model = "stewart-gough"
-layout = "aligned"
-parameters = { x1 = 12, x2 = 12, x3 = 20, x4 = 20 }
-[pose]
-position = [{ min = 0, max = 20 }, { min = 0, max = 20 }, { min = 10, max = 15 }]
-[limits]
-leg_length = { min = 2, max = 30 }
-[solve]
-starts = 1
-"""
+PARALLEL = edited(
+    TWO_GOALS,
+    ('name = "up", sense = "max", axis = [0, 0, 1]', 'name = "x", sense = "max", axis = [1, 0, 0]'),
+    ('name = "side", sense = "max", axis = [1, 0, 0]', 'name = "y", sense = "max", axis = [0, 1, 0]'),
+    ("x2 = 4, x3 = 30", "x2 = 12, x3 = 20"),
+    ("[0, 0, { min = 5, max = 40 }]", "[{ min = 0, max = 20 }, { min = 0, max = 20 }, { min = 10, max = 15 }]"),
+    ("max = 60", "max = 30"),
+    ("starts = 2", "starts = 1"),
+)
 #: The widest hole may be so many times that of points which are chosen with the exact front known, farthest ones first:
 #: that choice is itself within a factor of two of the best.
 HOLE = 2
@@ -125,8 +106,8 @@ def farthest_first(exact: np.ndarray, count: int) -> np.ndarray:
 
 
 def test_three_goals_on_an_exact_front(tmp_path: Path, cli: Run) -> None:
-    path, files = tmp_path / "parallel.toml", [tmp_path / f"front.{end}" for end in ("csv", "json", "html")]
-    path.write_text(PARALLEL, encoding="utf-8")
+    path = saved(tmp_path / "parallel.toml", PARALLEL)
+    files = [tmp_path / f"front.{end}" for end in ("csv", "json", "html")]
     goals = ("--goal", "max F:x", "--goal", "min limits.leg_length.max", "--goal", "max F:y")
     options = [word for file in files for word in (f"--{file.suffix[1:]}", str(file))]
     code, said, err = cli("pareto", str(path), *goals, "--points", "12", *options)
@@ -145,7 +126,7 @@ def test_three_goals_on_an_exact_front(tmp_path: Path, cli: Run) -> None:
     scale = np.ptp(exact, axis=0)
     best = widest_hole(exact / scale, farthest_first(exact / scale, 12))
     assert widest_hole(exact / scale, found / scale) < HOLE * best
-    result = load_result(files[1])
+    result = sn.load_result(files[1])
     assert isinstance(result, FrontResult)
     assert [each.goals["F:x"] for each in result.points] == x.tolist()
     assert set(result.points[0].design) == {"p_x", "p_y", "p_z"}
@@ -156,7 +137,7 @@ def test_two_limits_as_goals(tmp_path: Path) -> None:
     edits = ("x1 = 12", "x1 = { min = 8, max = 20 }"), ("[solve]", "radius_ratio = { max = 0.5 }\n[solve]")
     path = saved(tmp_path / "limits.toml", edited(TWO_GOALS, *edits))
     goals = ["min limits.leg_length.max", "min limits.radius_ratio.max"]
-    front = pareto(load_case(str(path)), goals, points=5, starts=1)
+    front = sn.pareto(sn.load_case(str(path)), goals, points=5, starts=1)
     length, ratio = np.array([each.values for each in front.points]).T
     # A small ratio needs a large base, and so long legs; the lowest height is the best, at the ends too.
     base = 4 / ratio
@@ -185,11 +166,9 @@ def test_bad_goals_are_one_sentence(goals: tuple[str, ...], words: str, case: st
 
 SMALL = """\
 title = "A platform on a column"
-[units]
-length = "cm"
-[robot]
-model = "stewart-gough"
-parameters = { x1 = 12, x2 = 8, x3 = 20, x4 = 8 }
+units = { length = "cm" }
+solve = { starts = 4 }
+robot = { model = "stewart-gough", parameters = { x1 = 12, x2 = 8, x3 = 20, x4 = 8 } }
 [pose]
 position = [0, { min = -5, max = 5 }, { min = 20, max = 50 }]
 rotation = { axis = [0, 0, 1], angle = { min = -25, max = 25 } }
@@ -199,8 +178,6 @@ sense = "max"
 axis = [2, 2, 1]
 point = [2, 3, 6]
 pitch = 1
-[solve]
-starts = 4
 """
 PUSH = '[[task]]\nname = "push"\nsense = "min"\naxis = [1, 0, 3]\npoint = [0, 1, 9]\npitch = 2\n'
 LIMIT = "limits.leg_length.max"
@@ -224,7 +201,7 @@ def test_each_point_is_the_optimum_of_the_case_with_that_value(small: str, cli: 
     assert (found["over"], found["unit"], found["senses"], found["tasks"]) == (LIMIT, "cm", ["max"], ["drive"])
     for point in found["points"]:
         path = saved(tmp_path / "edited.toml", f"{SMALL}[limits]\nleg_length = {{ max = {point['value']} }}\n")
-        solution = solve(load_case(str(path)))
+        solution = sn.solve(sn.load_case(str(path)))
         assert point["F"] == pytest.approx(solution.F, rel=1e-9)
         assert point["tasks"] == [point["F"]]
         assert point["pose"]["position"] == pytest.approx(solution.state.position, abs=1e-4)
@@ -233,25 +210,15 @@ def test_each_point_is_the_optimum_of_the_case_with_that_value(small: str, cli: 
     assert F[-1] > F[0]
 
 
-@pytest.mark.parametrize(
-    ("over", "unit"),
-    [
-        (f"{LIMIT}=30:30.02:3", "cm"),
-        ("x2=7.99:8.01:3", "cm"),
-        ("x3=19.99:20.01:3", "deg"),
-        ("p_z.max=29.99:30.01:3", "cm"),
-    ],
-)
-def test_the_slope_is_that_of_the_curve(over: str, unit: str, small: str, cli: Run) -> None:
-    found = curve(cli, small, over)
-    first, middle, last = found["points"]
-    difference = (last["F"] - first["F"]) / (last["value"] - first["value"])
-    assert abs(difference) > 1e-3
-    assert middle["slope"] == pytest.approx(difference, rel=1e-4)
-    assert found["unit"] == unit
-
-
-def test_the_slope_of_a_smallest_value_that_is_minimised(small: str, cli: Run, tmp_path: Path) -> None:
+def test_the_slope_is_that_of_the_curve(small: str, cli: Run, tmp_path: Path) -> None:
+    for over in (f"{LIMIT}=30:30.02:3", "x2=7.99:8.01:3", "x3=19.99:20.01:3", "p_z.max=29.99:30.01:3"):
+        found = curve(cli, small, over)
+        first, middle, last = found["points"]
+        difference = (last["F"] - first["F"]) / (last["value"] - first["value"])
+        assert abs(difference) > 1e-3
+        assert middle["slope"] == pytest.approx(difference, rel=1e-4)
+        assert found["unit"] == ("deg" if over.startswith("x3") else "cm")
+    # Of a smallest value that is minimised.
     path = saved(tmp_path / "min.toml", SMALL.replace('"max"', '"min"'))
     for over in ("p_y.min=-4.99:-5.01:3", "p_z.min=30.01:29.99:3", "limits.leg_length.min=30.02:30:3"):
         first, middle, last = curve(cli, str(path), over)["points"]
@@ -260,11 +227,11 @@ def test_the_slope_of_a_smallest_value_that_is_minimised(small: str, cli: Run, t
             assert abs(difference) < 1e-6, "a bound that is not active has no slope"
         else:
             assert middle["slope"] == pytest.approx(difference, rel=1e-4, abs=1e-7)
-    assert small
 
 
 def test_values_without_an_answer(small: str, cli: Run) -> None:
     found = curve(cli, small, f"{LIMIT}=12:32:3", "--starts", "2")
+    jsonschema.validate(found, json.loads(json.dumps(result_schema())))
     assert [point["status"] for point in found["points"]] == ["infeasible", "optimal", "optimal"]
     empty = found["points"][0]
     assert (empty["F"], empty["slope"], empty["tasks"], empty["parameters"]) == (None, None, [None], None)
@@ -272,38 +239,30 @@ def test_values_without_an_answer(small: str, cli: Run) -> None:
     # Where no value has an answer, the status of the command says so.
     curve(cli, small, f"{LIMIT}=10:12:2", "--starts", "2", status=1)
     out = output_of(cli("tradeoff", small, "--over", f"{LIMIT}=12:32:3", "--starts", "2"))
-    assert "infeasible at 12 cm" in out
-    assert "active throughout  leg_length.max" in out
+    assert_words(out, "infeasible at 12 cm", "active throughout  leg_length.max")
 
 
 def test_several_tasks(cli: Run, tmp_path: Path) -> None:
     path = tmp_path / "several.toml"
     for method, has_value in (("average", False), ("weighted-sum", True)):
-        text = SMALL.replace("[solve]", f'{PUSH}[combine]\nmethod = "{method}"\n[solve]')
-        path.write_text(text, encoding="utf-8")
+        saved(path, f'{SMALL}{PUSH}[combine]\nmethod = "{method}"\n')
         found = curve(cli, str(path), "x1=11:12:2")
         assert (found["tasks"], found["senses"]) == (["drive", "push"], ["max", "min"])
         for point in found["points"]:
-            solution = solve(load_case(str(path), {"x1": point["value"]}))
+            solution = sn.solve(sn.load_case(str(path), {"x1": point["value"]}))
             assert point["tasks"] == pytest.approx([outcome.F for outcome in solution.outcomes], rel=1e-7)
             assert (point["F"] is not None) == has_value
 
 
-def test_the_result_is_of_its_schema(small: str, cli: Run) -> None:
-    jsonschema = pytest.importorskip("jsonschema")
-    jsonschema.validate(curve(cli, small, f"{LIMIT}=12:32:3", "--starts", "2"), json.loads(json.dumps(result_schema())))
-
-
 def test_csv_picture_and_page(small: str, cli: Run, tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
     files = {kind: tmp_path / f"curve.{kind}" for kind in ("csv", "png", "svg", "html", "json")}
     arguments = ["--csv", str(files["csv"]), "--html", str(files["html"]), "--json", str(files["json"])]
     for kind in ("png", "svg"):
         output_of(cli("tradeoff", small, "--over", f"{LIMIT}=12:40:5", "--plot", str(files[kind]), *arguments))
     result = json.loads(files["json"].read_text(encoding="utf-8"))
-    again = load_result(files["json"])
+    again = sn.load_result(files["json"])
     assert isinstance(again, TradeoffResult)
-    assert json.loads(json.dumps(json_data(again))) == result
+    assert json.loads(json.dumps(sn.json_data(again))) == result
     rows = rows_of(files["csv"].read_text(encoding="utf-8"))
     assert len(rows) == 5
     for row, point in zip(rows, result["points"], strict=True):
@@ -346,34 +305,79 @@ def test_ranges_that_are_refused(over: str, words: str, small: str, cli: Run, tm
     assert not target.exists()
 
 
-def platform(radius: float, start: float) -> Case:
+def platform(radius: float, start: float) -> sn.Case:
     """A case with two local optima, to either side of no rotation; one start finds the one on its side."""
-    task = Task.screw("max", axis=[0, 0, 1], point=[0, 0, 0], pitch=4)
+    task = sn.Task.screw("max", axis=[0, 0, 1], point=[0, 0, 0], pitch=4)
     dimensions = {"x1": radius, "x2": 8, "x3": 0.4, "x4": 0.2}
-    return Case(stewart_gough(), dimensions, (0, 0, 20), [task], Rotation((0, 0, 1), Free(-2.5, 2.5, start)))
+    return sn.Case(stewart_gough(), dimensions, (0, 0, 20), [task], sn.Rotation((0, 0, 1), sn.Free(-2.5, 2.5, start)))
 
 
 def test_neighbours_lead_each_other_to_better_optima() -> None:
     radii = [10.0, 11.0, 12.0]
-    worse, better = ([solve(platform(radius, start), starts=1).F for radius in radii] for start in (-2.3, 1.4))
+    worse, better = ([sn.solve(platform(radius, start), starts=1).F for radius in radii] for start in (-2.3, 1.4))
     assert all(one < 0.9 * other for one, other in zip(worse, better, strict=True)), "two optima"
     # Only the middle value's own start leads to the better optimum.
     starts = {10.0: -2.3, 11.0: 1.4, 12.0: -2.3}
-    found = tradeoff(lambda radius: platform(radius, starts[radius]), radii, starts=1)
+    found = sn.tradeoff(lambda radius: platform(radius, starts[radius]), radii, starts=1)
     assert [point.solution.F for point in found.points] == pytest.approx(better, rel=1e-9)
 
 
 def test_in_python() -> None:
-    def at(value: float) -> Case:
+    def at(value: float) -> sn.Case:
         return platform(value, 1.4)
 
-    found = tradeoff(at, [10, 11], name="x1", starts=3)
-    assert [point.solution.status for point in found.points] == [Status.OPTIMAL, Status.OPTIMAL]
-    data = json_data(tradeoff_result(found))
-    assert data["over"] == "x1"
-    one = result_of(solve(at(11), starts=3))
-    assert json_data(tradeoff_result(found).points[1])["F"] == pytest.approx(json_data(one)["F"])
-    with pytest.raises(InputError, match="at least one value"):
-        tradeoff(at, [])
-    with pytest.raises(CaseError, match="x1"):
-        tradeoff(at, [10, -1])
+    found = sn.tradeoff(at, [10, 11], name="x1", starts=3)
+    assert [point.solution.status for point in found.points] == [sn.Status.OPTIMAL, sn.Status.OPTIMAL]
+    assert sn.json_data(sn.tradeoff_result(found))["over"] == "x1"
+    one = sn.result_of(sn.solve(at(11), starts=3))
+    assert sn.json_data(sn.tradeoff_result(found).points[1])["F"] == pytest.approx(sn.json_data(one)["F"])
+    with pytest.raises(sn.InputError, match="at least one value"):
+        sn.tradeoff(at, [])
+    with pytest.raises(sn.CaseError, match="x1"):
+        sn.tradeoff(at, [10, -1])
+
+
+def figures_of(page: str) -> list[tuple[str, ElementTree.Element]]:
+    """Return the words below each drawn design, and its picture."""
+    part = page[page.index('class="designs"') :]
+    found = re.findall(r'src="data:image/svg\+xml;base64,([^"]+)".*?<figcaption>(.*?)</figcaption>', part, re.DOTALL)
+    return [(re.sub("<[^>]+>", " ", words), ElementTree.fromstring(base64.b64decode(svg))) for svg, words in found]
+
+
+def test_a_tradeoff_shows_each_design_and_where_the_curve_bends(tmp_path: Path, cli: Run) -> None:
+    page, data = tmp_path / "page.html", tmp_path / "data.json"
+    asked = ("hexapod-machining", "--over", f"{LIMIT}=30:38:3", "--starts", "2")
+    output_of(cli("tradeoff", *asked, "--html", str(page), "--json", str(data)))
+    points, text = json.loads(data.read_text())["points"], page.read_text()
+    figures = figures_of(text)
+    assert len(figures) == len(points) == 3
+    for point, (words, picture) in zip(points, figures, strict=True):
+        assert f"{LIMIT} = {point['value']:.5g} in" in words
+        assert f"F = {point['F']:.6g}" in words
+        assert f"x2 = {point['parameters']['x2']:.5g}" in words
+        # The robot has six limbs in each picture, which has no words.
+        names = [each.get("id", "") for each in picture.iter()]
+        assert {f"limb {k}{side}" for k in (1, 2, 3) for side in "+-"} <= set(names)
+        assert not [name for name in names if name.startswith("text_")]
+    lines = re.findall("<li>(.*?)</li>", text[text.index('id="bends"') :].split("</ul>")[0])
+    changed = [(a["value"], b["value"]) for a, b in itertools.pairwise(points) if set(a["active"]) != set(b["active"])]
+    assert changed
+    assert len(lines) == len(changed) == text.count('class="bound"')
+    for line, (before, after) in zip(lines, changed, strict=True):
+        assert line.startswith(f"Between {LIMIT} = {before:.5g} in and {LIMIT} = {after:.5g} in: ")
+
+
+def test_all_designs_have_one_scale(tmp_path: Path, cli: Run) -> None:
+    page = tmp_path / "page.html"
+    case = str(saved(tmp_path / "case.toml", TWO_GOALS))
+    goals = ("--goal", "max F:up", "--goal", "max F:side")
+    output_of(cli("pareto", case, *goals, "--points", "3", "--html", str(page)))
+    figures = figures_of(page.read_text())
+    assert len(figures) == 3
+    # The base is the same in all designs, so it has the same place and size in all pictures.
+    for plate, count in (("plate base", 1), ("plate platform", 3)):  # the platform is higher or lower
+        drawn = [next(each for each in svg.iter() if each.get("id") == plate) for _, svg in figures]
+        assert len(set(map(ElementTree.tostring, drawn))) == count
+    assert changed_words(["a"], ["a", "b"]) == "b becomes active"
+    assert changed_words(["a", "b"], ["c", "d"]) == "c, d become active; a, b no longer are"
+    assert changed_words(["a"], []) == "a no longer is"

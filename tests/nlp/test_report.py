@@ -1,18 +1,9 @@
-"""The page about a case: what stands in it without a browser, and what it does in a real one."""
+"""Page of a case: contents, data, pictures and structure, read without a browser."""
 
 import json
-import os
 import re
-import shutil
-import sys
-import time
 from base64 import b64decode
-from collections.abc import Callable, Iterator
-from contextlib import redirect_stderr, redirect_stdout, suppress
-from dataclasses import dataclass, field
-from functools import cache
-from html.parser import HTMLParser
-from io import StringIO
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -20,9 +11,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from builders import Run, case_from, edited, refusal_of, saved
+from builders import Run, assert_words, edited, refusal_of, saved
 from casadi import SX
-from measures import exponential
+from matplotlib.colors import to_hex
+from pages import FEW, Page, displaced, made, number, posed, rates_of_lines
 
 from screwsynth.models import (
     Body,
@@ -37,9 +29,9 @@ from screwsynth.models import (
     Unknown,
     force_along,
 )
-from screwsynth.nlp import Case, Solution, Task, evaluate, formulate, load_case, result_of, solve
+from screwsynth.nlp import Case, Task, evaluate, formulate, load_case, result_of, solve
 from screwsynth.nlp.case.source import find_case
-from screwsynth.nlp.cli.main import run as command_line
+from screwsynth.nlp.output.pictures.painting import rate_colour_map
 from screwsynth.nlp.output.pictures.style import RATE_COLOURS
 from screwsynth.nlp.output.report import sections
 from screwsynth.nlp.output.report.charts import Curve, Spot, line_chart
@@ -49,119 +41,24 @@ from screwsynth.nlp.output.report.webpage import page_of
 from screwsynth.nlp.solver import solve as solve_module
 
 MEGABYTE = 1_000_000
+
+
 CASES = ("paper-4.1-helical", "paper-4.2", "paper-4.4-max", "hexapod-machining")
+
 
 IMPOSSIBLE = """\
 title = "Legs of half a metre on a small robot"
-[units]
-length = "cm"
-[robot]
-model = "stewart-gough"
-layout = "aligned"
-parameters = { x1 = 12, x2 = 8, x3 = 30, x4 = 8 }
-[pose]
-position = [0, 0, { min = 20, max = 50 }]
-rotation = { axis = [0, 0, 1], angle = 0 }
+units = { length = "cm" }
+robot = { model = "stewart-gough", layout = "aligned", parameters = { x1 = 12, x2 = 8, x3 = 30, x4 = 8 } }
+pose = { position = [0, 0, { min = 20, max = 50 }], rotation = { axis = [0, 0, 1], angle = 0 } }
+limits = { leg_length = { min = 500 } }
+solve = { starts = 2 }
 [[task]]
 sense = "max"
 axis = [2, 2, 1]
 point = [2, 3, 6]
 pitch = 1
-[limits]
-leg_length = { min = 500 }
-[solve]
-starts = 2
 """
-
-
-@dataclass
-class Page(HTMLParser):
-    """What a page has, read without a browser."""
-
-    text: str
-    elements: list[tuple[str, dict[str, str | None]]] = field(default_factory=list)
-    scripts: list[tuple[dict[str, str | None], str]] = field(default_factory=list)
-    words: str = ""
-    tables: dict[str, list[list[str]]] = field(default_factory=dict)
-    titles: str = ""
-
-    def __post_init__(self) -> None:
-        super().__init__()
-        self._open: list[str] = []
-        self._rows: list[list[str]] = []
-        self.feed(self.text)
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.elements.append((tag, dict(attrs)))
-        if tag not in {"meta", "link", "input", "img", "br"}:
-            self._open.append(tag)
-        if tag == "script":
-            self.scripts.append((dict(attrs), ""))
-        if tag == "table":
-            self._rows = []
-            self.tables[dict(attrs).get("id") or f"table {len(self.tables)}"] = self._rows
-        if tag == "tr":
-            self._rows.append([])
-        if tag in {"td", "th"}:
-            self._rows[-1].append("")
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self._open.pop() == tag, "elements close in order"
-
-    def handle_data(self, data: str) -> None:
-        if self._open[-1:] == ["script"]:
-            attributes, text = self.scripts[-1]
-            self.scripts[-1] = attributes, text + data
-        elif self._open == ["html", "head", "title"]:
-            self.titles += data
-        elif "style" not in self._open:
-            self.words += data
-            if {"td", "th"} & set(self._open):
-                self._rows[-1][-1] += data
-
-    def script(self, name: str) -> str:
-        return next(text for attributes, text in self.scripts if attributes.get("id") == name)
-
-    @property
-    def data(self) -> dict[str, Any]:
-        return dict(json.loads(self.script("data")))
-
-
-#: Searches of the pages: what a page shows does not depend on how many starts found the same optimum.
-FEW = ("--starts", "4")
-
-
-def made(case: str, target: Path, *options: str) -> tuple[int, str]:
-    """Exit status and standard error of the command that writes a page, in this process."""
-    errors = StringIO()
-    with pytest.MonkeyPatch.context() as patch, redirect_stdout(StringIO()), redirect_stderr(errors):
-        patch.setattr(sys, "argv", ["screwsynth", "report", case, "--out", str(target), *options])
-        return command_line(), errors.getvalue()
-
-
-@pytest.fixture(scope="session")
-def page_file(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
-    """The page of a shipped case, made once for all processes of the tests."""
-    # Processes of pytest-xdist have folders of their own in a common one.
-    base = tmp_path_factory.getbasetemp()
-    root = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "pages"
-    root.mkdir(exist_ok=True)
-
-    def make(case: str, *options: str) -> Path:
-        target = root / f"{' '.join([case, *options])}.html"
-        if not target.exists():
-            # Only a whole page has the common name: another process may be making the same one.
-            own = tmp_path_factory.mktemp("report") / "page.html"
-            assert made(case, own, *FEW, *options) == (0, "")
-            own.replace(target)
-        return target
-
-    return make
-
-
-@pytest.fixture(scope="session")
-def page(page_file: Callable[..., Path]) -> Callable[..., Page]:
-    return cache(lambda case, *options: Page(page_file(case, *options).read_text(encoding="utf-8")))
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -226,39 +123,16 @@ def test_tables_are_the_json_result(page: Callable[..., Page], case: str) -> Non
     assert (state, multiplier.split(" ")[1]) == ("active", f"F/{unit}")
 
 
-def test_rounding_is_no_rate(page: Callable[..., Page]) -> None:
+def test_rounding_is_no_rate_and_published_numbers_stand_beside_computed_ones(page: Callable[..., Page]) -> None:
     found = page("paper-4.4-snu")
     assert 0 < found.data["result"]["F"] < 1e-20
     assert "F = 0 (mm/rad)² with" in found.words
     assert [(number(row[3]), row[5]) for row in found.tables["rates"][1:]] == [(0, "none")] * 6
-
-
-def test_published_beside_computed(page: Callable[..., Page]) -> None:
     case = load_case("paper-4.1-helical")
     rows = page("paper-4.1-helical").tables["compared"][1:]
     assert [row[0] for row in rows] == [each.quantity for each in case.published]
     assert [row[3] == "reproduced" for row in rows] == [each.reproduced for each in case.published]
     assert "compared" not in page("hexapod-machining").tables
-
-
-def displaced(points: np.ndarray, twist: np.ndarray, t: float) -> np.ndarray:
-    """Points (n, 3) after a motion with a constant twist."""
-    E = exponential(twist, t)
-    return np.asarray(points @ E[:3, :3].T + E[:3, 3])
-
-
-def rates_of_lines(view: dict[str, Any], points: np.ndarray, twist: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Lengths of straight limbs, and the rates at which a twist of their upper ends changes them."""
-    names = [point["body"] for point in view["points"]]
-    lengths, rates = [], []
-    for row in view["rows"]:
-        (ends,) = [link["ends"] for link in view["links"] if link["limb"] == row["limb"]]
-        lower, upper = sorted(ends, key=lambda index: names[index] == "platform")
-        along = points[upper] - points[lower]
-        length = float(np.linalg.norm(along))
-        lengths.append(length)
-        rates.append(along @ (twist[3:] + np.cross(twist[:3], points[upper])) / length)
-    return np.array(lengths), np.array(rates)
 
 
 @pytest.mark.parametrize("case", ["paper-4.1-helical", "hexapod-machining"])
@@ -366,8 +240,7 @@ def test_what_failed_is_no_answer(tmp_path: Path) -> None:
     assert made(str(case), tmp_path / "page.html") == (1, "")
     found = Page((tmp_path / "page.html").read_text(encoding="utf-8"))
     assert found.data["result"]["F"] is None
-    assert "infeasible: this is not an optimum" in found.words
-    assert "would be feasible with" in found.words
+    assert_words(found.words, "infeasible: this is not an optimum", "would be feasible with")
     assert "largest F =" not in found.words
     assert found.tables["design"][0][1] == "reached"
     # What a solver leaves as multipliers of a failed search is no cost.
@@ -381,17 +254,11 @@ def sliding(*shifts: float) -> Case:
     q, pose = SX.sym("q"), PoseSymbols()
     foot, head = ca.vertcat(q, 0, 0), pose.position
     points = Point("F", foot, Body.LIMB), Point("H", head, Body.PLATFORM)
-    model = Model(
-        name="sliding",
-        description="one leg and a loop",
-        parameters=(),
-        pose=pose,
-        home=(0.0, 0.0, 1.0),
-        wrenches=(force_along("1", foot, head - foot),),
-        unknowns=(Unknown("q", q, Dimension.LENGTH, "place of the foot", -10.0, 10.0),),
-        closure=(Closure("loop", q - head[0]),),
-        scene=Scene(points, (Link("F", "H", Body.LIMB, limb="1"),)),
-    )
+    wrenches, loop = (force_along("1", foot, head - foot),), (Closure("loop", q - head[0]),)
+    unknowns = (Unknown("q", q, Dimension.LENGTH, "place of the foot", -10.0, 10.0),)
+    scene = Scene(points, (Link("F", "H", Body.LIMB, limb="1"),))
+    given = {"unknowns": unknowns, "closure": loop, "scene": scene}
+    model = Model("sliding", "one leg and a loop", (), pose, (0.0, 0.0, 1.0), wrenches, **given)
     task = Task([0, 0, 0, 0.6, 0, 0.8])
     steps = tuple(Displacement.by(np.eye(3), np.array([shift, 0.0, 0.0])) for shift in shifts)
     return Case(model=model, parameters={}, position=[1, 0, 2], tasks=[task], displacements=steps)
@@ -411,12 +278,17 @@ def test_robots_with_loops_follow() -> None:
         Page(text)
 
 
-def test_certificate(page: Callable[..., Page]) -> None:
+def test_certificate_and_a_drawing_without_a_script(page: Callable[..., Page]) -> None:
     found = page("paper-4.1-rotation", "--certify")
     certificate = found.data["result"]["certificate"]
     assert certificate["status"] == "proved"
     assert certificate["statement"] in found.words
     assert f"{certificate['bound']:.7g}" in found.words
+    stills = [a for tag, a in page("paper-4.1-helical").elements if tag == "img" and "still" in str(a.get("class"))]
+    assert [a["class"] for a in stills] == ["still chosen"]
+    drawn = b64decode(str(stills[0]["src"]).removeprefix("data:image/svg+xml;base64,")).decode("utf-8")
+    assert drawn.startswith("<?xml")
+    assert "limb 1-" in drawn
 
 
 def points_of(path: str) -> list[list[tuple[float, float]]]:
@@ -494,224 +366,17 @@ def test_contrast() -> None:
 
 
 def test_colours_are_those_of_picture_files() -> None:
-    painting = pytest.importorskip("screwsynth.nlp.output.pictures.painting")
-    colours = pytest.importorskip("matplotlib.colors")
-    drawn = painting.rate_colour_map().resampled(len(RATE_COLOURS))
-    assert [colours.to_hex(drawn(k)) for k in range(len(RATE_COLOURS))] == list(RATE_COLOURS)
+    drawn = rate_colour_map().resampled(len(RATE_COLOURS))
+    assert [to_hex(drawn(k)) for k in range(len(RATE_COLOURS))] == list(RATE_COLOURS)
 
 
-def test_without_plotly(cli: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_plotly_and_the_output_are_checked_first(cli: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr("screwsynth.nlp.output.pictures.requirements.find_spec", lambda _: None)
     refusal_of(cli("report", "paper-4.2", "--out", str(tmp_path / "page.html")), "reports need plotly")
     assert not list(tmp_path.iterdir())
-
-
-def test_output_is_checked_before_the_solve(cli: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.undo()
     monkeypatch.setattr(solve_module, "solve", lambda *_, **__: pytest.fail("it was solved"))
     refusal_of(cli("report", "paper-4.1-helical", "--out", str(tmp_path / "none" / "page.html")), "none")
-
-
-@pytest.fixture
-def opened(browser: Any, page_file: Callable[..., Path]) -> Iterator[Callable[..., Any]]:
-    """A page opened from disk in the window's own width or another one, its picture drawn."""
-
-    def open_page(page: str | Path, width: int | None = None) -> Any:
-        browser.get("about:blank")
-        for log in ("browser", "performance"):
-            browser.get_log(log)
-        if width is not None:
-            browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size_of_window(width))
-        browser.get((page_file(page) if isinstance(page, str) else page).as_uri())
-        until(lambda: browser.execute_script("return document.documentElement.dataset.drawn === 'yes'"))
-        return browser
-
-    yield open_page
-    browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
-
-
-def size_of_window(width: int) -> dict[str, Any]:
-    return {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
-
-
-def until(done: Callable[[], Any]) -> Any:
-    """What is asked for again and again, for as long as no machine takes that works."""
-    seconds = 600
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        if value := done():
-            return value
-        time.sleep(0.05)
-    pytest.fail(f"not within {seconds} s")
-
-
-LIMBS = """
-return document.getElementById("view").data.filter((each) => each.name.startsWith("limb "))
-  .map((each) => ({ name: each.name, x: each.x, y: each.y, z: each.z, text: each.hovertext[0] }))"""
-ROWS = """
-return [...document.querySelectorAll("#rates tbody tr")].map((row) => [row.querySelector("th").textContent,
-  ...["length", "rate", "share"].map((name) => row.querySelector("." + name).textContent)])"""
-#: Ends when what was asked for before is drawn.
-FRAMES = "requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(arguments[0])))"
-MOVE = """
-const slider = document.getElementById("travel");
-slider.value = arguments[0];
-slider.dispatchEvent(new Event("input"));"""
-CHOOSE = """
-const list = document.getElementById(arguments[0]);
-list.value = arguments[1];
-list.dispatchEvent(new Event("change"));"""
-
-
-def number(text: str) -> float:
-    return float(text.replace("\N{MINUS SIGN}", "-").removesuffix(" %"))
-
-
-def check_clean(chrome: Any) -> None:
-    """Check that a page that was just opened has no fault, asks no network, paints, and fits a telephone."""
-    painted = "const paint = performance.getEntriesByName('first-contentful-paint'); return paint.length && paint[0]"
-    assert until(lambda: chrome.execute_script(f"{painted}.startTime")) > 0
-    chrome.execute_async_script(FRAMES)
-    assert [entry for entry in chrome.get_log("browser") if entry["level"] == "SEVERE"] == []
-    events = [json.loads(entry["message"])["message"] for entry in chrome.get_log("performance")]
-    asked = [e["params"]["request"]["url"] for e in events if e["method"] == "Network.requestWillBeSent"]
-    assert [url for url in asked if not url.startswith(("data:", "blob:"))] == [chrome.current_url]
-    assert chrome.execute_script("return document.querySelectorAll('#view canvas').length") > 0
-    # Nothing is wider than the page, also on a telephone.
-    chrome.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size_of_window(400))
-    assert until(lambda: chrome.execute_script("return innerWidth === 400"))
-    assert until(lambda: chrome.execute_script("return document.documentElement.scrollWidth <= 400"))
-    chrome.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
-
-
-@pytest.mark.browser
-def test_page_of_another_robot_loads_clean(opened: Callable[..., Any]) -> None:
-    check_clean(opened("paper-4.4-max"))
-
-
-@pytest.mark.browser
-@pytest.mark.parametrize("case", ["paper-4.1-helical", "hexapod-machining"])
-def test_page_loads_clean_and_its_slider_moves_the_platform(
-    opened: Callable[..., Any], page: Callable[..., Page], case: str
-) -> None:
-    chrome, data = opened(case), page(case).data
-    check_clean(chrome)
-    check_view(chrome)
-    (view,) = data["views"]
-    twist = np.array(data["result"]["task"]["twist"])
-    at_rest = np.array(view["frames"][view["zero"]]["points"])
-    moving = np.array([point["body"] == "platform" for point in view["points"]])
-    start = chrome.execute_script(LIMBS)
-    assert [number(row[2]) for row in chrome.execute_script(ROWS)] == pytest.approx(data["result"]["rates"], rel=1e-5)
-    for index in (0, 33):
-        points = np.where(moving[:, None], displaced(at_rest, twist, view["frames"][index]["t"]), at_rest)
-        lengths, rates = rates_of_lines(view, points, twist)
-        before = chrome.execute_script(LIMBS)
-        chrome.execute_script(MOVE, index)
-        limbs = until(lambda before=before: (now := chrome.execute_script(LIMBS)) != before and now)
-        assert limbs != start
-        for limb in limbs:
-            ends = next(link["ends"] for link in view["links"] if f"limb {link['limb']}" == limb["name"])
-            drawn = np.array([limb["x"][:13], limb["y"][:13], limb["z"][:13]]).T
-            np.testing.assert_allclose(drawn[[0, 12]], points[ends], atol=1e-9 * view["size"])
-        rows = chrome.execute_script(ROWS)
-        assert [row[0] for row in rows] == [row["limb"] for row in view["rows"]]
-        # Lengths have the five digits of the table.
-        assert [number(row[1]) for row in rows] == [float(f"{length:.5g}") for length in lengths]
-        np.testing.assert_allclose([number(row[2]) for row in rows], rates, rtol=1e-5)
-        np.testing.assert_allclose([number(row[3]) for row in rows], 100 * rates**2 / (rates @ rates), atol=0.051)
-        for limb, rate, length in zip(limbs, rates, lengths, strict=True):
-            found = re.findall(r"length (\S+) .*rate (\S+) ", limb["text"].replace("\N{MINUS SIGN}", "-"))
-            assert [float(each) for each in found[0]] == pytest.approx([float(f"{length:.5g}"), rate], rel=1e-5)
-
-
-def check_hints(chrome: Any) -> None:
-    """Check that the tables that are wider than a narrow window say that they scroll, and no others."""
-    hint = (
-        "return [...document.querySelectorAll('.scroll')].filter((each) => each.checkVisibility()).map((each) =>"
-        " [each.scrollWidth > each.clientWidth + 1, getComputedStyle(each, '::before').content.includes('Scroll')])"
-    )
-    rows = until(lambda: (all_ := chrome.execute_script(hint)) and all(a == b for a, b in all_) and all_)
-    assert any(wide for wide, _ in rows)
-
-
-FRAME = """
-const view = document.getElementById("view"), box = view.getBoundingClientRect(), scene = view._fullLayout.scene._scene;
-const annotations = view.layout.scene.annotations.map((each) => each.text);
-const params = scene.glplot.cameraParams;
-const multiply = (m, v) => [0, 1, 2, 3].map((r) => v.reduce((sum, each, k) => sum + m[r + 4 * k] * each, 0));
-const sides = ["xaxis", "yaxis", "zaxis"].map((name) => view._fullLayout.scene[name].range), scale = scene.dataScale;
-const places = [0, 1, 2, 3, 4, 5, 6, 7].map((n) => {
-  const corner = [...sides.map((side, k) => side[(n >> k) & 1] * scale[k]), 1];
-  const clip = multiply(params.projection, multiply(params.view, multiply(params.model, corner)));
-  return [clip[0] / clip[3], clip[1] / clip[3]];
-});
-return { annotations, places, width: box.width, height: box.height };"""
-
-
-def check_view(chrome: Any) -> None:
-    """Check that the view fills its frame and names its limbs."""
-
-    def filled() -> Any:
-        """The frame, once the box of its axes has room for ticks and titles, and is as large as that allows."""
-        found = chrome.execute_script(FRAME)
-        half = np.array([found["width"] / 2, found["height"] / 2])
-        room = half - np.abs(np.array(found["places"]) * half).max(axis=0)
-        return found if 0 <= (room - [60, 30]).min() <= 15 else None
-
-    found = until(filled)
-    limbs = [row["limb"] for row in data_of(chrome)["views"][0]["rows"]]
-    assert sorted(text.removeprefix("limb ") for text in found["annotations"]) == sorted(limbs)
-
-
-@pytest.mark.browser
-@pytest.mark.parametrize("case", ["paper-4.1-helical", "hexapod-machining"])
-def test_a_narrow_view_fills_its_frame_and_names_its_limbs(opened: Callable[..., Any], case: str) -> None:
-    chrome = opened(case, 420)
-    check_view(chrome)
-    check_hints(chrome)
-
-
-def data_of(chrome: Any) -> dict[str, Any]:
-    return dict(json.loads(chrome.execute_script("return document.getElementById('data').textContent")))
-
-
-WITHOUT_WEBGL = """
-const asked = HTMLCanvasElement.prototype.getContext;
-HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
-  return kind.includes("webgl") ? null : asked.call(this, kind, ...more);
-};"""
-
-
-@pytest.mark.browser
-def test_without_webgl_the_drawing_stands_there(browser: Any, opened: Callable[..., Any]) -> None:
-    done = browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": WITHOUT_WEBGL})
-    try:
-        chrome = opened("paper-4.1-helical")
-        shown = [each for each in chrome.find_elements("css selector", "img.still") if each.is_displayed()]
-        assert len(shown) == 1
-        assert chrome.execute_script("return arguments[0].naturalWidth", shown[0]) > 300
-        assert "no WebGL" in chrome.find_element("class name", "flat-words").text
-        assert not chrome.find_element("id", "view").is_displayed()
-        before = chrome.execute_script(ROWS)
-        chrome.execute_script(MOVE, 0)
-        assert chrome.execute_script(ROWS) != before
-    finally:
-        browser.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", done)
-
-
-def test_the_drawing_needs_no_script(page: Callable[..., Page]) -> None:
-    stills = [a for tag, a in page("paper-4.1-helical").elements if tag == "img" and "still" in str(a.get("class"))]
-    assert [a["class"] for a in stills] == ["still chosen"]
-    drawn = b64decode(str(stills[0]["src"]).removeprefix("data:image/svg+xml;base64,")).decode("utf-8")
-    assert drawn.startswith("<?xml")
-    assert "limb 1-" in drawn
-
-
-@cache
-def posed(text: str) -> tuple[Solution, str]:
-    """The solution and the page of a case."""
-    solution = solve(case_from(text, "poses"))
-    return solution, page_of(report_of("", solution, result_of(solution)))
 
 
 @pytest.mark.parametrize("sense", ["max", "min"])
@@ -730,155 +395,6 @@ def test_page_has_every_pose_and_marks_the_worst(sense: str, three_poses: Callab
     assert f"The worst: pose {worst + 1} of 3, F = {values[worst]:.7g} {unit}." in found.words
     (slider,) = [a for tag, a in found.elements if tag == "input" and a.get("id") == "pose"]
     assert (slider["min"], slider["max"], slider["value"]) == ("1", "3", "1")
-
-
-@pytest.mark.browser
-def test_slider_shows_each_pose(opened: Callable[..., Any], tmp_path: Path, three_poses: Callable[[str], str]) -> None:
-    browser = opened(saved(tmp_path / "page.html", posed(three_poses("max"))[1]))
-    views = data_of(browser)["views"]
-    for k in (2, 1, 0):
-        browser.execute_script(MOVE.replace("travel", "pose"), k + 1)
-        rates = views[k]["frames"][views[k]["zero"]]["rates"]
-        np.testing.assert_allclose([number(row[2]) for row in browser.execute_script(ROWS)], rates, rtol=1e-5)
-        assert f"pose {k + 1} of 3" in browser.find_element("id", "posed").text
-    browser.find_element("id", "worst").click()
-    assert browser.find_element("id", "posed").text.endswith("the worst")
-
-
-PATH_LIMBS = """
-return document.getElementById("view").data.filter((each) => each.name.startsWith("limb "))
-  .map((each) => [each.x, each.y, each.z].map((values) => values.slice(0, 2)))"""
-
-
-@pytest.mark.browser
-def test_the_robot_runs_along_its_path(opened: Callable[..., Any], tmp_path: Path, cli: Run) -> None:
-    part, target = saved(tmp_path / "part.csv", "t,x,y,z\n0,0,0,20\n2,18,0,22\n3,4,3,21\n"), tmp_path / "path.html"
-    assert cli("path", "hexapod-linuxcnc", "--along", str(part), "--html", str(target))[0] == 1
-    chrome = opened(target, 420)
-    view = data_of(chrome)["view"]
-    assert chrome.execute_script("return document.documentElement.scrollWidth") <= 420
-    # Charts stand below each other.
-    places = "return [...document.querySelectorAll('.chart')].map((each) => each.getBoundingClientRect().left)"
-    assert len(set(chrome.execute_script(places))) == 1
-    check_clean(chrome)
-    assert chrome.find_element("id", "travelled").text == view["frames"][view["first"]]["words"]
-    names = chrome.execute_script(
-        "return document.getElementById('view').layout.scene.annotations.map((each) => each.text)"
-    )
-    assert names[-1] == "line 3"
-    slider = chrome.find_element("id", "travel")
-    for index in (0, len(view["frames"]) - 1):
-        chrome.execute_script(MOVE, index)
-        frame = view["frames"][index]
-        shown = [[[frame["points"][end][k] for end in link["ends"]] for k in range(3)] for link in limb_lines(view)]
-        assert until(lambda shown=shown: sorted(chrome.execute_script(PATH_LIMBS)) == sorted(shown))
-        assert chrome.find_element("id", "travelled").text == frame["words"]
-        # The cursor of each chart is at its end.
-        cursor = "const at = document.querySelector('.cursor'); return [at.getAttribute('transform'), at.dataset]"
-        moved, ends = chrome.execute_script(cursor)
-        part_of_way = (frame["at"] - float(ends["low"])) / (float(ends["high"]) - float(ends["low"]))
-        expected = float(ends["left"]) + part_of_way * float(ends["width"])
-        assert float(re.findall(r"translate\(([\d.]+) 0\)", moved)[0]) == pytest.approx(expected, abs=0.01)
-    # The robot runs from the beginning; the slider goes on by keyboard where it was stopped.
-    chrome.execute_script(MOVE, 0)
-    press = "const button = document.getElementById('play'); button.click(); return button.textContent"
-    assert chrome.execute_script(press) == "Pause"
-    assert until(lambda: int(slider.get_property("value")) > 0)
-    stop = "const button = document.getElementById('play'); if (button.textContent === 'Pause') button.click()"
-    chrome.execute_script(stop)
-    assert chrome.find_element("id", "play").text == "Play"
-    slider.send_keys("\ue012")  # the left arrow
-    reached = int(slider.get_property("value"))
-    chrome.execute_async_script(FRAMES)
-    assert int(slider.get_property("value")) == reached < len(view["frames"]) - 1
-    assert slider.get_attribute("aria-valuetext") == view["frames"][reached]["words"]
-    chrome.execute_script(CHOOSE, "colour", "margin")
-    names = "return document.getElementById('view').data.map((each) => each.name)"
-    assert until(lambda: "path margin" in chrome.execute_script(names))
-
-
-def limb_lines(view: dict[str, Any]) -> list[dict[str, Any]]:
-    return [link for link in view["links"] if link["limb"] is not None]
-
-
-@pytest.mark.browser
-def test_wide_tables_of_a_curve_say_that_they_scroll(browser: Any, tmp_path: Path, cli: Run) -> None:
-    curve = tmp_path / "curve.html"
-    over = ("--over", "limits.leg_length.max=60:70:2", "--starts", "1")
-    assert cli("tradeoff", "paper-4.1-helical", *over, "--html", str(curve))[0] == 0
-    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size_of_window(420))
-    browser.get(curve.as_uri())
-    check_hints(browser)
-    browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
-
-
-@pytest.mark.browser
-def test_hover_over_a_limb_and_slider_by_keyboard(opened: Callable[..., Any], page: Callable[..., Page]) -> None:
-    from selenium.webdriver.common.action_chains import ActionChains  # noqa: PLC0415 - not installed everywhere
-
-    chrome = opened("paper-4.1-helical")
-    result = page("paper-4.1-helical").data["result"]
-    chrome.execute_script("document.getElementById('view').scrollIntoView()")
-    chrome.execute_script(
-        "window.found = null; document.getElementById('view').on('plotly_hover', (event) => {"
-        " const at = event.points[0];"
-        " window.found = [at.data.name, at.hovertext || at.data.hovertext[at.pointNumber]]; })"
-    )
-    view = chrome.find_element("id", "view")
-    places = [(x, y) for y in range(-60, 70, 20) for x in range(-150, 120, 14)]
-    for x, y in places:
-        with suppress(Exception):
-            ActionChains(chrome, duration=0).move_to_element_with_offset(view, x, y).perform()
-        # The point under the pointer is looked for when the next picture is drawn.
-        chrome.execute_async_script(FRAMES)
-        if chrome.execute_script("return window.found"):
-            break
-    name, text = chrome.execute_script("return window.found")
-    row = result["limbs"].index(name.removeprefix("limb "))
-    text = text.replace("\N{MINUS SIGN}", "-")
-    assert f"<b>{name}</b>" in text
-    (rate, share) = re.findall(r"rate (\S+) \S+, (\S+) % of F", text)[0]
-    assert float(rate) == pytest.approx(result["rates"][row], rel=1e-5)
-    assert float(share) == pytest.approx(100 * result["rates"][row] ** 2 / result["F"], abs=0.051)
-    length = result["quantities"]["leg_length"][result["limbs"][row]]
-    assert float(re.findall(r"length (\S+)", text)[0]) == float(f"{length:.5g}")
-    wrench = [float(each) for each in re.findall(r"wrench \((.*)\)", text)[0].replace(";", ",").split(",")]
-    np.testing.assert_allclose(wrench, result["jacobian"][row], rtol=1e-3, atol=1e-3)
-    (view_data,) = page("paper-4.1-helical").data["views"]
-    slider = chrome.find_element("id", "travel")
-    slider.send_keys("\ue014")  # the right arrow
-    words = view_data["frames"][view_data["zero"] + 1]["words"]
-    assert chrome.find_element("id", "travelled").text == words
-    assert slider.get_attribute("aria-valuetext") == words
-    assert chrome.find_element("css selector", "label[for=travel]").text
-
-
-@pytest.mark.browser
-def test_several_tasks_maps_and_the_copied_text(opened: Callable[..., Any], page: Callable[..., Page]) -> None:
-    chrome, data = opened("paper-4.2"), page("paper-4.2").data
-    check_clean(chrome)
-    for k, outcome in enumerate(data["result"]["combined"]["tasks"]):
-        chrome.execute_script(CHOOSE, "task", k)
-        rates = [number(row[2]) for row in chrome.execute_script(ROWS)]
-        np.testing.assert_allclose(rates, outcome["rates"], atol=1e-9)
-    chosen = data["planes"][1][2]
-    chrome.execute_script(CHOOSE, "pair", "1 2")
-    assert chrome.find_element("id", "map-words").text == chosen["words"]
-    last = chrome.execute_script("return document.getElementById('map').data.filter((d) => d.type === 'contour').pop()")
-    assert last["x"] == chosen["first"]
-    chrome.execute_script("document.documentElement.style.scrollBehavior = 'auto'")
-    chrome.find_element("id", "copy").click()
-    assert until(lambda: chrome.find_element("id", "copied").text)
-    shown = chrome.execute_script("return document.getElementById('case-text').textContent")
-    assert shown == (Path(__file__).parents[2] / "cases" / "paper-4.2.toml").read_text(encoding="utf-8")
-
-
-def test_browser_is_where_ci_installs_it() -> None:
-    """The table of `.ci/run` has what the tests marked ``browser`` start."""
-    text = (Path(__file__).parents[2] / ".ci" / "run").read_text(encoding="utf-8")
-    assert "[chromium]=chromium" in text
-    assert "[chromedriver]=chromium-driver" in text
-    assert shutil.which("bash")
 
 
 def test_a_page_with_a_refused_certificate(tmp_path: Path, cli: Run, page: Callable[..., Page]) -> None:

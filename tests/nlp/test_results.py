@@ -1,8 +1,10 @@
-"""Results as typed values: what JSON has is what the schema says, and their words need neither terminal nor page."""
+"""Results as typed values and JSON, their schema, and the versions of all files."""
 
 import json
+import re
 import subprocess
 import sys
+import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from copy import deepcopy
 from dataclasses import replace
@@ -10,20 +12,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from builders import EACH_CASE, FEW_CASES, Run, edited, output_of, soaked
+from builders import DOCS, EACH_CASE, FEW_CASES, Run, edited, output_of, refusal_of, saved, soaked, starter_text
 from jsonschema import Draft202012Validator
 
 import screwsynth.cases
-from screwsynth.nlp import (
-    InputError,
-    Solution,
-    Status,
-    json_data,
-    load_case,
-    load_result,
-    result_of,
-    solve,
-)
+import screwsynth.models
+from screwsynth.models import fileversions, robot
+from screwsynth.models.fileversions import FileVersions
+from screwsynth.models.joints import RobotError
+from screwsynth.models.joints.mechanisms import mechanism_of
+from screwsynth.nlp import InputError, Solution, Status, json_data, load_case, load_result, result_of, solve
+from screwsynth.nlp.cli.usage import EARLIER
 from screwsynth.nlp.output.checks import markdown
 from screwsynth.nlp.output.report.markup import html_table, paragraphs
 from screwsynth.nlp.output.report.report import report_of
@@ -112,16 +111,13 @@ def test_the_schema_is_one(cli: Run, schema: Json) -> None:
 
 
 @pytest.mark.parametrize("name", soaked([*EACH_CASE, *WRITTEN], (*FEW_CASES, *WRITTEN)))
-def test_solves_and_evaluations_keep_to_the_schema(
-    name: str, cli: Run, schema: Json, case_path: Callable[[str], str]
-) -> None:
-    code, out, err = cli("solve", case_path(name), "--starts", "2", "--json", "-")
-    assert (code in (0, 1), err) == (True, "")
-    result = json.loads(out)
-    hold(result, schema, "CombinedResult" if "combined" in result else "SolveResult")
-    code, out, err = cli("evaluate", case_path(name), "--json", "-")
-    assert (code in (0, 1), err) == (True, "")
-    hold(json.loads(out), schema, "EvaluationResult")
+def test_answers_keep_to_the_schema(name: str, cli: Run, schema: Json, case_path: Callable[[str], str]) -> None:
+    for command in (("solve", case_path(name), "--starts", "2"), ("evaluate", case_path(name))):
+        code, out, err = cli(*command, "--json", "-")
+        assert (code in (0, 1), err) == (True, "")
+        result = json.loads(out)
+        solved = "CombinedResult" if "combined" in result else "SolveResult"
+        hold(result, schema, solved if command[0] == "solve" else "EvaluationResult")
 
 
 @pytest.mark.parametrize("name", ["paper-4.1-rotation", "paper-4.2", "worst-case", "infeasible", "nothing-free"])
@@ -142,9 +138,7 @@ def test_checks_keep_to_the_schema(cli: Run, schema: Json) -> None:
 
 
 @pytest.mark.parametrize("name", ["tolerance", "poses", "worst-case", "infeasible"])
-def test_the_schema_refuses_what_is_more_or_less_than_a_result(
-    name: str, cli: Run, schema: Json, case_path: Callable[[str], str]
-) -> None:
+def test_the_schema_refuses_more_and_less(name: str, cli: Run, schema: Json, case_path: Callable[[str], str]) -> None:
     _, out, _ = cli("solve", case_path(name), "--json", "-")
     result = json.loads(out)
     kind = "CombinedResult" if "combined" in result else "SolveResult"
@@ -213,19 +207,10 @@ def test_a_wrong_result_is_refused_with_its_key(change: Callable[[Json], object]
         result_from_json(table, "mine")
 
 
-@pytest.mark.parametrize(
-    ("content", "fault"),
-    [
-        (b"{", "is not valid JSON"),
-        (b"[1]", "must be an object"),
-        (b"{}", "schema: is missing"),
-    ],
-)
-def test_a_file_that_is_no_result_is_refused(content: bytes, fault: str, tmp_path: Path) -> None:
-    file = tmp_path / "result.json"
-    file.write_bytes(content)
-    with pytest.raises(InputError, match=fault):
-        load_result(file)
+def test_a_file_that_is_no_result_is_refused(tmp_path: Path) -> None:
+    for content, fault in (("{", "is not valid JSON"), ("[1]", "must be an object"), ("{}", "schema: is missing")):
+        with pytest.raises(InputError, match=fault):
+            load_result(saved(tmp_path / "result.json", content))
     with pytest.raises(InputError, match="cannot be read"):
         load_result(tmp_path / "none.json")
 
@@ -254,45 +239,34 @@ class Outer(JsonObject):
 
 
 def outer(**changes: object) -> Outer:
-    values: dict[str, Any] = {
-        "numbers": ((1.0, 2.0),),
-        "named": {"x": 3.0},
-        "status": Status.OPTIMAL,
-        "none": None,
-        "null": None,
-        "absent": None,
-        "inner": Inner(b=2.0),
-        "a": 1,
-    }
+    values: dict[str, Any] = {"numbers": ((1.0, 2.0),), "named": {"x": 3.0}, "status": Status.OPTIMAL}
+    values |= {"none": None, "null": None, "absent": None, "inner": Inner(b=2.0), "a": 1}
     return Outer(**values | changes)
-
-
-def test_json_has_the_fields_in_the_order_of_the_type() -> None:
-    found = json_data(outer())
-    assert list(found) == ["a", "b", "null", "status", "numbers", "named"]
-    assert found == {"a": 1, "b": 2.0, "null": None, "status": "optimal", "numbers": [[1.0, 2.0]], "named": {"x": 3.0}}
-    assert json_data(outer(absent="here", none=None))["absent"] == "here"
 
 
 def test_values_are_frozen_and_whole() -> None:
     value = outer()
-    with pytest.raises(AttributeError, match="frozen"):
-        value.a = 2  # type: ignore[misc]
-    with pytest.raises(AttributeError, match="frozen"):
-        del value.a
-    with pytest.raises(TypeError, match="more"):
-        outer(more=1)
-    with pytest.raises(TypeError, match="b"):
-        Inner()  # type: ignore[call-arg]
-    with pytest.raises(TypeError, match="object"):
-        json_data(outer(absent=object()))
-    with pytest.raises(TypeError, match="run time"):
-        type("Text", (JsonObject,), {"__annotations__": {"a": "int"}})
+    for change in (lambda: setattr(value, "a", 2), lambda: delattr(value, "a")):
+        with pytest.raises(AttributeError, match="frozen"):
+            change()
+    for wrong, words in (
+        (lambda: outer(more=1), "more"),
+        (Inner, "b"),
+        (lambda: json_data(outer(absent=object())), "object"),
+        (lambda: type("Text", (JsonObject,), {"__annotations__": {"a": "int"}}), "run time"),
+    ):
+        with pytest.raises(TypeError, match=words):
+            wrong()
     assert "status=<Status.OPTIMAL" in repr(value)
     for module in (parts, data):
         kinds = [each for each in vars(module).values() if isinstance(each, type) and issubclass(each, JsonObject)]
         assert len(kinds) > 5
         assert not any(getattr(kind, "__hash__", None) is None for kind in kinds)
+    # JSON has the fields in the order of the type.
+    found = json_data(outer())
+    assert list(found) == ["a", "b", "null", "status", "numbers", "named"]
+    assert found == {"a": 1, "b": 2.0, "null": None, "status": "optimal", "numbers": [[1.0, 2.0]], "named": {"x": 3.0}}
+    assert json_data(outer(absent="here", none=None))["absent"] == "here"
 
 
 def test_words_need_neither_terminal_nor_page() -> None:
@@ -341,3 +315,96 @@ def test_an_answer_begins_with_its_title_and_ends_with_the_rank() -> None:
     design, limbs = (item for item in items if isinstance(item, TextTable))
     assert [row[0] for row in design.rows] == ["p_x", "p_y", "p_z", "axis", "angle", "x1", "x2", "x3", "x4"]
     assert len(limbs.rows) == 6
+
+
+PAGE = (DOCS / "versions.md").read_text(encoding="utf-8")
+KINDS = [each for each in vars(fileversions).values() if isinstance(each, FileVersions)]
+SMALL = "paper-4.2-rotation"
+DELTA = (Path(screwsynth.models.__file__).parent / "robots" / "delta.toml").read_text(encoding="utf-8")
+#: A value of the key as TOML and JSON write it, and words about it.
+OTHERS = [
+    ("2", "schema = 2: this screwsynth reads {kind} of schema 1; a later version of it reads this one"),
+    ("0", "schema = 0: must be a version, which is a whole number from 1; this screwsynth reads {kind} of schema 1"),
+    ("true", "schema = true: must be a version"),
+    ("1.0", "schema = 1.0: must be a version"),
+    ('"1"', 'schema = "1": must be a version'),
+]
+
+
+def test_versions_in_words() -> None:
+    kind = FileVersions("cards", 4, 2)
+    assert [kind.fault(version) for version in (2, 3, 4)] == [None] * 3
+    reads = "this screwsynth reads cards of schema 2 to 4"
+    assert kind.fault(5) == f"{reads}; a later version of it reads this one"
+    assert kind.fault(1) == f"{reads}; an earlier version of it reads this one"
+    assert str(FileVersions("cards", 2).fault(3)).startswith("this screwsynth reads cards of schema 1 and 2; a later")
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "command"),
+    [
+        ("case files", "case.toml", "evaluate FILE"),
+        ("robot files", "robot.toml", "new FILE"),
+        ("results", "result.json", f"evaluate {SMALL} --of FILE"),
+        ("proofs", "proof.json", "verify-proof FILE"),
+    ],
+)
+def test_a_file_of_another_version_is_refused(kind: str, name: str, command: str, tmp_path: Path, cli: Run) -> None:
+    path = tmp_path / name
+    if name.endswith("toml"):
+        saved(path, f"schema = 1\n{DELTA if kind == 'robot files' else starter_text('3-rps')}")
+    elif kind == "results":
+        cli("solve", SMALL, "--starts", "2", "--json", str(path))
+    else:
+        cli("certify", SMALL, "--starts", "2", "--gap", "0.5", "--proof", str(path))
+    text, arguments = path.read_text(encoding="utf-8"), command.replace("FILE", str(path)).split()
+    (mark,) = re.findall(r'^ *"?schema"?(?:: | = )1\b', text, flags=re.MULTILINE)
+    assert cli(*arguments)[::2] == (0, ""), "the version that is written is read"
+    for version, sentence in OTHERS:
+        saved(path, edited(text, (mark, mark[:-1] + version)))
+        refusal_of(cli(*arguments), sentence.format(kind=kind), name, "schema")
+
+
+def test_a_robot_of_another_version_is_refused_in_python_and_within_a_case(tmp_path: Path, cli: Run) -> None:
+    tables = tomllib.loads(DELTA)
+    same = robot(**tables, schema=1)
+    assert same.options == robot(**tables).options, "a case that is written again states the robot as before"
+    assert repr(mechanism_of({"schema": 1, **tables}).joints) == repr(mechanism_of(tables).joints)
+    for call in (lambda: robot(**tables, schema=2), lambda: mechanism_of({"schema": 2, **tables})):
+        with pytest.raises(RobotError, match="schema = 2: this screwsynth reads robot files of schema 1"):
+            call()
+    named = saved(tmp_path / "robot.toml", f"schema = 1\n{DELTA}")
+    path = str(saved(tmp_path / "case.toml", output_of(cli("new", str(named)))))
+    again = load_case(path).to_toml()
+    within = edited(again, ("definition = {", "definition = { schema = 1,"))
+    assert load_case(str(saved(tmp_path / "again.toml", within))).to_toml() == again
+    path = str(saved(tmp_path / "again.toml", edited(within, ("schema = 1", "schema = 2"))))
+    refusal_of(cli("evaluate", path), "again.toml: robot.definition: schema = 2: this screwsynth")
+
+
+def test_the_schemas_know_the_versions(cli: Run) -> None:
+    case = json.loads(output_of(cli("schema")))["properties"]["schema"]
+    assert case["const"] == fileversions.CASE_FILES.newest == 1
+    definitions: dict[str, Any] = json.loads(json.dumps(result_schema()))["$defs"]
+    for kind in RESULTS:
+        versions = definitions[kind.__name__]["properties"]["schema"]
+        assert versions["enum"] == [fileversions.RESULT_FILES.newest]
+        assert "schema" in definitions[kind.__name__]["required"]
+        assert not Draft202012Validator(versions).is_valid(2)
+
+
+def test_a_result_without_its_version_is_none(tmp_path: Path, cli: Run) -> None:
+    path = tmp_path / "result.json"
+    cli("evaluate", "paper-4.4-min", "--set", "p_z=30", "--json", str(path))
+    content = json.loads(path.read_text(encoding="utf-8"))
+    del content["schema"]
+    with pytest.raises(InputError, match=r"result\.json: is no result of screwsynth: schema: is missing"):
+        load_result(saved(path, json.dumps(content)))
+
+
+def test_the_page_has_every_kind_of_file_with_its_versions_and_every_earlier_option() -> None:
+    rows = re.findall(r"^\| (.+?) \| `schema`.*? \| (\d+) \| (\d+) \|$", PAGE, flags=re.MULTILINE)
+    assert [(words, int(newest), int(oldest)) for words, newest, oldest in rows] == [tuple(kind) for kind in KINDS]
+    told = re.findall(r"^\| `(\w+) (--[\w-]+)` \| `?(--[\w-]+|nothing)`? \|$", PAGE, flags=re.MULTILINE)
+    known = [(command, old, new or "nothing") for command, names in EARLIER.items() for old, new in names.items()]
+    assert told == known

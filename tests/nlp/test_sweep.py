@@ -1,5 +1,7 @@
 """Sweeps: every row is an answer with evidence, and a killed run loses and doubles nothing."""
 
+import itertools
+import math
 import os
 import signal
 import subprocess
@@ -10,13 +12,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import Run, case_from, refusal_of, rows_of, starter_tables
+from builders import Run, case_from, output_of, refusal_of, rows_of, saved, starter_tables
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from screwsynth.nlp import InputError, examine, formulate, load_case, load_result, solve
 from screwsynth.nlp import sweep as run_in_python
 from screwsynth.nlp.case.reader import read_case
 from screwsynth.nlp.evidence.many import Numbers, _scales, judge_many
-from screwsynth.nlp.output.sweeptable import table_points, write_table
+from screwsynth.nlp.output.pictures.sweeps import sweep_figure, sweep_legend
+from screwsynth.nlp.output.sweeptable import TablePoint, table_points, write_table
 from screwsynth.nlp.results.explorations import SweepResult
 from screwsynth.nlp.sweeps import workers
 from screwsynth.nlp.sweeps.engines import EngineKind, Job
@@ -46,20 +50,15 @@ def sweep() -> Callable[..., Sweep]:
 
 
 def test_many_verdicts_are_those_of_single_points() -> None:
-    at = [
-        load_case(CASE, {"task.pitch": pitch, "x1": x1}) for pitch, x1 in ((0.2, 10), (1.0, 12), (2.0, 14), (1.5, 10))
-    ]
+    values = ((0.2, 10), (1.0, 12), (2.0, 14), (1.5, 10))
+    at = [load_case(CASE, {"task.pitch": pitch, "x1": x1}) for pitch, x1 in values]
     nlps = [formulate(case) for case in at]
     optima = [solve(case, starts=1).x for case in at]
     middle = [nlp.centre + 0.1 * nlp.scale for nlp in nlps]
     outside = [x + 3 * nlp.scale for x, nlp in zip(optima, nlps, strict=True)]
     x, several = np.array([*optima, *middle, *outside]), nlps * 3
-    numbers = Numbers(
-        *(
-            np.array([getattr(nlp, name) for nlp in several])
-            for name in ("arguments", "lower", "upper", "g_lower", "g_upper")
-        )
-    )
+    names = ("arguments", "lower", "upper", "g_lower", "g_upper")
+    numbers = Numbers(*(np.array([getattr(nlp, name) for nlp in several]) for name in names))
     # Where ranges are narrow, changes between the bounds are the scale of F.
     narrow = [replace(each, lower=each.centre, upper=each.centre + 1e-5 * each.scale) for each in nlps]
     ends = {name: np.array([getattr(each, name) for each in narrow]) for name in ("lower", "upper")}
@@ -112,13 +111,12 @@ def test_compiled_rows_are_those_of_solve(tmp_path: Path, cli: Run) -> None:
 
 def test_points_of_a_file_and_parquet(tmp_path: Path, cli: Run) -> None:
     pq = pytest.importorskip("pyarrow.parquet")
-    points, out = tmp_path / "points.csv", tmp_path / "sweep.parquet"
+    out = tmp_path / "sweep.parquet"
     # The limit on the rotation is a bound of the program; the axis of the last point is none.
-    points.write_text("task.axis_x,task.axis_y,task.axis_z,p_x.max\n2,2,1,10\n0,0,1,9\n1,0,0,5\n0,0,0,7\n0,1,1,8\n")
-    code, said, err = cli(
-        "sweep", CASE, "--over", str(points), "--starts", "2", "--engine", "ipopt", "--jobs", "1", "--out", str(out)
-    )
-    assert (code, err) == (0, ""), err
+    rows = "2,2,1,10\n0,0,1,9\n1,0,0,5\n0,0,0,7\n0,1,1,8\n"
+    points = saved(tmp_path / "points.csv", f"task.axis_x,task.axis_y,task.axis_z,p_x.max\n{rows}")
+    words = ("--over", str(points), "--starts", "2", "--engine", "ipopt", "--jobs", "1", "--out", str(out))
+    said = output_of(cli("sweep", CASE, *words))
     found = pq.read_table(out).to_pydict()
     assert found["index"] == list(range(5))
     assert found["status"] == ["optimal", "optimal", "optimal", "refused", "optimal"]
@@ -214,9 +212,8 @@ def test_joints_are_no_design() -> None:
     ],
 )  # fmt: skip
 def test_bad_input_is_one_sentence(arguments: tuple[str, ...], words: str, tmp_path: Path, cli: Run) -> None:
-    files = {"EMPTY": tmp_path / "empty.csv", "SHORT": tmp_path / "short.csv"}
-    files["EMPTY"].write_text("x1,x2\n")
-    files["SHORT"].write_text("x1,x2\n10,11\n12\n")
+    files = {"EMPTY": saved(tmp_path / "empty.csv", "x1,x2\n")}
+    files["SHORT"] = saved(tmp_path / "short.csv", "x1,x2\n10,11\n12\n")
     out = tmp_path / "out.csv"
     given = [str(files.get(word, word)) for word in arguments]
     refusal_of(cli("sweep", CASE, *given, "--out", str(out)), words)
@@ -226,11 +223,8 @@ def test_bad_input_is_one_sentence(arguments: tuple[str, ...], words: str, tmp_p
 
 def test_other_outputs_are_refused(tmp_path: Path, cli: Run) -> None:
     out = tmp_path / "out.csv"
-    for name, words in (
-        (tmp_path / "out.txt", "must end in .parquet or .csv"),
-        (tmp_path / "no" / "x.csv", "is no folder"),
-    ):
-        refusal_of(cli("sweep", CASE, *OVER, "--out", str(name)), words)
+    for name, words in (("out.txt", "must end in .parquet or .csv"), ("no/x.csv", "is no folder")):
+        refusal_of(cli("sweep", CASE, *OVER, "--out", str(tmp_path / name)), words)
     journal = Path(f"{out}.journal")
     for path, words in ((out, "is not the table of this sweep"), (journal, "belongs to another sweep")):
         path.write_text("mine\n")
@@ -295,15 +289,69 @@ def test_a_row_group_is_in_memory_at_once(sweep: Callable[..., Sweep], tmp_path:
     assert file.read(columns=["x1"]).to_pydict()["x1"] == one.points.values[:, 0].tolist()
 
 
+def test_axes_of_a_sweep_have_units() -> None:
+    case = load_case("hexapod-machining")
+    points = grid(["limits.leg_length.max=32,34", "task.pitch=0.1,0.2"])
+    found = [TablePoint(1.0, "")] * len(points)
+    labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in sweep_figure(case, points, found).axes]
+    assert labels[0] == ("limits.leg_length.max, in", "task.pitch, in/rad")
+    points = grid(["x3=1,2", "x1=30,31"])
+    labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in sweep_figure(case, points, found).axes]
+    assert labels[0] == ("x3, deg", "x1, in")
+
+
+def test_regions_of_a_sweep_have_numbers_that_a_legend_explains() -> None:
+    case = load_case("hexapod-machining")
+    points = grid(["x1=26:32:13", "x2=10:13:7"])
+    x1, x2 = (each.ravel() for each in np.meshgrid(*points.axes, indexing="ij"))
+    # Three regions: a half, a quarter, and a quarter without an answer.
+    words = ["leg_length limb 1- max; leg_length limb 1+ max; x3 min" if a < 29 else "x3 min" for a in x1]
+    F = np.where((x1 >= 29) & (x2 > 11.5), math.nan, x1 + x2)
+    found = [TablePoint(float(value), word) for value, word in zip(F, words, strict=True)]
+    figure = sweep_figure(case, points, found)
+    FigureCanvasAgg(figure).draw()
+    axes = figure.axes[0]
+    numbers = {text.get_text(): text.get_position() for text in axes.texts if text.get_gid() == "number"}
+    lines = {line.partition(": ")[0]: line.partition(": ")[2] for line in sweep_legend(found)}
+    assert lines.pop("Lines").endswith("Empty: no answer.")
+    limits = {"1": "also leg_length max (limb 1-, limb 1+)", "2": "no other limit is active"}
+    assert lines == {"Active at every number": "x3 min", **limits}
+    assert set(numbers) == {"1", "2"}
+    assert numbers["1"][0] < 28.75 < numbers["2"][0]
+    assert numbers["2"][1] < 11.75
+    for axis, values in zip((axes.get_xticks(), axes.get_yticks()), points.axes, strict=True):
+        assert 5 <= len(axis) <= 9
+        assert set(axis) <= set(values)
+    drawn = figure.get_supxlabel()
+    assert all(line in drawn for line in sweep_legend(found))
+    # The legend stands below the axes, and within the picture.
+    (legend,) = [text for text in figure.texts if text.get_text() == drawn]
+    box = legend.get_window_extent()
+    assert min(box.x0, box.y0) >= 0
+    assert box.x1 <= figure.bbox.x1
+    assert box.y1 <= axes.xaxis.label.get_window_extent().y0
+
+
+def test_numbers_above_a_curve_do_not_cover_each_other() -> None:
+    case = load_case("hexapod-machining")
+    points = grid(["x1=26:32:25"])
+    found = [TablePoint(float(k), "x2 min" if k % 8 < 2 else "x3 min" if k % 8 < 4 else "") for k in range(25)]
+    figure = sweep_figure(case, points, found)
+    FigureCanvasAgg(figure).draw()
+    boxes = [text.get_bbox_patch().get_window_extent() for text in figure.axes[0].texts]
+    assert len(boxes) == 10  # one for each run of equal limits
+    assert not [1 for one, other in itertools.combinations(boxes, 2) if one.overlaps(other)]
+
+
 #: A command that is killed in the middle of a row, in the block of rows whose number comes first.
 KILLED = """
 import os, signal, sys
 from screwsynth.nlp.cli.main import main
-from screwsynth.nlp.sweeps.journal import Journal
-from screwsynth.nlp.sweeps.journal import line_of
+from screwsynth.nlp.sweeps import sweep
+from screwsynth.nlp.sweeps.journal import Journal, line_of
 
+sweep._BLOCK = 128
 append, left = Journal.append, [int(sys.argv.pop(1))]
-
 def append_or_die(journal, rows):
     left[0] -= 1
     rows = list(rows)
@@ -312,7 +360,6 @@ def append_or_die(journal, rows):
         journal._file.write(line_of(rows[1]).encode()[:20])
         journal._file.flush()
         os.kill(os.getpid(), signal.SIGKILL)
-
 Journal.append = append_or_die
 main()
 """
@@ -320,7 +367,7 @@ main()
 
 @pytest.mark.slow
 def test_a_run_killed_three_times_has_the_same_table(tmp_path: Path, cli: Run) -> None:
-    over = ("--over", "task.pitch=0:2:12", "--over", "x1=10:14:100", "--starts", "4")
+    over = ("--over", "task.pitch=0:2:12", "--over", "x1=10:14:25", "--starts", "4")
     whole, parts = tmp_path / "whole.csv", tmp_path / "parts.csv"
     assert cli("sweep", CASE, *over, "--out", str(whole))[0] == 0
     journal, sizes = Path(f"{parts}.journal"), [0]
@@ -333,7 +380,7 @@ def test_a_run_killed_three_times_has_the_same_table(tmp_path: Path, cli: Run) -
     assert not parts.exists()
     assert cli("sweep", CASE, *over, "--out", str(parts))[0] == 0
     found = answers(parts)
-    assert len(found) == 1200
+    assert len(found) == 300
     assert found == answers(whole)
 
 
@@ -360,9 +407,8 @@ def test_processes_of_ipopt_and_one_that_is_killed(sweep: Callable[..., Sweep]) 
 def test_a_cluster_that_loses_a_worker(sweep: Callable[..., Sweep], tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")
     one = sweep("task.pitch=0:2:30", "x1=10:14:100", starts=2)
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, scheduler_port=0
-    ) as cluster:
+    options = {"threads_per_worker": 1, "processes": True, "dashboard_address": None, "scheduler_port": 0}
+    with distributed.LocalCluster(n_workers=2, **options) as cluster:
         journal, killed = one.journal_of(str(tmp_path / "out.csv")), list[int]()
 
         def kill(_before: int, done: int, total: int, _seconds: float) -> None:
