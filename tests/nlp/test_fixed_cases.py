@@ -5,12 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import starter
-from typer.testing import CliRunner
+from builders import ran, starter
 
 from screwsynth.models import Model, robot_function
 from screwsynth.nlp import Case, Free, Rotation, Status, Task, formulate, json_data, result_of, solve
-from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.evidence.assembly import assembly_over_poses
 from screwsynth.nlp.evidence.kkt import close_equations
 from screwsynth.nlp.evidence.state import loops_are_closed
@@ -62,8 +60,8 @@ def test_the_command_says_evaluated(tmp_path: Path) -> None:
         f'[robot]\nmodel = "3-rps"\n[robot.parameters]\n{numbers}\n[pose]\nposition = [0, 0, {values["h"]!r}]\n'
         '[[task]]\nname = "t"\nsense = "max"\naxis = [0, 1, 2]\npoint = [0, 0, 0]\npitch = 2\n'
     )
-    result = CliRunner().invoke(app, ["solve", str(case)])
-    assert result.exit_code == 0
+    result = ran("solve", str(case))
+    assert result.code == 0
     assert "fixed point: F = " in result.output
     assert "(evaluated)" in result.output
     assert "converged" not in result.output

@@ -6,11 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from builders import ran
 
 from screwsynth.models import Dimension, Model, robot, robot_function
 from screwsynth.nlp import Case, Free, PointKind, Status, Task, evaluate, formulate, json_data, result_of, solve
-from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.evidence.mobility import mobility_of
 from screwsynth.nlp.evidence.singularities import Singularity, SingularityKind, _null_twists, is_passive_singular
 
@@ -230,13 +229,11 @@ def test_commands_and_json_state_the_screws(tmp_path: Path) -> None:
         f"{definition}\n[pose]\nposition = [0, 0, 0.7]\n[[task]]\nname = 't'\nsense = 'max'\n"
         "axis = [0, 0, 1]\npoint = [0, 0, 0]\npitch = 0\n"
     )
-    result = CliRunner().invoke(app, ["evaluate", str(case)], env={"COLUMNS": "200"})
+    result = ran("evaluate", str(case))
     assert "singular: the constraints are dependent" in result.output
     assert result.output.count("  gained: rotation about") == 2
     assert "through (0, 0, 1.4)" in result.output
-    (each,) = json.loads(CliRunner().invoke(app, ["evaluate", str(case), "--json", "-"]).output)["joints"][
-        "singularities"
-    ]
+    (each,) = json.loads(ran("evaluate", str(case), "--json", "-").out)["joints"]["singularities"]
     assert each["kind"] == "constraint"
     assert "limb" not in each
     for motion in each["gained"]:

@@ -10,10 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import Array, commands_in, soaked, turn_about
+from builders import Array, commands_in, ran, soaked, turn_about
 from hexapods import case_of_legs
 from test_workspace_claims import at_home
-from typer.testing import CliRunner
 
 from screwsynth.models import three_upu
 from screwsynth.nlp import Case, Free, Rotation, Task, load_case
@@ -24,7 +23,6 @@ from screwsynth.nlp.case.motors import Motor
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.loads import LoadState, loads_at
 from screwsynth.nlp.evidence.state import evaluate
@@ -334,14 +332,14 @@ def test_limits_on_actuators_are_proved_refuted_by_a_pose_that_evaluate_shows_an
     assert max(abs(each.bound) for each in limited if each.key == "actuator_force.max") <= 1.003 * force * (1 + 1e-9)
 
     tight = loaded(tmp_path, f"actuator_force = {{ min = -{2 * force}, max = {0.999 * force} }}")
-    ended = CliRunner().invoke(app, ["workspace", str(tight)])
-    assert ended.exit_code == 1
-    words = commands_in(ended.stdout, "see it with")[0]
+    ended = ran("workspace", str(tight))
+    assert ended.code == 1
+    words = commands_in(ended.out, "see it with")[0]
     worst = max(
         (each for each in motors_of(load_case(str(tight))).values() if each.outcome is Outcome.REFUTED),
         key=lambda each: each.reached,
     )
-    shown = json.loads(CliRunner().invoke(app, [*words, "--json", "-"]).stdout)
+    shown = json.loads(ran(*words, "--json", "-").out)
     (load,) = shown["loads"]
     largest = max(load["actuators"], key=lambda each: each["largest"])
     assert worst.motor is not None
@@ -359,8 +357,8 @@ def test_the_motor_sheet_is_in_all_outputs(tmp_path: Path) -> None:
     for option in ("json", "csv", "html"):
         files[option] = tmp_path / f"out.{option}"
     asked = [word for option, file in files.items() for word in (f"--{option}", str(file))]
-    ended = CliRunner().invoke(app, ["workspace", str(path), *asked])
-    assert ended.exit_code == 0
+    ended = ran("workspace", str(path), *asked)
+    assert ended.code == 0
     result = json.loads(files["json"].read_text(encoding="utf-8"))
     motors = result["motors"]
     assert Counter((each["number"], each.get("load")) for each in motors) == {
@@ -407,8 +405,8 @@ def test_the_motor_sheet_is_in_all_outputs(tmp_path: Path) -> None:
     page = files["html"].read_text(encoding="utf-8")
     assert 'id="workspace-motors"' in page
     assert f"{by['2-', 'force']['largest']['bound']:.7g}" in page
-    assert "motors: what each actuator needs" in ended.stdout
-    plain = json.loads(CliRunner().invoke(app, ["workspace", "hexapod-linuxcnc", "--json", "-"]).stdout)
+    assert "motors: what each actuator needs" in ended.out
+    plain = json.loads(ran("workspace", "hexapod-linuxcnc", "--json", "-").out)
     assert "motors" not in plain
 
 

@@ -9,16 +9,14 @@ import casadi as ca
 import flint
 import numpy as np
 import pytest
-from builders import case_from, soaked, starter_tables
+from builders import case_from, ran, soaked, starter_tables
 from hexapods import bounds_of, smallest, values_of
 from kernel_enclosures import enclose
 from numpy_engine import first_order
-from typer.testing import CliRunner
 
 from screwsynth.models import Substitution
 from screwsynth.models.joints.closedform import closed_form
 from screwsynth.nlp import Case, Free, Outcome, Task, TurnKind, Turns, Workspace, build_model, judge_workspace
-from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.evidence.dependent import with_dependent
 from screwsynth.nlp.proof.enclosure.forms import ULP, Encloser, Forms
@@ -328,18 +326,18 @@ position = [{{ min = -{r}, max = {r} }}, {{ min = -{r}, max = {r} }}, -1.1]
 
 
 def test_the_command_proves_and_refutes_reach_constraints_and_angles(tmp_path: Path) -> None:
-    file, runner = tmp_path / "delta.toml", CliRunner()
+    file = tmp_path / "delta.toml"
     file.write_text(DELTA.format(r=0.1), encoding="utf-8")
-    run = runner.invoke(app, ["workspace", str(file), "--json", "-"])
-    result = json.loads(run.output)
-    assert run.exit_code == 0
+    run = ran("workspace", str(file), "--json", "-")
+    result = json.loads(run.out)
+    assert run.code == 0
     assert result["proved"]
     assert result["regular"]["outcome"] == result["constraints"]["outcome"] == "proved"
     reach = [each for each in result["extremes"] if each["name"].startswith("reach")]
     assert [each["outcome"] for each in reach] == ["proved"] * 3
     assert len([each for each in result["extremes"] if each["name"].startswith("actuator_angle")]) == 6
     file.write_text(DELTA.format(r=1.5), encoding="utf-8")
-    run = runner.invoke(app, ["workspace", str(file), "--time", "0.05"])
-    assert run.exit_code == 1
+    run = ran("workspace", str(file), "--time", "0.05")
+    assert run.code == 1
     assert "reach limb 1" in run.output
     assert "refuted" in run.output

@@ -39,7 +39,7 @@ def test_every_command_reads_a_case_from_standard_input(
     saved(tmp_path / "poses.csv", "x,y,z\n0,0,1\n")
     proof = tmp_path / "proof.json"
     output_of(cli("certify", "paper-4.1-rotation", "--starts", "1", "--gap", "0.5", "--proof", str(proof)))
-    taking = [name for name in SUMMARIES if any("CASE" in (each.metavar or "") for each in command_of(name).params)]
+    taking = [name for name in SUMMARIES if any("CASE" in each.name for each in command_of(name).arguments)]
     assert set(taking) == set(COMMANDS)
     for name, options in COMMANDS.items():
         give(edited(CASE, ('"stewart-gough"', '"nothing"')), monkeypatch)

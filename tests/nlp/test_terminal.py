@@ -9,13 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import FEW_CASES, Run, commands_in, output_of, refusal_of, saved, soaked, turn_about, unbroken
+from builders import FEW_CASES, Run, commands_in, output_of, ran, refusal_of, saved, soaked, turn_about, unbroken
 from rich.console import Console
-from typer.testing import CliRunner
 
 from screwsynth.nlp import Case, load_case, shipped_cases
 from screwsynth.nlp.case.pose import RotationForm
-from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.output.terminal import PLAIN_WIDTH, ROOM, show
 from screwsynth.nlp.results.posewording import evaluate_command, pose_words, rotation_form, rotation_numbers
 from screwsynth.nlp.results.text import Line, TextTable
@@ -100,7 +98,7 @@ def refuted(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
     """Output of a judged workspace with refuted and open claims, and its result."""
     target = tmp_path_factory.mktemp("judged") / "result.json"
     command = ["workspace", "reachy-mini-envelope", "--time", "2", "--json", str(target)]
-    return CliRunner().invoke(app, command).output, target
+    return ran(*command).output, target
 
 
 def test_every_limit_is_counted_by_its_outcome(refuted: tuple[str, Path]) -> None:

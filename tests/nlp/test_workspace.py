@@ -13,15 +13,13 @@ import casadi as ca
 import jsonschema
 import numpy as np
 import pytest
-from builders import case_from, soaked
+from builders import case_from, ran, refusal_of, soaked
 from hexapods import HEXAPOD, bounds_of, case_of_legs, clearance, hexapod_text, smallest, subject_of, values_of
-from typer.testing import CliRunner
 
 from screwsynth.models import FloatArray
-from screwsynth.nlp import Case, CaseError, Free, InputError, Limits, json_data, load_result, solve
+from screwsynth.nlp import Case, CaseError, Free, Limits, json_data, load_result, solve
 from screwsynth.nlp.case.reader import load_case
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.proof.enclosure.forms import Encloser
 from screwsynth.nlp.proof.statement.machine import Legs, legs_of
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
@@ -302,16 +300,16 @@ def test_the_largest_box_is_found_to_a_hundredth(case: Case) -> None:
 
 def test_the_command_proves_and_refutes(machine: Path, tmp_path: Path) -> None:
     target = tmp_path / "result.json"
-    run = CliRunner().invoke(app, ["workspace", str(machine), "--gap", "0.01", "--json", str(target)])
-    assert run.exit_code == 0, run.output
+    run = ran("workspace", str(machine), "--gap", "0.01", "--json", str(target))
+    assert run.code == 0, run.output
     assert "J has full rank at every pose" in run.output
     assert "everything is proved" in run.output
     result = load_result(target)
     assert isinstance(result, WorkspaceResult)
     assert result.proved
     jsonschema.validate(json.loads(target.read_text(encoding="utf-8")), result_schema())
-    shorter = CliRunner().invoke(app, ["workspace", str(machine), "--gap", "0.01", "--set", "limits.leg_length.max=40"])
-    assert shorter.exit_code == 1
+    shorter = ran("workspace", str(machine), "--gap", "0.01", "--set", "limits.leg_length.max=40")
+    assert shorter.code == 1
     assert "refuted" in shorter.output
 
 
@@ -457,8 +455,8 @@ def test_slices_show_where_the_determinant_has_which_sign(case: Case, machine: P
     area = np.prod(np.diff(np.tan(tilts.boxes.reshape(-1, 2, 2) / 2), axis=1), axis=2).sum()
     assert area == pytest.approx(np.prod(np.diff(np.tan(tilts.whole / 2), axis=0)))
     picture = tmp_path / "slices.svg"
-    run = CliRunner().invoke(app, ["workspace", str(machine), "--gap", "0.05", "--plot", str(picture)])
-    assert run.exit_code == 0, run.output
+    run = ran("workspace", str(machine), "--gap", "0.05", "--plot", str(picture))
+    assert run.code == 0, run.output
     text = picture.read_text(encoding="utf-8")
     assert 'id="workspace"' in text
     assert 'id="proved: regular, and every limit is kept"' in text
@@ -557,27 +555,26 @@ def test_first_order_errors_are_bounded_over_boxes(case: Case, kind: TurnKind, i
 
 
 def test_robots_with_other_rows_are_proved_and_drawn(tmp_path: Path) -> None:
-    runner, file = CliRunner(), tmp_path / "robot.toml"
-    text = runner.invoke(app, ["new", "three-upu"]).output
+    file = tmp_path / "robot.toml"
+    text = ran("new", "three-upu").out
     place = "position = [{ min = -2, max = 2 }, 0, { min = 45, max = 50 }]"
     box = f"[workspace]\n{place}\nrotation = {{ roll = {{ min = -5, max = 5 }} }}"
     file.write_text(f"{text}\n{box}\n", encoding="utf-8")
-    run = runner.invoke(app, ["workspace", str(file), "--set", "base_radius=50", "--json", "-"])
-    assert run.exit_code == 0
-    result = json.loads(run.stdout)
+    run = ran("workspace", str(file), "--set", "base_radius=50", "--json", "-")
+    assert run.code == 0
+    result = json.loads(run.out)
     assert result["regular"]["outcome"] == result["constraints"]["outcome"] == "proved"
     assert result["proved"]
     assert {each["outcome"] for each in result["extremes"]} == {"proved"}
-    drawn = runner.invoke(app, ["workspace", str(file), "--set", "base_radius=50", "--plot", str(tmp_path / "x.png")])
-    assert drawn.exit_code == 0
+    drawn = ran("workspace", str(file), "--set", "base_radius=50", "--plot", str(tmp_path / "x.png"))
+    assert drawn.code == 0
     assert (tmp_path / "x.png").read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize("option", [["--gap", "2"], ["--time", "0"], ["--leg-error", "-1"], ["--quantity", "mass"]])
 def test_wrong_options_are_refused_in_a_sentence(machine: Path, option: list[str]) -> None:
-    run = CliRunner().invoke(app, ["workspace", str(machine), *option])
-    assert isinstance(run.exception, InputError)
-    assert str(run.exception).startswith(option[0])
+    run = ran("workspace", str(machine), *option)
+    refusal_of(run, f"screwsynth: {option[0]}")
 
 
 def test_an_interrupt_keeps_what_is_proved(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,9 +10,8 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
-from builders import case_from, soaked
+from builders import case_from, ran, soaked
 from hexapods import bounds_of, clearance, hexapod_text, smallest, subject_of, values_of
-from typer.testing import CliRunner
 
 from screwsynth.models import FloatArray
 from screwsynth.models.joints.closedform import closed_form
@@ -21,7 +20,6 @@ from screwsynth.nlp.case.limits.joints import JointAngle
 from screwsynth.nlp.case.limits.legs import Actuator, LegLength
 from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.interruption import within
 from screwsynth.nlp.proof.statement.claims import claims_of
 from screwsynth.nlp.proof.statement.machine import Legs, legs_of, workspace_of_case
@@ -436,8 +434,8 @@ def test_the_command_shows_the_machine_that_refutes(tmp_path: Path) -> None:
     keep = ("leg_length = { min = 10, max = 60 }", "leg_length = { min = 10, max = 32 }")
     head, _, tail = TEXT.replace(*keep).partition("actuator =")
     file.write_text(head + tail[tail.index("[workspace]") :], encoding="utf-8")
-    run = CliRunner().invoke(app, ["workspace", str(file), "--gap", "0.01", "--all", "--json", str(target)])
-    assert run.exit_code == 1, run.output
+    run = ran("workspace", str(file), "--gap", "0.01", "--all", "--json", str(target))
+    assert run.code == 1, run.output
     result = load_result(target)
     jsonschema.validate(json.loads(target.read_text(encoding="utf-8")), result_schema())
     assert isinstance(result, WorkspaceResult)
@@ -482,10 +480,8 @@ def test_a_design_is_found_that_keeps_its_limits_for_every_machine() -> None:
 
 def test_what_takes_the_limits_at_the_stated_pose_says_so(tmp_path: Path) -> None:
     target = tmp_path / "certificate.json"
-    run = CliRunner().invoke(
-        app, ["certify", "hexapod-workspace", "--time", "1", "--starts", "1", "--json", str(target)]
-    )
-    assert run.exit_code in (0, 1)
+    run = ran("certify", "hexapod-workspace", "--time", "1", "--starts", "1", "--json", str(target))
+    assert run.code in (0, 1)
     result = json.loads(target.read_text(encoding="utf-8"))
     notice = "the limits are taken at the stated pose alone, not over the workspace"
     assert result["notice"] == notice

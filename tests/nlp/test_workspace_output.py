@@ -11,9 +11,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import commands_in, output_of, refusal_of, unbroken
+from builders import commands_in, output_of, ran, refusal_of, unbroken
 from hexapods import hexapod_text
-from typer.testing import CliRunner
 
 from screwsynth.models import FloatArray
 from screwsynth.models.joints.closedform import closed_form
@@ -22,7 +21,6 @@ from screwsynth.nlp.case.limits.clearance import LegClearance
 from screwsynth.nlp.case.limits.singular_values import SmallestSingularValue
 from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.output.pictures.workspaces import drawing_at, slices_legend
 from screwsynth.nlp.proof.statement.machine import legs_of
 from screwsynth.nlp.proof.workspace.ranks.krawczyk import Coordinates, no_relation
@@ -164,8 +162,8 @@ def refuted(limited: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[st
     flags = [part for pair in zip(("--json", "--html", "--plot-pose"), files, strict=True) for part in pair]
     numbers = ["x3=6", "limits.leg_clearance.min=6", "limits.base_joint_angle.max=8", "limits.actuator.stroke_max=5"]
     flags += [part for each in numbers for part in ("--set", each)]
-    run = CliRunner().invoke(app, ["workspace", str(limited), "--gap", "0.05", "--time", "2", "--all", *flags])
-    assert run.exit_code == 1
+    run = ran("workspace", str(limited), "--gap", "0.05", "--time", "2", "--all", *flags)
+    assert run.code == 1
     result = load_result(folder / "result.json")
     assert isinstance(result, WorkspaceResult)
     return run.output, result, folder

@@ -7,14 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import case_from
+from builders import case_from, ran
 from numpy.typing import NDArray
-from typer.testing import CliRunner
 
 from screwsynth.models import FloatArray
 from screwsynth.nlp import Case, Solution, load_case, pareto, solve
 from screwsynth.nlp.case.robots import build_model
-from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.front.data import front_result
 from screwsynth.nlp.output.fronttable import front_words
@@ -338,8 +336,8 @@ def test_a_front_and_a_compiled_sweep_say_that_limits_hold_at_the_stated_pose(tm
     assert NOTICE in front_words(front)
     table, data = tmp_path / "sweep.csv", tmp_path / "sweep.json"
     options = ("--over", "task.pitch=0.1,0.2", "--starts", "1", "--engine", "compiled", "--out", str(table))
-    run = CliRunner().invoke(app, ["sweep", str(path), *options, "--json", str(data)])
-    assert run.exit_code == 0, run.output
+    run = ran("sweep", str(path), *options, "--json", str(data))
+    assert run.code == 0, run.output
     assert NOTICE in run.output
     result = json.loads(data.read_text(encoding="utf-8"))
     assert result["notice"] == NOTICE
