@@ -11,14 +11,14 @@ import pytest
 from screwsynth.nlp import InputError
 from screwsynth.nlp.cli.commandline import Argument, Command, Option
 
-BEGUN: list[object] = []
+begun: list[object] = []
 
 
 @contextmanager
 def limited(seconds: float | None) -> Iterator[None]:
-    BEGUN.append(seconds)
+    begun.append(seconds)
     yield
-    BEGUN.append("ended")
+    begun.append("ended")
 
 
 def measure(
@@ -33,7 +33,7 @@ def measure(
 
     Everything is measured.
     """
-    BEGUN.append((case, robots, axis, count, seconds, whole))
+    begun.append((case, robots, axis, count, seconds, whole))
 
 
 MEASURE = Command("measure", measure, "screwsynth measure case")
@@ -85,8 +85,8 @@ def test_help_precedes_what_is_missing(capsys: pytest.CaptureFixture[str]) -> No
 
 
 def test_a_command_runs_within_the_contexts_of_its_options() -> None:
-    BEGUN.clear()
+    begun.clear()
     MEASURE.run(["case", "--time", "3", "--all"])
     MEASURE.run(["case"])
     first, second = ("case", None, None, 0, 3.0, True), ("case", None, None, 0, None, False)
-    assert BEGUN == [3.0, first, "ended", None, second, "ended"]
+    assert begun == [3.0, first, "ended", None, second, "ended"]
