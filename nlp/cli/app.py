@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 from ..errors import InputError, nearest
 from .commandline import HELP_ROW, Command, Option, print_line, print_notice
-from .helptext import paragraphs, table, usage
 from .usage import with_present_names
 
 if TYPE_CHECKING:
@@ -84,6 +83,8 @@ EXAMPLES = {name: f"screwsynth {example}" for group in GROUPS.values() for name,
 
 def help_of_commands() -> str:
     """Return the help of the command line: the commands by what they are for."""
+    from .helptext import paragraphs, table, usage
+
     options = [("--version", "Print the version."), HELP_ROW]
     width = max(map(len, SUMMARIES))
     blocks = [

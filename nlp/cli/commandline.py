@@ -14,7 +14,6 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any, NamedTuple, get_args, get_origin, get_type_hints
 
 from ..errors import InputError, nearest
-from .helptext import example, paragraphs, table, usage
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -130,6 +129,8 @@ class Command:
     @property
     def help(self) -> str:
         """Help of the command."""
+        from .helptext import example, paragraphs, table, usage
+
         name = f"screwsynth {self.name}"
         blocks = [usage(name, ["[OPTIONS]", *(each.name for each in self.arguments)])]
         blocks.append(paragraphs(self._function.__doc__ or ""))
