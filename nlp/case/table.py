@@ -13,6 +13,11 @@ from ..errors import CaseError, nearest
 Vector = Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)]
 
 
+def empty_list() -> list[Any]:
+    """Return an empty list, as the default of a key. The signature of ``list`` takes 2 ms to read, once in every command."""
+    return []
+
+
 class Table(BaseModel):
     """A table of a case file, with its known keys only."""
 
