@@ -14,7 +14,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 from builders import case_from, soaked, starter_tables
-from generated import BAD_INPUT, COMPILERS, INFEASIBLE, OK, OTHER_ASSEMBLY, RANGE_END, written
+from generated import BAD_INPUT, COMPILERS, INFEASIBLE, OK, OTHER_ASSEMBLY, RANGE_END, needs_compiler, written
 
 from screwsynth.nlp import Case, CompiledCase, load_case, load_compiled, shipped_cases
 from screwsynth.nlp.case.source import find_case
@@ -127,6 +127,7 @@ def test_the_worst_case_of_other_tasks_is_theirs(name: str, compiled: Compiled, 
     assert own.solve(sense="min").status.tolist() == [BAD_INPUT]
 
 
+@needs_compiler
 def test_the_largest_of_other_tasks_to_be_minimised_is_theirs(tmp_path: Path, ticks: ModuleType) -> None:
     tables = tomllib.loads(Path(find_case("camera-mount")).read_text(encoding="utf-8"))
     for task in tables["task"]:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from builders import Run, case_from, refusal_of, rows_of, starter_tables
+from generated import needs_compiler
 
 from screwsynth.nlp import InputError, examine, formulate, load_case, load_result, solve
 from screwsynth.nlp import sweep as run_in_python
@@ -83,6 +84,7 @@ def test_many_verdicts_are_those_of_single_points() -> None:
             assert mine == pytest.approx(theirs, rel=1e-6)
 
 
+@needs_compiler
 def test_compiled_rows_are_those_of_solve(tmp_path: Path, cli: Run) -> None:
     out, picture = tmp_path / "sweep.csv", tmp_path / "sweep.svg"
     command = ("sweep", CASE, *OVER, "--out", str(out))
@@ -318,6 +320,7 @@ main()
 """
 
 
+@needs_compiler
 @pytest.mark.slow
 def test_a_run_killed_three_times_has_the_same_table(tmp_path: Path, cli: Run) -> None:
     over = ("--over", "task.pitch=0:2:12", "--over", "x1=10:14:100", "--starts", "4")
@@ -355,6 +358,7 @@ def test_processes_of_ipopt_and_one_that_is_killed(sweep: Callable[..., Sweep]) 
     assert [row.F for row in found if row.point == 7] == pytest.approx([alone.F], rel=1e-12)
 
 
+@needs_compiler
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_a_cluster_that_loses_a_worker(sweep: Callable[..., Sweep], tmp_path: Path) -> None:
