@@ -118,7 +118,7 @@ def checked(where: Path, flags: str, *runner: str) -> subprocess.CompletedProces
     made(where, "clean")
     example = where / "example.c"
     example.write_text(example.read_text(encoding="utf-8").replace("TICKS 10000", "TICKS 500"), encoding="utf-8")
-    made(where, f"CC={COMPILERS[0]}", f"CFLAGS=-std=c99 -g {flags}", "selftest", "example")
+    made(where, f"CFLAGS=-std=c99 -g {flags}", "selftest", "example")
     for program in ("selftest", "example"):
         done = subprocess.run([*runner, str(where / program)], capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stdout + done.stderr
