@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import csv
 import importlib.util
+import io
 import math
 import re
 import shlex
@@ -12,11 +13,12 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Callable, Collection, Iterable, Mapping
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -26,6 +28,7 @@ from screwsynth.models import Dimension, Model, robot_function
 from screwsynth.nlp import Case, case_from_tables, shipped_cases
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.case.toml import toml_document
+from screwsynth.nlp.cli.main import run as command_line
 from screwsynth.nlp.proof.checker.proof_file import Proof, ProofClaim
 from screwsynth.nlp.starter.text import starter_case
 
@@ -204,6 +207,28 @@ def turn_about(axis: ArrayLike, angle: float) -> Array:
     x, y, z = np.array(axis, dtype=float) / np.linalg.norm(axis)
     K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.asarray(np.eye(3) + math.sin(angle) * K + (1 - math.cos(angle)) * (K @ K))
+
+
+class Ended(NamedTuple):
+    """A command that has ended: exit status, standard output, standard error."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def output(self) -> str:
+        """Everything that it printed."""
+        return self.out + self.err
+
+
+def ran(*words: str) -> Ended:
+    """A command of the command line, run in this process; for fixtures, which cannot take that of a test."""
+    out, err = io.StringIO(), io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
+        patch.setattr(sys, "argv", ["screwsynth", *words])
+        code = command_line()
+    return Ended(code, out.getvalue(), err.getvalue())
 
 
 def output_of(ended: tuple[int, str, str]) -> str:

@@ -16,7 +16,6 @@ from typing import Any, NamedTuple
 
 from ...models.values import dataclass
 from ..errors import CaseError, InputError, listing, nearest
-from ..system.slips import hint_of
 
 #: Largest size of a file, bytes, and the largest number of its rows: what is larger is no trajectory of a case.
 _MOST_BYTES, _MOST_ROWS = 4_000_000, 1_000
@@ -241,6 +240,8 @@ def number_in(text: str, row: int, column: str, file: str) -> float:
     try:
         return float(text)
     except ValueError:
+        from ..system.slips import hint_of  # noqa: PLC0415 - only messages need it
+
         fault = f"must be a number{hint_of(text)}" if text else "is empty; it must be a number"
         raise CaseError(f"row {row}, column {column}", fault, text or None, file) from None
 

@@ -21,7 +21,7 @@ from ...models.joints.words import GRAPH_KEYS, MOST_LIMBS, NESTED_BRANCH
 from ..errors import CaseError, InputError
 from ..system.reading import check_version, read_limited
 from ..system.slips import toml_fault
-from .table import Table, Vector, case_error
+from .table import Table, Vector, case_error, empty_list
 
 Name = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1)]
 Expression = Annotated[
@@ -82,8 +82,8 @@ class LimbTable(Table):
     name: Name | None = Field(default=None, description="its name; copies are numbered")
     repeat: RepeatTable | None = Field(default=None, description="copies of the limb")
     points: dict[str, VectorExpression] = Field(default_factory=dict, description="points by name, at home")
-    joints: list[JointTable] = Field(default_factory=list, description="joints from the base to the platform")
-    branch: list[BranchTable] = Field(default_factory=list, description="paths behind these joints")
+    joints: list[JointTable] = Field(default_factory=empty_list, description="joints from the base to the platform")
+    branch: list[BranchTable] = Field(default_factory=empty_list, description="paths behind these joints")
     centre: VectorExpression | None = Field(default=None, description="place where its wrenches are measured")
 
 
@@ -139,7 +139,7 @@ class LinkFile(HeadTable):
     platform: Name = Field(default="platform", description="the link that is the platform")
     points: dict[str, VectorExpression] = Field(default_factory=dict, description="points by name, at home")
     joint: Annotated[list[LinkJointTable], Field(min_length=1)] = Field(description="joints")
-    coupling: list[CouplingTable] = Field(default_factory=list, description="relations of joints' coordinates")
+    coupling: list[CouplingTable] = Field(default_factory=empty_list, description="relations of joints' coordinates")
 
 
 #: Keys longer than this are cut in messages.

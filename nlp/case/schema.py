@@ -22,7 +22,7 @@ from .case import Case
 from .loads import NO_LOADING, Loading
 from .pathfile import PathFile
 from .settings import Expectation, Published, Search
-from .table import Table, Vector, fault_of
+from .table import Table, Vector, empty_list, fault_of
 from .task import Task
 from .workspace import Workspace
 
@@ -290,7 +290,7 @@ class ExpectTable(Table):
     singular: bool | None = Field(
         default=Expectation.singular, description="whether J is rank deficient at the optimum"
     )
-    value: list[ExpectedValueTable] = Field(default_factory=list, description="other numbers of the result")
+    value: list[ExpectedValueTable] = Field(default_factory=empty_list, description="other numbers of the result")
 
 
 class PublishedTable(Table):
@@ -344,8 +344,8 @@ class Document(Table):
     units: UnitsTable = UnitsTable.model_construct()
     robot: RobotTable
     # A document that names CSV files has their rows here by the time that it is checked.
-    pose: Poses = Field(default_factory=list)
-    task: Annotated[list[TaskTable], Field(min_length=1)] = Field(default_factory=list)
+    pose: Poses = Field(default_factory=empty_list)
+    task: Annotated[list[TaskTable], Field(min_length=1)] = Field(default_factory=empty_list)
     poses: FileName | None = Field(default=None, description="CSV file beside this one with a pose in each row")
     tasks: FileName | None = Field(default=None, description="CSV file beside this one with a task in each row")
     combine: CombineTable | None = Field(default=None, description="several tasks or poses only")
@@ -355,7 +355,7 @@ class Document(Table):
     workspace: Table | None = None
     solve: SolveTable = SolveTable.model_construct()
     expect: ExpectTable = ExpectTable.model_construct()
-    published: list[PublishedTable] = Field(default_factory=list)
+    published: list[PublishedTable] = Field(default_factory=empty_list)
 
     @model_validator(mode="after")
     def _refuse_without_pose_or_task(self) -> Document:

@@ -16,7 +16,6 @@ from ... import cases
 from ...models import model_names
 from ..errors import InputError, nearest
 from ..system.reading import read_limited, text_of_bytes
-from ..system.slips import toml_fault
 from .csvrows import named_csv_files
 
 #: Largest case file, bytes. The largest that a person writes is a thousand times smaller; a device has no end.
@@ -124,6 +123,8 @@ def tables_of(path: Path, text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
+        from ..system.slips import toml_fault  # noqa: PLC0415 - only messages need it
+
         raise InputError(f"{source_name(path)}: {toml_fault(text, error)}") from None
 
 

@@ -13,6 +13,11 @@ from ..errors import CaseError, nearest
 Vector = Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)]
 
 
+def empty_list() -> list[Any]:
+    """Return an empty list, the default of a key. Its signature is read at once, that of ``list`` in 2 ms."""
+    return []
+
+
 class Table(BaseModel):
     """A table of a case file, with its known keys only."""
 

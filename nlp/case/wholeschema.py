@@ -18,7 +18,7 @@ from .loadtables import GravityTable, LoadTable, MotionTable, ObjectiveTable, lo
 from .pathfile import PLACE, Convention, PathFile
 from .pose import internal_value
 from .schema import Document, FileName, Value
-from .table import Table, Vector, fault_of
+from .table import Table, Vector, empty_list, fault_of
 from .task import Task
 from .workspace import TURNS, TurnKind, Turns, Workspace
 
@@ -117,7 +117,7 @@ class WholeDocument(Document):
     limits: LimitsTable | None = Field(default=None, description="limits that a design must keep to be built")
     workspace: WorkspaceTable | None = Field(default=None, description="poses for which a machine is judged")
     path: PathTable | None = Field(default=None, description="programmed path along which a machine is judged")
-    load: list[LoadTable] = Field(default_factory=list, description="loads on the platform")
+    load: list[LoadTable] = Field(default_factory=empty_list, description="loads on the platform")
     motion: MotionTable | None = Field(default=None, description="the platform's fastest motions")
     gravity: GravityTable | None = Field(default=None, description="gravity, for loads that are masses")
     objective: ObjectiveTable | None = Field(default=None, description="what is optimised, and over which poses")

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
 from importlib import import_module
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
-import typer
-from typer.core import TyperCommand, TyperGroup
-
-from .usage import Command, faults_in_sentences
+from ..errors import InputError, nearest
+from .commandline import HELP_ROW, Command, Option, print_line, print_notice
+from .usage import with_present_names
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -83,37 +81,52 @@ SUMMARIES = {name: summary for group in GROUPS.values() for name, (summary, _) i
 EXAMPLES = {name: f"screwsynth {example}" for group in GROUPS.values() for name, (_, example) in group.items()}
 
 
-class Commands(TyperGroup):
-    """The commands, of which only the one that is called is built."""
+def help_of_commands() -> str:
+    """Return the help of the command line: the commands by what they are for."""
+    from .helptext import paragraphs, table, usage
 
-    def __init__(self, **attributes: Any) -> None:  # noqa: ANN401 - of typer
-        super().__init__(**attributes)
-        listed = (TyperCommand(name, help=summary, rich_markup_mode=None) for name, summary in SUMMARIES.items())
-        self.commands = dict(zip(SUMMARIES, listed, strict=True))
+    options = [("--version", "Print the version."), HELP_ROW]
+    width = max(map(len, SUMMARIES))
+    blocks = [
+        usage("screwsynth", ["[OPTIONS]", "COMMAND", "[ARGS]..."]),
+        paragraphs(_program.__doc__ or ""),
+        table("Options", options),
+    ]
+    for title, group in GROUPS.items():
+        blocks.append(table(title, [(name.ljust(width), summary) for name, (summary, _) in group.items()]))
+    return "\n\n".join(blocks)
 
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:  # noqa: ANN401 - of typer or of click
-        """Read the options before the command; without a word, help is shown."""
-        with faults_in_sentences("screwsynth", self.params) if args else nullcontext():
-            return super().parse_args(ctx, args)
 
-    def resolve_command(self, _: Any, args: list[str]) -> Any:  # noqa: ANN401 - of typer or of click
-        """Return the name, the command and its arguments.
+def run_command(words: list[str]) -> None:
+    """Run the command that a command line names; without a word, help goes to standard error.
 
-        Raises:
-            InputError: there is no such command.
-        """
-        if args[0] not in SUMMARIES:
-            from ..errors import InputError
+    Raises:
+        InputError: the command line has a fault.
+        SystemExit: with an exit status other than 0.
+    """
+    first = next((k for k, word in enumerate(words) if word in ("-", "--") or not word.startswith("-")), len(words))
+    given = Command("screwsynth", _program, "").read(words[:first])
+    if given is None:
+        print_line(help_of_commands())
+        return
+    if given["version"]:
+        from .. import __version__
 
-            raise InputError(f"{args[0]}: no such command; {_meant(args)}")
-        return args[0], command_of(args[0]), args[1:]
+        print_line(f"screwsynth {__version__}")
+        return
+    rest = words[first:]
+    if rest[:1] == ["--"]:
+        del rest[0]
+    if not rest:
+        print_notice(help_of_commands())
+        raise SystemExit(2)
+    if rest[0] not in SUMMARIES:
+        raise InputError(f"{rest[0]}: no such command; {_meant(rest)}")
+    command_of(rest[0]).run(rest[1:])
 
-    def format_commands(self, _: Any, formatter: Any) -> None:  # noqa: ANN401 - of typer or of click
-        """Write the commands by what they are for."""
-        width = max(map(len, SUMMARIES))
-        for title, group in GROUPS.items():
-            with formatter.section(title):
-                formatter.write_dl([(name.ljust(width), summary) for name, (summary, _) in group.items()])
+
+def _program(version: Annotated[bool, Option("--version", "", "Print the version.")] = False) -> None:
+    """Geometry and pose of a parallel robot for a given instantaneous screw motion."""
 
 
 def _meant(args: list[str]) -> str:
@@ -123,7 +136,6 @@ def _meant(args: list[str]) -> str:
 
     from ...models import model_names
     from ..case.source import shipped_cases
-    from ..errors import nearest
 
     word, *others = args
     if word == "help":
@@ -137,48 +149,15 @@ def _meant(args: list[str]) -> str:
     return nearest(word, SUMMARIES)
 
 
-def command_of(name: str) -> Any:  # noqa: ANN401 - of typer or of click
+def command_of(name: str) -> Command:
     """Return a command with its options, from its module."""
-    single = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
     # A command that is too wide for a line goes on in the next one.
     begin, option, end = EXAMPLES[name].rpartition(" --")
     example = f"{begin} \\\n   {option}{end}" if len(EXAMPLES[name]) > _WIDTH else EXAMPLES[name]
-    epilog = f"\b\nExample:\n  {example}"
     if name == "import":
-        from .importing import SeveralValues, import_
+        from .importing import import_, with_repeated_options
 
-        single.command(name, cls=SeveralValues, epilog=epilog)(import_)
-    else:
-        module = name.replace("-", "_")
-        function: Callable[..., None] = getattr(import_module(f".{module}", __package__), module)
-        single.command(name, cls=Command, epilog=epilog)(function)
-    return typer.main.get_command(single)
-
-
-app = typer.Typer(
-    name="screwsynth",
-    cls=Commands,
-    help="Geometry and pose of a parallel robot for a given instantaneous screw motion.",
-    add_completion=False,
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
-    no_args_is_help=True,
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
-)
-
-
-def _print_version(wanted: bool) -> None:
-    if wanted:
-        from .. import __version__
-
-        typer.echo(f"screwsynth {__version__}")
-        raise typer.Exit
-
-
-@app.callback()
-def _options(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
-    ] = False,
-) -> None:
-    pass
+        return Command(name, import_, example, with_repeated_options)
+    module = name.replace("-", "_")
+    function: Callable[..., None] = getattr(import_module(f".{module}", __package__), module)
+    return Command(name, function, example, lambda words: with_present_names(name, words))

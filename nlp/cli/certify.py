@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
 from . import options
+from .commandline import print_notice
 
 
 def certify(
@@ -61,7 +60,7 @@ def certify(
             write_text(proof, proof_of(certified, text).as_text())
         else:
             # A file of an earlier run is left as it is: it must not be taken for the proof of this one.
-            typer.echo(f"--proof {one_line(proof)}: not written, as there is no complete proof", err=True)
+            print_notice(f"--proof {one_line(proof)}: not written, as there is no complete proof")
     options.write_json(json_file, result)
     if not files.is_piped:
         from ..results.summary import certified_summary
@@ -69,4 +68,4 @@ def certify(
         in_home_mode = all(each.nlp.in_home_mode for each in certified.certificates)
         options.show(unknown_lines(loaded.model, all_assemblies=not in_home_mode), whole=True)
         options.show(certified_summary(loaded, result), whole=whole)
-    raise typer.Exit(0 if certified.is_proved else 1)
+    raise SystemExit(0 if certified.is_proved else 1)

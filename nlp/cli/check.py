@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Annotated
 
-import typer
-
 from . import options
+from .commandline import Argument, print_notice
 
 
 def check(
     cases: Annotated[
         list[str] | None,
-        typer.Argument(
-            metavar="[CASE]...", help="Case files or names of shipped cases, - is stdin; all shipped ones if left out."
-        ),
+        Argument("[CASE]...", "Case files or names of shipped cases, - is stdin; all shipped ones if left out."),
     ] = None,
     json_file: options.JsonFile = None,
     junit: Annotated[str | None, options.file("--junit", "Write JUnit XML for a CI; - is stdout")] = None,
@@ -39,14 +37,14 @@ def check(
     checks = check_cases(cases)
     is_stopped = is_requested()
     if is_stopped:
-        typer.echo(f"{why_stopped()}: {len(checks)} of {len(cases or shipped_cases())} cases are checked", err=True)
+        print_notice(f"{why_stopped()}: {len(checks)} of {len(cases or shipped_cases())} cases are checked")
     options.write_json(json_file, checks_of(checks))
     if junit is not None:
         write_text(junit, checks_as_junit(checks))
     if markdown:
-        typer.echo(checks_as_markdown(checks), nl=False)
+        sys.stdout.write(checks_as_markdown(checks))
     elif "-" not in (json_file, junit):
         from ..results.checks import checks_summary
 
         options.show(checks_summary(checks), whole=whole)
-    raise typer.Exit(0 if all(each.passed for each in checks) and not is_stopped else 1)
+    raise SystemExit(0 if all(each.passed for each in checks) and not is_stopped else 1)

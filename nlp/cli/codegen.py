@@ -7,9 +7,8 @@ import sys
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from . import options
+from .commandline import print_line
 
 
 def codegen(
@@ -34,14 +33,14 @@ def codegen(
     files = generate_c(loaded, text)
     for name in files if Path(out).is_dir() else ():
         check_outputs(inputs, {"--out": str(Path(out) / name)})
-    typer.echo(size_words(loaded, files))
+    print_line(size_words(loaded, files))
     if loaded.limits_over:
-        typer.echo(loaded.stated_pose_notice)
+        print_line(loaded.stated_pose_notice)
     if not no_measure:
         files = _measured(files, identifier(loaded.name))
     write_folder(out, files, force=force)
     command = f"make -C {shlex.quote(one_line(out))} test"
-    typer.echo(f"{len(files)} files in {one_line(out)}; {command} compiles and tests them")
+    print_line(f"{len(files)} files in {one_line(out)}; {command} compiles and tests them")
 
 
 def _measured(files: dict[str, str], prefix: str) -> dict[str, str]:
@@ -56,5 +55,5 @@ def _measured(files: dict[str, str], prefix: str) -> dict[str, str]:
     else:
         figures = measure(files, prefix)
     for each in figures:
-        typer.echo(figure_words(each))
+        print_line(figure_words(each))
     return with_figures(files, prefix, figures)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from . import options
+from .commandline import Argument, print_notice
 from .progress import counting_line
 
 if TYPE_CHECKING:
@@ -17,7 +16,7 @@ def compare(
     case: options.CaseName,
     robots: Annotated[
         list[str],
-        typer.Argument(metavar="ROBOT...", help="Names of robots, robot files, or 'case' for the case's own robot."),
+        Argument("ROBOT...", "Names of robots, robot files, or 'case' for the case's own robot."),
     ],
     size: Annotated[
         float | None, options.number("--size", "LENGTH", "Common size; that of the case's robot if left out")
@@ -69,10 +68,10 @@ def compare(
     is_stopped = is_requested()
     if is_stopped:
         begun = f"{len(found.entries)} of {len(robots)} robots are begun, the last one not to its end"
-        typer.echo(f"{why_stopped()}: {begun}", err=True)
+        print_notice(f"{why_stopped()}: {begun}")
     _write(found, files, whole=whole)
     is_proved = not certified or all(each.certified is not None and each.certified.is_proved for each in found.ranked)
-    raise typer.Exit(0 if found.ranked and is_proved and not is_stopped else 1)
+    raise SystemExit(0 if found.ranked and is_proved and not is_stopped else 1)
 
 
 def _write(found: Comparison, files: options.Outputs, *, whole: bool) -> None:

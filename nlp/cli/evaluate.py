@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
 from . import options
+from .commandline import print_notice
 
 
 def evaluate(
@@ -45,7 +44,7 @@ def evaluate(
     if left_out := loaded.without_motion:  # a pose of a path, whose own motion is meant
         loaded = replace(loaded, limits=Limits(*(each for each in loaded.limits if each not in left_out)))
         names = ", ".join(f"limits.{each.name}" for each in left_out)
-        typer.echo(f"{names}: left out, as the case has no [motion]", err=True)
+        print_notice(f"{names}: left out, as the case has no [motion]")
     files = options.Outputs(json=json_file, csv=csv_file)
     files.check(given.inputs)
     options.check_csv(csv_file, table, loaded, at_point=True)
@@ -66,4 +65,4 @@ def evaluate(
         from ..results.summary import evaluation_summary
 
         options.show(evaluation_summary(loaded, result), whole=whole)
-    raise typer.Exit(1 if result.violated else 0)
+    raise SystemExit(1 if result.violated else 0)

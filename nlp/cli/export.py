@@ -6,9 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from . import options
+from .commandline import print_notice
 
 
 def export(
@@ -66,8 +65,8 @@ def export(
         if jacobian is not None and not fault:
             check_same_robot(nlp, x, jacobian)
     if fault:
-        typer.echo(f"screwsynth: {one_line(case)}: {fault}: nothing is exported", err=True)
-        raise typer.Exit(1)
+        print_notice(f"screwsynth: {one_line(case)}: {fault}: nothing is exported")
+        raise SystemExit(1)
     files = files_at(nlp, x, chosen, pose)
     for name in files if Path(out).is_dir() else ():
         check_outputs(inputs, {"--out": str(Path(out) / name)})

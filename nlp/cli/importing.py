@@ -3,35 +3,33 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
-
-import typer
+from typing import Annotated
 
 from . import options
-from .usage import Command
+from .commandline import Argument, print_line
 
 
-class SeveralValues(Command):
-    """A command whose options ``--actuated`` and ``--free`` also take every value up to the next option."""
+def with_repeated_options(words: list[str]) -> list[str]:
+    """Return the words of a command line with ``--actuated`` or ``--free`` before each of its values.
 
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:  # noqa: ANN401 - of typer or of click
-        """Write the option again before each further value, and read the arguments."""
-        written: list[str] = []
-        option, is_first = "", False
-        for word in args:
-            if word.startswith("-") and word != "-":
-                option, is_first = (word, True) if word in ("--actuated", "--free") else ("", False)
-                written.append(word)
-            elif option and not is_first:
-                written += [option, word]
-            else:
-                written.append(word)
-                is_first = False
-        return super().parse_args(ctx, written)
+    These options also take every value up to the next option.
+    """
+    written: list[str] = []
+    option, is_first = "", False
+    for word in words:
+        if word.startswith("-") and word != "-":
+            option, is_first = (word, True) if word in ("--actuated", "--free") else ("", False)
+            written.append(word)
+        elif option and not is_first:
+            written += [option, word]
+        else:
+            written.append(word)
+            is_first = False
+    return written
 
 
 def import_(
-    file: Annotated[str, typer.Argument(metavar="FILE", help="A model in MJCF (.xml) or URDF.")],
+    file: Annotated[str, Argument("FILE", "A model in MJCF (.xml) or URDF.")],
     platform: Annotated[str, options.text("--platform", "BODY", "Body, link or site that is the platform")],
     base: Annotated[str, options.text("--base", "BODY", "Body that is the base; the fixed root if left out")] = "",
     actuated: Annotated[
@@ -95,4 +93,4 @@ def import_(
         title = Line(found.mechanism.name, tone=Tone.TITLE)
         show(options.console(), [title, *(Line(text, label=label) for label, text in lines)])
         if out is not None:
-            typer.echo(f'{one_line(out)} has the robot: [robot] file = "{one_line(Path(out).name)}" in a case reads it')
+            print_line(f'{one_line(out)} has the robot: [robot] file = "{one_line(Path(out).name)}" in a case reads it')

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
 from . import options
 
 
@@ -42,4 +40,4 @@ def inverse(
     files.write("csv", inverse_csv, loaded, found, given.rows, derivatives=derivatives)
     if not files.is_piped:
         options.show(inverse_summary(loaded, found, poses, given.rows), whole=whole)
-    raise typer.Exit(0 if found.closed.all() else 1)
+    raise SystemExit(0 if found.closed.all() else 1)

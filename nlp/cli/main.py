@@ -15,8 +15,6 @@ from typing import TYPE_CHECKING
 from ..interruption import INTERRUPTED, is_requested, kept, listen
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from typing_extensions import Buffer
 
 #: Objects allocated between two garbage collections. Imports allocate 90,000 objects and leave no garbage: with
@@ -55,7 +53,6 @@ def run() -> int:
         Exit status.
     """
     from ..errors import ScrewsynthError
-    from .app import app
 
     # pydantic would look for plugins in every installed distribution: 6 ms where there are 70.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
@@ -69,7 +66,7 @@ def run() -> int:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     try:
-        status = _status_of(app)
+        status = _status_of(sys.argv[1:])
         sys.stdout.flush()
     except ScrewsynthError as error:
         _say(str(error))
@@ -87,10 +84,12 @@ def run() -> int:
     return INTERRUPTED
 
 
-def _status_of(app: Callable[[], object]) -> int:
-    """Run the commands and return the exit status that they end with."""
+def _status_of(words: list[str]) -> int:
+    """Run a command and return its exit status."""
+    from .app import run_command
+
     try:
-        app()
+        run_command(words)
     except SystemExit as ended:
         return ended.code if isinstance(ended.code, int) else 0
     return 0

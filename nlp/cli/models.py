@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from . import options
+from .commandline import Argument
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,9 +15,7 @@ if TYPE_CHECKING:
 
 
 def models(
-    name: Annotated[
-        str | None, typer.Argument(metavar="[NAME]", help="One robot, or a robot file (.toml), in full.")
-    ] = None,
+    name: Annotated[str | None, Argument("[NAME]", "One robot, or a robot file (.toml), in full.")] = None,
     plot: options.PlotFile = None,
     whole: options.ShowAll = False,
 ) -> None:

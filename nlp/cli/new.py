@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Annotated
 
-import typer
-
 from . import options
+from .commandline import Argument
 
 
 def new(
-    model: Annotated[str, typer.Argument(metavar="MODEL", help="Name of a robot, or a robot file (.toml).")],
+    model: Annotated[str, Argument("MODEL", "Name of a robot, or a robot file (.toml).")],
 ) -> None:
     """Print a commented starter case.
 
@@ -22,6 +22,6 @@ def new(
     from ..starter.text import starter_case
 
     if not model.endswith(".toml"):
-        typer.echo(starter_case(build_model(model)), nl=False)
+        sys.stdout.write(starter_case(build_model(model)))
         return
-    typer.echo(starter_case(options.read_robot(model), Path(model).name), nl=False)
+    sys.stdout.write(starter_case(options.read_robot(model), Path(model).name))

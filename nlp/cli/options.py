@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, ParamSpec
+from typing import TYPE_CHECKING, Annotated, NamedTuple, ParamSpec
 
-import typer
+from ..interruption import within
+from .commandline import Argument, Option, print_notice
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -39,10 +40,8 @@ class WholeNumber:
 
     def __init__(self, option: str, least: int, most: int | None = None) -> None:
         self.option, self.least, self.most = option, least, most
-        # The command line names the type of an option by its reader.
-        self.__name__ = "N"
 
-    def __call__(self, text: str | int) -> int:
+    def __call__(self, text: str) -> int:
         """Return the number.
 
         Raises:
@@ -70,9 +69,8 @@ class Number:
 
     def __init__(self, option: str, least: float | None = None) -> None:
         self.option, self.least = option, least
-        self.__name__ = "NUMBER"
 
-    def __call__(self, text: str | float) -> float:
+    def __call__(self, text: str) -> float:
         """Return the number.
 
         Raises:
@@ -84,94 +82,91 @@ class Number:
         try:
             number = float(text)
         except ValueError:
-            raise InputError(f"{self.option} {text}: must be a number{hint_of(str(text))}") from None
+            raise InputError(f"{self.option} {text}: must be a number{hint_of(text)}") from None
         if self.least is not None and not self.least <= number < 1:
             raise InputError(f"{self.option} {number:g}: must be at least {self.least:g} and below 1")
         return number
 
 
 # The words of the command line: what several commands have has one name, one form and one sentence of help, to which a
-# command adds its own words. typer's own type of an option is not public.
+# command adds its own words.
 
 
-def text(name: str, metavar: str, words: str) -> Any:  # noqa: ANN401 - as above
+def text(name: str, metavar: str, words: str) -> Option:
     """Return an option that is a text, with what the help says of it."""
-    return typer.Option(name, metavar=metavar, help=f"{words}.")
+    return Option(name, metavar, f"{words}.")
 
 
-def several(name: str, metavar: str, words: str) -> Any:  # noqa: ANN401 - as above
+def several(name: str, metavar: str, words: str) -> Option:
     """Return an option that is given once for each value: the only form of a list of names."""
-    return typer.Option(name, metavar=metavar, help=f"{words}; may be repeated.")
+    return Option(name, metavar, f"{words}; may be repeated.")
 
 
-def flag(name: str, words: str) -> Any:  # noqa: ANN401 - as above
+def flag(name: str, words: str) -> Option:
     """Return an option without a value."""
-    return typer.Option(name, help=f"{words}.")
+    return Option(name, "", f"{words}.")
 
 
-def file(name: str, words: str) -> Any:  # noqa: ANN401 - as above
+def file(name: str, words: str) -> Option:
     """Return an option that names a file."""
     return text(name, "FILE", words)
 
 
-def plot(words: str, name: str = "--plot") -> Any:  # noqa: ANN401 - as above
+def plot(words: str, name: str = "--plot") -> Option:
     """Return the option of a picture."""
     return file(name, f"{words}: a .png, .svg or .pdf file")
 
 
-def page(words: str) -> Any:  # noqa: ANN401 - as above
+def page(words: str) -> Option:
     """Return the option of a page that a command writes beside its result."""
     return file("--html", f"Write a page of HTML{words}; - is stdout")
 
 
-def table(words: str) -> Any:  # noqa: ANN401 - as above
+def table(words: str) -> Option:
     """Return the option of comma-separated values."""
     return file("--csv", f"Write {words} as CSV; - is stdout")
 
 
-def number(name: str, metavar: str, words: str, least: float | None = None) -> Any:  # noqa: ANN401 - as above
+def number(name: str, metavar: str, words: str, least: float | None = None) -> Option:
     """Return an option that is a number, of at least one and below 1 where a smallest one is given."""
-    return typer.Option(name, parser=Number(name, least), metavar=metavar, help=f"{words}.")
+    return Option(name, metavar, f"{words}.", Number(name, least))
 
 
-def whole(name: str, words: str, least: int, most: int | None = None) -> Any:  # noqa: ANN401 - as above
+def whole(name: str, words: str, least: int, most: int | None = None) -> Option:
     """Return an option that is a whole number within ends."""
-    return typer.Option(name, parser=WholeNumber(name, least, most), metavar="N", help=f"{words}.")
+    return Option(name, "N", f"{words}.", WholeNumber(name, least, most))
 
 
-def starts(words: str) -> Any:  # noqa: ANN401 - as above
+def starts(words: str) -> Option:
     """Return the option ``--starts``."""
     return whole("--starts", words, 1, 100_000)
 
 
-def jobs(words: str) -> Any:  # noqa: ANN401 - as above
+def jobs(words: str) -> Option:
     """Return the option ``--jobs``."""
     return whole("--jobs", words, 1, 256)
 
 
-def _begin(context: typer.Context, seconds: float | None) -> float | None:
-    """Begin the time of a command: its searches take from what is left of it.
+def _seconds(text: str) -> float:
+    """Return the time that a text gives.
 
     Raises:
-        InputError: the number is not positive.
+        InputError: the text is no number, or the number is not positive.
     """
     from ..errors import check_seconds
-    from ..interruption import within
 
+    seconds = Number("--time")(text)
     check_seconds(seconds)
-    context.with_resource(within(seconds))
     return seconds
 
 
-def time(left_out: str, end: str = "shows its results") -> Any:  # noqa: ANN401 - as above
+def time(left_out: str, end: str = "shows its results") -> Option:
     """Return the option ``--time``, with the time of a command without it, and what the command does at its end."""
     words = f"Seconds for the whole command, which then {end}; {left_out}."
-    return typer.Option("--time", parser=Number("--time"), metavar="SECONDS", callback=_begin, help=words)
+    return Option("--time", "SECONDS", words, _seconds, within)
 
 
-CaseName = Annotated[
-    str, typer.Argument(metavar="CASE", help="A case file, or the bare name of a shipped case; - is stdin.")
-]
+CaseName = Annotated[str, Argument("CASE", "A case file, or the bare name of a shipped case; - is stdin.")]
 SettingTexts = Annotated[
     list[str] | None, several("--set", "NAME=VALUE", "Replace a number of the case: x4=20, p_z=40, axis=0,0,1")
 ]
@@ -272,7 +267,7 @@ def read_machine(
     chosen = {**numbers, **place_of(result, case), **settings}
     if not is_same:
         what = "dimensions and the pose" if has_pose else "dimensions"
-        typer.echo(f"--of {one_line(of)}: has the {what} of the case {one_line(result.head.case)!r}", err=True)
+        print_notice(f"--of {one_line(of)}: has the {what} of the case {one_line(result.head.case)!r}")
     return Machine(read_case(name, chosen), chosen)
 
 

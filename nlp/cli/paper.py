@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-import typer
+from .commandline import print_notice
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -59,11 +59,11 @@ def write_paper(
     proof = paper_of(judged, record, text, quantities=quantities, leg_error=leg_error)
     if not proof.claims:
         # A file of an earlier run is left as it is: it must not be taken for the proof of this one.
-        typer.echo(f"--proof {one_line(target)}: not written, as no claim has a proof", err=True)
+        print_notice(f"--proof {one_line(target)}: not written, as no claim has a proof")
         return
     write_text(target, proof.as_text())
     for words in _unproved_words(proof.unproved):
-        typer.echo(one_line(words), err=True)
+        print_notice(one_line(words))
 
 
 def verify_paper(proof: Proof, case: Case, leg_error: float) -> Iterator[Line]:
@@ -78,8 +78,8 @@ def verify_paper(proof: Proof, case: Case, leg_error: float) -> Iterator[Line]:
     try:
         checked = check_workspace_proof(proof, case, leg_error=leg_error)
     except ProofError as error:
-        typer.echo(f"rejected: {error}", err=True)
-        raise typer.Exit(1) from None
+        print_notice(f"rejected: {error}")
+        raise SystemExit(1) from None
     return _checked_lines(proof, checked, case, leg_error)
 
 

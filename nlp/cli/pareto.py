@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from . import options
+from .commandline import print_notice
 from .progress import counting_line
 
 if TYPE_CHECKING:
@@ -60,10 +59,10 @@ def pareto(
         raise InputError(f"--certify: {error}") from None
     is_stopped = is_requested()
     if is_stopped:
-        typer.echo(f"{why_stopped()}: {len(found.points)} of {points} points are found", err=True)
+        print_notice(f"{why_stopped()}: {len(found.points)} of {points} points are found")
     _write(found, files, whole=whole)
     is_proved = all(each.certificate is None or each.certificate.status.value == "proved" for each in found.points)
-    raise typer.Exit(0 if is_proved and not is_stopped else 1)
+    raise SystemExit(0 if is_proved and not is_stopped else 1)
 
 
 def _write(found: Front, files: options.Outputs, *, whole: bool) -> None:

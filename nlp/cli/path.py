@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from . import options
 from .progress import spinner
 
@@ -96,7 +94,7 @@ def path(
         files.check(inputs)
         with spinner("the pose") as show:
             found = show_ranges(loaded, choices.start, most, time, files, show, whole=whole)
-        raise typer.Exit(0 if found.proved else 1)
+        raise SystemExit(0 if found.proved else 1)
     if html is not None:
         from ..output.pictures.requirements import check_library
 
@@ -116,7 +114,7 @@ def path(
     _write(files, judged, result, text, command)
     if not files.is_piped:
         options.show(path_summary(judged.case, result, command), whole=whole)
-    raise typer.Exit(0 if result.proved else 1)
+    raise SystemExit(0 if result.proved else 1)
 
 
 def _refuse_elsewhere(along: Mapping[str, object], most: str | None, *, ranges: bool) -> None:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Annotated
 
-import typer
-
 from . import options
+from .commandline import print_line
 
 
 def report(
@@ -67,5 +66,5 @@ def report(
         page = replace(page, curves=curves)
     write_text(out, page_of(page))
     if out != "-":
-        typer.echo(f"{one_line(out)}: {solution.status.value}{f'; {refusal}' if refusal else ''}")
-    raise typer.Exit(0 if solution.status.is_answer and is_proved else 1)
+        print_line(f"{one_line(out)}: {solution.status.value}{f'; {refusal}' if refusal else ''}")
+    raise SystemExit(0 if solution.status.is_answer and is_proved else 1)

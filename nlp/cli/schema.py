@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
 from . import options
+from .commandline import print_line
 
 
 def schema(
@@ -26,4 +25,4 @@ def schema(
         from ..case.wholeschema import WholeDocument
 
         found = WholeDocument.model_json_schema()
-    typer.echo(json.dumps(found, indent=2))
+    print_line(json.dumps(found, indent=2))

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Annotated
 
-import typer
-
 from . import options
 
 
@@ -67,4 +65,4 @@ def solve(
         from ..results.summary import case_summary
 
         options.show(case_summary(loaded, result), whole=whole)
-    raise typer.Exit(0 if solution.status.is_answer and is_proved and solution.keeps_limits else 1)
+    raise SystemExit(0 if solution.status.is_answer and is_proved and solution.keeps_limits else 1)

@@ -6,9 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from . import options
+from .commandline import print_notice
 from .progress import counting_line
 
 if TYPE_CHECKING:
@@ -71,12 +70,12 @@ def sweep(
     with _named_points(chosen, points):
         found = Sweep.of(CaseSource.from_file(read), chosen, starts, seed, certified=certified)
     if is_written(out, found):
-        typer.echo(f"{out}: holds all {len(chosen):,} points already", err=True)
+        print_notice(f"{out}: holds all {len(chosen):,} points already")
     else:
         with found.journal_of(out) as journal:
             before = len(chosen) - len(journal.missing)
             if before:
-                typer.echo(f"{before:,} of {len(chosen):,} points are in {journal.path} already", err=True)
+                print_notice(f"{before:,} of {len(chosen):,} points are in {journal.path} already")
             say_on_leaving(lambda: journal.words)
             with counting_line() as show:
                 run_sweep(
@@ -86,16 +85,16 @@ def sweep(
                     jobs=jobs,
                     dask=dask,
                     progress=lambda *counts: show(_progress_words(*counts)),
-                    notice=lambda text: typer.echo(text, err=True),
+                    notice=print_notice,
                 )
             if len(journal.missing):
-                typer.echo(f"the time is over: {journal.words}", err=True)
-                raise typer.Exit(1)
+                print_notice(f"the time is over: {journal.words}")
+                raise SystemExit(1)
             write_table(out, found, journal.rows())
             journal.remove()
     if json_file is not None or html is not None:
         _write(found, out, files)
-    raise typer.Exit(_show(found, out, files))
+    raise SystemExit(_show(found, out, files))
 
 
 def _write(found: Sweep, out: str, files: options.Outputs) -> None:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
 from . import options
+from .commandline import print_notice
 from .progress import counting_line
 
 #: Largest number of values.
@@ -64,7 +63,7 @@ def tradeoff(
             progress=lambda done, total: write(f"{done} of {total} values solved"),
         )
     if is_requested() and not found.unsolved:
-        typer.echo(f"{why_stopped()}: every value is solved, but not all from the optima beside it", err=True)
+        print_notice(f"{why_stopped()}: every value is solved, but not all from the optima beside it")
     loaded, result = found.points[0].solution.case, tradeoff_result(found)
     options.write_json(json_file, result)
     files.write("csv", tradeoff_csv, result)
@@ -80,4 +79,4 @@ def tradeoff(
         options.show(tradeoff_summary(loaded, result), whole=whole)
     statuses = [point.status for point in result.points]
     is_done = all(status.is_answer or status is Status.INFEASIBLE for status in statuses)
-    raise typer.Exit(0 if is_done and any(status.is_answer for status in statuses) else 1)
+    raise SystemExit(0 if is_done and any(status.is_answer for status in statuses) else 1)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from . import options
+from .commandline import Argument, print_notice
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -17,12 +16,10 @@ if TYPE_CHECKING:
 
 
 def verify_proof(
-    proof: Annotated[
-        str, typer.Argument(metavar="PROOF", help="A proof that certify --proof or workspace --proof wrote.")
-    ],
+    proof: Annotated[str, Argument("PROOF", "A proof that certify --proof or workspace --proof wrote.")],
     case: Annotated[
         str | None,
-        typer.Argument(metavar="[CASE]", help="The case to be proved, - is stdin; that in the proof if left out."),
+        Argument("[CASE]", "The case to be proved, - is stdin; that in the proof if left out."),
     ] = None,
     settings: options.SettingTexts = None,
     of: options.ResultFile = None,
@@ -86,8 +83,8 @@ def _verify(
         if above is not None and not shown > above:
             raise ProofError(f"the proof shows {shown:.10g}, which is not above {above:.10g}")
     except ProofError as error:
-        typer.echo(f"rejected: {error}", err=True)
-        raise typer.Exit(1) from None
+        print_notice(f"rejected: {error}")
+        raise SystemExit(1) from None
     bound = None if claim.bound is None else checked.bound
     holds = Line(f"holds: {claim_words(case, statement, bound, unit_of_objective(case))}")
     return [holds, Line(f"{checked.leaves:,} leaves, shown on {checked.pieces:,} boxes")]

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from . import options
 from .progress import spinner, tell_workspace
 
@@ -91,7 +89,7 @@ def workspace(
         from ..results.workspacewording import workspace_summary
 
         options.show(workspace_summary(loaded, result, command), whole=whole)
-    raise typer.Exit(0 if result.proved else 1)
+    raise SystemExit(0 if result.proved else 1)
 
 
 def _judge_with_progress(

@@ -44,8 +44,8 @@ def run(*words: str, where: Path) -> str:
 
 
 def made(where: Path, *words: str) -> str:
-    """Run make in a folder."""
-    return run("make", *words, where=where)
+    """Run make in a folder, with the first compiler there is unless the words name another one."""
+    return run("make", f"CC={COMPILERS[0]}", *words, where=where)
 
 
 def assert_only_mathematics_is_needed(where: Path, prefix: str) -> None:

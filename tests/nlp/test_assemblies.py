@@ -21,13 +21,13 @@ from builders import (
     case_of,
     case_tables,
     output_of,
+    ran,
     saved,
     starter,
     turn_about,
     unbroken,
 )
 from measures import circle_joints
-from typer.testing import CliRunner
 
 from screwsynth.models import Model, robot_function
 from screwsynth.nlp import (
@@ -44,7 +44,6 @@ from screwsynth.nlp import (
     result_of,
     solve,
 )
-from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.evidence.assembly import NEAR_SINGULAR, assembly_of, assembly_over_poses
 from screwsynth.nlp.evidence.closing import closed_in_place, closed_start
 from screwsynth.nlp.evidence.kkt import close_equations
@@ -347,8 +346,8 @@ def test_the_command_says_evaluated(tmp_path: Path) -> None:
     task = {"name": "t", "sense": "max", "axis": [0, 1, 2], "point": [0, 0, 0], "pitch": 2}
     robot = {"model": "3-rps", "parameters": values}
     case = case_file(tmp_path, case_tables(robot, pose={"position": [0, 0, values["h"]]}, task=[task]))
-    result = CliRunner().invoke(app, ["solve", str(case)])
-    assert result.exit_code == 0
+    result = ran("solve", str(case))
+    assert result.code == 0
     assert "fixed point: F = " in result.output
     assert "(evaluated)" in result.output
     assert "converged" not in result.output

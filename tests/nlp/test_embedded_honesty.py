@@ -118,6 +118,7 @@ def test_the_worst_case_of_other_tasks_is_theirs(name: str, compiled: Compiled, 
     assert own.solve(sense="min").status.tolist() == [BAD_INPUT]
 
 
+@needs_compiler
 def test_the_largest_of_other_tasks_to_be_minimised_is_theirs(tmp_path: Path, ticks: ModuleType) -> None:
     tasks_to_minimise = [each | {"sense": "min"} for each in shipped_tables("camera-mount")["task"]]
     own = load_compiled(written(case_of("camera-mount", task=tasks_to_minimise), tmp_path))

@@ -401,7 +401,7 @@ def test_every_command_reads_standard_input(tmp_path: Path, cli: Run, monkeypatc
     saved(tmp_path / "poses.csv", "x,y,z\n0,0,1\n")
     proof = tmp_path / "proof.json"
     output_of(cli("certify", "paper-4.1-rotation", "--starts", "1", "--gap", "0.5", "--proof", str(proof)))
-    taking = [name for name in SUMMARIES if any("CASE" in (each.metavar or "") for each in command_of(name).params)]
+    taking = [name for name in SUMMARIES if any("CASE" in each.name for each in command_of(name).arguments)]
     assert set(taking) == set(COMMANDS)
     for name, options in COMMANDS.items():
         give(edited(TEXT, ('"stewart-gough"', '"nothing"')), monkeypatch)

@@ -10,14 +10,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import case_file, case_tables
-from typer.testing import CliRunner
+from builders import case_file, case_tables, ran
 
 from screwsynth.models import Dimension, Model, robot, robot_function
 from screwsynth.nlp import Case, Free, Limits, PointKind, Status, Task, evaluate, formulate, json_data, result_of, solve
 from screwsynth.nlp.case.limits.rates import ActuatorRate
 from screwsynth.nlp.case.workspace import Workspace
-from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.evidence.margins import margins_of
 from screwsynth.nlp.evidence.mobility import Mobility, mobility_of
@@ -227,11 +225,11 @@ def test_commands_and_json_state_the_screws(tmp_path: Path) -> None:
     task = {"name": "t", "sense": "max", "axis": [0, 0, 1], "point": [0, 0, 0], "pitch": 0}
     tables = case_tables({"definition": tomllib.loads(SNU)}, pose={"position": [0, 0, 0.7]}, task=[task])
     case = str(case_file(tmp_path, tables))
-    output = CliRunner().invoke(app, ["evaluate", case], env={"COLUMNS": "200"}).output
+    output = ran("evaluate", case).output
     assert "singular: the constraints are dependent" in output
     assert output.count("  gained: rotation about") == 2
     assert "through (0, 0, 1.4)" in output
-    joints = json.loads(CliRunner().invoke(app, ["evaluate", case, "--json", "-"]).output)["joints"]
+    joints = json.loads(ran("evaluate", case, "--json", "-").output)["joints"]
     (each,) = joints["singularities"]
     assert each["kind"] == "constraint"
     assert "limb" not in each

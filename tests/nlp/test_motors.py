@@ -9,9 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import Array, commands_in, rows_of, saved, soaked, turn_about
+from builders import Array, commands_in, ran, rows_of, saved, soaked, turn_about
 from hexapods import case_of_legs
-from typer.testing import CliRunner
 from workspace_cases import gallery_case as at_home
 
 from screwsynth.models import three_upu
@@ -23,7 +22,6 @@ from screwsynth.nlp.case.motors import Motor
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.loads import LoadState, loads_at
 from screwsynth.nlp.evidence.state import evaluate
@@ -334,12 +332,12 @@ def test_limits_on_actuators_are_proved_refuted_by_a_pose_that_evaluate_shows_an
 
     tight = loaded(tmp_path, f"actuator_force = {{ min = -{2 * force}, max = {0.999 * force} }}")
     result = tmp_path / "result.json"
-    ended = CliRunner().invoke(app, ["workspace", str(tight), "--json", str(result)])
-    assert ended.exit_code == 1
-    words = commands_in(ended.stdout, "see it with")[0]
+    ended = ran("workspace", str(tight), "--json", str(result))
+    assert ended.code == 1
+    words = commands_in(ended.out, "see it with")[0]
     refuted = [each for each in json.loads(result.read_text())["extremes"] if each["outcome"] == "refuted"]
     worst = max(refuted, key=lambda each: each["reached"])
-    shown = json.loads(CliRunner().invoke(app, [*words, "--json", "-"]).stdout)
+    shown = json.loads(ran(*words, "--json", "-").out)
     (load,) = shown["loads"]
     largest = max(load["actuators"], key=lambda each: each["largest"])
     assert worst["name"].startswith(f"actuator_force actuator {largest['actuator']} ")
@@ -355,8 +353,8 @@ def test_the_motor_sheet_is_in_all_outputs(tmp_path: Path) -> None:
     path = loaded(tmp_path, "actuator_force = { min = -200, max = 100 }")
     files = {option: tmp_path / f"out.{option}" for option in ("json", "csv", "html")}
     asked = [word for option, file in files.items() for word in (f"--{option}", str(file))]
-    ended = CliRunner().invoke(app, ["workspace", str(path), *asked])
-    assert ended.exit_code == 0
+    ended = ran("workspace", str(path), *asked)
+    assert ended.code == 0
     result = json.loads(files["json"].read_text(encoding="utf-8"))
     motors = result["motors"]
     kinds = [("coordinate", None), ("force", "push"), ("speed", None), ("power", "push")]
@@ -386,8 +384,8 @@ def test_the_motor_sheet_is_in_all_outputs(tmp_path: Path) -> None:
     page = files["html"].read_text(encoding="utf-8")
     assert 'id="workspace-motors"' in page
     assert f"{by['2-', 'force']['largest']['bound']:.7g}" in page
-    assert "motors: what each actuator needs" in ended.stdout
-    plain = json.loads(CliRunner().invoke(app, ["workspace", "hexapod-linuxcnc", "--json", "-"]).stdout)
+    assert "motors: what each actuator needs" in ended.out
+    plain = json.loads(ran("workspace", "hexapod-linuxcnc", "--json", "-").out)
     assert "motors" not in plain
 
 

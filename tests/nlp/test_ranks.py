@@ -16,17 +16,15 @@ from types import ModuleType
 import casadi as ca
 import numpy as np
 import pytest
-from builders import case_file, case_from, case_tables, soaked, starter_tables
+from builders import case_file, case_from, case_tables, ran, soaked, starter_tables
 from hexapods import bounds_of, smallest, values_of
 from kernel_enclosures import enclose
 from numpy_engine import first_order
 from numpy_engine.rank_rule import NumpyRankTest
-from typer.testing import CliRunner
 
 from screwsynth.models import FloatArray, Substitution, stewart_gough
 from screwsynth.models.joints.closedform import closed_form
 from screwsynth.nlp import Case, Free, Outcome, Task, TurnKind, Turns, Workspace, build_model, judge_workspace
-from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.evidence.dependent import with_dependent
 from screwsynth.nlp.proof.enclosure.forms import ULP, Encloser, Forms
@@ -532,16 +530,16 @@ def test_the_command_proves_and_refutes_reach_constraints_and_angles(tmp_path: P
         )
         return str(case_file(tmp_path, tables))
 
-    runner, file = CliRunner(), file_of(0.1)
-    run = runner.invoke(app, ["workspace", file, "--json", "-"])
+    file = file_of(0.1)
+    run = ran("workspace", file, "--json", "-")
     result = json.loads(run.output)
-    assert run.exit_code == 0
+    assert run.code == 0
     assert result["proved"]
     assert result["regular"]["outcome"] == result["constraints"]["outcome"] == "proved"
     reach = [each for each in result["extremes"] if each["name"].startswith("reach")]
     assert [each["outcome"] for each in reach] == ["proved"] * 3
     assert len([each for each in result["extremes"] if each["name"].startswith("actuator_angle")]) == 6
-    run = runner.invoke(app, ["workspace", file_of(1.5), "--time", "0.05"])
-    assert run.exit_code == 1
+    run = ran("workspace", file_of(1.5), "--time", "0.05")
+    assert run.code == 1
     assert "reach limb 1" in run.output
     assert "refuted" in run.output

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from builders import Run, case_from, output_of, refusal_of, rows_of, saved, starter_tables
+from generated import needs_compiler
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from screwsynth.nlp import InputError, examine, formulate, load_case, load_result, solve
@@ -82,6 +83,7 @@ def test_many_verdicts_are_those_of_single_points() -> None:
             assert mine == pytest.approx(theirs, rel=1e-6)
 
 
+@needs_compiler
 def test_compiled_rows_are_those_of_solve(tmp_path: Path, cli: Run) -> None:
     out, picture = tmp_path / "sweep.csv", tmp_path / "sweep.svg"
     command = ("sweep", CASE, *OVER, "--out", str(out))
@@ -365,6 +367,7 @@ main()
 """
 
 
+@needs_compiler
 @pytest.mark.slow
 def test_a_run_killed_three_times_has_the_same_table(tmp_path: Path, cli: Run) -> None:
     over = ("--over", "task.pitch=0:2:12", "--over", "x1=10:14:25", "--starts", "4")
@@ -402,6 +405,7 @@ def test_processes_of_ipopt_and_one_that_is_killed(sweep: Callable[..., Sweep]) 
     assert [row.F for row in found if row.point == 7] == pytest.approx([alone.F], rel=1e-12)
 
 
+@needs_compiler
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_a_cluster_that_loses_a_worker(sweep: Callable[..., Sweep], tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ from builders import (
     case_from,
     commands_in,
     output_of,
+    ran,
     refusal_of,
     rows_of,
     saved,
@@ -30,14 +31,12 @@ from builders import (
     unbroken,
 )
 from rich.console import Console
-from typer.testing import CliRunner
 
 from screwsynth.models import model_names
 from screwsynth.nlp import Case, Free, Limits, Rotation, Task, build_model, load_case, shipped_cases, solve
 from screwsynth.nlp.case.limits.legs import LegLength
 from screwsynth.nlp.case.pose import RotationForm
 from screwsynth.nlp.case.robots import model_options
-from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.evidence.kkt import close_equations
 from screwsynth.nlp.evidence.state import evaluate
 from screwsynth.nlp.output.report.report import report_of
@@ -138,7 +137,7 @@ def refuted(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
     """Output of a judged workspace with refuted and open claims, and its result."""
     target = tmp_path_factory.mktemp("judged") / "result.json"
     command = ["workspace", "reachy-mini-envelope", "--time", "2", "--json", str(target)]
-    return CliRunner().invoke(app, command).output, target
+    return ran(*command).output, target
 
 
 def test_every_limit_is_counted_by_its_outcome(refuted: tuple[str, Path]) -> None:

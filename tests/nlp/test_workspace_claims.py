@@ -12,9 +12,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 import pytest
-from builders import Run, case_from, commands_in, edited, output_of, refusal_of, saved, unbroken
+from builders import Run, case_from, commands_in, edited, output_of, ran, refusal_of, saved, unbroken
 from hexapods import SMALL, hexapod_text
-from typer.testing import CliRunner
 from workspace_cases import gallery_case
 
 from screwsynth.models import FloatArray
@@ -22,7 +21,6 @@ from screwsynth.models.joints.closedform import closed_form
 from screwsynth.nlp import Case, Free, LegClearance, Limits, Outcome, Rotation, Sense, formulate, load_case, load_result
 from screwsynth.nlp.case.limits.singular_values import SmallestSingularValue
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.output.pictures.workspaces import drawing_at, slices_legend
 from screwsynth.nlp.proof.statement.machine import legs_of
@@ -385,8 +383,8 @@ def refuted(limited: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[st
     flags = [part for pair in zip(("--json", "--html", "--plot-pose"), files, strict=True) for part in pair]
     numbers = ["x3=6", "limits.leg_clearance.min=6", "limits.base_joint_angle.max=8", "limits.actuator.stroke_max=5"]
     flags += [part for each in numbers for part in ("--set", each)]
-    run = CliRunner().invoke(app, ["workspace", str(limited), "--gap", "0.05", "--time", "2", "--all", *flags])
-    assert run.exit_code == 1
+    run = ran("workspace", str(limited), "--gap", "0.05", "--time", "2", "--all", *flags)
+    assert run.code == 1
     result = load_result(folder / "result.json")
     assert isinstance(result, WorkspaceResult)
     return run.output, result, folder

@@ -23,7 +23,7 @@ from ....models import Dimension, Model
 from ....models.expression import FUNCTIONS, LARGEST_POWER, ExpressionError, Language
 from ...errors import CaseError, nearest
 from ...units import Units
-from ..table import Table
+from ..table import Table, empty_list
 from ..toml import TomlValue
 from .constraint import NUMBER, BoundedConstraint, Constraint
 from .limit import Design, Limit, LimitedCase, TableField, Written
@@ -263,7 +263,7 @@ class Relations(Limit[list[str]]):
     @classmethod
     def fields(cls) -> dict[str, TableField]:
         """Return the key of the list, which is empty if left out."""
-        return {cls.key: TableField(cls.table, Field(default_factory=list, description=cls.description))}
+        return {cls.key: TableField(cls.table, Field(default_factory=empty_list, description=cls.description))}
 
     @classmethod
     def read(cls, limits: Table, model: Model, units: Units) -> Iterator[Self]:

@@ -1,0 +1,231 @@
+"""Commands that the signatures of functions declare: their arguments and options, how these are read, and their help.
+
+The annotation of a parameter has its option or argument, as in ``Annotated[int, Option("--jobs", "N", "Threads")]``. A
+parameter without a default is required; one that is a list takes several values.
+
+Libraries for this take longer to load than everything else that help needs, and ``argparse`` reads a value with a minus
+sign, such as the vector -1,0,0, as an option.
+"""
+
+from __future__ import annotations
+
+import sys
+from contextlib import ExitStack
+from typing import TYPE_CHECKING, Any, NamedTuple, get_args, get_origin, get_type_hints
+
+from ..errors import InputError, nearest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+    from contextlib import AbstractContextManager
+
+#: Names of the option that every command has, and its row in help.
+HELP = ("-h", "--help")
+HELP_ROW = (", ".join(HELP), "Show this message and exit.")
+
+
+class Argument(NamedTuple):
+    """Argument of a command.
+
+    Attributes:
+        metavar: the word that stands for it in help.
+        help: what it is, one sentence.
+    """
+
+    metavar: str
+    help: str
+
+
+class Option(NamedTuple):
+    """Option of a command.
+
+    Attributes:
+        name: name, with its two dashes.
+        metavar: the word that stands for its value in help; empty for a flag, which has no value.
+        help: what it does, one sentence.
+        read: reader of its value; it raises InputError.
+        during: of its value, or its default, a context in which the command runs.
+    """
+
+    name: str
+    metavar: str
+    help: str
+    read: Callable[[str], Any] = str
+    during: Callable[[Any], AbstractContextManager[object]] | None = None
+
+
+class Parameter(NamedTuple):
+    """Parameter of a command's function.
+
+    Attributes:
+        key: its name in the function.
+        declared: its option or argument.
+        is_several: whether it is a list.
+        is_required: whether it has no default.
+        default: its default; None where it is required.
+    """
+
+    key: str
+    declared: Option | Argument
+    is_several: bool
+    is_required: bool
+    default: Any
+
+    @property
+    def name(self) -> str:
+        """Name of the option, or the word that stands for the argument."""
+        return self.declared.name if isinstance(self.declared, Option) else self.declared.metavar
+
+    @property
+    def row(self) -> tuple[str, str]:
+        """Row of the parameter in help: its form, and words about it."""
+        each, words = self.declared, self.declared.help
+        if self.is_required:
+            words += "  [required]"
+        elif self.default is not None and not isinstance(self.default, bool) and self.default != "":
+            words += f"  [default: {self.default}]"
+        return (f"{each.name} {each.metavar}".rstrip() if isinstance(each, Option) else each.metavar), words
+
+    @property
+    def missing(self) -> str:
+        """Words about the parameter where it is required and not given."""
+        words = self.declared.help.removesuffix(".")
+        # Words such as CSV keep their letters.
+        words = words if words[1:2].isupper() else words[:1].lower() + words[1:]
+        return f"{self.declared.metavar}, {words}" if isinstance(self.declared, Option) else words
+
+    def value_of(self, texts: list[str]) -> Any:  # noqa: ANN401 - of the type that the function states
+        """Return the value that one or more texts give."""
+        if isinstance(self.declared, Argument):
+            return texts if self.is_several else texts[-1]
+        if not self.declared.metavar:
+            return True
+        return [self.declared.read(text) for text in texts] if self.is_several else self.declared.read(texts[-1])
+
+
+class Command:
+    """A command.
+
+    Attributes:
+        name: name.
+        arguments: arguments, of which the last may be a list.
+        options: options by name, without that of help.
+
+    Args:
+        name: name.
+        function: function that the command calls; its docstring is the text of the command's help.
+        shown: example for help.
+        rewritten: the words of a command line in the form in which they are read.
+    """
+
+    def __init__(
+        self, name: str, function: Callable[..., None], shown: str, rewritten: Callable[[list[str]], list[str]] = list
+    ) -> None:
+        self.name, self._function, self._example, self._rewritten = name, function, shown, rewritten
+        self._parameters = {each.key: each for each in _parameters_of(function)}
+        self.arguments = [each for each in self._parameters.values() if isinstance(each.declared, Argument)]
+        self.options = {each.name: each for each in self._parameters.values() if isinstance(each.declared, Option)}
+
+    @property
+    def help(self) -> str:
+        """Help of the command."""
+        from .helptext import example, paragraphs, table, usage
+
+        name = f"screwsynth {self.name}"
+        blocks = [usage(name, ["[OPTIONS]", *(each.name for each in self.arguments)])]
+        blocks.append(paragraphs(self._function.__doc__ or ""))
+        if self.arguments:
+            blocks.append(table("Arguments", [each.row for each in self.arguments]))
+        blocks.append(table("Options", [*(each.row for each in self.options.values()), HELP_ROW]))
+        return "\n\n".join([*blocks, example(self._example)])
+
+    def run(self, words: list[str]) -> None:
+        """Call the function with what a command line gives, or print help where that is requested.
+
+        Raises:
+            InputError: the command line has a fault.
+        """
+        given = self.read(words)
+        if given is None:
+            print_line(self.help)
+            return
+        with ExitStack() as stack:
+            for each in self.options.values():
+                if isinstance(each.declared, Option) and each.declared.during is not None:
+                    stack.enter_context(each.declared.during(given[each.key]))
+            self._function(**given)
+
+    def read(self, words: list[str]) -> dict[str, Any] | None:
+        """Return the values of a command line by the names of the function's parameters; None where help is requested.
+
+        Raises:
+            InputError: an option or an argument is missing, is not one of the command, or has no such value.
+        """
+        texts, places, is_help = self._sorted(self._rewritten(words))
+        if is_help:
+            return None
+        for each in self.arguments:
+            count = len(places) if each.is_several else 1
+            if places:
+                texts[each.key], places = places[:count], places[count:]
+        given = {key: self._parameters[key].value_of(some) for key, some in texts.items()}
+        for key, each in self._parameters.items():
+            if key not in given and each.is_required:
+                raise InputError(f"{each.name}: is missing: {each.missing}")
+            given.setdefault(key, each.default)
+        if places:
+            taken = ", ".join(each.name for each in self.arguments) or "options alone"
+            raise InputError(f"{self.name}: got unexpected extra argument(s) ({' '.join(places)}); it takes {taken}")
+        return given
+
+    def _sorted(self, words: Iterable[str]) -> tuple[dict[str, list[str]], list[str], bool]:
+        """Return the texts of options by parameter, those of arguments, and whether help is requested."""
+        texts: dict[str, list[str]] = {}
+        places: list[str] = []
+        is_help, rest = False, iter(words)
+        for word in rest:
+            if word == "--":
+                break
+            if word == "-" or not word.startswith("-"):
+                places.append(word)
+                continue
+            name, equals, text = word.partition("=")
+            if name not in self.options and name not in HELP:
+                raise InputError(f"{name}: no such option of {self.name}; {nearest(name, [*self.options, HELP[1]])}")
+            metavar = self.options[name].declared.metavar if name in self.options else ""
+            if equals and not metavar:
+                raise InputError(f"{name}: takes no value")
+            if metavar and not equals:
+                following = next(rest, None)
+                if following is None:
+                    raise InputError(f"{name}: needs a value, {metavar}")
+                text = following
+            if name in self.options:
+                texts.setdefault(self.options[name].key, []).append(text)
+            else:
+                is_help = True
+        return texts, [*places, *rest], is_help
+
+
+def _parameters_of(function: Callable[..., None]) -> list[Parameter]:
+    """Return the parameters of a command's function."""
+    hints = {name: hint for name, hint in get_type_hints(function, include_extras=True).items() if name != "return"}
+    defaults = dict(zip(reversed(hints), reversed(function.__defaults__ or ()), strict=False))
+    parameters = []
+    for name, hint in hints.items():
+        kind, declared = get_args(hint)
+        is_several = any(get_origin(each) is list for each in (kind, *get_args(kind)))
+        parameters.append(Parameter(name, declared, is_several, name not in defaults, defaults.get(name)))
+    return parameters
+
+
+def print_line(text: str) -> None:
+    """Write a line to standard output."""
+    sys.stdout.write(f"{text}\n")
+    sys.stdout.flush()
+
+
+def print_notice(text: str) -> None:
+    """Write a line to standard error: what a command says beside its result."""
+    sys.stderr.write(f"{text}\n")
+    sys.stderr.flush()
