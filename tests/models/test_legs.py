@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -9,7 +10,7 @@ from functools import cache
 import mujoco
 import numpy as np
 import pytest
-from builders import Array, turn_about
+from builders import Array, soaked, turn_about
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from measures import circle_joints
@@ -20,7 +21,11 @@ from screwsynth.nlp import Case, Free, RobotState, Rotation, Task, evaluate, for
 Joints = Mapping[str, tuple[Array, Array]]
 
 KINDS = ("aligned", "octahedral", "hexapod")
-ROBOTS = 30  # of each kind, each with one twist of finite pitch, one of zero pitch and one pure translation
+#: Robots of each kind, always and in all, each with twists of finite and of zero pitch and a pure translation.
+FEW, MANY = 30, 70
+each_kind = pytest.mark.parametrize(
+    "drawn", soaked(itertools.product(KINDS, (FEW, MANY)), [(kind, FEW) for kind in KINDS])
+)
 
 MODELS: dict[str, Model] = {
     "aligned": stewart_gough(), "octahedral": stewart_gough(layout="octahedral"), "hexapod": hexapod(),
@@ -80,10 +85,10 @@ def random_twists(rng: np.random.Generator) -> Array:
 
 
 @cache
-def scenes(kind: str) -> tuple[Scene, ...]:
+def scenes(kind: str, count: int = FEW) -> tuple[Scene, ...]:
     rng = np.random.default_rng([2024, KINDS.index(kind)])
     made = []
-    for _ in range(ROBOTS):
+    for _ in range(count):
         parameters, joints = random_robot(kind, rng)
         # High enough that no joint of the platform comes near the base, however the platform is turned.
         position = rng.uniform([-10, -10, 20], [10, 10, 50])
@@ -98,10 +103,10 @@ def scenes(kind: str) -> tuple[Scene, ...]:
 
 
 @cache
-def engine_rates(kind: str) -> tuple[tuple[Array, Array], ...]:
+def engine_rates(kind: str, count: int) -> tuple[tuple[Array, Array], ...]:
     """Tendon velocities (3, 6), one row for each twist, and tendon lengths (6,) of each robot in MuJoCo."""
     found = []
-    for scene in scenes(kind):
+    for scene in scenes(kind, count):
         model = mujoco.MjModel.from_xml_string(platform_on_tendons(scene))
         data = mujoco.MjData(model)
         velocities = []
@@ -139,10 +144,10 @@ def platform_on_tendons(scene: Scene) -> str:
         </mujoco>"""
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_rates_are_the_tendon_velocities_of_a_physics_engine(kind: str) -> None:
+@each_kind
+def test_rates_are_the_tendon_velocities_of_a_physics_engine(drawn: tuple[str, int]) -> None:
     # Both sides are closed forms in double precision: some tens of rounding units of their terms remain.
-    for scene, (velocities, lengths) in zip(scenes(kind), engine_rates(kind), strict=True):
+    for scene, (velocities, lengths) in zip(scenes(*drawn), engine_rates(*drawn), strict=True):
         for twist, state, rates in zip(scene.twists, scene.states, velocities, strict=True):
             np.testing.assert_allclose(state.rates, rates, rtol=0, atol=4e-15 * scene.reach(twist))
             # F is down to 3e-4 of what it would be without cancellation, so its relative error is larger.
@@ -150,9 +155,11 @@ def test_rates_are_the_tendon_velocities_of_a_physics_engine(kind: str) -> None:
         np.testing.assert_allclose(scene.states[0].quantities["leg_length"], lengths, rtol=4e-15)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_rows_of_the_jacobian_are_unit_forces_along_the_legs_with_moments_about_the_world_origin(kind: str) -> None:
-    for scene in scenes(kind):
+@each_kind
+def test_rows_of_the_jacobian_are_unit_forces_along_the_legs_with_moments_about_the_origin(
+    drawn: tuple[str, int],
+) -> None:
+    for scene in scenes(*drawn):
         spans = scene.ends - scene.base
         along = spans / np.linalg.norm(spans, axis=1, keepdims=True)
         # Either joint of a leg gives its moment; the code may not use the platform joint, so this does.
@@ -165,9 +172,9 @@ def test_rows_of_the_jacobian_are_unit_forces_along_the_legs_with_moments_about_
             np.testing.assert_allclose(state.jacobian @ swapped, state.rates, rtol=0, atol=2e-15 * scene.reach(twist))
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_joint_angles_are_those_between_a_leg_and_the_plates(kind: str) -> None:
-    for scene in scenes(kind):
+@each_kind
+def test_joint_angles_are_those_between_a_leg_and_the_plates(drawn: tuple[str, int]) -> None:
+    for scene in scenes(*drawn):
         spans = scene.ends - scene.base
         normals = {"base": np.array([0.0, 0.0, 1.0]), "platform": turn_about(scene.axis, scene.angle)[:, 2]}
         for plate, normal in normals.items():
@@ -180,7 +187,7 @@ def test_joint_angles_are_those_between_a_leg_and_the_plates(kind: str) -> None:
 def test_the_random_scenes_are_worth_testing() -> None:
     # Guards the tests above: relative errors of F mean little where F is nearly zero by cancellation.
     sizes = [(state.F, state.size) for kind in KINDS for scene in scenes(kind) for state in scene.states]
-    assert len(sizes) == 9 * ROBOTS
+    assert len(sizes) == 9 * FEW
     assert min(F / size for F, size in sizes) > 1e-4
     assert all(state.rank == 6 for scene in scenes("hexapod") for state in scene.states)
 
