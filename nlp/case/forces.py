@@ -69,6 +69,7 @@ class PosedForces(NamedTuple):
         cases: their forces under each load case.
         speeds: (a, 1) their largest speeds; empty without a motion.
         stiffness: (a, 1) force of each by its displacement; empty where it is not known.
+        size: (1, 1) characteristic size of the robot, length.
     """
 
     joints: tuple[DrivenJoint, ...]
@@ -76,6 +77,7 @@ class PosedForces(NamedTuple):
     cases: tuple[CaseForces, ...]
     speeds: SX
     stiffness: SX
+    size: SX
 
     @property
     def compliance(self) -> SX:
@@ -92,9 +94,10 @@ class PosedForces(NamedTuple):
         Changes of the actuators' forces by loads of any direction add up in it, although no one direction may be the
         worst for all.
         """
-        found = _size(self.displacement(case)[3:])
+        found = _size(self.displacement(case)[3:], self.size)
         if not case.spread.is_zero():
-            sizes = [_size(each[3:]) for each in ca.horzsplit(self.statics.motions)]
+            motions = zip(ca.horzsplit(self.statics.motions), _reaches(self.joints, self.size), strict=True)
+            sizes = [_size(each[3:], reach) for each, reach in motions]
             found += ca.dot(ca.vertcat(*sizes), case.spread / ca.fabs(case.divisor) / self.stiffness)
         return found
 
@@ -113,7 +116,7 @@ def forces_at(model: Model, statics: Statics, rotation: SX, loading: Loading, si
     cases = tuple(_case_forces(case, statics, rotation, joints, size) for case in loading.cases)
     speeds = SX(0, 1) if loading.motion is None else _speeds(model, statics, loading.motion, joints, size)
     known = [] if loading.stiffness is None else loading.stiffness_of([joint.name for joint in joints])
-    return PosedForces(joints, statics, cases, speeds, SX(known) if known else SX(0, 1))
+    return PosedForces(joints, statics, cases, speeds, SX(known) if known else SX(0, 1), size)
 
 
 def _case_forces(case: LoadCase, statics: Statics, rotation: SX, joints: Sequence[DrivenJoint], size: SX) -> CaseForces:
