@@ -113,41 +113,85 @@ def drive_of(driven: FloatArray, relations: FloatArray, unit: FloatArray, size: 
     return Drive(works, left[:, :rank].T, left[:, rank:].T, idle, is_zero, unit, inverse)
 
 
-def with_loops(
-    model: Model, velocities: Velocities, paths: Sequence[tuple[JointScrews, FloatArray, FloatArray]]
-) -> Velocities:
+class PathScrews(NamedTuple):
+    """A path of joints with its screws (6, k), loops (m, k) and the centre (3,) of its member, length, at a point."""
+
+    path: JointScrews
+    screws: FloatArray
+    loops: FloatArray
+    centre: FloatArray
+
+
+def expressions_of_paths(paths: Sequence[JointScrews]) -> list[SX]:
+    """Return the expressions of paths, from the values of which :func:`paths_of` makes them at a point."""
+    return [ca.densify(part) for each in paths for part in (each.all, each.loops, each.centre)]
+
+
+def paths_of(paths: Sequence[JointScrews], values: Sequence[FloatArray]) -> list[PathScrews]:
+    """Return paths at a point from the values of their expressions."""
+    thirds = zip(paths, values[::3], values[1::3], values[2::3], strict=True)
+    return [PathScrews(path, screws, loops, np.ravel(centre)) for path, screws, loops, centre in thirds]
+
+
+def with_loops(model: Model, velocities: Velocities, paths: Sequence[PathScrews], length: float) -> Velocities:
     """Return velocity equations with the loops of nested members as they are at the point.
 
     With ``L_p`` the loops' columns of passive joints, and ``L_a`` of actuators, ``B`` is what ``L_p`` cannot close of
     ``L_a``. The expressions of a model have the rank of ``L_p`` at almost all points. Where it is smaller at the point,
-    the loops demand more of the actuators, and a rate may be determined that others leave free.
+    the loops demand more of the actuators, and a rate may be determined that others leave free. The expressions of the
+    member's rows are 0 / 0 there: the rows follow from the motions that the loops allow at the point instead.
 
     Args:
         model: the robot.
         velocities: at the point.
-        paths: members of nested loops with their screws (6, k) and loops (m, k) there.
+        paths: members of nested loops.
+        length: characteristic length.
     """
     names = [(each.limb, each.name) for each in model.actuators]
     nested = {each.limb for each, *_ in paths}
-    driven, relations = velocities.driven.copy(), velocities.relations.copy()
+    if not paths:
+        return velocities
+    jacobian, driven, relations = (part.copy() for part in velocities)
     relations[:, [k for k, (limb, _) in enumerate(names) if limb in nested]] = 0.0
     found = [relations]
-    for each, screws, loops in paths:
+    for each, screws, loops, centre in paths:
         own = [names.index((each.limb, each.joints[k].removeprefix(f"{each.limb}:"))) for k in each.driven]
         rows = [k for k, row in enumerate(model.frame_rows) if row.member == each.member]
         passive = each.passive
         left, values, right = np.linalg.svd(loops[:, passive])
         rank = rank_of(values)
+        if rank < each.loop_rank and rows:
+            jacobian[rows] = _resisting_rows(screws[:, passive], right[rank:].T, centre, length)
         by_actuators = loops[:, each.driven]
         closing = right[:rank].T @ ((left[:, :rank].T @ by_actuators) / values[:rank, None])
         motions = screws[:, each.driven] - screws[:, passive] @ closing
-        driven[np.ix_(rows, own)] = velocities.jacobian[rows] @ np.vstack([motions[3:], motions[:3]])
+        driven[np.ix_(rows, own)] = jacobian[rows] @ np.vstack([motions[3:], motions[:3]])
         demanded = np.zeros((len(left) - rank, len(names)))
         demanded[:, own] = left[:, rank:].T @ by_actuators
         least = np.zeros(len(names))
         least[own] = RANK_TOLERANCE * np.abs(by_actuators).max(axis=0, initial=0.0)
         found.append(np.where(np.abs(demanded) > least, demanded, 0.0))
-    return Velocities(velocities.jacobian, driven, np.vstack(found))
+    return Velocities(jacobian, driven, np.vstack(found))
+
+
+def _resisting_rows(screws: FloatArray, rates: FloatArray, centre: FloatArray, length: float) -> FloatArray:
+    """Return the rows (6, 6) of a member's projector: force, then moment about the world origin.
+
+    Args:
+        screws: (6, k) of its passive joints.
+        rates: (k, n) orthonormal rates of these that its loops allow.
+        centre: (3,) of the member, length.
+        length: characteristic length.
+    """
+    velocities = screws[3:] + np.cross(screws[:3].T, centre).T
+    reach = float(np.linalg.norm(velocities, axis=0).max(initial=0.0)) or 1.0
+    scaled = np.vstack([velocities / reach, screws[:3]])
+    left, values, _ = np.linalg.svd(scaled @ rates)
+    allowed = left[:, : rank_of(values, 1.0)] * np.array([reach] * 3 + [length] * 3)[:, None]
+    basis = np.linalg.qr(allowed)[0]
+    unit, none = np.eye(3), np.zeros((3, 3))
+    rows = np.block([[unit, np.cross(unit, centre).T], [none, length * unit]])
+    return np.asarray(rows - basis @ (basis.T @ rows))
 
 
 class LimbDrive(NamedTuple):

@@ -264,6 +264,7 @@ class JointScrews:
         member: name of the member of nested loops; empty for a path of joints.
         loops: (m, k) ``L`` of nested loops, without a unit for rates of order 1.
         loop_rank: of the columns of passive joints in ``L``, at almost all dimensions and poses.
+        centre: (3, 1) of the member, length.
     """
 
     limb: str
@@ -275,6 +276,7 @@ class JointScrews:
     member: str = ""
     loops: SX = field(default_factory=lambda: SX(0, 0))
     loop_rank: int = 0
+    centre: SX = field(default_factory=lambda: SX.zeros(3))
 
     @property
     def is_nested(self) -> bool:

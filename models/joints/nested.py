@@ -19,10 +19,11 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
+from ..arrays import FloatArray
 from ..limbjoints import JointCoordinate, LimbJoint
 from ..mechanism.centre import CentreRule, centre_rule
 from ..mechanism.decomposition import robot_graph
-from ..mechanism.topology import spanning_tree
+from ..mechanism.topology import nearest_tree
 from ..member import Member, pseudo_inverse
 from ..parts import Actuator, Dimension, JointScrews, PathStructure
 from ..rows import RANK_TOLERANCE, independent_rows, rank_of
@@ -44,12 +45,14 @@ class NestedMember:
     Attributes:
         passive: indices of the joints that move while actuators are locked.
         joints: of these and of all others that it depends on.
+        still: indices of those among them that locked actuators and couplings hold.
         centre: indices of the joints whose mean is its centre, or whose axes meet there.
         is_meeting: whether axes meet at the centre.
     """
 
     passive: tuple[int, ...]
     joints: tuple[int, ...]
+    still: tuple[int, ...]
     centre: tuple[int, ...]
     is_meeting: bool
 
@@ -85,17 +88,29 @@ def nested_members(robot: HomeRobot, network: OpenNetwork) -> list[NestedMember]
         return tuple(dict.fromkeys(names[name] for name in found))
 
     members = []
-    for each in robot_graph(mechanism).members:
+    graph = robot_graph(mechanism)
+    still = written(graph.still)
+    for each in graph.members:
         joints = written(each.joints)
         if set(joints) <= set(network.joints):
             rule: CentreRule = centre_rule(mechanism, each)
-            members.append(NestedMember(written(each.passive), joints, written(rule.joints), rule.is_meeting))
+            members.append(NestedMember(written(each.passive), joints, still, written(rule.joints), rule.is_meeting))
     return members
 
 
-def motions_of(network: OpenNetwork, frame: PathFrame, joints: Collection[int], free: Collection[int]) -> Motions:
-    """Return loops and platform's twists of some joints of a network, some of which are free."""
-    own = [k for k in network.joints if k in joints]
+def motions_of(network: OpenNetwork, frame: PathFrame, member: NestedMember, free: Collection[int]) -> Motions:
+    """Return loops and platform's twists of a member of a network, some of whose joints are free.
+
+    The tree has the joints that stand still with locked actuators, and then the shortest paths from the base. So a loop
+    beside such a joint has no part in the platform's twists: at a dead centre the rates of its joints have no value.
+
+    Args:
+        network: the network.
+        frame: values that all parts of the robot share.
+        member: the member.
+        free: indices of the joints that move; the tree is the same for all of them.
+    """
+    own = [k for k in network.joints if k in member.joints]
     moving = [k for k in own if k in free]
     start, count = {}, 0
     for k in moving:
@@ -113,7 +128,7 @@ def motions_of(network: OpenNetwork, frame: PathFrame, joints: Collection[int], 
         return found
 
     edges = [network.ends(k) for k in own]
-    tree = spanning_tree([network.base], edges, lambda i: len(network.screws[own[i]]))
+    tree = nearest_tree(network.base, edges, [0 if k in member.still else len(network.screws[k]) for k in own])
     twists = {network.base: SX(6, count)}
     for i, parent, child in tree.branches:
         sign = 1 if edges[i][0] == parent else -1
@@ -150,8 +165,22 @@ def _coupling_rows(
     return rows
 
 
-def measured_ranks(motions: Motions, symbols: Sequence[SX], points: Sequence[ClosedPoint], size: SX) -> MotionRanks:
-    """Return the most frequent ranks at closed configurations.
+class MeasuredMotions(NamedTuple):
+    """Numbers of motions at a closed configuration.
+
+    Attributes:
+        loops: (m, n) each, the rows of ``L`` for each loop or coupling.
+        platform: (6, n) ``S``, with velocities of the platform's origin in parts of the robot's size.
+    """
+
+    loops: tuple[FloatArray, ...]
+    platform: FloatArray
+
+
+def measured(
+    motions: Motions, symbols: Sequence[SX], points: Sequence[ClosedPoint], size: SX
+) -> tuple[MeasuredMotions, ...]:
+    """Return motions at closed configurations, those where all numbers are finite.
 
     Args:
         motions: loops and platform's twists.
@@ -161,22 +190,47 @@ def measured_ranks(motions: Motions, symbols: Sequence[SX], points: Sequence[Clo
     """
     outputs = [motions.platform, size, *[ca.densify(loop) for loop in motions.loops]]
     function = ca.Function("nested", list(symbols), outputs)
+    found = []
+    for point in points:
+        platform, length, *loops = (np.asarray(each.full(), dtype=np.float64) for each in function(*point))
+        if all(np.isfinite(each).all() for each in (platform, *loops)):
+            velocities = platform[3:] + np.cross(platform[:3].T, point.position).T
+            found.append(MeasuredMotions(tuple(loops), np.vstack([platform[:3], velocities / length])))
+    return tuple(found)
+
+
+def ranks_of(points: Sequence[MeasuredMotions], loops: Sequence[int]) -> MotionRanks:
+    """Return the most frequent ranks at closed configurations.
+
+    Args:
+        points: the configurations.
+        loops: indices of the loops that count.
+    """
     found: Counter[MotionRanks] = Counter()
     for point in points:
-        values = function(*point)
-        platform, length, *loops = (np.asarray(each.full(), dtype=np.float64) for each in values)
-        if not all(np.isfinite(each).all() for each in (platform, *loops)):
-            continue
-        about = np.vstack([platform[:3], (platform[3:] + np.cross(platform[:3].T, point.position).T) / length])
-        ranks, null = [], np.eye(platform.shape[1])
-        for loop in loops:
-            _, singular, right = np.linalg.svd(loop @ null)
+        ranks, null = [], np.eye(point.platform.shape[1])
+        for k in loops:
+            _, singular, right = np.linalg.svd(point.loops[k] @ null)
             # A loop that others close already leaves rounding errors alone.
             ranks.append(rank_of(singular, 1.0))
             null = null @ right[ranks[-1] :].T
-        twists = rank_of(np.linalg.svd(about @ null)[1], 1.0) if null.size else 0
+        twists = rank_of(np.linalg.svd(point.platform @ null)[1], 1.0) if null.size else 0
         found[MotionRanks(tuple(ranks), twists)] += 1
     return max(found, key=lambda ranks: (found[ranks], ranks))
+
+
+def platform_loops(points: Sequence[MeasuredMotions]) -> list[int]:
+    """Return the indices of the loops on which the platform's twists depend, the shortest that suffice.
+
+    The other loops may lose their rank, as at a dead centre, where the platform's twists keep theirs.
+    """
+    kept = list(range(len(points[0].loops)))
+    twists = ranks_of(points, kept).twists
+    for k in sorted(kept, key=lambda k: np.count_nonzero(points[0].loops[k].any(axis=0)), reverse=True):
+        rest = [other for other in kept if other != k]
+        if ranks_of(points, rest).twists == twists:
+            kept = rest
+    return kept
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,11 +274,18 @@ class NullSpace:
         return screw + self.platform @ rates, ca.vertcat(*open_loops)
 
 
-def null_space(motions: Motions, ranks: MotionRanks) -> NullSpace:
-    """Return the null space of a member's loops from their ranks."""
+def null_space(motions: Motions, loops: Sequence[int], ranks: MotionRanks) -> NullSpace:
+    """Return the null space of a member's loops.
+
+    Args:
+        motions: loops and platform's twists.
+        loops: indices of the loops that count.
+        ranks: of these loops.
+    """
     projector = SX.eye(motions.platform.shape[1])
     equations, inverses = [], []
-    for loop, rank in zip(motions.loops, ranks.loops, strict=True):
+    for k, rank in zip(loops, ranks.loops, strict=True):
+        loop = motions.loops[k]
         is_regular = rank == loop.shape[0]
         for each in ca.vertsplit(loop) if is_regular else [loop]:
             left = ca.densify(each @ projector @ projector)
@@ -301,11 +362,13 @@ def add_resisting(
     members = nested_members(robot, network)
     for number, each in enumerate(members):
         label = _member_name(network, number) if len(members) > 1 else ""
-        locked = motions_of(network, frame, each.joints, [k for k in each.joints if k not in actuated])
-        ranks = measured_ranks(locked, symbols, points, robot.size)
-        free = motions_of(network, frame, each.joints, each.joints)
-        free_ranks = measured_ranks(free, symbols, points, robot.size)
-        null = null_space(locked, ranks)
+        locked = motions_of(network, frame, each, [k for k in each.joints if k not in actuated])
+        at_points = measured(locked, symbols, points, robot.size)
+        every = range(len(locked.loops))
+        ranks = ranks_of(at_points, every)
+        free = motions_of(network, frame, each, each.joints)
+        free_ranks = ranks_of(measured(free, symbols, points, robot.size), every)
+        null = null_space(locked, every, ranks)
         free_loops, open_columns = ca.vertcat(SX(0, len(free.columns)), *free.loops), []
         for k in actuated:
             column = free.columns.index(k)
@@ -314,16 +377,18 @@ def add_resisting(
             if not ca.sparsify(screw).is_zero():
                 screws[k][label or limb] = screw / rate_sizes[k]
         open_loops.append(ca.horzcat(*open_columns))
+        place = _centre(network, each)
         if ranks.twists < 6:
-            place, slide = _centre(network, each), _slide(network, each)
-            found.members.append(Member(limb, place, null.screws, ranks.twists, (), slide=slide, name=label))
+            slide, needed = _slide(network, each), platform_loops(at_points)
+            allowed = null_space(locked, needed, ranks_of(at_points, needed)).screws
+            found.members.append(Member(limb, place, allowed, ranks.twists, (), slide=slide, name=label))
         labels = tuple(f"{limb}:{network.graph.joints[k].name}" for k in free.columns)
         driving = tuple(i for i, k in enumerate(free.columns) if k in actuated)
         sizes = ca.horzcat(*[rate_sizes.get(k, SX(1)) for k in free.columns])
         motions, loops = (part / ca.repmat(sizes, part.shape[0], 1) for part in (free.platform, free_loops))
         ends = ranks.twists, free_ranks.twists
         names = limb, labels, motions, driving, *ends, label or limb
-        found.screws.append(JointScrews(*names, loops, sum(ranks.loops)))
+        found.screws.append(JointScrews(*names, loops, sum(ranks.loops), place))
         found.structure.append(_structure(network, each, number, 6 - ranks.twists, 6 - free_ranks.twists))
     relations = _relations(ca.vertcat(*open_loops), symbols, points)
     for column, k in enumerate(actuated):

@@ -2,7 +2,7 @@
 
 In this order: the mean of the passive joints on the platform where there are several; the passive spherical joint, or
 the common point of three passive hinges that follow each other, nearest the platform; that of two hinges; the point of
-the last passive joint. A nested loop between two hinges ends their row.
+the last passive joint; without one that of the last joint. A nested loop between two hinges ends their row.
 """
 
 from __future__ import annotations
@@ -72,16 +72,37 @@ def centre_rule(mechanism: Mechanism, member: MemberGraph) -> CentreRule:
             before += len(row)
         if found:
             return max(found, key=lambda each: each[0])[1]
-    return CentreRule((chain[-1] if chain else (*member.on_platform, *reversed(member.joints))[0],))
+    return CentreRule((chain[-1],) if chain else member.on_platform or _last(mechanism, member))
 
 
-def _rows(mechanism: Mechanism, member: MemberGraph) -> list[list[int]]:
-    """Return the passive joints that every path from base to platform has, in rows that follow each other directly."""
+class _Ends(NamedTuple):
+    """Bodies of base and platform, and those that each joint of a member is between."""
+
+    base: str
+    platform: str
+    edges: list[tuple[str, str]]
+
+
+def _ends(mechanism: Mechanism, member: MemberGraph) -> _Ends:
+    """Return the bodies of a member, with welded links as one."""
     welds = [(joint.inner, joint.outer) for joint in mechanism.joints if joint.kind == "weld"]
     classes = Classes([link.name for link in mechanism.links], welds)
     own = [mechanism.joints[k] for k in member.joints]
     edges = [(classes.find(joint.inner), classes.find(joint.outer)) for joint in own]
-    path = bridges_between(classes.find(mechanism.base), classes.find(mechanism.platform), edges)
+    return _Ends(classes.find(mechanism.base), classes.find(mechanism.platform), edges)
+
+
+def _last(mechanism: Mechanism, member: MemberGraph) -> tuple[int, ...]:
+    """Return the last joint that every path from base to platform has; without one, the joints on the platform."""
+    base, platform, edges = _ends(mechanism, member)
+    common = bridges_between(base, platform, edges).bridges[-1:]
+    return tuple(member.joints[k] for k in common or [k for k, edge in enumerate(edges) if platform in edge])
+
+
+def _rows(mechanism: Mechanism, member: MemberGraph) -> list[list[int]]:
+    """Return the passive joints that every path from base to platform has, in rows that follow each other directly."""
+    base, platform, edges = _ends(mechanism, member)
+    path = bridges_between(base, platform, edges)
     rows: list[list[int]] = [[]]
     for number, k in enumerate(path.bridges):
         follows = number > 0 and bool(set(edges[k]) & set(edges[path.bridges[number - 1]]))

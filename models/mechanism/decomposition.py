@@ -199,10 +199,17 @@ class MemberGraph:
 
 @dataclass(frozen=True)
 class RobotGraph:
-    """Members of a mechanism, and indices of the joints of each limb, that join its base and its platform."""
+    """The graph of a mechanism taken apart.
+
+    Attributes:
+        members: that join its base and its platform with locked actuators.
+        limbs: indices of the joints of each limb, which join them with free ones.
+        still: indices of the joints that locked actuators and couplings hold.
+    """
 
     members: tuple[MemberGraph, ...]
     limbs: tuple[tuple[int, ...], ...]
+    still: tuple[int, ...]
 
 
 def robot_graph(mechanism: Mechanism) -> RobotGraph:
@@ -239,7 +246,7 @@ def robot_graph(mechanism: Mechanism) -> RobotGraph:
             on_platform = [k for k in group if top in (locked.find(joints[k].inner), locked.find(joints[k].outer))]
             kept = tuple(k for k in limb if k not in passive or k in group)
             members.append(MemberGraph(number, tuple(group), kept, tuple(on_platform)))
-    return RobotGraph(tuple(members), tuple(map(tuple, limbs)))
+    return RobotGraph(tuple(members), tuple(map(tuple, limbs)), tuple(sorted(still)))
 
 
 def _still(mechanism: Mechanism, couplings: Sequence[Collection[int]]) -> set[int]:

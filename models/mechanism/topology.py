@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from typing import Generic, NamedTuple, TypeVar
 
@@ -221,3 +222,35 @@ def spanning_tree(
     used = {branch.edge for branch in branches}
     chords = [k for k, edge in enumerate(edges) if k not in used and edge[0] in known]
     return SpanningTree(branches, chords)
+
+
+def nearest_tree(root: str, edges: Sequence[Edge[str]], lengths: Sequence[int]) -> SpanningTree:
+    """Return a spanning tree with the shortest path from the root to each node, as E. W. Dijkstra's algorithm finds it.
+
+    Nodes that edges of length 0 join count as one: such edges are in the tree before all others. So a loop that begins
+    and ends at such a node has no edge on the path to another node.
+
+    Args:
+        root: node where all paths begin.
+        edges: pairs of nodes.
+        lengths: of the edges, 0 or more.
+    """
+    classes = Classes({root, *(node for edge in edges for node in edge)})
+    for edge, length in zip(edges, lengths, strict=True):
+        if not length:
+            classes.merge(*edge)
+    joined = [(classes.find(one), classes.find(other)) for one, other in edges]
+    neighbours = incident(joined)
+    found: set[str] = set()
+    chosen: set[int] = set()
+    waiting = [(0, -1, classes.find(root))]
+    while waiting:
+        distance, last, node = heapq.heappop(waiting)
+        if node in found:
+            continue
+        found.add(node)
+        chosen.add(last)
+        for k, other in neighbours.get(node, ()):
+            if other not in found:
+                heapq.heappush(waiting, (distance + lengths[k], k, other))
+    return spanning_tree([root], edges, lambda k: 0.0 if not lengths[k] else 1.0 if k in chosen else 2.0)

@@ -16,7 +16,7 @@ import numpy as np
 from ...models import FloatArray, GenericRanks, LimbDrive, constraint_rows, limb_drive, rank_of_rows
 from ...models.values import dataclass
 from ..program.nlp import Nlp
-from .paths import velocities_at
+from .paths import numbers_at
 from .singularities import Singularity, SingularityKind, limb_singularities, platform_singularities
 from .state import RobotState
 
@@ -65,10 +65,10 @@ def mobility_of(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> Mo
     model = nlp.program.model
     if model.generic is None:
         return None
-    numbers = nlp.program.kernels.robot_states[pose](x, nlp.arguments)
+    numbers = numbers_at(nlp, x, pose)
     J, length = numbers.jacobian, nlp.case.characteristic_length
     reach = float(np.abs(J[:, 3:]).max(initial=0.0)) or length
-    velocities = velocities_at(nlp, x, numbers, pose)
+    velocities = numbers.velocities
     constraints = constraint_rows(model, velocities, state.position)
     constraint_rank = rank_of_rows(constraints, state.position, reach)
     drives = {limb: limb_drive(model, velocities, state.position, limb) for limb in model.limbs}

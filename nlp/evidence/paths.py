@@ -1,23 +1,13 @@
-"""Screws of joints and equations of nested loops at one point, and the velocity equations with these loops."""
+"""Screws of joints and equations of nested loops at one point, and the robot's numbers there with these loops."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from ...models import FloatArray, JointScrews, Velocities
-from ...models.actuation import with_loops
+from ...models import FloatArray, Velocities
+from ...models.actuation import PathScrews, paths_of, with_loops
 from ..program.nlp import Nlp
 from ..program.program import RobotNumbers
-
-
-class PathScrews(NamedTuple):
-    """A path of joints with its screws (6, k) and loops (m, k) at a point."""
-
-    path: JointScrews
-    screws: FloatArray
-    loops: FloatArray
 
 
 def paths_at(nlp: Nlp, x: FloatArray, numbers: RobotNumbers, pose: int = 0) -> list[PathScrews]:
@@ -35,7 +25,7 @@ def paths_at(nlp: Nlp, x: FloatArray, numbers: RobotNumbers, pose: int = 0) -> l
     unknowns = x[list(nlp.program.places.unknowns[pose])]
     given = numbers.parameters, unknowns, numbers.rotation, numbers.position
     values = [np.array(each, dtype=np.float64) for each in nlp.program.kernels.joint_screws.call(given)]
-    return [PathScrews(*each) for each in zip(paths, values[::2], values[1::2], strict=True)]
+    return paths_of(paths, values)
 
 
 def velocities_at(nlp: Nlp, x: FloatArray, numbers: RobotNumbers, pose: int = 0) -> Velocities:
@@ -43,4 +33,24 @@ def velocities_at(nlp: Nlp, x: FloatArray, numbers: RobotNumbers, pose: int = 0)
     model = nlp.program.model
     is_nested = any(each.is_nested for each in model.joint_screws)
     nested = [each for each in paths_at(nlp, x, numbers, pose) if each.path.is_nested] if is_nested else []
-    return with_loops(model, Velocities(numbers.jacobian, numbers.driven, numbers.relations), nested)
+    return with_loops(model, numbers.velocities, nested, nlp.case.characteristic_length)
+
+
+def numbers_at(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotNumbers:
+    """Return the robot's numbers at a point, with nested loops as they are there.
+
+    Where loops lose their rank, the program's expressions are 0 / 0, and their values are rounding errors.
+
+    Args:
+        nlp: the program.
+        x: (n,) the point.
+        pose: index of the pose.
+    """
+    numbers = nlp.program.kernels.robot_states[pose](x, nlp.arguments)
+    jacobian, driven, relations = velocities_at(nlp, x, numbers, pose)
+    if np.array_equal(jacobian, numbers.jacobian, equal_nan=True):
+        return numbers._replace(driven=driven, relations=relations)
+    twists = np.array([nlp.arguments[list(each)] for each in nlp.program.places.twists])
+    rates = jacobian @ np.hstack([twists[:, 3:], twists[:, :3]]).T
+    F = np.sum(rates**2, axis=0)[:, None]
+    return numbers._replace(jacobian=jacobian, rates=rates, F=F, driven=driven, relations=relations)

@@ -24,7 +24,7 @@ from ..errors import EvaluationError
 from ..program.nlp import Nlp
 from ..program.places import HeldRotation
 from .linalg import echelon_basis
-from .paths import velocities_at
+from .paths import numbers_at
 
 #: F below this part of its size without cancellation is zero: the rates are then below 1e-6 of their sizes.
 ZERO_F = 1e-12
@@ -115,7 +115,7 @@ def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
     """
     model, case = nlp.program.model, nlp.case
     where = f"{case.source}: " if case.source else ""
-    numbers = nlp.program.kernels.robot_states[pose](x, nlp.arguments)
+    numbers = numbers_at(nlp, x, pose)
     rotation, position = numbers.rotation, numbers.position
     sizes = [len(parameter.typical) for parameter in model.parameters]
     parts = np.split(numbers.parameters.ravel(), np.cumsum(sizes)[:-1]) if sizes else []
@@ -128,7 +128,7 @@ def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
             raise EvaluationError(f"{where}{reason_for_zero_row(row)}, at this point")
     if not all(np.isfinite(each).all() for each in (numbers.squares, numbers.jacobian, numbers.rates, rotation)):
         raise EvaluationError(f"{where}the robot's equations give no finite Jacobian at this point")
-    reporting = reporting_matrix(model, velocities_at(nlp, x, numbers, pose), position)
+    reporting = reporting_matrix(model, numbers.velocities, position)
     jacobian, rates = reporting @ numbers.jacobian, reporting @ numbers.rates
     axis, angle = axis_angle_from_matrix(rotation)
     stated, step = _pose_displacements(case)[pose]

@@ -20,7 +20,8 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ...models import FloatArray, Model, RobotInstance, Substitution
+from ...models import FloatArray, Model, RobotInstance, Substitution, Velocities
+from ...models.actuation import expressions_of_paths
 from ...models.arrays import buffer_on
 from ...models.values import dataclass
 from ...models.whole import Whole
@@ -135,6 +136,11 @@ class RobotNumbers(NamedTuple):
         """Return the numbers from the outputs of :meth:`Program.robot_state`."""
         numbers, quantities = outputs[:11], outputs[11:]
         return cls._make((*numbers, quantities))
+
+    @property
+    def velocities(self) -> Velocities:
+        """Velocity equations of the platform and the actuators."""
+        return Velocities(self.jacobian, self.driven, self.relations)
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,10 +267,9 @@ class Kernels:
 
     @cached_property
     def joint_screws(self) -> ca.Function:
-        """Parameters, unknowns, rotation and position to the screws (6, k) and loops of each path of the model."""
+        """Parameters, unknowns, rotation and position to the values of the paths of the model."""
         model = self._program.model
-        outputs = [ca.densify(part) for each in model.joint_screws for part in (each.all, each.loops)]
-        return ca.Function("joint_screws", Substitution.identity(model).all, outputs)
+        return ca.Function("joint_screws", Substitution.identity(model).all, expressions_of_paths(model.joint_screws))
 
 
 def design_indices(program: Program) -> tuple[int, ...]:

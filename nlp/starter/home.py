@@ -28,7 +28,7 @@ from ..case.case import Case
 from ..case.pose import Free, Rotation, Value
 from ..case.task import Sense, Task
 from ..evidence.closing import close_near, closed_start
-from ..evidence.paths import velocities_at
+from ..evidence.paths import numbers_at
 from ..evidence.state import RobotState, evaluate, loops_are_closed
 from ..program.formulation import formulate
 from ..program.nlp import Nlp
@@ -203,12 +203,12 @@ def _places(nlp: Nlp) -> list[_Place]:
 def _place(nlp: Nlp, x: FloatArray) -> _Place:
     """Return the robot at a point (n,) of a program."""
     model = nlp.program.model
-    numbers = nlp.program.kernels.robot_states[0](x, nlp.arguments)
+    numbers = numbers_at(nlp, x)
     rows, position = numbers.jacobian, numbers.position.ravel()
     if model.generic is None:
         couples = [k for k, row in enumerate(model.frame_rows) if row.kind is not WrenchKind.FORCE]
         return _Place(rows[couples], rows, position)
-    return _Place(constraint_rows(model, velocities_at(nlp, x, numbers), position), rows, position)
+    return _Place(constraint_rows(model, numbers.velocities, position), rows, position)
 
 
 def _scaled(rows: FloatArray, centre: FloatArray, size: float) -> FloatArray:

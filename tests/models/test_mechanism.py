@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from builders import Array, turn_about
 from casadi import SX
-from engine_comparison import Differences, compare
+from engine_comparison import Differences, compare, objective, program_at, with_twist
 from mechanism_robots import Engine, four_bar_delta, geared, projector, without
 from mujoco_robots import Oracle
 from random_mechanisms import Builder, random_mechanism, unit
@@ -35,7 +35,10 @@ from screwsynth.models.mechanism import (
 )
 from screwsynth.models.mechanism.graph import Coupling, Mechanism, MechanismError, MechanismJoint, MechanismLink
 from screwsynth.models.mechanism.singularities import SingularityType, generic_ranks, singularities_of
+from screwsynth.nlp import evaluate
 from screwsynth.nlp.evidence.assembly import unknowns_from_home
+from screwsynth.nlp.evidence.mobility import mobility_of
+from screwsynth.nlp.evidence.singularities import SingularityKind
 
 
 def driven(mechanism: Mechanism, seed: int, reach: float = 0.05) -> dict[str, float]:
@@ -525,23 +528,118 @@ def test_dependent_screws_that_nearly_lose_a_rank_keep_their_complement(kind: st
     assert_equal(compare(tables, driven=1, regular=1e-8))
 
 
-def test_loops_at_a_dead_centre_determine_the_rates_that_they_hold() -> None:
-    """A crank and its rod in line hold a foot's motor at home, and with it the hip's: both were not determined."""
-    links = ["base", "thigh", "shin", "heel", "crank", "rod", "platform"]
-    ends = {"hip": ("base", "thigh"), "knee": ("thigh", "shin"), "ankle": ("shin", "heel")}
-    ends |= {
-        "foot": ("heel", "platform"),
-        "low": ("heel", "crank"),
-        "middle": ("crank", "rod"),
-        "high": ("rod", "platform"),
-    }
-    places = [(0, 1, 0), (0.3, 0.7, 0), (-0.2, 0.4, 0), (0, 0, 0), (0, -0.5, 0), (0.15, -0.2, 0), (0.3, 0.1, 0)]
+#: Name, links and place of hinges of planar robots. Of each some are in line at home.
+Hinges = dict[str, tuple[tuple[str, str], tuple[float, float]]]
+
+#: A leg, and beside its foot a crank and its rod in line.
+LEG: Hinges = {
+    "hip": (("base", "thigh"), (0, 1)),
+    "knee": (("thigh", "shin"), (0.3, 0.7)),
+    "ankle": (("shin", "heel"), (-0.2, 0.4)),
+    "foot": (("heel", "platform"), (0, 0)),
+    "low": (("heel", "crank"), (0, -0.5)),
+    "middle": (("crank", "rod"), (0.15, -0.2)),
+    "high": (("rod", "platform"), (0.3, 0.1)),
+}
+#: The same with a foot of four motors: more joints than its crank and rod have.
+TOES: Hinges = {
+    **LEG,
+    "foot": (("heel", "toe1"), (0, 0)),
+    "toe1": (("toe1", "toe2"), (0.1, -0.3)),
+    "toe2": (("toe2", "toe3"), (0.2, 0.1)),
+    "toe3": (("toe3", "platform"), (0.4, -0.1)),
+}
+#: A limb beside other joints.
+BESIDE: Hinges = {"x": (("base", "bar"), (-1, 0.2)), "z": (("bar", "platform"), (-0.6, 0.9))}
+#: A closed loop of three links in whose last one a dead centre, or a flat four-bar, is.
+INSIDE: Hinges = {
+    "a": (("base", "one"), (0, 0)),
+    "b": (("one", "platform"), (0.2, 0.8)),
+    "c": (("base", "two"), (1, 0.1)),
+    "foot": (("two", "three"), (1.1, 0.5)),
+    "low": (("two", "crank"), (1.2, 0.6)),
+    "middle": (("crank", "rod"), (1.5, 0.8)),
+    "high": (("rod", "three"), (1.8, 1.0)),
+    "d": (("three", "one"), (0.5, 0.7)),
+    **BESIDE,
+}
+FLAT: Hinges = {**INSIDE, "middle": (("crank", "rod"), (1.5, 0.9)), "high": (("rod", "three"), (1.35, 0.75))}
+#: A driven four-bar whose rocker and coupler are in line, and a flat parallelogram: the platform gains a motion.
+IN_LINE: Hinges = {
+    "m": (("base", "crank"), (0, 0)),
+    "n": (("crank", "coupler"), (0.2, 0.5)),
+    "o": (("coupler", "rocker"), (0.5, 0.2)),
+    "p": (("rocker", "base"), (0.8, -0.1)),
+    "q": (("coupler", "platform"), (0.4, 0.9)),
+    **BESIDE,
+}
+PARALLELOGRAM: Hinges = {
+    **IN_LINE,
+    "n": (("crank", "coupler"), (0.3, 0.1)),
+    "o": (("coupler", "rocker"), (0.9, 0.3)),
+    "p": (("rocker", "base"), (0.6, 0.2)),
+}
+
+
+def planar_robot(hinges: Hinges, motors: Sequence[str], home: Sequence[float] = (0.1, 0.9, 0)) -> dict[str, Any]:
+    """A planar robot in a plane that is at an angle to all axes, so that its singularities are those of rounding."""
+    R = turn_about([1, 2, -1], 1.1)
     joints = [
-        joint_table(name, "R", between, at, axis="z", actuated=name in ("hip", "foot"))
-        for (name, between), at in zip(ends.items(), places, strict=True)
+        joint_table(name, "R", between, (R @ [*at, 0.0]).tolist(), axis=R[:, 2].tolist(), actuated=name in motors)
+        for name, (between, at) in hinges.items()
     ]
-    tables = {"name": "dead centre", "home": [0.1, -0.2, 0], "links": links, "joint": joints}
-    assert_equal(compare(tables, driven=2))
+    links = dict.fromkeys([*(link for between, _ in hinges.values() for link in between), "platform"])
+    return {"name": "planar", "home": (R @ home).tolist(), "links": list(links), "joint": joints}
+
+
+def reordered(tables: dict[str, Any], count: int, seed: int = 0) -> list[dict[str, Any]]:
+    """A robot with its joints in the order given, in the opposite one, and in random ones, so many in all."""
+    rng, joints = np.random.default_rng(seed), tables["joint"]
+    orders = [range(len(joints)), range(len(joints))[::-1], *(rng.permutation(len(joints)) for _ in range(count))]
+    return [{**tables, "joint": [joints[k] for k in order]} for order in orders[:count]]
+
+
+@pytest.mark.parametrize(
+    ("tables", "count"),
+    [
+        # A crank and its rod in line hold a foot's motor at home: the hip's rate was not determined. With the foot
+        # behind them F was wrong, and a degree of freedom was missing.
+        (planar_robot(LEG, ("hip", "foot"), (0.1, -0.2, 0)), 5),
+        (planar_robot(TOES, ("hip", "foot", "toe1", "toe2", "toe3"), (0.1, -0.2, 0)), 3),
+        (planar_robot({**LEG, **BESIDE}, ("hip", "foot"), (0.1, -0.2, 0)), 3),
+        (planar_robot(INSIDE, ("d", "x")), 5),
+        (planar_robot(FLAT, ("c", "x")), 5),
+        (geared(), 3),
+        (random_mechanism(12), 3),
+        (random_mechanism(0), 2),  # one member has no passive joint: its centre was that of the joint written last
+    ],
+    ids=["leg", "toes", "leg beside", "inside", "flat", "geared", "random", "no passive joint"],
+)
+def test_numbers_of_the_model_do_not_depend_on_the_order_of_joints(tables: dict[str, Any], count: int) -> None:
+    """At home, which is a dead centre of the first five, and away from it: all of them are the engine's."""
+    for each in reordered(tables, count):
+        assert_equal(compare(each, driven=1))
+
+
+@pytest.mark.parametrize(
+    ("hinges", "motors"), [(IN_LINE, "mx"), (PARALLELOGRAM, "mx")], ids=["in line", "flat parallelogram"]
+)
+def test_where_loops_lose_their_rank_numbers_are_those_of_the_point(hinges: Hinges, motors: str) -> None:
+    """Locked actuators allow the platform more than near by, where F is another one: the point is passive singular."""
+    for tables in reordered(planar_robot(hinges, motors), 5):
+        home = mechanism_of(tables)
+        nlp, x = program_at(robot(**tables), home, home)
+        state, engine, numbers = evaluate(nlp, x), Engine(home), wrenches_of(home, LENGTH)
+        centres = {each.joints or each.actuators: each.centre for each in numbers.members}
+        assert pytest.approx(objective(home, centres, CHI), rel=1e-10) == state.F
+        free, locked = (engine.platform_twists(locked=each) for each in (False, True))
+        mobility = mobility_of(nlp, x, state)
+        assert (mobility.freedoms, 6 - state.rank) == (free.shape[1], locked.shape[1])
+        assert SingularityKind.PASSIVE in {each.kind for each in mobility.singularities}
+        chi = free @ (free.T @ CHI)
+        nlp = with_twist(nlp, chi)
+        rates = mobility_of(nlp, x, evaluate(nlp, x)).actuator_rates.values()
+        np.testing.assert_allclose(sorted(rates), sorted(engine.rates(chi)), rtol=1e-9, atol=1e-9)
 
 
 def test_links_that_hang_on_one_joint_leave_a_network_as_it_is() -> None:

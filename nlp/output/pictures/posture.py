@@ -21,7 +21,7 @@ from ....models import (
     rate_relations,
     reporting_matrix,
 )
-from ....models.actuation import with_loops
+from ....models.actuation import expressions_of_paths, paths_of, with_loops
 from ...case.task import Sense
 from ...errors import EvaluationError, InputError
 from ...evidence.state import RobotState, evaluate
@@ -114,7 +114,7 @@ class Linkage:
 
     def __init__(self, model: Model, parameters: FloatArray, characteristic_length: float = 1.0) -> None:
         self.model = model
-        self._parameters = parameters
+        self._parameters, self._length = parameters, characteristic_length
         own = Substitution.identity(model)
         self._nested = [each for each in model.joint_screws if each.is_nested]
         outputs = [
@@ -122,7 +122,7 @@ class Linkage:
             jacobian(model.wrenches, SX(characteristic_length), model.members),
             driven(model.wrenches, model.actuators, SX(characteristic_length), model.members),
             rate_relations(model.actuators),
-            *[part for each in self._nested for part in (each.all, each.loops)],
+            *expressions_of_paths(self._nested),
             *[quantity.values for quantity in model.quantities],
         ]
         self._drawing = Kernel(ca.Function("drawing", own.all, [ca.densify(each) for each in outputs]), tuple_of)
@@ -142,11 +142,11 @@ class Linkage:
         scene = self.model.scene
         arguments = self._parameters, unknowns, rotation.ravel(order="F"), position
         columns, rows, works, relations, *quantities = self._drawing(*arguments)
-        screws, quantities = quantities[: 2 * len(self._nested)], quantities[2 * len(self._nested) :]
-        paths = list(zip(self._nested, screws[::2], screws[1::2], strict=True))
-        velocities = with_loops(self.model, Velocities(rows, works, relations), paths)
+        screws, quantities = quantities[: 3 * len(self._nested)], quantities[3 * len(self._nested) :]
+        paths = paths_of(self._nested, screws)
+        velocities = with_loops(self.model, Velocities(rows, works, relations), paths, self._length)
         matrix = reporting_matrix(self.model, velocities, position)
-        rows, works = matrix @ rows, np.abs(matrix @ velocities.driven)
+        rows, works = matrix @ velocities.jacobian, np.abs(matrix @ velocities.driven)
         sizes = [mark.kind.size for mark in scene.marks]
         counts = [len(scene.points), 3 * len(scene.circles), 2 * len(scene.directions), sum(sizes)]
         points, circles, directions, marks, joints = np.split(columns.T, np.cumsum(counts))
