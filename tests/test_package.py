@@ -18,6 +18,7 @@ import screwsynth.cases
 import screwsynth.models
 import screwsynth.nlp
 from screwsynth.nlp.case.limits.registry import LIMIT_TYPES
+from screwsynth.nlp.cli import contents
 from screwsynth.nlp.starter.text import starter_case
 
 ROOT = Path(__file__).parents[1]
@@ -109,6 +110,17 @@ def test_pictures_and_pages_are_public_functions(tmp_path: Path) -> None:
 
 def test_public_names_show_before_they_are_loaded() -> None:
     code = "import sys, screwsynth.nlp as n; sys.exit('numpy' in sys.modules or not {'solve', 'Case'} < set(dir(n)))"
+    assert subprocess.run([sys.executable, "-P", "-c", code], check=False).returncode == 0
+
+
+def test_what_commands_deliver_is_loaded_when_it_is_used() -> None:
+    names = re.findall(
+        r" as (\w+)$", Path(contents.__file__).with_suffix(".pyi").read_text("utf-8"), flags=re.MULTILINE
+    )
+    assert all(callable(getattr(contents, name)) for name in names)
+    code = (
+        "import sys, screwsynth.nlp.cli.contents; sys.exit(any('.output' in m or '.results' in m for m in sys.modules))"
+    )
     assert subprocess.run([sys.executable, "-P", "-c", code], check=False).returncode == 0
 
 

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
-from . import options
+from . import contents, options
 
 if TYPE_CHECKING:
     from ..case.case import Case
-    from ..results.axisranges import AxisRangesResult
 
 
 def show_ranges(
@@ -22,8 +21,8 @@ def show_ranges(
     report: Callable[[str], None],
     *,
     whole: bool,
-) -> AxisRangesResult:
-    """Write how far each coordinate of a pose can move.
+) -> NoReturn:
+    """Write how far each coordinate of a pose can move, and exit.
 
     Args:
         case: with fixed dimensions.
@@ -45,11 +44,13 @@ def show_ranges(
     limit = TIME_LIMIT if time is None else time
     found = axis_ranges(case, pose, most=_largest(most), time_limit=limit, progress=report)
     result = axis_ranges_result(found)
-    options.write_json(files["json"], result)
-    options.write_csv(files["csv"], axis_ranges_tables(result), None)
-    if not files.is_piped:
-        options.show(axis_ranges_summary(case, result), whole=whole)
-    return result
+    files.deliver(
+        lambda: axis_ranges_summary(case, result),
+        whole=whole,
+        done=result.proved,
+        json=lambda: result,
+        csv=lambda: contents.tables_as_csv(axis_ranges_tables(result)),
+    )
 
 
 def _largest(text: str | None) -> tuple[float, float] | None:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-from . import options
+from . import contents, options
 from .commandline import print_notice
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from ..results.text import Line, TextTable
 
 
 def certify(
@@ -28,9 +33,7 @@ def certify(
     """Prove a bound of the global optimum over the whole box."""
     from ..errors import InputError, one_line
     from ..interruption import Milestone, answer_after
-    from ..output.files import write_text
     from ..results.evidence import certified_of
-    from ..results.robotwording import unknown_lines
     from ..solver.certified import CertifyOptions, OptionError, proof_of
     from .progress import certify_with_progress
 
@@ -55,17 +58,17 @@ def certify(
     except OptionError as error:
         raise InputError(f"--{error}") from None
     result = certified_of(certified)
-    if proof is not None:
-        if certified.tree is not None:
-            write_text(proof, proof_of(certified, text).as_text())
-        else:
-            # A file of an earlier run is left as it is: it must not be taken for the proof of this one.
-            print_notice(f"--proof {one_line(proof)}: not written, as there is no complete proof")
-    options.write_json(json_file, result)
-    if not files.is_piped:
-        from ..results.summary import certified_summary
 
+    def proof_text() -> str | None:
+        if certified.tree is not None:
+            return proof_of(certified, text).as_text()
+        # A file of an earlier run is left as it is: it must not be taken for the proof of this one.
+        print_notice(f"--proof {one_line(proof or '')}: not written, as there is no complete proof")
+        return None
+
+    def shown() -> Iterable[Line | TextTable]:
         in_home_mode = all(each.nlp.in_home_mode for each in certified.certificates)
-        options.show(unknown_lines(loaded.model, all_assemblies=not in_home_mode), whole=True)
-        options.show(certified_summary(loaded, result), whole=whole)
-    raise SystemExit(0 if certified.is_proved else 1)
+        options.show(contents.unknown_lines(loaded.model, all_assemblies=not in_home_mode), whole=True)
+        return contents.certified_summary(loaded, result)
+
+    files.deliver(shown, whole=whole, done=certified.is_proved, proof=proof_text, json=lambda: result)

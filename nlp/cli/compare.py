@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
-from . import options
+from . import contents, options
 from .commandline import Argument, print_notice
 from .progress import counting_line
-
-if TYPE_CHECKING:
-    from ..comparison.compare import Comparison
 
 
 def compare(
@@ -40,6 +37,7 @@ def compare(
     from pathlib import Path
 
     from ..comparison.compare import compare as compare_robots
+    from ..comparison.data import comparison_result
     from ..comparison.robots import read_robots
     from ..interruption import Milestone, answer_after, is_requested, why_stopped
 
@@ -69,26 +67,14 @@ def compare(
     if is_stopped:
         begun = f"{len(found.entries)} of {len(robots)} robots are begun, the last one not to its end"
         print_notice(f"{why_stopped()}: {begun}")
-    _write(found, files, whole=whole)
     is_proved = not certified or all(each.certified is not None and each.certified.is_proved for each in found.ranked)
-    raise SystemExit(0 if found.ranked and is_proved and not is_stopped else 1)
-
-
-def _write(found: Comparison, files: options.Outputs, *, whole: bool) -> None:
-    """Write a comparison into its files, and onto the terminal where standard output takes no file."""
-    from ..comparison.data import comparison_result
-    from ..results.comparison import comparison_csv, comparison_summary
-
     result = comparison_result(found)
-    options.write_json(files["json"], result)
-    files.write("csv", comparison_csv, result)
-    if files["html"] is not None:
-        from ..output.report.comparison import comparison_page
-
-        files.write("html", comparison_page, found, result)
-    if files["plot"] is not None:
-        from ..output.pictures.comparisons import comparison_figure
-
-        files.draw("plot", comparison_figure, found)
-    if not files.is_piped:
-        options.show(comparison_summary(result), whole=whole)
+    files.deliver(
+        lambda: contents.comparison_summary(result),
+        whole=whole,
+        done=bool(found.ranked) and is_proved and not is_stopped,
+        json=lambda: result,
+        csv=lambda: contents.comparison_csv(result),
+        html=lambda: contents.comparison_page(found, result),
+        plot=lambda: contents.comparison_figure(found),
+    )

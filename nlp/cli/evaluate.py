@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from . import options
+from . import contents, options
 from .commandline import print_notice
 
 
@@ -56,13 +56,10 @@ def evaluate(
         nlps[0] = begun_at(nlps[0], joints_of(robot_of(load_answer(of), f"--of {of}", loaded), loaded))
     x = with_exact_level(nlps[0], closed_start(nlps[0]))
     result = evaluation_of(nlps, x, [state.evaluate(nlp, x) for nlp in nlps])
-    options.write_json(json_file, result)
-    if csv_file is not None:
-        from ..results.summary import evaluation_tables
-
-        options.write_csv(csv_file, evaluation_tables(loaded, result), table)
-    if not files.is_piped:
-        from ..results.summary import evaluation_summary
-
-        options.show(evaluation_summary(loaded, result), whole=whole)
-    raise SystemExit(1 if result.violated else 0)
+    files.deliver(
+        lambda: contents.evaluation_summary(loaded, result),
+        whole=whole,
+        done=not result.violated,
+        json=lambda: result,
+        csv=lambda: contents.tables_as_csv(contents.evaluation_tables(loaded, result), table),
+    )

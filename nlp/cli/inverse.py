@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from . import options
+from . import contents, options
 
 
 def inverse(
@@ -28,7 +28,6 @@ def inverse(
     from ..case.reader import read_poses
     from ..errors import InputError
     from ..evidence.inverse import inverse as inverse_at
-    from ..results.inverse import inverse_csv, inverse_summary
 
     if derivatives and csv_file is None:
         raise InputError("--derivatives: needs --csv FILE")
@@ -37,7 +36,9 @@ def inverse(
     files.check({**inputs, Path(poses): "the file of the poses"})
     given = read_poses(poses, loaded.units, "--poses")
     found = inverse_at(loaded, given.positions, given.rotations, follow="previous" if previous else "home")
-    files.write("csv", inverse_csv, loaded, found, given.rows, derivatives=derivatives)
-    if not files.is_piped:
-        options.show(inverse_summary(loaded, found, poses, given.rows), whole=whole)
-    raise SystemExit(0 if found.closed.all() else 1)
+    files.deliver(
+        lambda: contents.inverse_summary(loaded, found, poses, given.rows),
+        whole=whole,
+        done=bool(found.closed.all()),
+        csv=lambda: contents.inverse_csv(loaded, found, given.rows, derivatives=derivatives),
+    )

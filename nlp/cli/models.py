@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-from . import options
+from . import contents, options
 from .commandline import Argument
 
 if TYPE_CHECKING:
@@ -23,55 +23,42 @@ def models(
 
     One robot is shown with its parameters, options and wrenches.
     """
+    from pathlib import Path
+
     from ...models import model_names
     from ..case.robots import build_model, model_options
     from ..errors import InputError
     from ..results.robotwording import model_words, models_words
 
-    options.Outputs(plot=plot).check({})
+    file = name if name is not None and name.endswith(".toml") else None
+    files = options.Outputs(plot=plot)
+    files.check({} if file is None else {Path(file): "the robot file that is read"})
     if name is None:
         if plot is not None:
             raise InputError(f"--plot {plot}: needs the name of a robot")
         options.show(models_words((each, _description(each)) for each in model_names()), whole=whole)
         return
-    if name.endswith(".toml"):
-        _show_file(name, plot, whole=whole)
-        return
-    found = model_options(name)
+    found = model_options(name) if file is None else ()
     needed = [option.name for option in found if option.default is None]
     # Without the options that have no default, the robot cannot be built, and has no parameters to show.
-    model = None if needed else build_model(name)
-    if plot is not None:
-        from ..output.pictures.plot import plot as draw
-
-        if model is None:
-            raise InputError(f"--plot {plot}: robot {name!r} needs its option {needed[0]!r} first")
-        draw(_variants(name, model, found), plot)
-    options.show(model_words(name, model, found), whole=whole)
-
-
-def _show_file(file: str, plot: str | None, *, whole: bool) -> None:
-    """Show the robot of a robot file in full, and draw it into a file."""
-    from pathlib import Path
-
-    from ..output.files import check_outputs
-    from ..results.robotwording import model_words
-
-    check_outputs({Path(file): "the robot file that is read"}, {"--plot": plot})
-    model = options.read_robot(file)
-    if plot is not None:
-        from ..output.pictures.plot import plot as draw
-
-        draw(model, plot)
-    options.show(model_words(model.name, model, ()), whole=whole)
+    model = options.read_robot(file) if file is not None else None if needed else build_model(name)
+    if plot is not None and model is None:
+        raise InputError(f"--plot {plot}: robot {name!r} needs its option {needed[0]!r} first")
+    files.deliver(
+        lambda: model_words(name if file is None or model is None else model.name, model, found),
+        whole=whole,
+        plot=lambda: contents.figure_of([contents.drawing_of_model(each) for each in _variants(name, model, found)]),
+    )
 
 
-def _variants(name: str, model: Model, found: Sequence[ModelOption]) -> list[Model]:
+def _variants(name: str, model: Model | None, found: Sequence[ModelOption]) -> list[Model]:
     """Return the robot with each value of the first option whose values can be listed, or the robot alone."""
     from ..case.robots import build_model
 
     listed = next((option for option in found if option.choices), None)
-    return [model] if listed is None else [build_model(name, {listed.name: value}) for value in listed.choices]
+    if listed is None:
+        return [] if model is None else [model]
+    return [build_model(name, {listed.name: value}) for value in listed.choices]
 
 
 def _description(model: str) -> str:

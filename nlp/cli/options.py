@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import TYPE_CHECKING, Annotated, NamedTuple, ParamSpec
+from typing import TYPE_CHECKING, Annotated, NamedTuple, NoReturn, cast
 
 from ..interruption import within
 from .commandline import Argument, Option, print_notice
@@ -25,9 +25,6 @@ if TYPE_CHECKING:
     from ..case.reader import CaseFile
     from ..results.jsondata import JsonObject
     from ..results.text import Line, TextTable
-
-
-_P = ParamSpec("_P")
 
 
 class WholeNumber:
@@ -341,46 +338,57 @@ class Outputs:
 
         check_outputs(inputs, {f"--{name.replace('_', '-')}": target for name, target in self._targets.items()})
 
-    def write(self, name: str, make: Callable[_P, str], *values: _P.args, **options: _P.kwargs) -> None:
-        """Write the text of an option, which a function returns for arguments, where it is asked for.
+    def deliver(
+        self,
+        shown: Callable[[], Iterable[Line | TextTable]],
+        *,
+        whole: bool,
+        done: bool = True,
+        **contents: Callable[[], JsonObject | str | Figure | None],
+    ) -> NoReturn:
+        """Write the files that are asked for, show the answer where standard output takes no file, and exit.
+
+        Nothing is made that is not asked for. Each file is written whole or not at all, in the order of the contents.
+
+        Args:
+            shown: returns the lines and tables for the terminal.
+            whole: whether everything is shown, and not the answer alone.
+            done: whether the exit status is 0, and not 1.
+            contents: by option, what returns the content of its file: a result, which is written as JSON, a text, or a
+                picture's figure; None for a file that is not written after all.
 
         Raises:
-            InputError: the file cannot be written.
+            InputError: a file cannot be written.
+            SystemExit: at the end, with the exit status.
         """
-        from ..output.files import write_text
+        for name, make in contents.items():
+            target = self._targets.get(name)
+            if target is not None:
+                _write(target, make, is_picture=name in _PICTURES)
+        if not self.is_piped:
+            show(shown(), whole=whole)
+        raise SystemExit(0 if done else 1)
 
-        target = self._targets[name]
-        if target is not None:
-            write_text(target, make(*values, **options))
 
-    def draw(self, name: str, make: Callable[_P, Figure], *values: _P.args, **options: _P.kwargs) -> None:
-        """Write the picture of an option, of the figure that a function returns for arguments.
+def _write(target: str, make: Callable[[], JsonObject | str | Figure | None], *, is_picture: bool) -> None:
+    """Write the content that a function returns into a file, or to standard output for ``-``."""
+    from ..output.files import write_bytes, write_text
 
-        Raises:
-            InputError: the file cannot be written.
-        """
-        from ..output.files import write_bytes
+    if is_picture:
         from ..output.pictures.figures import picture_of
         from ..output.pictures.requirements import ending_of
 
-        target = self._targets[name]
-        if target is not None:
-            write_bytes(target, picture_of(ending_of(target), make, *values, **options))
+        write_bytes(target, picture_of(ending_of(target), cast("Callable[[], Figure]", make)))
+        return
+    content = make()
+    if isinstance(content, str):
+        write_text(target, content)
+    elif content is not None:
+        import json
 
+        from ..results.jsondata import json_data
 
-def write_json(target: str | None, result: JsonObject) -> None:
-    """Write a result as JSON where it is asked for, to standard output for ``-``.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
-    import json
-
-    from ..output.files import write_text
-    from ..results.jsondata import json_data
-
-    if target is not None:
-        write_text(target, json.dumps(json_data(result), indent=2, allow_nan=False) + "\n")
+        write_text(target, json.dumps(json_data(cast("JsonObject", content)), indent=2, allow_nan=False) + "\n")
 
 
 def check_csv(target: str | None, table: str | None, case: Case, *, at_point: bool) -> None:
@@ -403,19 +411,6 @@ def check_csv(target: str | None, table: str | None, case: Case, *, at_point: bo
     names = table_names(case, at_point=at_point)
     if table is not None and table not in names:
         raise InputError(f"--table {table}: must be one of {listing(names)}")
-
-
-def write_csv(target: str | None, tables: Iterable[TextTable], name: str | None) -> None:
-    """Write tables as comma-separated values where they are asked for, to standard output for ``-``.
-
-    Raises:
-        InputError: it cannot be written, or the result has no table of this name.
-    """
-    from ..output.csvtables import tables_as_csv
-    from ..output.files import write_text
-
-    if target is not None:
-        write_text(target, tables_as_csv(tables, name))
 
 
 def show(items: Iterable[Line | TextTable], *, whole: bool) -> None:

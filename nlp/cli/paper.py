@@ -37,33 +37,37 @@ def paper_record(target: str | None, json_file: str | None) -> PaperRecord | Non
     return PaperRecord()
 
 
-def write_paper(
-    target: str, judged: Judgement, record: PaperRecord | None, text: str, quantities: Sequence[str], leg_error: float
-) -> None:
-    """Write the proof of a judgement, and say what has none.
+def paper_text(
+    target: str | None,
+    judged: Judgement,
+    record: PaperRecord | None,
+    text: str,
+    quantities: Sequence[str],
+    leg_error: float,
+) -> str | None:
+    """Return the proof of a judgement as the text of a file, and say what has none; None where nothing has.
 
     Args:
         target: file name; ``-`` is standard output.
         judged: the verdicts.
-        record: of the searches that led to them; without one nothing is written.
+        record: of the searches that led to them; there is no proof without one.
         text: the case file's text.
         quantities: measures that were asked for.
         leg_error: largest error of a leg's length.
     """
     from ..errors import one_line
-    from ..output.files import write_text
     from ..proof.workspace.proof_writer import paper_of
 
-    if record is None:
-        return
+    if target is None or record is None:
+        return None
     proof = paper_of(judged, record, text, quantities=quantities, leg_error=leg_error)
     if not proof.claims:
         # A file of an earlier run is left as it is: it must not be taken for the proof of this one.
         print_notice(f"--proof {one_line(target)}: not written, as no claim has a proof")
-        return
-    write_text(target, proof.as_text())
+        return None
     for words in _unproved_words(proof.unproved):
         print_notice(one_line(words))
+    return proof.as_text()
 
 
 def verify_paper(proof: Proof, case: Case, leg_error: float) -> Iterator[Line]:

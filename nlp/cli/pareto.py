@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
-from . import options
+from . import contents, options
 from .commandline import print_notice
 from .progress import counting_line
-
-if TYPE_CHECKING:
-    from ..front.front import Front
 
 
 def pareto(
@@ -37,6 +34,7 @@ def pareto(
     from ..front.front import pareto as find_front
     from ..front.goals import read_goals
     from ..interruption import Milestone, answer_after, is_requested, why_stopped
+    from ..results.text import Line
 
     files = options.Outputs(json=json_file, csv=csv_file, html=html, plot=plot)
     read = options.read_machine(case, settings, of).file
@@ -60,26 +58,13 @@ def pareto(
     is_stopped = is_requested()
     if is_stopped:
         print_notice(f"{why_stopped()}: {len(found.points)} of {points} points are found")
-    _write(found, files, whole=whole)
     is_proved = all(each.certificate is None or each.certificate.status.value == "proved" for each in found.points)
-    raise SystemExit(0 if is_proved and not is_stopped else 1)
-
-
-def _write(found: Front, files: options.Outputs, *, whole: bool) -> None:
-    """Write a front into its files, and onto the terminal where standard output takes no file."""
-    from ..front.data import front_result
-    from ..output.fronttable import front_csv, front_table, front_words
-    from ..results.text import Line
-
-    options.write_json(files["json"], front_result(found))
-    files.write("csv", front_csv, found)
-    if files["html"] is not None:
-        from ..output.report.front import front_page
-
-        files.write("html", front_page, found)
-    if files["plot"] is not None:
-        from ..output.pictures.curves import front_figure
-
-        files.draw("plot", front_figure, found)
-    if not files.is_piped:
-        options.show([*map(Line, front_words(found)), front_table(found)], whole=whole)
+    files.deliver(
+        lambda: [*map(Line, contents.front_words(found)), contents.front_table(found)],
+        whole=whole,
+        done=is_proved and not is_stopped,
+        json=lambda: contents.front_result(found),
+        csv=lambda: contents.front_csv(found),
+        html=lambda: contents.front_page(found),
+        plot=lambda: contents.front_figure(found),
+    )

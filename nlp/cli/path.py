@@ -5,16 +5,14 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Annotated
 
-from . import options
+from . import contents, options
 from .progress import spinner
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
 
     from ..path.options import PathOptions
-    from ..proof.workspace.path_judge import PathJudgement
     from ..proof.workspace.path_knots import Sampling
-    from ..results.path import PathResult
     from ..results.workspace import WorkspacePose
 
 
@@ -65,6 +63,7 @@ def path(
     whole: options.ShowAll = False,
 ) -> None:
     """Prove regular poses and limits at every point of a path."""
+    from functools import cache
     from pathlib import Path
 
     from ..case.pose import RotationForm
@@ -73,7 +72,6 @@ def path(
     from ..path.reader import options_of, path_of_case, read_path
     from ..proof.workspace.path_judge import TIME_LIMIT, judge_path
     from ..results.path import path_result
-    from ..results.pathwording import path_summary
     from ..results.posewording import evaluate_command
 
     sampling = _sampling(step, within, is_written=csv_file is not None)
@@ -93,8 +91,7 @@ def path(
 
         files.check(inputs)
         with spinner("the pose") as show:
-            found = show_ranges(loaded, choices.start, most, time, files, show, whole=whole)
-        raise SystemExit(0 if found.proved else 1)
+            show_ranges(loaded, choices.start, most, time, files, show, whole=whole)
     if html is not None:
         from ..output.pictures.requirements import check_library
 
@@ -110,11 +107,22 @@ def path(
         """Return the command that shows a pose."""
         return evaluate_command(case, loaded, chosen, pose, RotationForm.RPY)
 
-    options.write_json(json_file, result)
-    _write(files, judged, result, text, command)
-    if not files.is_piped:
-        options.show(path_summary(judged.case, result, command), whole=whole)
-    raise SystemExit(0 if result.proved else 1)
+    @cache
+    def picture() -> contents.PathPicture:
+        """Return what the picture and the page show."""
+        from ..proof.workspace.path_samples import samples_of
+
+        return contents.path_picture(judged, samples_of(judged), result)
+
+    files.deliver(
+        lambda: contents.path_summary(judged.case, result, command),
+        whole=whole,
+        done=result.proved,
+        json=lambda: result,
+        csv=lambda: None if judged.knots is None else contents.knots_csv(judged.case, judged.path, judged.knots),
+        plot=lambda: contents.path_figure(picture()),
+        html=lambda: contents.path_page(picture(), text, command),
+    )
 
 
 def _refuse_elsewhere(along: Mapping[str, object], most: str | None, *, ranges: bool) -> None:
@@ -128,31 +136,6 @@ def _refuse_elsewhere(along: Mapping[str, object], most: str | None, *, ranges: 
     for name, given in along.items() if ranges else [("--most", most)]:
         if given not in (None, []):
             raise InputError(f"{name}: is not for --range" if ranges else f"{name}: needs --range")
-
-
-def _write(
-    files: options.Outputs,
-    judged: PathJudgement,
-    result: PathResult,
-    text: str,
-    command: Callable[[WorkspacePose], str],
-) -> None:
-    """Write the table of actuators, the picture and the page."""
-    if judged.knots is not None:
-        from ..results.pathtable import knots_csv
-
-        files.write("csv", knots_csv, judged.case, judged.path, judged.knots)
-    if files["plot"] is None and files["html"] is None:
-        return
-    from ..output.pictures.pathpanels import path_picture
-    from ..output.pictures.paths import path_figure
-    from ..output.report.path import path_page
-    from ..proof.workspace.path_samples import samples_of
-
-    picture = path_picture(judged, samples_of(judged), result)
-    files.draw("plot", path_figure, picture)
-    if files["html"] is not None:
-        files.write("html", path_page, picture, text, command)
 
 
 def _sampling(step: float | None, within: float | None, *, is_written: bool) -> Sampling | None:

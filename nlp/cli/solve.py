@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Annotated
 
-from . import options
+from . import contents, options
 
 
 def solve(
@@ -52,17 +52,11 @@ def solve(
         raise InputError(f"--pose {pose}: the case has {loaded.pose_count} pose{'s' * (loaded.pose_count > 1)}")
     solution, found, is_proved = solve_with_progress(loaded, jobs, certify=certify, gap=gap, step=step)
     result = result_of(found)
-    options.write_json(json_file, result)
-    if csv_file is not None:
-        from ..results.summary import case_tables
-
-        options.write_csv(csv_file, case_tables(loaded, result), table)
-    if plot is not None:
-        from ..output.pictures.plot import plot as draw
-
-        draw(solution, plot, pose=pose)
-    if not files.is_piped:
-        from ..results.summary import case_summary
-
-        options.show(case_summary(loaded, result), whole=whole)
-    raise SystemExit(0 if solution.status.is_answer and is_proved and solution.keeps_limits else 1)
+    files.deliver(
+        lambda: contents.case_summary(loaded, result),
+        whole=whole,
+        done=solution.status.is_answer and is_proved and solution.keeps_limits,
+        json=lambda: result,
+        csv=lambda: contents.tables_as_csv(contents.case_tables(loaded, result), table),
+        plot=lambda: contents.figure_of(contents.drawings_of(solution, pose)),
+    )

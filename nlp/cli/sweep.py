@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
-from . import options
+from . import contents, options
 from .commandline import print_notice
 from .progress import counting_line
 
@@ -92,22 +92,7 @@ def sweep(
                 raise SystemExit(1)
             write_table(out, found, journal.rows())
             journal.remove()
-    if json_file is not None or html is not None:
-        _write(found, out, files)
-    raise SystemExit(_show(found, out, files))
-
-
-def _write(found: Sweep, out: str, files: options.Outputs) -> None:
-    """Write a sweep as JSON and as a page."""
-    from ..output.sweeptable import table_rows
-    from ..sweeps.columns import columns_of, sweep_result
-
-    case, columns = found.source.case_at(found.points.settings(0)), columns_of(found, table_rows(out, found))
-    options.write_json(files["json"], sweep_result(case, columns))
-    if files["html"] is not None:
-        from ..output.report.sweep import sweep_page
-
-        files.write("html", sweep_page, case, found.points, columns)
+    _deliver(found, out, files)
 
 
 @contextmanager
@@ -143,43 +128,40 @@ def _points_file(over: list[str]) -> str | None:
     return file
 
 
-def _show(found: Sweep, out: str, files: options.Outputs) -> int:
-    """Draw the picture, print a line about the table, and return the exit status."""
+def _deliver(found: Sweep, out: str, files: options.Outputs) -> NoReturn:
+    """Write a sweep as JSON, as a page and as a picture, print a line about its table, and exit."""
     import math
+    from functools import cache
 
-    from ..output.sweeptable import table_points
-
-    rows = table_points(out)
-    if files["plot"] is not None:
-        from ..output.pictures.sweeps import sweep_figure
-
-        files.draw("plot", sweep_figure, found.source.case_at(found.points.settings(0)), found.points, rows)
-    values = [row.F for row in rows if not math.isnan(row.F)]
-    regions = len({row.active for row in rows if not math.isnan(row.F)})
-    ends = f", F from {min(values):.7g} to {max(values):.7g}, {regions} sets of active limits" if values else ""
-    if found.certified:
-        from ..output.sweeptable import table_rows
-
-        proved = sum(row.certificate == "proved" for row in table_rows(out, found))
-        ends += f", {proved:,} are proved"
-    if not files.is_piped:
-        from ..results.text import Line
-
-        notice = _notice(found, out)
-        lines = [Line(f"{len(values):,} of {len(rows):,} points have an answer{ends}: {out}")]
-        options.show([*lines, *([] if notice is None else [Line(f"note: {notice}")])], whole=True)
-    return 0 if values else 1
-
-
-def _notice(found: Sweep, out: str) -> str | None:
-    """Return the notice that limits elsewhere are taken at the stated pose alone; None where they are not."""
-    from ..output.sweeptable import table_rows
-    from ..sweeps.columns import stated_pose_note
+    from ..output.sweeptable import table_points, table_rows
+    from ..results.text import Line
+    from ..sweeps.columns import columns_of, stated_pose_note, sweep_result
 
     case = found.source.case_at(found.points.settings(0))
-    if not case.limits_over:
-        return None
-    return stated_pose_note(case, [row.note for row in table_rows(out, found)])
+    rows = cache(lambda: table_rows(out, found))
+    columns = cache(lambda: columns_of(found, rows()))
+    points = table_points(out)
+    answered = [row for row in points if not math.isnan(row.F)]
+
+    def shown() -> Iterator[Line]:
+        values = [row.F for row in answered]
+        regions = len({row.active for row in answered})
+        ends = f", F from {min(values):.7g} to {max(values):.7g}, {regions} sets of active limits" if values else ""
+        if found.certified:
+            ends += f", {sum(row.certificate == 'proved' for row in rows()):,} are proved"
+        yield Line(f"{len(values):,} of {len(found.points):,} points have an answer{ends}: {out}")
+        notice = stated_pose_note(case, [row.note for row in rows()]) if case.limits_over else None
+        if notice is not None:
+            yield Line(f"note: {notice}")
+
+    files.deliver(
+        shown,
+        whole=True,
+        done=bool(answered),
+        json=lambda: sweep_result(case, columns()),
+        html=lambda: contents.sweep_page(case, found.points, columns()),
+        plot=lambda: contents.sweep_figure(case, found.points, points),
+    )
 
 
 def _progress_words(before: int, done: int, total: int, seconds: float) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from . import options
+from . import contents, options
 from .commandline import print_notice
 from .progress import counting_line
 
@@ -65,18 +65,14 @@ def tradeoff(
     if is_requested() and not found.unsolved:
         print_notice(f"{why_stopped()}: every value is solved, but not all from the optima beside it")
     loaded, result = found.points[0].solution.case, tradeoff_result(found)
-    options.write_json(json_file, result)
-    files.write("csv", tradeoff_csv, result)
-    if html is not None:
-        from ..output.report.curves import tradeoff_page
-
-        files.write("html", tradeoff_page, found, result)
-    if plot is not None:
-        from ..output.pictures.curves import tradeoff_figure
-
-        files.draw("plot", tradeoff_figure, loaded, result)
-    if not files.is_piped:
-        options.show(tradeoff_summary(loaded, result), whole=whole)
     statuses = [point.status for point in result.points]
     is_done = all(status.is_answer or status is Status.INFEASIBLE for status in statuses)
-    raise SystemExit(0 if is_done and any(status.is_answer for status in statuses) else 1)
+    files.deliver(
+        lambda: tradeoff_summary(loaded, result),
+        whole=whole,
+        done=is_done and any(status.is_answer for status in statuses),
+        json=lambda: result,
+        csv=lambda: tradeoff_csv(result),
+        html=lambda: contents.tradeoff_page(found, result),
+        plot=lambda: contents.tradeoff_figure(loaded, result),
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-from . import options
+from . import contents, options
 from .progress import spinner, tell_workspace
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def workspace(
     from ..proof.statement.machine import workspace_of_case
     from ..results.posewording import evaluate_command
     from ..results.workspace import scale_data, workspace_of
-    from .paper import paper_record, write_paper
+    from .paper import paper_record, paper_text
 
     record = paper_record(proof, json_file)
     answer_after(Milestone.BOUND)
@@ -66,30 +66,17 @@ def workspace(
         """Return the command that shows a pose."""
         return evaluate_command(case, loaded, chosen, pose)
 
-    options.write_json(json_file, result)
-    if csv_file is not None:
-        from ..results.text import TextTable
-        from ..results.workspacewording import workspace_summary
-
-        shown = workspace_summary(loaded, result)
-        options.write_csv(csv_file, [each for each in shown if isinstance(each, TextTable)], None)
-    if plot is not None:
-        from ..output.pictures.workspaces import slices_figure
-
-        files.draw("plot", slices_figure, loaded, slices)
-    if plot_pose is not None:
-        files.draw("plot_pose", _worst, loaded, result, plot_pose)
-    if html is not None:
-        from ..output.report.workspace import WorkspaceReport, workspace_page
-
-        files.write("html", workspace_page, WorkspaceReport(loaded, text, result, slices, command))
-    if proof is not None:
-        write_paper(proof, judged, record, text, quantities or (), leg_error)
-    if not files.is_piped:
-        from ..results.workspacewording import workspace_summary
-
-        options.show(workspace_summary(loaded, result, command), whole=whole)
-    raise SystemExit(0 if result.proved else 1)
+    files.deliver(
+        lambda: contents.workspace_summary(loaded, result, command),
+        whole=whole,
+        done=result.proved,
+        json=lambda: result,
+        csv=lambda: contents.tables_as_csv(contents.workspace_summary(loaded, result)),
+        plot=lambda: contents.slices_figure(loaded, slices),
+        plot_pose=lambda: _worst(loaded, result, plot_pose),
+        html=lambda: contents.workspace_page(contents.WorkspaceReport(loaded, text, result, slices, command)),
+        proof=lambda: paper_text(proof, judged, record, text, quantities or (), leg_error),
+    )
 
 
 def _judge_with_progress(
@@ -139,18 +126,16 @@ def _slices(case: Case, files: options.Outputs) -> tuple[Slice, ...]:
         return ()
 
 
-def _worst(case: Case, result: WorkspaceResult, target: str) -> Figure:
+def _worst(case: Case, result: WorkspaceResult, target: str | None) -> Figure:
     """Return a picture of the robot at its worst pose.
 
     Raises:
         InputError: no pose is known.
     """
     from ..errors import InputError
-    from ..output.pictures.figures import figure_of
-    from ..output.pictures.workspaces import drawing_at
     from ..results.workspaceposes import worst_claim
 
     worst = worst_claim(result, case.tasks[0].sense)
     if worst is None:
         raise InputError(f"--plot-pose {target}: no pose of the workspace is known at which a number is reached")
-    return figure_of([drawing_at(case, worst)])
+    return contents.figure_of([contents.drawing_at(case, worst)])

@@ -9,17 +9,17 @@ from ..results.text import Figure, Line, TextTable
 from ..system.csvtext import csv_text
 
 
-def tables_as_csv(tables: Iterable[TextTable], name: str | None = None) -> str:
+def tables_as_csv(items: Iterable[Line | TextTable], name: str | None = None) -> str:
     """Return tables as comma-separated values.
 
     Args:
-        tables: of a result.
+        items: tables of a result; lines are left out.
         name: of the one table to write; None for all, each below a line with its name, with an empty line between.
 
     Raises:
         InputError: no table has this name.
     """
-    named = [table for table in tables if table.name]
+    named = [item for item in items if isinstance(item, TextTable) and item.name]
     if name is None:
         return "\n".join(f"{table.name}\n{_as_csv(table)}" for table in named)
     for table in named:
