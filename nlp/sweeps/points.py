@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import tomllib
 from collections.abc import Sequence
@@ -14,6 +12,7 @@ import numpy as np
 
 from ...models import FloatArray, frozen_array
 from ..case.case import Case
+from ..case.csvrows import csv_rows
 from ..case.overrides import Settings
 from ..case.reader import CaseFile, case_from_tables
 from ..errors import InputError
@@ -103,22 +102,21 @@ def points_of_csv(text: str, source: str) -> Points:
     Raises:
         InputError: the file has no points, a row has another length, or something is no finite number.
     """
-    rows = [row for row in csv.reader(io.StringIO(text)) if row]
-    if not rows:
+    names, *rows = [cells for _, cells in csv_rows(text, source)] or [[]]
+    if not names:
         raise InputError(f"{source}: is empty: the first row must have the names of the numbers")
-    names = tuple(name.strip() for name in rows[0])
     _check_names(names, source)
-    if len(rows) == 1:
+    if not rows:
         raise InputError(f"{source}: has 0 points: a row of values must follow the names")
-    if len(rows) - 1 > MOST_POINTS:
-        raise InputError(f"{source}: has {len(rows) - 1:,} points, and at most {MOST_POINTS:,} are allowed")
-    values = np.empty((len(rows) - 1, len(names)))
-    for k, row in enumerate(rows[1:]):
+    if len(rows) > MOST_POINTS:
+        raise InputError(f"{source}: has {len(rows):,} points, and at most {MOST_POINTS:,} are allowed")
+    values = np.empty((len(rows), len(names)))
+    for k, row in enumerate(rows):
         if len(row) != len(names):
             raise InputError(f"{source}: point {k + 1} has {len(row)} values, and must have {len(names)}")
         for j, part in enumerate(row):
             values[k, j] = _number(part, f"{source}: point {k + 1}, {names[j]}")
-    return Points(names, frozen_array(values, values.shape))
+    return Points(tuple(names), frozen_array(values, values.shape))
 
 
 def _read_axis(text: str) -> tuple[str, FloatArray]:
