@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test quick soak check lint types more-types docs site figures bench dist clean
+.PHONY: help demo test quick soak check lint types more-types house docs site figures bench dist clean
 
 help: ## list these commands
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -38,7 +38,7 @@ build/typing/screwsynth:
 	mkdir -p $@
 	ln -sfn ../../../models ../../../nlp ../../../cases $@
 
-check: lint types more-types ## check formatting, lint, types and import contracts; with --jobs 2 at once
+check: lint types more-types house ## check formatting, lint, types and import contracts; with --jobs 2 at once
 
 lint: $(VENV)/ready
 	$(BIN)/ruff format --check .
@@ -50,6 +50,10 @@ types: $(VENV)/ready build/typing/screwsynth
 
 more-types: $(VENV)/ready build/typing/screwsynth
 	$(BIN)/basedpyright --level error
+
+# Sizes are for reading: whatever they are, the check goes on.
+house: $(VENV)/ready
+	@-$(BIN)/python bench/house.py
 
 docs: $(VENV)/ready ## write the program's output into the documentation
 	$(BIN)/python -P docs/gallery.py

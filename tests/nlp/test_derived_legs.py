@@ -14,7 +14,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from builders import Array, Run, case_from, case_of, output_of, refusal_of, saved, turn_about
+from builders import Array, Run, case_from, case_of, output_of, refusal_of, saved, soaked, turn_about
 from generated import made, needs_compiler, written
 from measures import circle_joints, segment_distance
 
@@ -384,7 +384,7 @@ def tripod_pose(z: float, turn: Array, errors: Array) -> tuple[Array, Array]:
     return base, ends(u)
 
 
-@pytest.mark.parametrize("tolerance", [0.0, 0.001])
+@pytest.mark.parametrize("tolerance", soaked([0.0, 0.001], [0.001]))
 def test_a_robot_with_fewer_freedoms_and_loops(tolerance: float) -> None:
     more = {"tolerance": {"joint_centre": tolerance}} if tolerance else {}
     case, record = case_from({**TRIPOD, **more}), PaperRecord()

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
+from builders import soaked
 from generated import COMPILERS, STRICT, WARNINGS, needs_compiler, run, written
 
 from screwsynth.nlp import generate_c, load_case
@@ -415,7 +416,9 @@ def image(case: str, folder: Path) -> Path:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", ["paper-4.1-helical", "paper-4.2-rotation", "paper-4.4-max"])
+@pytest.mark.parametrize(
+    "case", soaked(["paper-4.1-helical", "paper-4.2-rotation", "paper-4.4-max"], ["paper-4.1-helical"])
+)
 def test_self_test_and_counted_solves(
     case: str, tmp_path: Path, record_property: Callable[[str, object], None]
 ) -> None:

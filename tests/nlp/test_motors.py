@@ -180,7 +180,7 @@ def held_at(case: Case, position: list[float], rotation: Rotation) -> tuple[Load
     return one, speeds
 
 
-@pytest.mark.parametrize("name", ["6-pus", "delta", "tricept"])
+@pytest.mark.parametrize("name", soaked(["6-pus", "delta", "tricept"], ["6-pus"]))
 def test_numbers_of_robots_with_passive_joints_are_those_that_a_pose_shows(name: str) -> None:
     """With six freedoms or fewer, with loops in closed form and others: forces and torques from J at single poses."""
     load = Load("push", (1.0, 2.0, -10.0), point=(0.0, 0.1, 0.1), any_force=2.0)

@@ -266,7 +266,10 @@ def descended(
 
 @pytest.mark.parametrize(
     ("name", "part", "degrees"),
-    [("three-upu", 0.1, 0.0), ("6-rus", 0.03, 4.0), ("6-ups", 0.05, 5.0), ("tripteron", 0.03, 0.0)],
+    [
+        *(("three-upu", 0.1, 0.0), ("6-rus", 0.03, 4.0)),
+        *(pytest.param(*each, marks=pytest.mark.soak) for each in (("6-ups", 0.05, 5.0), ("tripteron", 0.03, 0.0))),
+    ],
 )
 def test_no_pose_is_beyond_a_proven_number(name: str, part: float, degrees: float) -> None:
     has_legs, length = name == "three-upu", LENGTHS.get(name, 0.4)

@@ -10,7 +10,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from builders import Run, case_file, case_from, case_tables, edited, ends, output_of, saved, unbroken, unpacked
+from builders import Run, case_file, case_from, case_tables, edited, ends, output_of, saved, soaked, unbroken, unpacked
 from casadi import SX
 from hexapods import EVERY_LIMIT, HEXAPOD, case_of_legs, random_legs
 from workspace_cases import (
@@ -189,7 +189,7 @@ def machines_of(case: Case) -> tuple[Machines, PoseRoot]:
     return Machines(case, closed_form(case.model).model, root_of(case)), root_of(case)
 
 
-@pytest.mark.parametrize("robot", ["hexapod", "6-rus"])
+@pytest.mark.parametrize("robot", soaked(["hexapod", "6-rus"], ["hexapod"]))
 def test_numbers_hold_for_random_machines_and_are_nearly_reached(robot: str) -> None:
     """What is shown of terms of second order is at least that of random machines, and little more."""
     turns = {"axis": [0.6, 0, 0.8], "angle": ends(2)}
