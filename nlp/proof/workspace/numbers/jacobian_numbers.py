@@ -36,7 +36,7 @@ from .....models.arrays import FloatArray, values_at
 from ....evidence.closed_loops import inverses
 from ...enclosure.forms import Forms
 from ...statement.machine import LEGS, Legs
-from ..ranks.krawczyk import by_centres
+from ..ranks.krawczyk import bounds_of_inverses, by_centres
 from ..robot.posed_robot import Problem
 from .bound_search import Bounds, Number
 
@@ -46,10 +46,6 @@ ROUNDING = 1e-10
 _OUTWARDS = 1 + 1e-12
 #: Part of C below which a singular value of the middle matrix is zero.
 _ZERO = 1e-14
-#: Part by which a computed bound of an inverse is made larger, so that it surely is one.
-_ROOM = 1e-6
-#: Steps after which each entry of such a bound has few roundings of its own size, and not of that of the largest entry.
-_REFINED = 2
 #: Squarings in the norm of an inverse: its n is 2 to this power. Two equal singular values make it 2 % too large.
 _SQUARINGS = 4
 #: Signs (6, 32) of the errors of legs: a pair of opposite signs has one size.
@@ -281,13 +277,9 @@ def _left_inverses(rows: _Rows) -> tuple[FloatArray, FloatArray, FloatArray, Flo
         E = first + far
         known &= np.isfinite(E).all(axis=(1, 2))
         E = np.where(known[:, None, None], E, 0.0)
-        # |(I + E)^-1 C| <= X with (I - B) X >= |C|: an M-matrix with a nonnegative solution.
-        wider = E * (1 + _ROOM)
-        X = inverses(eye - wider) @ size
-        for _ in range(_REFINED):
-            X = size + wider @ np.maximum(X, 0.0)
-        X *= 1 + _ROOM
-        known &= (X >= 0).all(axis=(1, 2)) & (size <= X - E @ X).all(axis=(1, 2))
+        # |(I + E)^-1 C| <= X.
+        X, holds = bounds_of_inverses(E, size)
+        known &= holds
         # Rows are divided by 1 + d with |d| <= spread of the sizes.
         change = C[:, None] * rows.bend[:, :, None] - slopes @ C[:, None]
         d = rows.spread(rows.bend) + rows.slack

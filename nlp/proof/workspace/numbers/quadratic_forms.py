@@ -22,17 +22,13 @@ import numpy as np
 from .....models import FloatArray
 from ....evidence.closed_loops import inverses
 from ...enclosure.forms import Forms, QuadraticModel
-from ..ranks.krawczyk import ROUNDING, by_centres
+from ..ranks.krawczyk import ROUNDING, bounds_of_inverses, by_centres
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 #: Part of C below which a singular value of the middle matrix is zero.
 _ZERO = 1e-14
-#: Part by which a computed bound of an inverse is made larger, so that it surely is one.
-_ROOM = 1e-6
-#: Steps after which each entry of such a bound has few roundings of its own size, and not of that of the largest entry.
-_REFINED = 2
 #: More than underflow can cost a sum or a product.
 _TINY = 1e-290
 
@@ -226,13 +222,9 @@ def solved(A: Quadratics, D: Quadratics) -> Quadratics:
         left += 4 * ROUNDING * (Z.size + _product(E.size, Y.size)) + _TINY
         right = np.concatenate([left, np.ones((n, 1, len(known)))], axis=1) * (1 + ROUNDING)
         size = np.where(np.isfinite(E.size), E.size, 0.0)
-        wider = size * (1 + _ROOM)
-        V = _product(inverses((eye[:, :, None] - wider).transpose(2, 0, 1)).transpose(1, 2, 0), right)
-        for _ in range(_REFINED):
-            V = right + _product(wider, np.maximum(V, 0.0))
-        V *= 1 + _ROOM
-        known &= (V >= 0).all(axis=(0, 1)) & (right <= (V - _product(size, V)) * (1 - ROUNDING)).all(axis=(0, 1))
-        rest = V[:, :-1]
+        V, holds = bounds_of_inverses(size.transpose(2, 0, 1), right.transpose(2, 0, 1))
+        known &= holds
+        rest = V.transpose(1, 2, 0)[:, :-1]
     rest = np.where(known & np.isfinite(rest) & np.isfinite(E.size).all(axis=(0, 1)), rest, np.inf)
     return replace(Y, r=rest)
 

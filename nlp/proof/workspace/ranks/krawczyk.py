@@ -15,7 +15,7 @@ form with parameters is in A. Neumaier, *Interval Methods for Systems of Equatio
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -23,9 +23,16 @@ from .....models import FloatArray
 from ....evidence.closed_loops import inverses
 from ...enclosure.forms import Forms
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
 #: Part of the sum of the sizes of all terms by which a computed product may be off: products here have fewer than 400
 #: terms, each with a rounding of 2^-53.
 ROUNDING = 1e-13
+#: Part by which the bound of an inverse is enlarged, so that rounding errors do not decide whether it is proved.
+_ROOM = 1e-6
+#: Steps that make the rounding error of each entry of such a bound relative to this entry, not to the largest one.
+_REFINED = 2
 #: More than underflow can take from a sum of squares.
 _TINY = 1e-300
 
@@ -68,6 +75,21 @@ def by_centres(slopes: FloatArray) -> FloatArray:
     """Return the largest sizes (...) of linear parts (..., 3 m) in the errors of m centres, each of at most size 1."""
     parts = slopes.reshape(*slopes.shape[:-1], slopes.shape[-1] // 3, 3)
     return np.asarray(np.sqrt((parts * parts).sum(axis=-1) + _TINY).sum(axis=-1) * (1 + ROUNDING))
+
+
+def bounds_of_inverses(E: FloatArray, right: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return X (B, n, k) with ``(I - E) X >= right`` for nonnegative matrices (B, n, n), and where it is proved (B,).
+
+    With a positive row sum of every row of ``right``, a nonnegative X proves that ``I - E`` is an M-matrix. Then X is
+    not below ``(I - E)^-1 right``.
+    """
+    wider = E * (1 + _ROOM)
+    X = inverses(np.eye(E.shape[1]) - wider) @ right
+    for _ in range(_REFINED):
+        X = right + wider @ np.maximum(X, 0.0)
+    X = X * (1 + _ROOM)
+    holds = (X >= 0).all(axis=(1, 2)) & (right <= (X - E @ X) * (1 - ROUNDING)).all(axis=(1, 2))
+    return np.asarray(X), np.asarray(holds)
 
 
 def no_relation(count: int, of: Coordinates) -> Relation:
