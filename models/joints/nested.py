@@ -280,7 +280,7 @@ def null_space(motions: Motions, loops: Sequence[int], ranks: MotionRanks) -> Nu
     Args:
         motions: loops and platform's twists.
         loops: indices of the loops that count.
-        ranks: of these loops.
+        ranks: ranks of these loops.
     """
     projector = SX.eye(motions.platform.shape[1])
     equations, inverses = [], []

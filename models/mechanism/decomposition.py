@@ -202,7 +202,7 @@ class RobotGraph:
     """The graph of a mechanism taken apart.
 
     Attributes:
-        members: that join its base and its platform with locked actuators.
+        members: members, which join its base and its platform with locked actuators.
         limbs: indices of the joints of each limb, which join them with free ones.
         still: indices of the joints that locked actuators and couplings hold.
     """

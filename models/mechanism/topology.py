@@ -233,7 +233,7 @@ def nearest_tree(root: str, edges: Sequence[Edge[str]], lengths: Sequence[int]) 
     Args:
         root: node where all paths begin.
         edges: pairs of nodes.
-        lengths: of the edges, 0 or more.
+        lengths: lengths of the edges, 0 or more.
     """
     classes = Classes({root, *(node for edge in edges for node in edge)})
     for edge, length in zip(edges, lengths, strict=True):

@@ -20,7 +20,7 @@ from ...models.parts import Dimension
 from ...models.statics import DrivenJoint, Statics, driven_joints, freedoms_of
 from .loads import LoadCase, Loading, Motion
 
-#: Keeps sizes of vectors smooth where they are 0: they are too large by at most this part of the usual size.
+#: Keeps the norm of a vector smooth where it is 0: the norm is too large by at most this part of a typical norm.
 _SMOOTH = 1e-12
 
 
@@ -139,7 +139,7 @@ def _case_forces(case: LoadCase, statics: Statics, rotation: SX, joints: Sequenc
 
 
 def _reaches(joints: Sequence[DrivenJoint], size: SX) -> list[SX]:
-    """Return the way of a platform of the robot's size for a unit way of each actuator: 1 for slides, else the size."""
+    """Return the typical displacement of the platform by a unit of each actuator: 1 for slides, else the size."""
     return [size if joint.dimension is Dimension.ANGLE else SX(1) for joint in joints]
 
 
@@ -155,9 +155,9 @@ def _speeds(model: Model, statics: Statics, motion: Motion, joints: Sequence[Dri
     )
 
 
-def _size(vector: SX, usual: SX) -> SX:
-    """Return the size of a vector (3, 1), smooth where it is 0, with a size (1, 1) that it usually has."""
-    return SX(0) if vector.is_zero() else ca.sqrt(ca.sumsqr(vector) + (_SMOOTH * usual) ** 2)
+def _size(vector: SX, typical: SX) -> SX:
+    """Return the norm of a vector (3, 1), smooth where it is 0; ``typical`` (1, 1) is a norm of its order."""
+    return SX(0) if vector.is_zero() else ca.sqrt(ca.sumsqr(vector) + (_SMOOTH * typical) ** 2)
 
 
 def dimension_of_measure(measure: str, joint: DrivenJoint) -> Dimension:

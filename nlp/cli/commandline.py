@@ -29,7 +29,7 @@ class Argument(NamedTuple):
 
     Attributes:
         metavar: the word that stands for it in help.
-        help: what it is, one sentence.
+        help: one sentence about it.
     """
 
     metavar: str
@@ -42,9 +42,9 @@ class Option(NamedTuple):
     Attributes:
         name: name, with its two dashes.
         metavar: the word that stands for its value in help; empty for a flag, which has no value.
-        help: what it does, one sentence.
+        help: one sentence about it.
         read: reader of its value; it raises InputError.
-        during: of its value, or its default, a context in which the command runs.
+        during: function from its value, or its default, to a context in which the command runs.
     """
 
     name: str
