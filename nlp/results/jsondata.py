@@ -7,7 +7,7 @@ short command a thirtieth slower.
 
 import enum
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import (
     TYPE_CHECKING,
     Annotated,
@@ -63,7 +63,8 @@ class JsonObject:
         kinds = cls.__annotations__
         if any(isinstance(kind, str) for kind in kinds.values()):
             raise TypeError(f"{cls.__name__}: its annotations are read at run time, and must not be text")
-        cls.marks = {name: _mark_of(kind) for name, kind in kinds.items()}
+        # A subclass has the fields of its base first.
+        cls.marks = {**cls.marks, **{name: _mark_of(kind) for name, kind in kinds.items()}}
 
     def __init__(self, **values: object) -> None:
         if values.keys() != self.marks.keys():
@@ -98,9 +99,16 @@ def kinds_of(kind: type[JsonObject]) -> dict[str, object]:
     A type whose module few commands need stands in an annotation as text, such as ``Absent["ProofData"]``. Who calls
     this has imported that module.
     """
-    objects = {each.__name__: each for each in JsonObject.__subclasses__()}
+    objects = {each.__name__: each for each in _subclasses(JsonObject)}
     found = get_type_hints(kind, localns=objects, include_extras=True)
     return {name: found[name] for name in kind.marks}
+
+
+def _subclasses(kind: type[JsonObject]) -> Iterator[type[JsonObject]]:
+    """Yield the subclasses of a type, and theirs."""
+    for each in kind.__subclasses__():
+        yield each
+        yield from _subclasses(each)
 
 
 def _mark_of(kind: object) -> Mark | None:
