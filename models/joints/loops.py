@@ -15,6 +15,7 @@ import numpy as np
 from casadi import SX
 
 from ..arrays import FloatArray
+from ..newton import VectorEquations, newton
 from ..parts import Closure, Unknown
 from ..rotation import matrix_from_cayley
 from ..rows import DEPENDENT, independent_rows, rank_of
@@ -100,11 +101,12 @@ def examine_loops(
             if len(points) >= _POINTS:
                 break
             z = change * rng.uniform(-1.0, 1.0, free)
-            found = _closed(function, z, sample)
-            if found is not None:
-                R, p, values = (each.full() for each in placed(found, sample))
+            equations = VectorEquations(lambda z, sample=sample: [each.full() for each in function(z, sample)], _CLOSED)
+            found = newton(equations, equations.at(z), steps=_STEPS, zeros=[DEPENDENT])
+            if found.error <= np.sqrt(_CLOSED):
+                R, p, values = (each.full() for each in placed(found.z, sample))
                 points.append(ClosedPoint(sample, values.ravel(), R, p.ravel()))
-                jacobians.append(function(found, sample)[1].full())
+                jacobians.append(found.slopes)
     if not points:
         raise RobotError("", "its loops could not be closed at any configuration near home: is it movable?")
     own_slopes = [each[:, 6 : 6 + len(unknowns)] for each in jacobians]
@@ -149,15 +151,3 @@ def _slopes(residual: SX, moving: SX, robot: HomeRobot) -> SX:
     scales = [robot.size if item.kind.value == "length" else SX(1) for item in robot.words.dimensions.values()]
     scaled = [own[:, k] * scale for k, scale in enumerate(scales)]
     return ca.horzcat(ca.jacobian(residual, moving), *scaled)
-
-
-def _closed(function: ca.Function, z: FloatArray, sample: FloatArray) -> FloatArray | None:
-    """Return pose and unknowns at which the loops are closed; None where Newton's method does not converge."""
-    for _ in range(_STEPS):
-        residual, slopes = (each.full() for each in function(z, sample))
-        if not np.isfinite(residual).all() or not np.isfinite(slopes).all():
-            return None
-        if not residual.size or float(np.abs(residual).max()) < _CLOSED:
-            return z
-        z = z - np.linalg.lstsq(slopes[:, : len(z)], residual.ravel(), rcond=DEPENDENT)[0]
-    return z if float(np.abs(residual).max()) < np.sqrt(_CLOSED) else None

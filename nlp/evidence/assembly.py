@@ -31,6 +31,7 @@ from ...models import (
     matrix_from_axis_angle,
 )
 from ...models.instance import length_of
+from ...models.newton import VectorEquations, newton
 from ...models.values import dataclass
 from ..program.nlp import Nlp
 from ..program.program import Kernel, tuple_of
@@ -40,7 +41,7 @@ from .workingmode import Posture, names_of, turned_limbs
 #: First and shortest step of the path, as parts of its length, and largest number of Newton steps at each.
 _FIRST = 1 / 16
 _SHORTEST = 1 / 2048
-_STEPS = 12
+_STEPS = 11
 #: Largest change of pose and unknowns, of order 1, in a step: a larger one that stays in the shortest step is a jump.
 _LARGE = 0.05
 #: Size of a step of the pose beside one of the unknowns in the norm: the pose only moves where unknowns do not suffice.
@@ -297,16 +298,9 @@ class _Path:
         movable = np.concatenate([np.arange(6), self._determined]) if with_pose else self._determined
         scale = self.scale[movable].copy()
         scale[movable < 6] *= _HEAVY
-        for _ in range(_STEPS):
-            residual, slopes = self._kernel(z, parameters)
-            if not (np.isfinite(residual).all() and np.isfinite(slopes).all()):
-                return None
-            if float(np.abs(residual).max(initial=0.0)) <= _CLOSED:
-                return z
-            step = np.linalg.lstsq(slopes[:, movable] * scale, -residual.ravel(), rcond=_ZERO)[0]
-            z = z.copy()
-            z[movable] += scale * step
-        return None
+        equations = VectorEquations(lambda at: self._kernel(at, parameters), _CLOSED, movable, scale)
+        found = newton(equations, equations.at(z), steps=_STEPS, zeros=[_ZERO])
+        return found.z if found.error <= _CLOSED else None
 
 
 def _sizes_of_unknowns(model: Model, parameters: FloatArray) -> FloatArray:

@@ -18,10 +18,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ...models import FloatArray
+from ...models.linalg import least_squares, nonnegative_least_squares
 from ...models.values import dataclass
 from ..program.nlp import Nlp, Side
 from .equations import gradient_sizes, linearise_equations
-from .linalg import least_squares, nonnegative_least_squares
 
 #: Largest slack of an active side, in scaled variables: well above the rounding error of a corrected point, well below
 #: any distance that matters in a design.

@@ -21,13 +21,13 @@ from typing import Literal
 import numpy as np
 
 from ...models import Dimension, FloatArray, frozen_array
+from ...models.linalg import echelon_basis
 from ...models.values import dataclass
 from ..case.task import Sense
 from ..program.nlp import Nlp
 from ..program.pairs import with_pairs_at
 from ..units import Units
 from .kkt import FEASIBLE, STATIONARY, Linearisation, correct_point, lagrangian_hessian, linearise, multipliers
-from .linalg import echelon_basis
 from .singularities import is_passive_singular
 
 #: Multiplier, in scaled terms, below which an active side is weakly active.

@@ -25,10 +25,10 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from ...models import FloatArray, JointScrews, frozen_array
+from ...models.linalg import echelon_basis
 from ...models.values import dataclass
 from ..program.nlp import Nlp
 from ..program.program import RobotNumbers
-from .linalg import echelon_basis
 from .paths import paths_at
 from .state import RobotState
 

@@ -17,13 +17,13 @@ from ...models import (
     reporting_matrix,
 )
 from ...models.basis import settled_basis
+from ...models.linalg import echelon_basis
 from ...models.values import dataclass
 from ..case.case import Case
 from ..case.existence import fault_of_dimensions
 from ..errors import EvaluationError
 from ..program.nlp import Nlp
 from ..program.places import HeldRotation
-from .linalg import echelon_basis
 from .paths import numbers_at
 
 #: F below this part of its size without cancellation is zero: the rates are then below 1e-6 of their sizes.

@@ -15,6 +15,7 @@ import numpy as np
 from casadi import SX
 
 from ...models import FloatArray
+from ...models.newton import VectorEquations, newton
 from ...models.rows import independent_rows
 from .places import SymbolTable
 
@@ -23,7 +24,7 @@ _POINTS = 6
 #: Share of the box in which the points lie, about its middle.
 _SPREAD = 0.6
 #: Newton steps to a closed point, with the unknowns alone and with all variables. From home six are enough.
-_STEPS = (12, 40)
+_STEPS = (11, 39)
 #: Largest residual of a closed point; equations are of order 1.
 _CLOSED = 1e-10
 #: Singular values below this part of the largest are zero in a step, so that rounding moves nothing.
@@ -72,14 +73,10 @@ def _closed_point(
         own: indices of the unknowns, which move alone if this closes the loops.
     """
     for movable, steps in zip((own, list(range(len(start)))), _STEPS, strict=True):
-        point = start.copy()
-        for _ in range(steps):
-            residual, jacobian = (each.full() for each in function(point, arguments))
-            if not (np.isfinite(residual).all() and np.isfinite(jacobian).all()):
-                break
-            if float(np.abs(residual).max()) <= _CLOSED:
-                return np.asarray(jacobian, dtype=np.float64)
-            part = scale[movable]
-            step = np.linalg.lstsq(jacobian[:, movable] * part, -residual.ravel(), rcond=_DEPENDENT)[0]
-            point[movable] += part * step
+        equations = VectorEquations(
+            lambda x: [each.full() for each in function(x, arguments)], _CLOSED, movable, scale[movable]
+        )
+        found = newton(equations, equations.at(start), steps=steps, zeros=[_DEPENDENT])
+        if found.error <= _CLOSED:
+            return found.slopes
     return None

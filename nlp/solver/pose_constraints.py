@@ -30,6 +30,7 @@ from ...models import (
 )
 from ...models.instance import homogenised
 from ...models.joints.closedform import Reach, closed_form
+from ...models.newton import VectorEquations, newton
 from ...models.rows import independent_rows
 from ..case.case import Case
 from ..case.limits.constraint import NUMBER, BoundedConstraint, Constraint
@@ -68,7 +69,7 @@ _WAY = 16
 #: is another.
 _BEYOND = 2.0
 #: Steps of Newton's method for the further variables, and largest residual of closed loops.
-_STEPS, _CLOSED = 12, 1e-9
+_STEPS, _CLOSED = 11, 1e-9
 #: Part of its size by which two constraints may differ that count as the same; and the distance of designs, in half
 #: ranges, at which they are compared.
 _ALIKE, _NEARBY = 3e-4, 0.05
@@ -250,16 +251,15 @@ class PoseConstraints:
                 (*claim.constraints, *claim.of_level),
             )
         )
-        outputs = [ca.densify(each) for each in (equations, ca.jacobian(equations, symbols), values)]
-        function, found = ca.Function("claim", [program.x, program.p, symbols], outputs), list[FloatArray]()
+        inputs, found = [program.x, program.p, symbols], list[FloatArray]()
+        slopes = ca.jacobian(equations, symbols)
+        loops = ca.Function("loops", inputs, [ca.densify(equations), ca.densify(slopes)])
+        numbers = ca.Function("numbers", inputs, [ca.densify(values)])
         for x in points:
-            w = np.concatenate([each.start for each in claim.poses])
-            for _ in range(_STEPS):
-                residual, slopes, numbers = (each.full() for each in function(x, arguments, w))
-                if not len(w) or not np.isfinite(slopes).all() or np.abs(residual).max() <= _CLOSED:
-                    break
-                w -= np.linalg.lstsq(slopes, residual.ravel(), rcond=None)[0]
-            found.append(numbers.ravel())
+            start = np.concatenate([each.start for each in claim.poses])
+            closed = VectorEquations(lambda w, x=x: [each.full() for each in loops(x, arguments, w)], _CLOSED)
+            w = newton(closed, closed.at(start), steps=_STEPS).z
+            found.append(numbers(x, arguments, w).full().ravel())
         return np.array(found)
 
     def _claim(self, binding: BindingPose, problem: Problem, x: FloatArray) -> _PosedClaim | None:

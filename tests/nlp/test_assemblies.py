@@ -30,6 +30,7 @@ from builders import (
 from measures import circle_joints
 
 from screwsynth.models import Model, robot_function
+from screwsynth.models.linalg import least_squares, nonnegative_least_squares
 from screwsynth.nlp import (
     Case,
     CertificateStatus,
@@ -47,7 +48,6 @@ from screwsynth.nlp import (
 from screwsynth.nlp.evidence.assembly import NEAR_SINGULAR, assembly_of, assembly_over_poses
 from screwsynth.nlp.evidence.closing import closed_in_place, closed_start
 from screwsynth.nlp.evidence.kkt import close_equations
-from screwsynth.nlp.evidence.linalg import least_squares, nonnegative_least_squares
 from screwsynth.nlp.evidence.state import evaluate, loops_are_closed
 from screwsynth.nlp.evidence.workingmode import _about, turned_over_poses
 from screwsynth.nlp.program.blocks import Blocks

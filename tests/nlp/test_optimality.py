@@ -16,10 +16,10 @@ from numpy.typing import ArrayLike
 
 from screwsynth import models
 from screwsynth.models import Closure, Dimension, Model, Unknown, Wrench, axis_from_screw, hexapod, stewart_gough
+from screwsynth.models.linalg import echelon_basis, nonnegative_least_squares
 from screwsynth.nlp import Case, Free, Nlp, Rotation, TaskAnalysis, analyse_tasks, evaluate, formulate, load_case
 from screwsynth.nlp.case.limits.constraint import Constraint, Reading
 from screwsynth.nlp.case.task import Sense, Task
-from screwsynth.nlp.evidence.linalg import echelon_basis, nonnegative_least_squares
 from screwsynth.nlp.evidence.optimality import Evidence, PointKind, examine
 from screwsynth.nlp.program.places import Places, Scalar
 from screwsynth.nlp.program.program import Program

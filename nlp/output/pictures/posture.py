@@ -22,6 +22,7 @@ from ....models import (
     reporting_matrix,
 )
 from ....models.actuation import expressions_of_paths, paths_of, with_loops
+from ....models.newton import VectorEquations, newton
 from ...case.task import Sense
 from ...errors import EvaluationError, InputError
 from ...evidence.state import RobotState, evaluate
@@ -128,7 +129,7 @@ class Linkage:
         self._drawing = Kernel(ca.Function("drawing", own.all, [ca.densify(each) for each in outputs]), tuple_of)
         closure = ca.vertcat(SX(0, 1), *[equation.scaled for equation in model.closure])
         self._determined = [k for k, each in enumerate(model.unknowns) if not each.is_free]
-        slopes = ca.jacobian(closure, own.unknowns)[:, self._determined]
+        slopes = ca.jacobian(closure, own.unknowns)
         self._loops = Kernel(ca.Function("loops", own.all, [ca.densify(closure), ca.densify(slopes)]), tuple_of)
 
     def posture_at(self, rotation: FloatArray, position: FloatArray, unknowns: FloatArray) -> Posture:
@@ -178,17 +179,17 @@ class Linkage:
         """
         turn, shift = displacement(twist, t)
         rotation, position = turn @ start.rotation, turn @ start.position + shift
-        unknowns = np.array(start.unknowns)
-        for _ in range(_STEPS if self._determined else 0):
-            residual, slopes = self._loops(self._parameters, unknowns, rotation.ravel(order="F"), position)
-            if not np.isfinite(residual).all() or np.max(np.abs(residual)) <= _ROUNDING:
-                break
-            unknowns[self._determined] -= np.linalg.lstsq(slopes, residual.ravel(), rcond=None)[0]
-        reached = self.posture_at(rotation, position, unknowns)
+        unknowns = start.unknowns
         if self._determined:
-            residual, _ = self._loops(self._parameters, unknowns, rotation.ravel(order="F"), position)
-            if not np.max(np.abs(residual)) <= np.sqrt(_ROUNDING):
+            pose = rotation.ravel(order="F"), position
+            equations = VectorEquations(
+                lambda at: self._loops(self._parameters, at, *pose), _ROUNDING, self._determined
+            )
+            found = newton(equations, equations.at(unknowns), steps=_STEPS)
+            if not found.error <= np.sqrt(_ROUNDING):
                 return None
+            unknowns = found.z
+        reached = self.posture_at(rotation, position, unknowns)
         return reached if np.isfinite(reached.jacobian).all() else None
 
 

@@ -1,4 +1,4 @@
-"""Linear algebra that NumPy lacks: least squares by blocks, non-negative ones, and reduced echelon form."""
+"""Linear algebra that NumPy lacks: least squares by blocks, damped and non-negative ones, and reduced echelon form."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...models import FloatArray
-from ...models.arrays import first_largest
+from .arrays import FloatArray, first_largest
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -18,17 +17,25 @@ _NEGLIGIBLE = 1e-9
 _LARGE = 160
 
 
-def least_squares(A: FloatArray, b: FloatArray, rcond: float | None = None) -> FloatArray:
-    """Return the shortest of ``argmin |A y - b|``, (k,); of a large matrix block by block, where it has blocks.
+def least_squares(A: FloatArray, b: FloatArray, rcond: float | None = None, damping: float = 0.0) -> FloatArray:
+    """Return the shortest of ``argmin |A y - b|^2 + damping |y|^2``, (k,); block by block, where a large A has blocks.
 
     Args:
         A: (n, k) matrix, possibly rank deficient.
         b: (n,) vector.
         rcond: part of the largest singular value, of a block, below which others count as zero; rounding for None.
+        damping: 0 or more.
     """
     found = np.zeros(A.shape[1])
     for rows, columns in _blocks(A):
-        found[columns] = np.linalg.lstsq(A[np.ix_(rows, columns)], b[rows], rcond=rcond)[0]
+        block = A[np.ix_(rows, columns)]
+        if not damping:
+            found[columns] = np.linalg.lstsq(block, b[rows], rcond=rcond)[0]
+            continue
+        left, values, right = np.linalg.svd(block, full_matrices=False)
+        weights = values / (values**2 + damping)
+        weights[values <= (rcond or 0.0) * values.max(initial=0.0)] = 0.0
+        found[columns] = right.T @ (weights * (left.T @ b[rows]))
     return found
 
 
