@@ -13,19 +13,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import FloatArray
+from ..newton import newton
+from .descent import CLOSED, Descent
 from .graph import Mechanism, MechanismError, MechanismJoint, MechanismLink
 from .motions import Coordinates, Equations, Motions, Placed, moved, rotation_matrix, rotation_vector
 
 #: First and shortest step of the path, as parts of its length.
 _FIRST = 1 / 8
 _SHORTEST = 1 / 1024
-#: Largest number of Newton steps, and of halvings of one, at each point of the path.
+#: Largest number of Newton steps at each point of the path, and the parts of one that are tried.
 _STEPS = 40
-_HALVINGS = 12
+_PARTS = 0.5 ** np.arange(12)
 #: Steps that leave more than this part of the residual lead nowhere: no solution is near.
 _STUCK = 0.999
-#: Loops are closed where no residual, of order 1, is above this: rounding of 60 joints in a row leaves 1e-14.
-CLOSED = 1e-11
 #: Newton's method goes on until the residual is below this, or no longer falls.
 _EXACT = 2e-16
 #: Singular values of the derivatives below this part of the largest are zero: those of dependent loops, and of rods
@@ -186,34 +186,11 @@ class _Path:
 
     def reduced(self, at: Coordinates, part: float) -> tuple[Coordinates, FloatArray, FloatArray]:
         """Return the coordinates of least residual near others, with the residual and its derivatives."""
-        motions, free = self.motions, self._free
-        placed = motions.placed(at)
-        residual, slopes = self.equations(at, placed, part)
-        error = float(np.linalg.norm(residual))
-        for _ in range(_STEPS):
-            if error <= _EXACT:
-                break
-            left, singular, right = np.linalg.svd(slopes[:, free], full_matrices=False)
-            # Damping by the squared residual keeps dependent loops, whose smallest singular values are of the order of
-            # the residual, from asking for large steps, and vanishes fast enough for quadratic convergence.
-            weights = singular / (singular**2 + error**2)
-            weights[singular <= _ZERO * singular.max(initial=0.0)] = 0.0
-            step = np.zeros(motions.count)
-            step[free] = -right.T @ (weights * (left.T @ residual))
-            for halving in range(_HALVINGS):
-                trial = motions.stepped(at, step / 2**halving, placed)
-                there = motions.placed(trial)
-                values, derivatives = self.equations(trial, there, part)
-                if float(np.linalg.norm(values)) < error:
-                    break
-            else:
-                break
-            is_stuck = float(np.linalg.norm(values)) > _STUCK * error > CLOSED
-            at, placed, residual, slopes = trial, there, values, derivatives
-            error = float(np.linalg.norm(residual))
-            if is_stuck:
-                break
-        return at, residual, slopes
+        descent = Descent(
+            self.motions, lambda there, placed: self.equations(there, placed, part), self._free, _EXACT, stuck=_STUCK
+        )
+        found = newton(descent, descent.at(at), steps=_STEPS, zeros=[_ZERO], parts=_PARTS)
+        return found.at, found.residual, found.slopes
 
 
 def _is_closed(residual: FloatArray) -> bool:

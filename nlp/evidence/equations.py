@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from ...models import FloatArray
+from ...models.newton import Linear
 from ..program.nlp import Nlp
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 
 class Equations(NamedTuple):
@@ -29,23 +28,43 @@ class Equations(NamedTuple):
     is_defined: bool
 
 
-def linearise_equations(nlp: Nlp, rows: NDArray[np.intp], x: FloatArray, no_gradient: float) -> Equations:
-    """Return some of a program's equations linearised at a point.
+class ProgramEquations:
+    """The equations of a program for Newton's method, with steps inside the bounds of the variables.
 
     Args:
         nlp: the program.
-        rows: (k,) indices of the equations' sides.
-        x: (n,) the point.
+        movable: indices of the variables that move.
+        closed: largest residual where the equations hold.
         no_gradient: gradient of a constraint, as a part of its typical size, that counts as zero.
     """
-    F, _, g, jacobian = nlp.program.kernels.derivatives(x, nlp.arguments)
-    sides, place = nlp.sides, nlp.sides.place[rows] - nlp.n
-    gradients = jacobian[place] * nlp.scale
-    per_unit = 1 / gradient_sizes(gradients, nlp.row_sizes[place], no_gradient)
-    residual = sides.sign[rows] * (g.ravel()[place] - sides.limit[rows]) * per_unit
-    normals = (sides.sign[rows] * per_unit)[:, None] * gradients
-    is_defined = bool(np.isfinite(F).all() and np.isfinite(g).all())
-    return Equations(np.asarray(x, dtype=np.float64), residual, normals, is_defined)
+
+    def __init__(self, nlp: Nlp, movable: Sequence[int], closed: float, no_gradient: float) -> None:
+        self._nlp, self._movable, self._closed, self._no_gradient = nlp, list(movable), closed, no_gradient
+        self._rows = np.flatnonzero(nlp.sides.equal)
+
+    def at(self, x: FloatArray) -> Equations:
+        """Return the equations at a point (n,)."""
+        nlp, sides, rows = self._nlp, self._nlp.sides, self._rows
+        F, _, g, jacobian = nlp.program.kernels.derivatives(x, nlp.arguments)
+        place = sides.place[rows] - nlp.n
+        gradients = jacobian[place] * nlp.scale
+        per_unit = 1 / gradient_sizes(gradients, nlp.row_sizes[place], self._no_gradient)
+        residual = sides.sign[rows] * (g.ravel()[place] - sides.limit[rows]) * per_unit
+        normals = (sides.sign[rows] * per_unit)[:, None] * gradients
+        is_defined = bool(np.isfinite(F).all() and np.isfinite(g).all())
+        return Equations(np.asarray(x, dtype=np.float64), residual, normals, is_defined)
+
+    def linear(self, at: Equations) -> Linear | None:
+        """Return the equations to first order; None where they hold or are not defined."""
+        if np.max(np.abs(at.residual)) <= self._closed or not at.is_defined:
+            return None
+        return Linear(at.residual, at.normals[:, self._movable])
+
+    def moved(self, at: Equations, step: FloatArray) -> Equations:
+        """Return the equations after a step of the variables that move."""
+        x = at.x.copy()
+        x[self._movable] += self._nlp.scale[self._movable] * step
+        return self.at(np.clip(x, self._nlp.lower, self._nlp.upper))
 
 
 def gradient_sizes(gradients: FloatArray, longest: FloatArray, no_gradient: float) -> FloatArray:

@@ -19,9 +19,10 @@ import numpy as np
 
 from ...models import FloatArray
 from ...models.linalg import least_squares, nonnegative_least_squares
+from ...models.newton import Linear, newton
 from ...models.values import dataclass
 from ..program.nlp import Nlp, Side
-from .equations import gradient_sizes, linearise_equations
+from .equations import ProgramEquations, gradient_sizes
 
 #: Largest slack of an active side, in scaled variables: well above the rounding error of a corrected point, well below
 #: any distance that matters in a design.
@@ -205,26 +206,84 @@ def correct_point(nlp: Nlp, x: FloatArray, active: Sequence[int]) -> Linearisati
         The program at the corrected point, inside the variables' bounds; where Newton's method does not converge, at
         the iterate with the smallest residual since the last change of the active set.
     """
-    active_set = list(active)
-    at = linearise(nlp, _move_onto_bounds(nlp, np.clip(x, nlp.lower, nlp.upper), active_set))
-    best, least = at, np.inf
+    at = linearise(nlp, _move_onto_bounds(nlp, np.clip(x, nlp.lower, nlp.upper), active))
+    conditions = _Stationarity(nlp, at, active)
     for _ in range(_NEWTON_STEPS):
-        mu, error = _residual(at, active_set)
-        if error <= least:
-            best, least = at, error
-        count = len(active_set)
-        following = None if error <= _ROUNDING else _newton_step(nlp, at, active_set, mu, error)
-        if following is not None:
-            at = following
-            least = least if len(active_set) == count else np.inf
-            continue
-        wrong = np.where(nlp.sides.equal, 0.0, mu)
-        converged = max(_CONVERGED, 4 * at.rounding)
-        if not error <= converged or wrong.min(initial=0.0) >= -converged:
+        at = newton(conditions, at, steps=_NEWTON_STEPS, zeros=_NEWTON_RCOND)
+        if not conditions.drops_side(at):
             break
-        active_set.remove(int(np.argmin(wrong)))
-        least = np.inf
-    return best
+    return conditions.best
+
+
+class _Stationarity:
+    """Conditions of stationarity with an active set, as equations in scaled variables and multipliers.
+
+    Args:
+        nlp: the program.
+        at: the program at the first point.
+        active: indices of the first active set.
+
+    Attributes:
+        best: the point with the smallest residual since the last change of the active set.
+    """
+
+    def __init__(self, nlp: Nlp, at: Linearisation, active: Sequence[int]) -> None:
+        self._nlp, self._active, self._left = nlp, list(active), _NEWTON_STEPS
+        self.best, self._least = at, np.inf
+        self._mu, self._error = np.zeros(len(at.sides)), np.inf
+
+    def linear(self, at: Linearisation) -> Linear | None:
+        """Return the conditions to first order; None where they hold to rounding, and after the last step."""
+        n, k = self._nlp.n, len(self._active)
+        if not self._left:
+            return None
+        self._left -= 1
+        self._mu, self._error = _residual(at, self._active)
+        if self._error <= self._least:
+            self.best, self._least = at, self._error
+        if self._error <= _ROUNDING:
+            return None
+        A = at.normals[self._active]
+        matrix = np.zeros((n + k, n + k))
+        matrix[:n, :n], matrix[:n, n:], matrix[n:, :n] = lagrangian_hessian(self._nlp, at, self._mu), A.T, A
+        residual = np.concatenate([at.gradient + at.normals.T @ self._mu, at.residual[self._active]])
+        return Linear(residual, matrix) if np.isfinite(matrix).all() and np.isfinite(residual).all() else None
+
+    def moved(self, at: Linearisation, step: FloatArray) -> Linearisation | None:
+        """Return the program after a step; None where it is long, or the residual grows.
+
+        Where the step would cross a side, it ends there, and the side joins the active set.
+        """
+        nlp, active = self._nlp, self._active
+        step = step[: nlp.n]
+        if np.max(np.abs(step), initial=0.0) > _LONGEST_STEP:
+            return None
+        towards = at.normals @ step
+        towards[active] = 0.0
+        reach = np.where(towards > 1e-12, np.maximum(at.slack, 0.0) / np.maximum(towards, 1e-12), np.inf)
+        part = min(1.0, float(reach.min(initial=1.0)))
+        crossed = [int(np.argmin(reach))] if part < 1.0 else []
+        moved = np.clip(at.x + part * nlp.scale * step, nlp.lower, nlp.upper)
+        after = linearise(nlp, _move_onto_bounds(nlp, moved, [*active, *crossed]))
+        # Newton's error is about the square of its step: a residual that grows no further decreases at the next step.
+        if not crossed and not _residual(after, active)[1] < max(self._error, 4 * float(step @ step)):
+            return None
+        self._change([*active, *crossed])
+        return after
+
+    def drops_side(self, at: Linearisation) -> bool:
+        """Take the side with the most negative multiplier off the active set; return whether there is one."""
+        wrong = np.where(self._nlp.sides.equal, 0.0, self._mu)
+        converged = max(_CONVERGED, 4 * at.rounding)
+        if not self._left or not self._error <= converged or wrong.min(initial=0.0) >= -converged:
+            return False
+        worst = int(np.argmin(wrong))
+        self._change([j for j in self._active if j != worst])
+        return True
+
+    def _change(self, active: list[int]) -> None:
+        if active != self._active:
+            self._active, self._least = active, np.inf
 
 
 def _residual(at: Linearisation, active_set: list[int]) -> tuple[FloatArray, float]:
@@ -254,45 +313,6 @@ def _move_onto_bounds(nlp: Nlp, x: FloatArray, active_set: Sequence[int]) -> Flo
     return moved
 
 
-def _newton_step(
-    nlp: Nlp, at: Linearisation, active_set: list[int], mu: FloatArray, error: float
-) -> Linearisation | None:
-    """Return the program after one Newton step; None when no short step reduces the residual.
-
-    Where the step would cross a side, it ends there, and the side joins the active set.
-
-    Args:
-        nlp: the program.
-        at: the program before the step.
-        active_set: active set, to which the crossed side is added in place.
-        mu: (k,) multipliers.
-        error: residual before the step.
-    """
-    n, k, A = nlp.n, len(active_set), at.normals[active_set]
-    left = at.gradient + at.normals.T @ mu
-    matrix = np.zeros((n + k, n + k))
-    matrix[:n, :n], matrix[:n, n:], matrix[n:, :n] = lagrangian_hessian(nlp, at, mu), A.T, A
-    right = -np.concatenate([left, at.residual[active_set]])
-    if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
-        return None
-    for rcond in _NEWTON_RCOND:
-        step = least_squares(matrix, right, rcond)[:n]
-        if np.max(np.abs(step), initial=0.0) > _LONGEST_STEP:
-            continue
-        towards = at.normals @ step
-        towards[active_set] = 0.0
-        reach = np.where(towards > 1e-12, np.maximum(at.slack, 0.0) / np.maximum(towards, 1e-12), np.inf)
-        part = min(1.0, float(reach.min(initial=1.0)))
-        crossed = [int(np.argmin(reach))] if part < 1.0 else []
-        moved = np.clip(at.x + part * nlp.scale * step, nlp.lower, nlp.upper)
-        after = linearise(nlp, _move_onto_bounds(nlp, moved, [*active_set, *crossed]))
-        # Newton's error is about the square of its step: a residual that grows no further decreases at the next step.
-        if crossed or _residual(after, active_set)[1] < max(error, 4 * float(step @ step)):
-            active_set += crossed
-            return after
-    return None
-
-
 def close_equations(nlp: Nlp, x: FloatArray, *, in_place: bool = False) -> FloatArray:
     """Return the point, nearest to the given one to first order, at which the program's equations hold.
 
@@ -308,19 +328,12 @@ def close_equations(nlp: Nlp, x: FloatArray, *, in_place: bool = False) -> Float
     Returns:
         (n,) the point inside the variables' bounds; the last iterate where Newton's method does not converge.
     """
-    rows = np.flatnonzero(nlp.sides.equal)
-    if not len(rows):
+    if not nlp.sides.equal.any():
         return np.asarray(x, dtype=np.float64)
-    at = start = linearise_equations(nlp, rows, x, NO_GRADIENT)
     for movable in [list(nlp.program.places.inner)] if in_place else _movable(nlp):
-        at = start
-        for _ in range(_NEWTON_STEPS if len(movable) == nlp.n else _FIRST_STEPS):
-            if np.max(np.abs(at.residual)) <= _ROUNDING or not at.is_defined:
-                break
-            step = np.zeros(nlp.n)
-            step[movable] = np.linalg.lstsq(at.normals[:, movable], -at.residual, rcond=None)[0]
-            moved = np.clip(at.x + nlp.scale * step, nlp.lower, nlp.upper)
-            at = linearise_equations(nlp, rows, moved, NO_GRADIENT)
+        equations = ProgramEquations(nlp, movable, _ROUNDING, NO_GRADIENT)
+        steps = _NEWTON_STEPS if len(movable) == nlp.n else _FIRST_STEPS
+        at = newton(equations, equations.at(x), steps=steps)
         if np.max(np.abs(at.residual)) <= FEASIBLE:
             break
     return at.x

@@ -18,6 +18,7 @@ import numpy as np
 
 from ....models.arrays import FloatArray
 from ....models.mechanism import Mechanism, MechanismJoint
+from ....models.newton import VectorEquations, newton
 from ...errors import InputError
 from ..frames import cross_matrix
 from .elements import SAME_POINT
@@ -140,19 +141,14 @@ def snapped(given: Mechanism, size: float, within: float) -> tuple[Mechanism, st
     points = np.array([each.point for each in joints]) / size
     axes = np.array([each.axis for each in joints])
     rank = max(_RANK, min(_DEPENDENT * within / size, 0.1))
-    x = np.stack([points, axes], axis=1)
-    for _ in range(_MOST_STEPS):
-        values, slopes = _equations(joints, relations, parallelograms, x)
-        if float(np.abs(values).max(initial=0.0)) <= _HOLDS:
-            break
-        # There are many more equations than numbers: the least-norm step comes from their normal equations.
-        squares, ways = np.linalg.eigh(slopes.T @ slopes)
-        kept = squares > rank**2 * squares[-1]
-        ways = ways[:, kept]
-        x = x - (ways @ ((ways.T @ (slopes.T @ values)) / squares[kept])).reshape(x.shape)
+    shape = len(joints), 2, 3
+    equations = VectorEquations(lambda z: _equations(joints, relations, parallelograms, z.reshape(shape)), _HOLDS)
+    start = np.stack([points, axes], axis=1)
+    found = newton(equations, equations.at(start.ravel()), steps=_MOST_STEPS, zeros=[rank])
+    x = found.z.reshape(shape)
     way = size * float(np.linalg.norm(x[:, 0] - points, axis=1).max(initial=0.0))
     turn = size * float(np.linalg.norm(x[:, 1] - axes, axis=1).max(initial=0.0))
-    if not float(np.abs(values).max(initial=0.0)) <= 10 * _HOLDS or max(way, turn) > _FARTHEST * within:
+    if not found.error <= 10 * _HOLDS or max(way, turn) > _FARTHEST * within:
         fault = "the axes cannot all be made to meet or to be parallel that are so within this length"
         raise InputError(f"--snap {within:g}: {fault}; a smaller length may do")
     moved = iter(x)

@@ -29,6 +29,7 @@ import numpy as np
 
 from .....models import FloatArray, frozen_array
 from .....models.arrays import first_largest, values_at
+from .....models.newton import Linear, newton
 from ....evidence.closed_loops import inverses
 from ...enclosure.forms import Encloser
 from ...statement.machine import JointErrors
@@ -106,22 +107,22 @@ class SingularPose:
     """
 
     def __init__(self, problem: Problem, matrix: RankMatrix) -> None:
-        self._problem, self._rank = problem, matrix.matrix.shape[1] - matrix.nullity
+        self.problem, self.rank = problem, matrix.matrix.shape[1] - matrix.nullity
         z, M = problem.z, ca.densify(matrix.matrix)
         v = ca.SX.sym("v", M.shape[1])
         product = M @ v
         self._values = ca.Function("values", [z], [M])
-        self._equations = ca.Function(
+        self.equations = ca.Function(
             "singular", [z, v], [problem.equations, product, ca.jacobian(problem.equations, z), ca.jacobian(product, z)]
         )
         self._jacobian = ca.Function("J", [z], [ca.densify(problem.posed.scaled.jacobian)])
 
     def smallest(self, z: FloatArray) -> float:
         """Return the singular value that is 0 at a singular pose, in parts of the largest; infinite without one."""
-        M, J, rank = self._values(z).full(), self._jacobian(z).full(), self._rank
-        if not (np.isfinite(M).all() and np.isfinite(J).all()) or rank < 1:
+        decomposed, J, rank = self.decomposed(z), self._jacobian(z).full(), self.rank
+        if decomposed is None or not np.isfinite(J).all() or rank < 1:
             return float("inf")
-        _, values, right = np.linalg.svd(M)
+        M, values, right = decomposed
         if not float(np.abs(right[rank - 1, :6]).max()) > _MOVES:
             return float("inf")
         if rank == M.shape[1]:
@@ -136,39 +137,21 @@ class SingularPose:
             z: the point.
             moving: number of the first coordinates that move; all if left out.
         """
-        z, size, rank = z.copy(), self._problem.size[:moving], self._rank
-        M, n, v = self._values(z).full(), len(size), np.zeros(0)
-        seen: list[float] = []
-        for _ in range(_STEPS):
-            if not np.isfinite(M).all():
-                return None
-            _, values, right = np.linalg.svd(M)
-            # The direction that M shrinks most, among those across its null space.
-            v = v if v.size else right[rank - 1]
-            seen.append(float(values[rank - 1] / values[0]) if len(values) >= rank else 0.0)
-            if seen[-1] <= _NEAR and self.is_singular(z):
-                return z
-            if len(seen) > _PATIENCE and not seen[-1] < 0.9 * seen[-1 - _PATIENCE]:
-                return None
-            g, r, by_z, turned = (each.full() for each in self._equations(z, v))
-            if not all(np.isfinite(each).all() for each in (g, r, by_z, turned)):
-                return None
-            basis = right[rank:]
-            rows = np.block(
-                [
-                    [by_z[:, :n] * size, np.zeros((len(g), len(v)))],
-                    [turned[:, :n] * size, M],
-                    [np.zeros((1 + len(basis), n)), np.vstack([v, basis])],
-                ]
-            )
-            residual = np.concatenate([g.ravel(), r.ravel(), [0.5 * (v @ v - 1)], basis @ v])
-            step = np.linalg.lstsq(rows, -residual, rcond=_DEPENDENT)[0]
-            step *= min(1.0, _STEP / max(float(np.abs(step[:n]).max(initial=0.0)), 1e-300))
-            z[:n] += size * step[:n]
-            z, v = self._problem.within(z), v + step[n:]
-            v /= np.linalg.norm(v)
-            M = self._values(z).full()
-        return z if np.isfinite(M).all() and self.is_singular(z) else None
+        decomposed = self.decomposed(z)
+        if decomposed is None:
+            return None
+        # The direction that M shrinks most, among those across its null space.
+        v = decomposed[2][self.rank - 1]
+        found, _ = newton(_NullVector(self, moving), (z, v), steps=_STEPS, zeros=[_DEPENDENT])
+        return found if self.is_singular(found) else None
+
+    def decomposed(self, z: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+        """Return M at a point (n,), its singular values and its right singular vectors; None where M is not finite."""
+        M = self._values(z).full()
+        if not np.isfinite(M).all():
+            return None
+        _, values, right = np.linalg.svd(M)
+        return M, values, right
 
     def slopes(self, z: FloatArray) -> FloatArray | None:
         """Return the derivatives (n,) of the smallest singular value at a closed point (n,); None without any.
@@ -179,22 +162,22 @@ class SingularPose:
         if not np.isfinite(M).all():
             return None
         left, _, right = np.linalg.svd(M)
-        _, _, by_z, turned = (each.full() for each in self._equations(z, right[self._rank - 1]))
-        found: FloatArray = left[:, self._rank - 1] @ turned
-        dependent = list(self._problem.dependent)
+        _, _, by_z, turned = (each.full() for each in self.equations(z, right[self.rank - 1]))
+        found: FloatArray = left[:, self.rank - 1] @ turned
+        dependent = list(self.problem.dependent)
         if dependent:
             found -= found[dependent] @ np.linalg.pinv(by_z[:, dependent]) @ by_z
         return found if np.isfinite(found).all() else None
 
     def is_singular(self, z: FloatArray) -> bool:
         """Return whether a point (n,) is a pose of the workspace, with closed loops, that is singular."""
-        problem = self._problem
+        problem = self.problem
         closed = np.abs(problem.loops.values(z[:, None])).max(initial=0.0) <= _CLOSED
         return bool(closed and problem.box.holds(problem.pose_of(z))) and self.smallest(z) <= SINGULAR
 
     def machines(self, z: FloatArray) -> Iterator[FloatArray]:
         """Yield points (n,) of machines with smaller and smaller singular values, from a point of the design."""
-        problem, machine = self._problem, z
+        problem, machine = self.problem, z
         for step in range(_MACHINES):
             closed = problem.loops.all_closed(machine[:, None], problem.dependent)[:, 0]
             slopes = self.slopes(closed)
@@ -203,6 +186,54 @@ class SingularPose:
             end = problem.with_errors(closed[None], -slopes[None, problem.of_errors])[0]
             machine = closed + 2 / (step + 2) * (end - closed)
             yield machine
+
+
+class _NullVector:
+    """``M(z) v = 0`` at closed loops, for a unit vector v across the null space that M has everywhere.
+
+    A point is z (n,) with v.
+
+    Args:
+        pose: the matrix.
+        moving: number of the first coordinates that move; all for None.
+    """
+
+    def __init__(self, pose: SingularPose, moving: int | None) -> None:
+        self._pose, self._size = pose, pose.problem.size[:moving]
+        self._seen: list[float] = []
+
+    def linear(self, at: tuple[FloatArray, FloatArray]) -> Linear | None:
+        """Return the equations to first order; None where z is singular, and where steps lead to no singular point."""
+        (z, v), pose, seen, n = at, self._pose, self._seen, len(self._size)
+        decomposed, rank = pose.decomposed(z), pose.rank
+        if decomposed is None:
+            return None
+        M, values, right = decomposed
+        seen.append(float(values[rank - 1] / values[0]) if len(values) >= rank else 0.0)
+        if seen[-1] <= _NEAR and pose.is_singular(z):
+            return None
+        if len(seen) > _PATIENCE and not seen[-1] < 0.9 * seen[-1 - _PATIENCE]:
+            return None
+        basis = right[rank:]
+        g, r, by_z, turned = (each.full() for each in pose.equations(z, v))
+        rows = np.block(
+            [
+                [by_z[:, :n] * self._size, np.zeros((len(g), len(v)))],
+                [turned[:, :n] * self._size, M],
+                [np.zeros((1 + len(basis), n)), np.vstack([v, basis])],
+            ]
+        )
+        residual = np.concatenate([g.ravel(), r.ravel(), [0.5 * (v @ v - 1)], basis @ v])
+        return Linear(residual, rows) if np.isfinite(residual).all() and np.isfinite(rows).all() else None
+
+    def moved(self, at: tuple[FloatArray, FloatArray], step: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the point after a step that moves no coordinate far and stays in the workspace, with a unit vector."""
+        (z, v), n = at, len(self._size)
+        step = step * min(1.0, _STEP / max(float(np.abs(step[:n]).max(initial=0.0)), 1e-300))
+        z = z.copy()
+        z[:n] += self._size * step[:n]
+        v = v + step[n:]
+        return self._pose.problem.within(z), v / np.linalg.norm(v)
 
 
 class DeterminantSigns:
