@@ -7,12 +7,15 @@ Loops of many poses at once are closed by :meth:`screwsynth.nlp.evidence.closed_
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, Protocol, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
 from .arrays import FloatArray
 from .linalg import least_squares
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 P = TypeVar("P")
 
@@ -47,7 +50,7 @@ def newton(
     *,
     steps: int,
     zeros: Sequence[float | None] = (None,),
-    parts: Sequence[float] = (1.0,),
+    parts: Sequence[float] | FloatArray = (1.0,),
 ) -> P:
     """Return the point at which Newton's method with least-norm steps ends.
 
@@ -107,7 +110,7 @@ class VectorEquations:
         self,
         values: Callable[[FloatArray], Sequence[FloatArray]],
         closed: float,
-        moving: Sequence[int] | slice = slice(None),
+        moving: Sequence[int] | NDArray[np.intp] | slice = slice(None),
         size: FloatArray | float = 1.0,
     ) -> None:
         self._values, self._closed, self._moving, self._size = values, closed, moving, size

@@ -15,7 +15,7 @@ import numpy as np
 from casadi import SX
 
 from ..arrays import FloatArray
-from ..newton import VectorEquations, newton
+from ..newton import Point, VectorEquations, newton
 from ..parts import Closure, Unknown
 from ..rotation import matrix_from_cayley
 from ..rows import DEPENDENT, independent_rows, rank_of
@@ -101,8 +101,7 @@ def examine_loops(
             if len(points) >= _POINTS:
                 break
             z = change * rng.uniform(-1.0, 1.0, free)
-            equations = VectorEquations(lambda z, sample=sample: [each.full() for each in function(z, sample)], _CLOSED)
-            found = newton(equations, equations.at(z), steps=_STEPS, zeros=[DEPENDENT])
+            found = _closed(function, z, sample)
             if found.error <= np.sqrt(_CLOSED):
                 R, p, values = (each.full() for each in placed(found.z, sample))
                 points.append(ClosedPoint(sample, values.ravel(), R, p.ravel()))
@@ -151,3 +150,9 @@ def _slopes(residual: SX, moving: SX, robot: HomeRobot) -> SX:
     scales = [robot.size if item.kind.value == "length" else SX(1) for item in robot.words.dimensions.values()]
     scaled = [own[:, k] * scale for k, scale in enumerate(scales)]
     return ca.horzcat(ca.jacobian(residual, moving), *scaled)
+
+
+def _closed(function: ca.Function, z: FloatArray, sample: FloatArray) -> Point:
+    """Return pose and unknowns (n,) at which Newton's method ends, for some dimensions (d,)."""
+    equations = VectorEquations(lambda at: [each.full() for each in function(at, sample)], _CLOSED)
+    return newton(equations, equations.at(z), steps=_STEPS, zeros=[DEPENDENT])

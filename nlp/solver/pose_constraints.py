@@ -242,7 +242,7 @@ class PoseConstraints:
 
     def _values(self, claim: _PosedClaim, points: Sequence[FloatArray]) -> FloatArray:
         """Return the numbers of a claim's constraints, with loops closed, at designs (n,)."""
-        program, arguments = self._nlp.program, self._nlp.arguments
+        program = self._nlp.program
         symbols = ca.vertcat(SX(0, 1), *[each.symbols for each in claim.poses])
         equations, values = (
             ca.vertcat(SX(0, 1), *[item.constraint.expression for item in items])
@@ -251,16 +251,17 @@ class PoseConstraints:
                 (*claim.constraints, *claim.of_level),
             )
         )
-        inputs, found = [program.x, program.p, symbols], list[FloatArray]()
-        slopes = ca.jacobian(equations, symbols)
+        slopes, inputs = ca.jacobian(equations, symbols), [program.x, program.p, symbols]
         loops = ca.Function("loops", inputs, [ca.densify(equations), ca.densify(slopes)])
         numbers = ca.Function("numbers", inputs, [ca.densify(values)])
-        for x in points:
-            start = np.concatenate([each.start for each in claim.poses])
-            closed = VectorEquations(lambda w, x=x: [each.full() for each in loops(x, arguments, w)], _CLOSED)
-            w = newton(closed, closed.at(start), steps=_STEPS).z
-            found.append(numbers(x, arguments, w).full().ravel())
-        return np.array(found)
+        start = np.concatenate([each.start for each in claim.poses])
+
+        def at_design(x: FloatArray) -> FloatArray:
+            given = x, self._nlp.arguments
+            closed = VectorEquations(lambda w: [each.full() for each in loops(*given, w)], _CLOSED)
+            return np.asarray(numbers(*given, newton(closed, closed.at(start), steps=_STEPS).z).full().ravel())
+
+        return np.array([at_design(x) for x in points])
 
     def _claim(self, binding: BindingPose, problem: Problem, x: FloatArray) -> _PosedClaim | None:
         """Return a claim as constraints; None where it has none, or the loops of the design (n,) do not close there."""

@@ -20,8 +20,8 @@ from screwsynth.models.mechanism import mechanism_of, wrenches_of
 from screwsynth.models.mechanism.topology import between
 from screwsynth.nlp import InputError, load_case
 from screwsynth.nlp.formats.frames import Frame, rotation_from_roll_pitch_yaw
+from screwsynth.nlp.formats.reading.closing import close, gap_of
 from screwsynth.nlp.formats.reading.importing import Imported, Request, import_robot
-from screwsynth.nlp.formats.reading.newton import close, gap_of
 from screwsynth.nlp.formats.reading.reduction import Ends, _extent
 from screwsynth.nlp.formats.reading.robotfile import check_text, robot_file_text
 from screwsynth.nlp.formats.reading.urdf import read_urdf

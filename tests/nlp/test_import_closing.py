@@ -26,10 +26,10 @@ from screwsynth.models.mechanism import (
 )
 from screwsynth.nlp import InputError
 from screwsynth.nlp.formats.frames import Frame, rotation_vector
+from screwsynth.nlp.formats.reading.closing import close, gap_of, gap_of_coupling
 from screwsynth.nlp.formats.reading.description import Description
 from screwsynth.nlp.formats.reading.importing import Imported, Request, import_robot
 from screwsynth.nlp.formats.reading.mjcf import read_mjcf
-from screwsynth.nlp.formats.reading.newton import close, gap_of, gap_of_coupling
 from screwsynth.nlp.formats.reading.reduction import Ends
 from screwsynth.nlp.formats.reading.robotfile import check_text, robot_file_text
 from screwsynth.nlp.formats.reading.snapping import near_misses, snapped

@@ -18,10 +18,10 @@ from ....models.mechanism import (
     wrenches_of,
 )
 from ...errors import InputError, listing
+from .closing import CLOSED, LEAST, Closed, Gap, close, close_from_other_starts, least_gaps
 from .description import Description
 from .meeting import with_meeting_joints, with_universal_joints
 from .mjcf import read_mjcf
-from .newton import CLOSED, LEAST, Closed, Gap, close, close_from_other_starts, least_gaps
 from .reduction import Ends, Reduced, reduce
 from .snapping import near_misses, snapped
 from .symmetry import joints_of_limb

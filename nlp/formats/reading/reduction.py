@@ -11,9 +11,9 @@ from ....models.mechanism import Coupling, Mechanism, MechanismJoint, MechanismL
 from ....models.mechanism.topology import between, incident
 from ...errors import InputError, listing, nearest
 from ..frames import Frame
+from .closing import Gap, gap_of, gap_of_coupling
 from .description import LARGEST, Description
 from .elements import bodies_of, elements_of, rigid_groups
-from .newton import Gap, gap_of, gap_of_coupling
 
 #: Most names that a message lists.
 _MOST_NAMES = 12

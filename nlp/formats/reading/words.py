@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from ....models.arrays import FloatArray
 from ....models.mechanism import wrenches_of
 from ...errors import listing
+from .closing import CLOSED
 from .importing import Imported
-from .newton import CLOSED
 from .symmetry import SAME, Offers
 
 #: Most names that a line lists.
