@@ -50,7 +50,7 @@ def newton(
     *,
     steps: int,
     zeros: Sequence[float | None] = (None,),
-    parts: Sequence[float] | FloatArray = (1.0,),
+    parts: Sequence[float] = (1.0,),
 ) -> P:
     """Return the point at which Newton's method with least-norm steps ends.
 

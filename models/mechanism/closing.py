@@ -23,7 +23,7 @@ _FIRST = 1 / 8
 _SHORTEST = 1 / 1024
 #: Largest number of Newton steps at each point of the path, and the parts of one that are tried.
 _STEPS = 40
-_PARTS = 0.5 ** np.arange(12)
+_PARTS = [0.5**k for k in range(12)]
 #: Steps that leave more than this part of the residual lead nowhere: no solution is near.
 _STUCK = 0.999
 #: Newton's method goes on until the residual is below this, or no longer falls.

@@ -20,7 +20,7 @@ from .description import Closing, Description, LoopClosure
 #: Loops are closed where no equation is larger, in parts of the robot's size: rounding leaves 1e-16 to 1e-14.
 CLOSED = 1e-12
 #: Steps of Newton's method, of which decimals of six digits need three, and the parts of a step that are tried.
-_STEPS, _PARTS = 60, 0.5 ** np.arange(13)
+_STEPS, _PARTS = 60, [0.5**k for k in range(13)]
 #: Singular values below this share of the largest count as zero, in the order in which they are tried. By its decimals,
 #: dependent equations of an overconstrained robot are independent, which no motion of its joints is to make up for.
 _RANKS = (1e-5, 1e-9)
