@@ -11,7 +11,7 @@ import sys
 import time
 
 from screwsynth.models.catalog import gallery_names
-from screwsynth.models.joints.closedform import closed_form
+from screwsynth.models.joints.model.closedform import closed_form
 from screwsynth.nlp import Case, Free, Task
 from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace

@@ -62,8 +62,8 @@ from .three_upu import three_upu
 from .wrench import RowLabel, Wrench, WrenchKind, couple_about, force_along, reason_for_zero_row
 
 if TYPE_CHECKING:
-    from .joints.forms import RobotError
-    from .joints.robot import robot
+    from .joints.model.robot import robot
+    from .joints.written.forms import RobotError
 
 __all__ = [
     "Actuator",
@@ -149,7 +149,7 @@ __all__ = [
 
 
 #: The modules of names that most runs do not need: each is imported when its name is first used.
-_JOINTS = {"RobotError": ".joints.forms", "robot": ".joints.robot"}
+_JOINTS = {"RobotError": ".joints.written.forms", "robot": ".joints.model.robot"}
 
 
 def __getattr__(name: str) -> object:

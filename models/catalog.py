@@ -86,7 +86,7 @@ def gallery_robot(name: str) -> Model:
     Raises:
         UnknownModelError: there is no such robot.
     """
-    from .joints.robot import robot  # noqa: PLC0415 - most runs do not need it
+    from .joints.model.robot import robot  # noqa: PLC0415 - most runs do not need it
 
     if name not in gallery_names():
         raise UnknownModelError(name)

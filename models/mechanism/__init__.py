@@ -2,10 +2,11 @@
 
 The modules in order, each of which imports only those before it: ``topology`` (connected parts, bridges, spanning
 trees), ``graph`` (links, joints and couplings, and a mechanism that contradicts itself), ``motions`` (links and screws
-at any coordinates), ``closing`` (closed loops at a pose or at positions of the actuators), ``decomposition`` (limbs,
-branches, and parts that resist the platform), ``limbs`` (tables of a robot file), ``freedoms`` (twists that joints
-allow), ``centre`` (a member's), ``wrenches`` (resistance, F, rates and ranks), ``singularities`` (ranks against generic
-ones). Mechanisms from robot files are made where these are read, in :mod:`screwsynth.models.joints.mechanisms`.
+at any coordinates), ``descent`` (joints moved until equations hold), ``closing`` (closed loops at a pose or at
+positions of the actuators), ``decomposition`` (limbs, branches, and parts that resist the platform), ``limbs`` (tables
+of a robot file), ``freedoms`` (twists that joints allow), ``centre`` (a member's), ``wrenches`` (resistance, F, rates
+and ranks), ``singularities`` (ranks against generic ones). Mechanisms from robot files are made where these are read,
+in :mod:`screwsynth.models.joints.home.mechanisms`.
 """
 
 from importlib import import_module
@@ -18,7 +19,7 @@ from .singularities import MechanismSingularity, SingularityType, generic_ranks,
 from .wrenches import MemberWrenches, RobotRanks, RobotWrenches, wrenches_of
 
 if TYPE_CHECKING:
-    from ..joints.mechanisms import mechanism_of
+    from ..joints.home.mechanisms import mechanism_of
 
 __all__ = [
     "ClosedMechanism",
@@ -48,5 +49,5 @@ def __getattr__(name: str) -> object:
     """Return ``mechanism_of``, which reads robot files and needs symbols, when it is first used."""
     if name != "mechanism_of":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    found: object = import_module("..joints.mechanisms", __name__).mechanism_of
+    found: object = import_module("..joints.home.mechanisms", __name__).mechanism_of
     return found

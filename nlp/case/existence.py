@@ -17,7 +17,7 @@ from ..units import Units
 from .pose import Free, Value
 
 if TYPE_CHECKING:
-    from ...models.joints.forms import UndefinedError
+    from ...models.joints.written.forms import UndefinedError
 
 #: Robots and dimensions that are remembered: as many as the cases that one program has at a time.
 _REMEMBERED = 64
@@ -45,9 +45,9 @@ def fault_of_dimensions(
 def _undefined_place(model: Model, values: tuple[tuple[str, float], ...]) -> UndefinedError | None:
     """Return the first place of a robot's file that has no finite value; None where there is none."""
     from ...models.catalog import definition_of  # noqa: PLC0415 - most robots need no reading of their file
-    from ...models.joints.chain import home_of  # noqa: PLC0415
-    from ...models.joints.forms import UndefinedError  # noqa: PLC0415
-    from ...models.joints.words import read_robot  # noqa: PLC0415
+    from ...models.joints.home.chain import home_of  # noqa: PLC0415
+    from ...models.joints.written.forms import UndefinedError  # noqa: PLC0415
+    from ...models.joints.written.words import read_robot  # noqa: PLC0415
 
     tables = definition_of(model)
     if not tables:

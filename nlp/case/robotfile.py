@@ -17,7 +17,7 @@ from pydantic_core import ErrorDetails
 from ...models import Model, ModelError, robot
 from ...models.fileversions import ROBOT_FILES, VERSION_KEY
 from ...models.joints import RobotError
-from ...models.joints.words import GRAPH_KEYS, MOST_LIMBS, NESTED_BRANCH
+from ...models.joints.written.words import GRAPH_KEYS, MOST_LIMBS, NESTED_BRANCH
 from ..errors import CaseError, InputError
 from ..system.reading import check_version, read_limited
 from ..system.slips import toml_fault

@@ -20,7 +20,7 @@ from casadi import SX
 from ...models import Dimension, FloatArray, Substitution, axis_angle_from_matrix
 from ...models.arrays import values_at
 from ...models.instance import instantiate
-from ...models.joints.closedform import closed_form, with_joints_at_home
+from ...models.joints.model.closedform import closed_form, with_joints_at_home
 from ...models.parts import Quantity
 from ...models.rows import independent_rows
 from ...models.statics import driven_joints, inverse_rates, rows_about

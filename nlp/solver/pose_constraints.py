@@ -29,7 +29,7 @@ from ...models import (
     instantiate,
 )
 from ...models.instance import homogenised
-from ...models.joints.closedform import Reach, closed_form
+from ...models.joints.model.closedform import Reach, closed_form
 from ...models.newton import VectorEquations, newton
 from ...models.rows import independent_rows
 from ..case.case import Case

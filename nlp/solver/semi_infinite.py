@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...models import FloatArray
-from ...models.joints.closedform import closed_form
+from ...models.joints.model.closedform import closed_form
 from ...models.statics import driven_joints
 from ..case.case import Case
 from ..case.forces import dimension_of_measure

@@ -18,7 +18,7 @@ from screwsynth import models
 from screwsynth.models import Model, Velocities, hexapod, instantiate, rank_of_rows, robot, stewart_gough
 from screwsynth.models.basis import basis_of_member
 from screwsynth.models.expression import ExpressionError, evaluate
-from screwsynth.models.joints.motion import AxisKind, JointAxis, Motion
+from screwsynth.models.joints.home.motion import AxisKind, JointAxis, Motion
 from screwsynth.models.member import resisted_parts, scaled_twists
 from screwsynth.models.rows import column_groups
 from screwsynth.models.wrench import WrenchKind

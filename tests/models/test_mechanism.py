@@ -22,8 +22,8 @@ from robot_files import Joint, every_joint, robot_of
 from robot_gallery import CHI, GALLERY, LENGTH, snu, table
 
 from screwsynth.models import GenericRanks, Model, RobotError, Substitution, axis_angle_from_matrix, instantiate, robot
-from screwsynth.models.joints.chain import Joint as ChainJoint
-from screwsynth.models.joints.motion import AxisKind, JointAxis
+from screwsynth.models.joints.home.chain import Joint as ChainJoint
+from screwsynth.models.joints.home.motion import AxisKind, JointAxis
 from screwsynth.models.mechanism import (
     check_mechanism,
     close,
@@ -663,7 +663,7 @@ def test_two_loops_that_leave_one_link_and_come_back_to_it_are_read() -> None:
 
 def test_each_joint_has_variables_of_its_own_also_where_it_is_soon_forgotten() -> None:
     """Ball joints in nested loops shared their angles where one had the address of another one before it."""
-    module = import_module("screwsynth.models.joints.robot")
+    module = import_module("screwsynth.models.joints.model.robot")
     variable = module._Builder(frame=None)._variables("1", {})
     axis = JointAxis(AxisKind.ROTATION, SX([0, 0, 1]), SX.zeros(3), False, SX(0), SX.zeros(3))
     symbols = [variable(ChainJoint("", "R", SX.zeros(3), (axis,), actuated=False), 0) for _ in range(20)]

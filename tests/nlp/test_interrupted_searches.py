@@ -21,7 +21,7 @@ from workspace_cases import problem_of
 
 import screwsynth.nlp
 from screwsynth.models import FloatArray
-from screwsynth.models.joints.closedform import closed_form
+from screwsynth.models.joints.model.closedform import closed_form
 from screwsynth.nlp import Case, Free, Limits, Nlp, build_model, certify, formulate, load_case, solve, sweep
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.interruption import STOPPED, is_requested, one_call

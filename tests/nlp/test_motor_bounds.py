@@ -11,7 +11,7 @@ from builders import Array
 from workspace_cases import CUT, robot_of
 
 from screwsynth.models import FloatArray
-from screwsynth.models.joints.closedform import closed_form
+from screwsynth.models.joints.model.closedform import closed_form
 from screwsynth.nlp import Case
 from screwsynth.nlp.case.loads import Load, Loading, Motion
 from screwsynth.nlp.case.motors import Motor, MotorNumber

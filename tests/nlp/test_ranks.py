@@ -23,7 +23,7 @@ from numpy_engine import first_order
 from numpy_engine.rank_rule import NumpyRankTest
 
 from screwsynth.models import FloatArray, Substitution, stewart_gough
-from screwsynth.models.joints.closedform import closed_form
+from screwsynth.models.joints.model.closedform import closed_form
 from screwsynth.nlp import Case, Free, Outcome, Task, TurnKind, Turns, Workspace, build_model, judge_workspace
 from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.evidence.dependent import with_dependent

@@ -20,7 +20,7 @@ import screwsynth.models
 from screwsynth.models import fileversions, robot
 from screwsynth.models.fileversions import FileVersions
 from screwsynth.models.joints import RobotError
-from screwsynth.models.joints.mechanisms import mechanism_of
+from screwsynth.models.joints.home.mechanisms import mechanism_of
 from screwsynth.nlp import InputError, Solution, Status, json_data, load_case, load_result, result_of, solve
 from screwsynth.nlp.cli.usage import EARLIER
 from screwsynth.nlp.output.checks import markdown

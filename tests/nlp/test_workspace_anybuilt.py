@@ -21,7 +21,7 @@ from path_cases import turns_of
 from workspace_cases import ROBOTS, box_of, on_paper, problem_of, rank_of, root_of, tables_of, written
 
 from screwsynth.models import FloatArray
-from screwsynth.models.joints.closedform import closed_form
+from screwsynth.models.joints.model.closedform import closed_form
 from screwsynth.nlp import Case, CaseError, Outcome, Sense, build_model, json_data, judge_workspace
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.enclosure.forms import Forms

@@ -15,7 +15,7 @@ from hexapods import EVERY_LIMIT, bounds_of, clearance, singular_part, smallest,
 from workspace_cases import box_of, problem_of, turned
 
 from screwsynth.models import FloatArray
-from screwsynth.models.joints.closedform import closed_form
+from screwsynth.models.joints.model.closedform import closed_form
 from screwsynth.nlp import Case, Free, Limits, Outcome, RateShare, Sense, judge_workspace, load_case, load_result, solve
 from screwsynth.nlp.case.limits.joints import JointAngle
 from screwsynth.nlp.case.limits.legs import Actuator, LegLength

@@ -17,7 +17,7 @@ from hexapods import SMALL, hexapod_text
 from workspace_cases import gallery_case
 
 from screwsynth.models import FloatArray
-from screwsynth.models.joints.closedform import closed_form
+from screwsynth.models.joints.model.closedform import closed_form
 from screwsynth.nlp import Case, Free, LegClearance, Limits, Outcome, Rotation, Sense, formulate, load_case, load_result
 from screwsynth.nlp.case.limits.singular_values import SmallestSingularValue
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace

@@ -28,7 +28,7 @@ from workspace_cases import (
 )
 
 from screwsynth.models import FloatArray
-from screwsynth.models.joints.closedform import closed_form
+from screwsynth.models.joints.model.closedform import closed_form
 from screwsynth.nlp import Case, Free, Judgement, Limits, Outcome, Sense, TurnKind, Turns, UncoveredError, Workspace
 from screwsynth.nlp.program.layout import robot_length
 from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, read_proof

@@ -25,7 +25,7 @@ from workspace_cases import (
 )
 
 from screwsynth.models import FloatArray
-from screwsynth.models.joints.closedform import closed_form
+from screwsynth.models.joints.model.closedform import closed_form
 from screwsynth.nlp import Case, Judgement, Loading, Motion, Outcome, Verdict
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, read_proof, workspace_numbers

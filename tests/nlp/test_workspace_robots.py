@@ -17,7 +17,7 @@ from path_cases import delta_angles
 from workspace_cases import box_of, on_paper, problem_of, root_of
 
 from screwsynth.models import Dimension, FloatArray
-from screwsynth.models.joints.closedform import closed_form
+from screwsynth.models.joints.model.closedform import closed_form
 from screwsynth.nlp import (
     Case,
     Judgement,

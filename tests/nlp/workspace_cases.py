@@ -11,7 +11,7 @@ import pytest
 from builders import case_tables, ends, turn_about
 from hexapods import case_of_legs
 
-from screwsynth.models.joints.closedform import closed_form
+from screwsynth.models.joints.model.closedform import closed_form
 from screwsynth.nlp import Case, Free, Judgement, Task, TurnKind, Turns, Workspace, build_model, judge_workspace
 from screwsynth.nlp.case.loads import Load, Loading, Motion
 from screwsynth.nlp.proof.checker.proof_file import Premises, Proof, ProofClaim, ProofError, Unproved, read_proof

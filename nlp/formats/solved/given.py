@@ -11,9 +11,9 @@ import numpy as np
 
 from ....models import Dimension, Model
 from ....models.catalog import gallery_names, gallery_tables
-from ....models.joints.chain import home_of
-from ....models.joints.mechanisms import mechanism_at_home
-from ....models.joints.words import read_robot
+from ....models.joints.home.chain import home_of
+from ....models.joints.home.mechanisms import mechanism_at_home
+from ....models.joints.written.words import read_robot
 from ....models.limbjoints import LimbJoint
 from ....models.mechanism import Mechanism
 from ....models.mechanism.closing import ClosedMechanism, close, closed_near

@@ -13,7 +13,7 @@ import numpy as np
 from casadi import SX
 
 from ....models import Dimension, Model, Substitution
-from ....models.joints.closedform import ClosedForm, Reach
+from ....models.joints.model.closedform import ClosedForm, Reach
 from ....models.rotation import turn_about
 from ...case.case import Case
 from ...case.limits.constraint import Reading

@@ -19,8 +19,8 @@ eigenvalue is at most ``c^2`` times the smallest one, and no entry ``A_ii`` is l
 taken, which is the eigenvalue itself where the motion i is a principal one, as of many robots at symmetric poses.
 
 In home's working mode an unknown that follows from dimensions and pose in closed form is an expression of the others
-(:mod:`screwsynth.models.joints.elimination`). The form keeps, in its place, the condition that the limb reaches the
-pose. The remaining equations are kept, such as those of the freedoms that a limb takes from the platform. Equations
+(:mod:`screwsynth.models.joints.model.elimination`). The form keeps, in its place, the condition that the limb reaches
+the pose. The remaining equations are kept, such as those of the freedoms that a limb takes from the platform. Equations
 that are zero everywhere and the range of an unknown are left out, which never makes the feasible set smaller.
 """
 
@@ -38,8 +38,8 @@ from casadi import SX
 
 from ....models import Dimension, FloatArray, Substitution, frozen_array
 from ....models.instance import sizes_at
-from ....models.joints.elimination import Eliminated, eliminated
-from ....models.joints.replacing import Solved, with_replaced
+from ....models.joints.model.elimination import Eliminated, eliminated
+from ....models.joints.model.replacing import Solved, with_replaced
 from ...case.limits.constraint import End
 from ...evidence.state import CLOSED
 from ...program.layout import reference_of

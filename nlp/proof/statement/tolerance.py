@@ -19,7 +19,7 @@ from ....models import Dimension, FloatArray, Model, matrix_from_axis_angle
 from ....models.catalog import definition_of
 from ....models.displaced import DisplacedRobot, displaced_legs
 from ....models.joints import RobotError
-from ....models.joints.closedform import Reach, closed_form
+from ....models.joints.model.closedform import Reach, closed_form
 from ...case.case import Case
 from ...case.limits.constraint import LENGTH, BoundedConstraint, Constraint, Reading
 from ...case.limits.joints import BaseJointAngle, JointAngle, MountingPose, unit_axes
@@ -89,7 +89,7 @@ def _displaced(model: Model) -> DisplacedRobot:
             raise RobotError("", "the joint centres of this robot are not known")
         return displaced_legs(model)
     # Only robots given joint by joint need the language of robot files.
-    from ....models.joints.centres import displaced_robot  # noqa: PLC0415
+    from ....models.joints.model.centres import displaced_robot  # noqa: PLC0415
 
     try:
         return displaced_robot(model, definition_of(model))

@@ -17,7 +17,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from ....models import Dimension, FloatArray
-from ....models.joints.closedform import closed_form
+from ....models.joints.model.closedform import closed_form
 from ...case.case import Case
 from ...case.checks import check_determined_joints
 from ...case.limits.legs import Actuator

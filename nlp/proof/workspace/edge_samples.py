@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 
 from ....models import FloatArray
-from ....models.joints.closedform import closed_form
+from ....models.joints.model.closedform import closed_form
 from ...case.case import Case
 from .numbers.expressions import Expressions
 from .numbers.extremes import goal_of

@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from ....models.joints.closedform import closed_form
+from ....models.joints.model.closedform import closed_form
 from ...case.case import Case
 from ...case.workspace import Workspace
 from ...interruption import one_call, within

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from ....models import Dimension, FloatArray
-from ....models.joints.closedform import ClosedForm, closed_form
+from ....models.joints.model.closedform import ClosedForm, closed_form
 from ...case.case import Case
 from ...errors import InputError
 from ...evidence.inverse import inverse

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from ....models import FloatArray, frozen_array
-from ....models.joints.closedform import ClosedForm
+from ....models.joints.model.closedform import ClosedForm
 from ...case.case import Case
 from ...case.pose import Free, Value, ends_of
 from ...case.workspace import LARGEST_TURN, TurnKind, Turns, Workspace

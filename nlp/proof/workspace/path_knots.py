@@ -13,7 +13,7 @@ import numpy as np
 from casadi import SX
 
 from ....models import Dimension, FloatArray
-from ....models.joints.closedform import closed_form
+from ....models.joints.model.closedform import closed_form
 from ....models.statics import driven_joints
 from ...case.case import Case
 from ...case.pose import Free, ends_of

@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 
 from ....models import FloatArray, axis_angle_from_matrix
-from ....models.joints.closedform import ClosedForm
+from ....models.joints.model.closedform import ClosedForm
 from ...case.case import Case
 from ...case.motors import Motor, MotorNumber
 from ...case.task import Sense

@@ -12,7 +12,7 @@ from casadi import SX
 
 from .....models import Model, WrenchKind
 from .....models.joints import RobotError
-from .....models.joints.closedform import closed_form
+from .....models.joints.model.closedform import closed_form
 from ....case.case import Case
 from ....case.task import Sense
 from ....case.workspace import Workspace

@@ -23,7 +23,7 @@ from casadi import SX
 
 from .....models import Dimension
 from .....models.joints import RobotError
-from .....models.joints.closedform import ClosedForm
+from .....models.joints.model.closedform import ClosedForm
 from ....case.case import Case
 from ....case.limits.constraint import LENGTH, Reading
 from ....errors import UncoveredError

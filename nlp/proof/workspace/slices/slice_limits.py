@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from .....models import Dimension, FloatArray
 from .....models.arrays import values_at
-from .....models.joints.closedform import ClosedForm
+from .....models.joints.model.closedform import ClosedForm
 from ....case.case import Case
 from ....case.task import Sense
 from ....case.workspace import Workspace

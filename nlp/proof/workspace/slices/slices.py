@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .....models import FloatArray, frozen_array
-from .....models.joints.closedform import closed_form
+from .....models.joints.model.closedform import closed_form
 from ....case.case import Case
 from ....case.limits.legs import Actuator
 from ....case.workspace import TurnKind, Workspace

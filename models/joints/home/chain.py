@@ -16,15 +16,15 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ..arrays import FloatArray
-from ..expression import ExpressionError, NoValueError, UnknownNameError, evaluate
-from ..mechanism.decomposition import GraphJoint, LimbPaths, Step, decompose
-from ..mechanism.topology import bridges_between, reached
-from ..parts import Dimension
-from ..screws import Displacement, Screw, screw_displacement, unit_vector
-from .forms import RobotError, UndefinedError, VectorExpression
+from ...arrays import FloatArray
+from ...expression import ExpressionError, NoValueError, UnknownNameError, evaluate
+from ...mechanism.decomposition import GraphJoint, LimbPaths, Step, decompose
+from ...mechanism.topology import bridges_between, reached
+from ...parts import Dimension
+from ...screws import Displacement, Screw, screw_displacement, unit_vector
+from ..written.forms import RobotError, UndefinedError, VectorExpression
+from ..written.words import GraphWords, JointWords, LimbWords, RepeatWords, RobotWords
 from .motion import UNIT_VECTORS, AxisKind, JointAxis
-from .words import GraphWords, JointWords, LimbWords, RepeatWords, RobotWords
 
 #: Entries of a rotation of repetition this near to -1, -1/2, 0, 1/2 or 1 are these numbers: a turn by 120 degrees then
 #: leaves no entries of rounding error in the expressions.

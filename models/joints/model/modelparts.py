@@ -12,13 +12,13 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ..actuation import LimbDrive, Velocities, limb_drive
-from ..arrays import FloatArray
-from ..basis import basis_of_member, constraint_rows, is_apart, rank_of_rows
-from ..instance import Substitution, driven, jacobian
-from ..member import Member, resisted_parts, scaled_twists
-from ..model import Model
-from ..parts import (
+from ...actuation import LimbDrive, Velocities, limb_drive
+from ...arrays import FloatArray
+from ...basis import basis_of_member, constraint_rows, is_apart, rank_of_rows
+from ...instance import Substitution, driven, jacobian
+from ...member import Member, resisted_parts, scaled_twists
+from ...model import Model
+from ...parts import (
     Actuator,
     Closure,
     Dimension,
@@ -30,11 +30,11 @@ from ..parts import (
     Quantity,
     rate_relations,
 )
-from ..rows import column_groups
-from .chain import HomeRobot, Joint, Limb
-from .loops import ClosedPoint
-from .opened import OpenedPath
-from .resistance import Ranks
+from ...rows import column_groups
+from ..home.chain import HomeRobot, Joint, Limb
+from ..posed.loops import ClosedPoint
+from ..posed.opened import OpenedPath
+from ..posed.resistance import Ranks
 
 #: A member with so many wrenches resists nearly every motion alike.
 _MANY_WRENCHES = 5

@@ -19,9 +19,9 @@ from collections.abc import Sequence
 import casadi as ca
 from casadi import SX
 
-from ..parts import AssemblySign, Unknown
-from .generic import PathFrame
-from .motion import AxisKind
+from ...parts import AssemblySign, Unknown
+from ..home.generic import PathFrame
+from ..home.motion import AxisKind
 from .opened import OpenedPath
 
 #: Part of its largest possible size below which a mode's sign at home is zero: home is singular. Rounding leaves 1e-16.

@@ -9,10 +9,10 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ..drawing import JointKind
-from .chain import Joint
-from .generic import PathFrame
-from .motion import Motion
+from ...drawing import JointKind
+from ..home.chain import Joint
+from ..home.generic import PathFrame
+from ..home.motion import Motion
 from .opened import OpenedPath, directions_at_rod
 
 #: Distance of a parallelogram's rods from its middle, in parts of the rod: it is no dimension of the robot.

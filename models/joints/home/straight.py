@@ -20,7 +20,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ..parts import Leg
+from ...parts import Leg
 from .chain import Joint, Limb
 from .generic import INCIDENT, PathFrame, meeting_point
 

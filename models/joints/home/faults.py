@@ -14,8 +14,8 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
+from ..written.forms import RobotError
 from .chain import HomeRobot, Joint, Limb
-from .forms import RobotError
 from .generic import INCIDENT, PathFrame
 from .motion import AxisKind
 

@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 from casadi import SX
 
-from .chain import Joint
-from .generic import PathFrame, meeting_point
-from .motion import UNIT_VECTORS, AxisKind, JointAxis
+from ..home.chain import Joint
+from ..home.generic import PathFrame, meeting_point
+from ..home.motion import UNIT_VECTORS, AxisKind, JointAxis
 
 
 class Cut(NamedTuple):

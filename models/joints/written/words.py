@@ -1,7 +1,7 @@
 """A robot as it is written, with its form checked: dimensions and points; limbs and joints, or links and joints.
 
-The tables of a robot file and the arguments of :func:`~screwsynth.models.joints.robot.robot` have the same words. Links
-and joints are for shapes that limbs with branches do not have. :mod:`.chain` gives the expressions their values.
+The tables of a robot file and the arguments of :func:`~screwsynth.models.joints.model.robot.robot` have the same words.
+Links and joints are for shapes that limbs with branches do not have. :mod:`.chain` gives the expressions their values.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from ..fileversions import ROBOT_FILES, VERSION_KEY
-from ..parts import Dimension
+from ...fileversions import ROBOT_FILES, VERSION_KEY
+from ...parts import Dimension
 from .forms import (
     NAME,
     Expression,

@@ -24,10 +24,10 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from .. import Closure, Dimension, Model, Substitution, Unknown
-from ..drawing import Scene
-from ..instance import length_of
-from ..whole import expressions_of, with_expressions
+from ... import Closure, Dimension, Model, Substitution, Unknown
+from ...drawing import Scene
+from ...instance import length_of
+from ...whole import expressions_of, with_expressions
 from .elimination import limb_of
 from .replacing import Solved, at_turn, with_replaced
 

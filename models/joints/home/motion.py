@@ -13,7 +13,7 @@ from typing import NamedTuple
 import casadi as ca
 from casadi import SX
 
-from ..parts import Dimension
+from ...parts import Dimension
 
 #: Unit vectors (3, 1) along x, y and z.
 UNIT_VECTORS = (SX([1, 0, 0]), SX([0, 1, 0]), SX([0, 0, 1]))

@@ -7,8 +7,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
-from ..expression import CONSTANTS, FUNCTIONS
-from ..model import ModelError
+from ...expression import CONSTANTS, FUNCTIONS
+from ...model import ModelError
 
 #: A scalar expression: a number or a text.
 Expression: TypeAlias = str | float

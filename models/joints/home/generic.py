@@ -11,10 +11,10 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ..arrays import FloatArray
-from ..rows import rank_of
+from ...arrays import FloatArray
+from ...rows import rank_of
+from ..written.forms import RobotError, UndefinedError
 from .chain import HomeRobot, Joint, home_of
-from .forms import RobotError, UndefinedError
 from .motion import AxisKind, Motion
 
 #: Number of random points at which ranks are measured; the largest rank counts.

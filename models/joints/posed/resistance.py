@@ -8,12 +8,12 @@ from typing import NamedTuple
 import casadi as ca
 from casadi import SX
 
-from ..member import Member
-from ..wrench import Wrench, force_along
-from .chain import Joint
+from ...member import Member
+from ...wrench import Wrench, force_along
+from ..home.chain import Joint
+from ..home.generic import PathFrame, free_screws, generic_rank
+from ..home.motion import UNIT_VECTORS, AxisKind, Motion
 from .cut import Cut
-from .generic import PathFrame, free_screws, generic_rank
-from .motion import UNIT_VECTORS, AxisKind, Motion
 from .opened import OpenedPath
 
 

@@ -14,11 +14,11 @@ from dataclasses import dataclass, field, replace
 import casadi as ca
 from casadi import SX
 
-from ..mechanism.topology import Classes, spanning_tree
-from .chain import HomeGraph, Joint
+from ...mechanism.topology import Classes, spanning_tree
+from ..home.chain import HomeGraph, Joint
+from ..home.generic import PathFrame
+from ..home.motion import AxisKind, JointAxis, Motion
 from .cut import Cut
-from .generic import PathFrame
-from .motion import AxisKind, JointAxis, Motion
 from .opened import (
     LoopEquation,
     Opened,

@@ -27,11 +27,11 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ..parts import Closure
-from .chain import Joint
+from ...parts import Closure
+from ..home.chain import Joint
+from ..home.generic import INCIDENT, PathFrame
+from ..home.motion import UNIT_VECTORS, Motion
 from .cut import Cut
-from .generic import INCIDENT, PathFrame
-from .motion import UNIT_VECTORS, Motion
 
 #: Squared sine of the angle between a slide and its rod below which they are parallel: rounding leaves 1e-16.
 _STRAIGHT = 1e-14

@@ -27,8 +27,8 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from .. import Dimension, FloatArray, Model, Substitution, Unknown
-from ..instance import length_of
+from ... import Dimension, FloatArray, Model, Substitution, Unknown
+from ...instance import length_of
 from .replacing import Solved, at_turn, with_replaced
 
 #: Largest difference of two sides of an identity at random values, in parts of the sizes of its terms: rounding.

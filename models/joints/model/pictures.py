@@ -14,14 +14,14 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ..arrays import FloatArray
-from ..drawing import Body, JointKind, JointSymbol, Link, LinkKind, Point, Scene, outline
-from ..parts import PoseSymbols
-from .chain import Limb
-from .generic import PathFrame
-from .network import OpenNetwork
-from .opened import OpenedPath
-from .placed import SLIDING, Place, PlacedJoint, arc_between, placed_joints
+from ...arrays import FloatArray
+from ...drawing import Body, JointKind, JointSymbol, Link, LinkKind, Point, Scene, outline
+from ...parts import PoseSymbols
+from ..home.chain import Limb
+from ..home.generic import PathFrame
+from ..posed.network import OpenNetwork
+from ..posed.opened import OpenedPath
+from ..posed.placed import SLIDING, Place, PlacedJoint, arc_between, placed_joints
 
 #: Half of the length of a rail, in parts of the robot's size: it is no dimension of the robot.
 _RAIL = 0.2

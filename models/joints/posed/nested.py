@@ -19,19 +19,19 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ..arrays import FloatArray
-from ..limbjoints import JointCoordinate, LimbJoint
-from ..mechanism.centre import CentreRule, centre_rule
-from ..mechanism.decomposition import robot_graph
-from ..mechanism.topology import nearest_tree
-from ..member import Member, pseudo_inverse
-from ..parts import Actuator, Dimension, JointScrews, PathStructure
-from ..rows import RANK_TOLERANCE, independent_rows, rank_of
-from .chain import HomeRobot
-from .generic import PathFrame
+from ...arrays import FloatArray
+from ...limbjoints import JointCoordinate, LimbJoint
+from ...mechanism.centre import CentreRule, centre_rule
+from ...mechanism.decomposition import robot_graph
+from ...mechanism.topology import nearest_tree
+from ...member import Member, pseudo_inverse
+from ...parts import Actuator, Dimension, JointScrews, PathStructure
+from ...rows import RANK_TOLERANCE, independent_rows, rank_of
+from ..home.chain import HomeRobot
+from ..home.generic import PathFrame
+from ..home.mechanisms import mechanism_at_home
+from ..home.motion import AxisKind
 from .loops import ClosedPoint
-from .mechanisms import mechanism_at_home
-from .motion import AxisKind
 from .network import OpenNetwork
 from .states import COORDINATE_PARTS, rotation_angle
 

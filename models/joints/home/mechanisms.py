@@ -14,11 +14,11 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ..arrays import FloatArray
-from ..mechanism.graph import Coupling, ElementaryKind, Mechanism, MechanismError, MechanismJoint, MechanismLink
-from ..parts import Dimension
+from ...arrays import FloatArray
+from ...mechanism.graph import Coupling, ElementaryKind, Mechanism, MechanismError, MechanismJoint, MechanismLink
+from ...parts import Dimension
+from ..written.words import read_robot
 from .chain import HomeGraph, HomeRobot, Joint, home_of
-from .words import read_robot
 
 #: Distance of a parallelogram's rods from its middle line, in parts of their length.
 _APART = 0.1

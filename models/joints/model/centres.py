@@ -15,15 +15,15 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ..displaced import Centre, DisplacedRobot, error_parameter
-from ..model import Model
-from ..parts import Leg
-from .chain import Joint, Limb, home_of
-from .forms import RobotError
-from .generic import PathFrame, sampled_dimensions
-from .motion import AxisKind, Motion
+from ...displaced import Centre, DisplacedRobot, error_parameter
+from ...model import Model
+from ...parts import Leg
+from ..home.chain import Joint, Limb, home_of
+from ..home.generic import PathFrame, sampled_dimensions
+from ..home.motion import AxisKind, Motion
+from ..written.forms import RobotError
+from ..written.words import read_robot
 from .robot import joint_labels, model_of_home
-from .words import read_robot
 
 #: Part of the robot's size by which joint centres are off where ranks are measured: small enough for loops to close.
 _OFF = 0.01

@@ -14,14 +14,14 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ..arrays import FloatArray
-from ..newton import Point, VectorEquations, newton
-from ..parts import Closure, Unknown
-from ..rotation import matrix_from_cayley
-from ..rows import DEPENDENT, independent_rows, rank_of
-from .chain import HomeRobot
-from .forms import RobotError
-from .generic import PathFrame
+from ...arrays import FloatArray
+from ...newton import Point, VectorEquations, newton
+from ...parts import Closure, Unknown
+from ...rotation import matrix_from_cayley
+from ...rows import DEPENDENT, independent_rows, rank_of
+from ..home.chain import HomeRobot
+from ..home.generic import PathFrame
+from ..written.forms import RobotError
 
 #: Closed configurations that are tried; the largest rank among them counts.
 _POINTS = 5

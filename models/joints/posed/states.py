@@ -16,12 +16,12 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ..arrays import FloatArray
-from ..limbjoints import JointCone, JointCoordinate, LimbJoint, LimbLink
-from ..parts import Dimension
-from .chain import Joint, Limb
-from .generic import PathFrame
-from .motion import AxisKind, JointAxis, Motion
+from ...arrays import FloatArray
+from ...limbjoints import JointCone, JointCoordinate, LimbJoint, LimbLink
+from ...parts import Dimension
+from ..home.chain import Joint, Limb
+from ..home.generic import PathFrame
+from ..home.motion import AxisKind, JointAxis, Motion
 from .opened import OpenedPath, slide_length
 
 #: Names of the coordinates of a joint that has two.

@@ -10,11 +10,11 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ..arrays import FloatArray
-from ..fileversions import VERSION_KEY
-from ..limbjoints import LimbJoint, LimbLink
-from ..model import Model
-from ..parts import (
+from ...arrays import FloatArray
+from ...fileversions import VERSION_KEY
+from ...limbjoints import LimbJoint, LimbLink
+from ...model import Model
+from ...parts import (
     Actuator,
     AssemblySign,
     Closure,
@@ -24,13 +24,22 @@ from ..parts import (
     PoseSymbols,
     Unknown,
 )
-from ..wrench import Wrench
-from .chain import HomeRobot, Joint, Limb, home_of
-from .cut import choose_cut, simplified
-from .faults import examine_geometry
-from .forms import Expression, RobotError, VectorExpression, plain
-from .generic import PathFrame, sampled_dimensions
-from .loops import examine_loops
+from ...wrench import Wrench
+from ..home.chain import HomeRobot, Joint, Limb, home_of
+from ..home.faults import examine_geometry
+from ..home.generic import PathFrame, sampled_dimensions
+from ..home.motion import AxisKind, Motion
+from ..home.straight import straight_legs
+from ..posed.cut import choose_cut, simplified
+from ..posed.loops import examine_loops
+from ..posed.modes import joint_signs, mode_signs
+from ..posed.nested import ResistingParts, add_resisting, nested_joints
+from ..posed.network import OpenNetwork, open_network
+from ..posed.opened import OpenedPath, Variables, closures, distance_equations, open_path, slide_length
+from ..posed.resistance import Ranks, path_ranks, resistance
+from ..posed.states import PathJoints, limb_links, with_shared_places
+from ..written.forms import Expression, RobotError, VectorExpression, plain
+from ..written.words import read_robot
 from .modelparts import (
     actuator_name,
     generic_ranks,
@@ -43,16 +52,7 @@ from .modelparts import (
     with_kept,
     with_kinds,
 )
-from .modes import joint_signs, mode_signs
-from .motion import AxisKind, Motion
-from .nested import ResistingParts, add_resisting, nested_joints
-from .network import OpenNetwork, open_network
-from .opened import OpenedPath, Variables, closures, distance_equations, open_path, slide_length
 from .pictures import DrawnPath, scene_of
-from .resistance import Ranks, path_ranks, resistance
-from .states import PathJoints, limb_links, with_shared_places
-from .straight import straight_legs
-from .words import read_robot
 
 #: Range of an unknown from home: half a turn for an angle; for a slide, four times the robot's size.
 _TURN = float(np.pi)
