@@ -1,7 +1,7 @@
 """Newton's method with least-norm steps, for equations in a vector of numbers or in a point of any other kind.
 
 All equations of one point are solved here: closed loops, conditions of stationarity, joints in line with each other.
-Loops of many poses at once are closed by :meth:`screwsynth.nlp.evidence.closed_loops.Loops.all_closed`.
+Loops of many poses at once are closed by ``Loops.all_closed`` of :mod:`screwsynth.nlp`, in the home assembly mode.
 """
 
 from __future__ import annotations

@@ -302,6 +302,20 @@ def test_loop_joints_and_offsets_of_mimic(tmp_path: Path) -> None:
     assert angles[1] == pytest.approx(-angles[0] + 0.1, abs=1e-9)
 
 
+def test_fixed_joints_with_actuators_and_couplings_move_nothing(tmp_path: Path) -> None:
+    """Loops are closed as without them: a fixed joint has no coordinate to keep, or to couple."""
+    path, text = tmp_path / "bars.urdf", bars("spherical", 0.0)
+    plain = imported(path, text).mechanism
+    fixed = '<link name="f"/><joint name="fix" type="fixed"><parent link="a"/><child link="f"/>{}</joint>{}'
+    for more in (
+        fixed.format("", '<transmission><joint name="fix"/></transmission>'),
+        fixed.format('<mimic joint="left" multiplier="2"/>', ""),
+    ):
+        found = imported(path, edited(text, ("<loop_joint", f"{more}<loop_joint"))).mechanism
+        for one, other in zip(found.joints, plain.joints, strict=True):
+            np.testing.assert_array_equal(one.point, other.point)
+
+
 def test_motors_keep_their_names() -> None:
     """A limb with two motors, and a network with one: the joints' names, unless another limb has them."""
 

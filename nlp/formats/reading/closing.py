@@ -15,7 +15,7 @@ from ....models.mechanism.descent import Descent, Reached
 from ....models.mechanism.motions import WIDTHS, Coordinates, Equations, Motions, Placed
 from ....models.newton import newton
 from ..frames import Frame, cross_matrix, rotation_vector
-from .description import Closing, Description, LoopClosure
+from .description import Closing, Description, LoopClosure, unique_name
 
 #: Loops are closed where no equation is larger, in parts of the robot's size: rounding leaves 1e-16 to 1e-14.
 CLOSED = 1e-12
@@ -151,8 +151,9 @@ class _Loops:
         joint_of = {joint.outer: [joint] for joint in given.joints}
         joints = [each for body in given.bodies[1:] for each in joint_of.get(body.name) or _floating(given, body.name)]
         self.motions = motions = Motions(Mechanism(given.name, (), tuple(joints), given.root, given.root))
-        held = [motions.column(each.name) for each in joints if keeps_driven and each.name in given.driven]
-        self._free = np.delete(np.arange(motions.count), held)
+        self._columns = {each.name: columns for each, columns in zip(joints, motions.columns, strict=True)}
+        kept = [own for name, own in self._columns.items() if keeps_driven and name in given.driven]
+        self._free = np.delete(np.arange(motions.count), np.r_[(slice(0), *kept)])
         lengths = np.array([each.kind == "P" for each in joints for _ in range(WIDTHS[each.kind])], dtype=bool)
         # Of the coordinates that move: what makes radians and parts of the size, or radians and lengths, of order 1.
         self._parts = np.where(lengths, size / motions.units, 1.0)[self._free]
@@ -176,7 +177,7 @@ class _Loops:
         for coupling in given.couplings:
             row = np.zeros(motions.count)
             for name, factor in coupling.factors:
-                row[motions.column(name)] = factor * motions.units[motions.column(name)]
+                row[self._columns[name]] = factor * motions.units[self._columns[name]]
             unit = size if _is_length(given, coupling) else 1.0
             values.append(np.array([row @ at.values + given.offsets.get(coupling.name, 0.0)]) / unit)
             rows.append(row[None] / unit)
@@ -211,12 +212,10 @@ class _Loops:
     def closed(self, found: Reached) -> Closed:
         """Return the description with all its bodies and joints at coordinates."""
         given, values = self.given, found.at.values * self.motions.units
-        coordinates = {
-            each.name: float(values[self.motions.column(each.name)]) for each in given.joints if each.kind in ("R", "P")
-        }
+        coordinates = {each.name: float(values[self._columns[each.name]].sum()) for each in given.joints}
 
         def joint(each: MechanismJoint) -> MechanismJoint:
-            carried, way = _frame(found.placed, each.inner), coordinates.get(each.name, 0.0)
+            carried, way = _frame(found.placed, each.inner), coordinates[each.name]
             limits = None if each.range is None else (each.range[0] - way, each.range[1] - way)
             point, axis = carried.position + carried.rotation @ each.point, carried.rotation @ each.axis
             return replace(each, point=point, axis=axis, range=limits)
@@ -228,7 +227,7 @@ class _Loops:
         turns = [
             float(np.linalg.norm(rotation_vector(own[:3, :3])))
             for each, own in zip(self.motions.mechanism.joints, found.placed.joints, strict=True)
-            if each in given.joints and each.kind in ("R", "S")
+            if each.name in coordinates and each.kind in ("R", "S")
         ]
         ways = [abs(coordinates[each.name]) for each in given.joints if each.kind == "P"]
         description = replace(
@@ -242,12 +241,14 @@ class _Loops:
 
 def _floating(given: Description, body: str) -> list[MechanismJoint]:
     """Return the joints of a body that floats freely: three slides, and a ball joint in the world's origin."""
-    names = [given.root, *(f"{body} floating {axis}" for axis in "xyz"), body]
+    taken = {*(each.name for each in given.bodies), *(each.name for each in given.joints)}
+    names = [unique_name(f"{body} floating {axis}", taken) for axis in "xyz"]
+    inner = [given.root, *names]
     slides = [
-        MechanismJoint(name, "P", names[k], name, np.zeros(3), axis)
-        for k, (name, axis) in enumerate(zip(names[1:4], np.eye(3), strict=True))
+        MechanismJoint(name, "P", inner[k], name, np.zeros(3), axis)
+        for k, (name, axis) in enumerate(zip(names, np.eye(3), strict=True))
     ]
-    return [MechanismJoint(f"{body} floating", "S", names[3], body, np.zeros(3)), *slides]
+    return [MechanismJoint(unique_name(f"{body} floating", taken), "S", names[-1], body, np.zeros(3)), *slides]
 
 
 def _frame(placed: Placed, body: str) -> Frame:
