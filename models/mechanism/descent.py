@@ -1,4 +1,10 @@
-"""Joints moved until equations hold, or as near to that as they come: each step makes the residual smaller."""
+"""Joints moved until equations hold, or as near to that as they come: each step makes the residual smaller.
+
+Damped by the squared residual, the steps are those of Levenberg and Marquardt, and converge quadratically [1].
+
+Source: 1. N. Yamashita, M. Fukushima, *On the rate of convergence of the Levenberg-Marquardt method*, Computing
+Supplementa 15 (2001).
+"""
 
 from __future__ import annotations
 
@@ -53,8 +59,8 @@ class Descent:
         closed: largest left side where the equations hold.
         size: (f,) of each of these: least-norm steps are shortest in parts of it.
         stuck: part of the residual above which a step leads nowhere, where loops are open; 1 for none.
-        is_damped: whether singular values are damped by the residual. Equations that depend on each other have
-            singular values of the order of the residual, and ask for no large steps so; convergence stays quadratic.
+        is_damped: whether steps are damped. Equations that depend on each other have singular values of the order of
+            the residual: damped, they ask for no large steps.
     """
 
     def __init__(

@@ -30,7 +30,7 @@ LEAST = 1e-4
 _WORTH = 0.1
 #: Random starts beside the stated configuration, their largest motions in radians and parts of the size, and the seed.
 _STARTS, _FAR, _SEED = 4, (0.1, 0.3, 1.0), 0
-#: Damped steps to least squares: these loops need 60 to 140; and the part of the equations that the last one leaves.
+#: Damped steps to least squares, of which loops need 5 to 25; and the part of the equations that the last one leaves.
 _DAMPED, _STUCK = 300, 1 - 1e-12
 
 
