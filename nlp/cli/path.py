@@ -5,23 +5,19 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Annotated
 
-from . import contents, options
+from . import contents, options, pathoptions
 from .progress import spinner
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from ..path.options import PathOptions
     from ..proof.workspace.path_knots import Sampling
     from ..results.verdicts import WorkspacePose
 
 
 def path(
     case: options.CaseName,
-    along: Annotated[
-        str | None,
-        options.file("--along", "The path, poses in a .csv file or G-code, in place of the case's own"),
-    ] = None,
+    along: pathoptions.AlongFile = None,
     ranges: Annotated[
         bool, options.flag("--range", "How far each coordinate can move from a pose, and each two")
     ] = False,
@@ -30,26 +26,18 @@ def path(
     ] = None,
     settings: options.SettingTexts = None,
     of: options.ResultFile = None,
-    unit: Annotated[str | None, options.text("--unit", "mm|in", "Unit of a program before G20 or G21")] = None,
+    unit: pathoptions.Unit = None,
     start: Annotated[
         str | None,
         options.text("--start", "X,Y,Z,A,B,C", "Where the machine stands: before a program, or the pose of --range"),
     ] = None,
-    offset: Annotated[
-        list[str] | None,
-        options.several("--offset", "G54=X,Y,Z,A,B,C", "Origin of a program's coordinate system"),
-    ] = None,
-    angles: Annotated[
-        str | None,
-        options.text("--angles", "rpy|xyz|...", "Convention of a program's A, B, C; LinuxCNC's rpy if left out"),
-    ] = None,
-    between: Annotated[
-        str | None,
-        options.text("--between", "angles|slerp", "Turns between points: linear angles, or one axis"),
-    ] = None,
+    offset: pathoptions.Offsets = None,
+    angles: pathoptions.Angles = None,
+    between: pathoptions.BetweenPoints = None,
     gap: options.RangeGap = 1e-3,
     time: Annotated[float | None, options.time("600 if left out, as programs are long; 120 with --range")] = None,
     json_file: options.JsonFile = None,
+    proof: options.ProofFile = None,
     csv_file: Annotated[str | None, options.table("the actuators along the path")] = None,
     step: Annotated[
         float | None, options.number("--step", "LENGTH", "Length of the path between rows, at turns by 1 degree")
@@ -73,19 +61,21 @@ def path(
     from ..proof.workspace.path_judge import TIME_LIMIT, judge_path
     from ..results.path import path_result
     from ..results.posewording import evaluate_command
+    from .proofs import path_premises, path_proof_text, proof_record
 
     sampling = _sampling(step, within, is_written=csv_file is not None)
     _refuse_elsewhere(
         {"--along": along, "--unit": unit, "--offset": offset, "--angles": angles, "--between": between}
-        | {"--step": step, "--within": within, "--plot": plot, "--html": html},
+        | {"--step": step, "--within": within, "--plot": plot, "--html": html, "--proof": proof},
         most,
         ranges=ranges,
     )
+    record = proof_record(proof, json_file)
     answer_after(Milestone.BOUND)
     (loaded, text, inputs), chosen = options.read_machine(case, settings, of)
-    files = options.Outputs(json=json_file, csv=csv_file, plot=plot, html=html)
+    files = options.Outputs(json=json_file, csv=csv_file, plot=plot, html=html, proof=proof)
     own = PathOptions() if along is not None or ranges or loaded.path is None else options_of(loaded.path)
-    choices = _options(own, unit, start, offset or [], angles, between)
+    choices = pathoptions.PathChoices(unit, start, offset or [], angles, between).over(own)
     if ranges:
         from .axisranges import show_ranges
 
@@ -99,8 +89,11 @@ def path(
     files.check(inputs if along is None else {**inputs, Path(along): "the path that is read"})
     with spinner("reading the path") as show:
         programmed = path_of_case(loaded, choices) if along is None else read_path(along, loaded.units, choices)
+        premises = path_premises(proof, loaded, along, choices)
         limit = TIME_LIMIT if time is None else time
-        judged = judge_path(loaded, programmed, gap=gap, time_limit=limit, sampling=sampling, progress=show)
+        judged = judge_path(
+            loaded, programmed, gap=gap, time_limit=limit, sampling=sampling, progress=show, record=record
+        )
     result = path_result(judged, chosen)
 
     def command(pose: WorkspacePose) -> str:
@@ -122,6 +115,7 @@ def path(
         csv=lambda: None if judged.knots is None else contents.knots_csv(judged.case, judged.path, judged.knots),
         plot=lambda: contents.path_figure(picture()),
         html=lambda: contents.path_page(picture(), text, command),
+        proof=lambda: path_proof_text(proof, loaded, judged, record, text, premises),
     )
 
 
@@ -153,40 +147,3 @@ def _sampling(step: float | None, within: float | None, *, is_written: bool) -> 
     if step is not None and within is not None:
         raise InputError("--step and --within: give one; each states how far rows are from each other")
     return None if step is None and within is None and not is_written else Sampling(step, within)
-
-
-def _options(
-    own: PathOptions, unit: str | None, start: str | None, offsets: list[str], angles: str | None, between: str | None
-) -> PathOptions:
-    """Return the choices that a path's file leaves open: those of the case, but for what is given.
-
-    Raises:
-        InputError: one is not allowed.
-    """
-    from dataclasses import replace
-
-    from ..errors import InputError
-    from ..path.options import Between
-
-    def numbers(option: str, text: str) -> list[float]:
-        try:
-            return [float(part) for part in text.split(",")]
-        except ValueError:
-            raise InputError(f"{option} {text}: must be six numbers with commas: X,Y,Z,A,B,C") from None
-
-    found = dict(own.offsets)
-    for each in offsets:
-        name, equals, text = each.partition("=")
-        if not equals:
-            raise InputError(f"--offset {each}: must be a coordinate system and its origin: G54=X,Y,Z,A,B,C")
-        found[name] = numbers("--offset", text)
-    if between not in (None, *(each.value for each in Between)):
-        raise InputError(f"--between {between}: must be angles or slerp")
-    return replace(
-        own,
-        between=own.between if between is None else Between(between),
-        angles=own.angles if angles is None else angles,
-        unit=own.unit if unit is None else unit,
-        start=own.start if start is None else numbers("--start", start),
-        offsets=found,
-    )

@@ -1,4 +1,4 @@
-"""Proofs about machines in the commands ``workspace`` and ``verify-proof``."""
+"""Proofs about robots in the commands ``workspace``, ``path`` and ``verify-proof``."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ from .commandline import print_notice
 if TYPE_CHECKING:
     from ..case.case import Case
     from ..case.pose import Value
-    from ..proof.checker.proof_file import Proof, Unproved
+    from ..path.options import PathOptions
+    from ..path.path import ProgrammedPath
+    from ..proof.checker.proof_file import PathPremises, Proof, Unproved
     from ..proof.checker.workspace.check import CheckedClaim, VerifiedWorkspace
     from ..proof.workspace.judgement import Judgement
     from ..proof.workspace.proof_record import ProofRecord
@@ -55,12 +57,64 @@ def proof_text(
         quantities: measures that were asked for.
         leg_error: largest error of a leg's length.
     """
-    from ..errors import one_line
     from ..proof.workspace.proof_writer import proof_of
 
     if target is None or record is None:
         return None
-    proof = proof_of(judged, record, text, quantities=quantities, leg_error=leg_error)
+    return _told(target, proof_of(judged, record, text, quantities=quantities, leg_error=leg_error))
+
+
+def path_premises(target: str | None, case: Case, along: str | None, choices: PathOptions) -> PathPremises | None:
+    """Return the premises of a proof about a path; None without a proof.
+
+    Args:
+        target: name of the proof's file; None without a proof.
+        case: the case.
+        along: the path's file; None for that of the case.
+        choices: of reading it.
+
+    Raises:
+        InputError: the file cannot be read, or is longer than a proof carries.
+    """
+    from ..path.reader import text_of_path
+    from ..proof.checker.workspace.path_premises import premises_of
+
+    stated = case.path if along is None else None
+    if target is None or (along is None and stated is None):
+        return None
+    file, name = (along, along) if stated is None else (stated.file, stated.name)
+    return premises_of(case, file or "", text_of_path(name or ""), choices, of_case=stated is not None)
+
+
+def path_proof_text(
+    target: str | None,
+    case: Case,
+    judged: Judgement,
+    record: ProofRecord | None,
+    text: str,
+    premises: PathPremises | None,
+) -> str | None:
+    """Return the proof of a judgement along a path, as :func:`proof_text` does.
+
+    Args:
+        target: file name; ``-`` is standard output.
+        case: the case.
+        judged: the verdicts.
+        record: of the searches that led to them; there is no proof without one.
+        text: the case file's text.
+        premises: of the path.
+    """
+    from ..proof.workspace.path_proof_writer import path_proof_of
+
+    if target is None or record is None or premises is None:
+        return None
+    return _told(target, path_proof_of(case, judged, record, text, premises))
+
+
+def _told(target: str, proof: Proof) -> str | None:
+    """Return a proof as the text of a file, and say what has none; None where nothing has."""
+    from ..errors import one_line
+
     if not proof.claims:
         # A file of an earlier run is left as it is: it must not be taken for the proof of this one.
         print_notice(f"--proof {one_line(target)}: not written, as no claim has a proof")
@@ -84,10 +138,34 @@ def verified_lines(proof: Proof, case: Case, leg_error: float) -> Iterator[Line]
     except ProofError as error:
         print_notice(f"rejected: {error}")
         raise SystemExit(1) from None
-    return _checked_lines(proof, checked, case, leg_error)
+    premises = list(_premises(case, checked))
+    return _checked_lines(proof, checked, case, leg_error, f"the workspace of {case.name}", premises)
 
 
-def _checked_lines(proof: Proof, checked: VerifiedWorkspace, case: Case, leg_error: float) -> Iterator[Line]:
+def verified_path_lines(proof: Proof, premises: PathPremises, case: Case) -> Iterator[Line]:
+    """Check the proof of a path, and return the lines that say what it proves.
+
+    Raises:
+        Exit: with status 1 where the proof does not hold.
+    """
+    from ..proof.checker.proof_file import ProofError
+    from ..proof.checker.workspace.check import check_path_proof
+    from ..proof.checker.workspace.path_premises import carried_path
+
+    try:
+        path = carried_path(case, premises)
+        checked = check_path_proof(proof, case, path)
+    except ProofError as error:
+        print_notice(f"rejected: {error}")
+        raise SystemExit(1) from None
+    subject = f"the path {premises.file} of {case.name}"
+    lines = list(_path_premises(premises, path, case))
+    return _checked_lines(proof, checked, case, 0.0, subject, lines)
+
+
+def _checked_lines(
+    proof: Proof, checked: VerifiedWorkspace, case: Case, leg_error: float, whose: str, premises: Sequence[str]
+) -> Iterator[Line]:
     """Yield what a checked proof proves: the counts, claims that have no proof, then every premise and claim."""
     from ..proof.checker.premises import exact
     from ..proof.statement.claims import ERRORS
@@ -95,7 +173,6 @@ def _checked_lines(proof: Proof, checked: VerifiedWorkspace, case: Case, leg_err
     from ..results.verdictwording import SHOWN
 
     count = len(checked.claims) + len(proof.unproved)
-    whose = f"the workspace of {case.name}"
     if case.joint_centre_tolerance:
         off = f"{exact(case.joint_centre_tolerance)} {case.units.length}"
         whose += f", for every machine whose joint centres are off by at most {off}"
@@ -105,7 +182,7 @@ def _checked_lines(proof: Proof, checked: VerifiedWorkspace, case: Case, leg_err
     if proof.unproved:
         yield Line("the file's reasons for claims that are not on paper are not checked")
     yield Line(f"{checked.leaves:,} leaves, shown on {checked.pieces:,} boxes")
-    for line in _premises(case, checked):
+    for line in premises:
         yield Line(f"  {line}", part="premises")
     legs = f"off by at most {exact(leg_error)} {case.units.length}" if leg_error else "exact"
     for each in checked.claims:
@@ -145,6 +222,25 @@ def _premises(case: Case, checked: VerifiedWorkspace) -> Iterator[str]:
         others = "numbers" if followed == "ranks" else "other numbers"
         middle = "the one of home in the middle of the workspace"
         yield f"assemblies: {followed} in {middle}, {others} in {checked.numbers_at}"
+
+
+def _path_premises(premises: PathPremises, path: ProgrammedPath, case: Case) -> Iterator[str]:
+    """Yield the path, how its file is read, and the assembly that claims are about."""
+    from ..proof.checker.premises import exact
+
+    arcs = len(path.arc_segments)
+    with_arcs = f", {arcs:,} of them arc{'s' * (arcs > 1)}" if arcs else ""
+    placed = ", in its place in the case" if premises.of_case else ""
+    yield f"path: {premises.file}, {len(path):,} segment{'s' * (len(path) > 1)}{with_arcs}{placed}"
+    choices = {"angles": premises.angles, "between": path.between.value, "unit before G20 or G21": premises.unit}
+    choices |= {name: ", ".join(map(exact, each)) for name, each in premises.offsets.items()}
+    if premises.start is not None:
+        choices["start"] = ", ".join(map(exact, premises.start))
+    yield f"read with: {'; '.join(f'{name} {each}' for name, each in choices.items() if each is not None)}"
+    if path.is_timed:
+        yield "speeds and powers: in the path's own motion; 0 along segments without a stated time"
+    if case.model.unknowns:
+        yield "assembly: that of home at the first point, followed along the path"
 
 
 def _words(claim: CheckedClaim, case: Case) -> str:

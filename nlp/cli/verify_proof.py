@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-from . import options
+from . import options, pathoptions
 from .commandline import Argument, print_notice
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from ..case.case import Case
-    from ..proof.checker.proof_file import ProofClaim, Statement
+    from ..proof.checker.proof_file import PathPremises, ProofClaim, Statement
     from ..results.text import Line
 
 
 def verify_proof(
-    proof: Annotated[str, Argument("PROOF", "A proof that certify --proof or workspace --proof wrote.")],
+    proof: Annotated[str, Argument("PROOF", "A proof that certify, workspace or path wrote with --proof.")],
     case: Annotated[
         str | None,
         Argument("[CASE]", "The case to be proved, - is stdin; that in the proof if left out."),
@@ -28,6 +28,12 @@ def verify_proof(
     ] = None,
     all_assemblies: options.AllAssemblies = False,
     leg_error: options.LegError = 0.0,
+    along: pathoptions.AlongFile = None,
+    unit: pathoptions.Unit = None,
+    start: pathoptions.Stands = None,
+    offset: pathoptions.Offsets = None,
+    angles: pathoptions.Angles = None,
+    between: pathoptions.BetweenPoints = None,
     whole: options.ShowAll = False,
 ) -> None:
     """Check a proof with independent code.
@@ -36,16 +42,27 @@ def verify_proof(
     """
     from .. import __version__
     from ..errors import InputError
-    from ..proof.checker.proof_file import LARGEST_PROOF, Statement, read_proof
+    from ..proof.checker.proof_file import LARGEST_PROOF, PathPremises, Statement, read_proof
     from ..results.text import Line
     from ..system.reading import read_limited
-    from .proofs import verified_lines
+    from .proofs import verified_lines, verified_path_lines
 
+    of_path = {"--along": along, "--unit": unit, "--start": start, "--offset": offset} | {
+        "--angles": angles,
+        "--between": between,
+    }
     is_given = {"--above": above is not None, "--all-assemblies": all_assemblies, "--leg-error": leg_error != 0}
+    is_given |= {name: each not in (None, []) for name, each in of_path.items()}
     given = read_proof(read_limited(proof, LARGEST_PROOF), proof)
-    foreign = ("--leg-error",) if isinstance(given.premises, Statement) else ("--above", "--all-assemblies")
-    for name in foreign:
-        if is_given[name]:
+    own = (
+        {"--above", "--all-assemblies"}
+        if isinstance(given.premises, Statement)
+        else set(of_path)
+        if isinstance(given.premises, PathPremises)
+        else {"--leg-error"}
+    )
+    for name in is_given:
+        if is_given[name] and name not in own:
             raise InputError(f"{name}: means nothing for this proof, which another command wrote")
     if case is not None:
         loaded = options.read_machine(case, settings, of).file.case
@@ -53,13 +70,58 @@ def verify_proof(
         raise InputError(f"{'--set' if settings else '--of'}: needs the CASE that it changes")
     else:
         loaded = _carried_case(given.case, given.name, proof)
+    carried = ["case"] if case is None else []
     if isinstance(given.premises, Statement):
         lines: Iterable[Line] = _verify(given.premises, given.claims[0], loaded, above, all_assemblies=all_assemblies)
+    elif isinstance(given.premises, PathPremises):
+        choices = pathoptions.PathChoices(unit, start, offset or [], angles, between)
+        if not _hold_path(given.premises, loaded, along, choices, is_own=case is not None):
+            carried.append("path")
+        lines = verified_path_lines(given, given.premises, loaded)
     else:
         lines = verified_lines(given, loaded, leg_error)
-    whose = "the case is the one that the proof carries; " if case is None else ""
+    verb = "is the one" if len(carried) < 2 else "are those"
+    whose = f"the {' and the '.join(carried)} {verb} that the proof carries; " if carried else ""
     first, *others = lines
     options.show([first, Line(f"{whose}checked by screwsynth {__version__}"), *others], whole=whole)
+
+
+def _hold_path(
+    given: PathPremises, case: Case, along: str | None, choices: pathoptions.PathChoices, *, is_own: bool
+) -> bool:
+    """Hold the path of a proof to the user's files; return whether there are any.
+
+    Args:
+        given: premises of the proof.
+        case: the case.
+        along: the path's file; None for that of the case, or of the proof.
+        choices: of reading it.
+        is_own: whether the case is the user's.
+
+    Raises:
+        InputError: a file cannot be read, or choices are given without one.
+        Exit: with status 1 where the proof is for another path.
+    """
+    from ..errors import InputError
+    from ..path.options import PathOptions
+    from ..path.reader import options_of, text_of_path
+    from ..proof.checker.proof_file import ProofError
+    from ..proof.checker.workspace.path_premises import hold_path, premises_of
+
+    stated = case.path if is_own and along is None and given.of_case else None
+    if along is None and stated is None:
+        if choices.is_any:
+            raise InputError("--along: is needed by the options of reading a path")
+        return False
+    own = choices.over(PathOptions() if stated is None else options_of(stated))
+    file = along if stated is None else str(stated.name)
+    try:
+        text = text_of_path(file or "")
+        hold_path(given, premises_of(case, file or "", text, own, of_case=stated is not None))
+    except ProofError as error:
+        print_notice(f"rejected: {error}")
+        raise SystemExit(1) from None
+    return True
 
 
 def _verify(

@@ -37,21 +37,48 @@ def read_path(file: str | Path, units: Units, options: PathOptions | None = None
     Raises:
         InputError: the file cannot be read, or holds anything that is not read.
     """
-    options = options or PathOptions()
+    return path_of_text(text_of_path(file), str(file), units, options)
+
+
+def text_of_path(file: str | Path) -> str:
+    """Return the text of a path's file, with the line ends of Unix.
+
+    Raises:
+        InputError: the file cannot be read.
+    """
     content = read_limited(file, _LARGEST)
-    if str(file).lower().endswith(".csv"):
+    if is_table(str(file)):
         try:
-            text = text_of_bytes(content)
+            return text_of_bytes(content)
         except UnicodeDecodeError:
             raise InputError(f"{file}: cannot be read: it is not UTF-8 text") from None
-        path = read_poses(text, str(file), units, options)
+    # Comments may be in any encoding; a word of a program is ASCII.
+    text = content.removeprefix(b"\xef\xbb\xbf").decode("ascii", "replace")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def is_table(file: str) -> bool:
+    """Return whether a file of a path is a table of poses, by its name; else it is a program."""
+    return file.lower().endswith(".csv")
+
+
+def path_of_text(text: str, source: str, units: Units, options: PathOptions | None = None) -> ProgrammedPath:
+    """Return the path in the text of a file.
+
+    Args:
+        text: the text, with the line ends of Unix.
+        source: name of the file, which tells tables from programs.
+        units: of the case.
+        options: choices that the file leaves open.
+
+    Raises:
+        InputError: the text holds anything that is not read.
+    """
+    options = options or PathOptions()
+    if is_table(source):
+        path = read_poses(text, source, units, options)
     else:
-        # Comments may be in any encoding; a word of a program is ASCII.
-        text = content.removeprefix(b"\xef\xbb\xbf").decode("ascii", "replace")
-        del content
-        lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-        del text
-        path = read_program(lines, str(file), units, options)
+        path = read_program(text.split("\n"), source, units, options)
     if path.between is Between.SLERP:
         _check_turns(path)
     return path
@@ -68,7 +95,16 @@ def path_of_case(case: Case, options: PathOptions | None = None) -> ProgrammedPa
         CaseError: it states none, or a number of its place is free.
         InputError: its file cannot be read, or holds anything that is not read.
     """
-    path, stated = stated_path(case, options), case.path
+    return in_place_of_case(stated_path(case, options), case)
+
+
+def in_place_of_case(path: ProgrammedPath, case: Case) -> ProgrammedPath:
+    """Return the path of a case's file in the place that the case states.
+
+    Raises:
+        CaseError: a number of its place is free.
+    """
+    stated = case.path
     numbers = () if stated is None else stated.place
     fixed = [value for value in numbers if not isinstance(value, Free)]
     if stated is not None and stated.free:

@@ -1,5 +1,6 @@
 """Rules and parts of the checkers one by one, and proofs by limbs that share variables."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from types import SimpleNamespace
@@ -10,6 +11,7 @@ import pytest
 from casadi import SX
 from limb_cases import machine, poses, separated
 
+from screwsynth.models.arrays import FloatArray, values_at
 from screwsynth.nlp import Case, CertificateStatus, Free, Nlp, Rotation, Search, certify_program, formulate, load_case
 from screwsynth.nlp.proof.boxes.limbs import shared as sharedsearch
 from screwsynth.nlp.proof.boxes.limbs.decomposition import LimbBound, bound_limb, first_largest_of_lists
@@ -330,7 +332,13 @@ def test_no_points_are_closed() -> None:
 def test_ways_to_closed_points_stay_between_their_ends() -> None:
     """On a unit circle, from the top or the bottom to the side: beyond it there are no points."""
     z = SX.sym("z", 2)
-    points = LoopPoints(SimpleNamespace(size=np.ones(2), z=z), ca.sumsqr(z) - 1)  # type: ignore[arg-type]
+
+    def of(expression: SX) -> Callable[[FloatArray], list[FloatArray]]:
+        function = ca.Function("values", [z], [ca.densify(expression)])
+        return lambda at: values_at(function, at)
+
+    robot = SimpleNamespace(size=np.ones(2), function=of, slopes=lambda g: lambda at: of(ca.jacobian(g, z))(at)[0])
+    points = LoopPoints(robot, ca.sumsqr(z) - 1)  # type: ignore[arg-type]
     angle = np.random.default_rng(0).uniform(-0.5, 0.5, 40)
     begin = np.stack([np.sin(angle), np.repeat([1.0, -1.0], 20) * np.cos(angle)], axis=1)
     found = points.closed(begin, [1], np.full((40, 1), 0.8), steps=4)
@@ -342,7 +350,7 @@ def test_the_sign_of_a_nearly_singular_matrix_is_right_or_unknown(size: float) -
     """Two rows are parallel but for rounding, and the sign of the computed inverse is wrong."""
     rng, case = np.random.default_rng(1), load_case("hexapod-linuxcnc")
     robot = PosedRobot(case, case.model, pose_root(workspace_of_case(case)))
-    loops, at = PosedLoops(robot, robot.centre, Assembly(robot, SX(0, 1), robot.centre), 0.0), np.zeros((1, 6))
+    loops, at = PosedLoops(robot, robot.centre, Assembly(robot, SX(0, 1), robot.centre), 0.0, ()), np.zeros((1, 6))
 
     def shown(block: np.ndarray) -> int:
         M = np.eye(6)

@@ -42,7 +42,7 @@ from screwsynth.nlp.proof.checker.workspace.number_claims import (
     are_positive,
     whole_errors,
 )
-from screwsynth.nlp.proof.checker.workspace.pose_boxes import BoxClaim, PoseRoot, pose_root, show_on_leaves
+from screwsynth.nlp.proof.checker.workspace.pose_boxes import BoxClaim, PoseRoot, pose_root
 from screwsynth.nlp.proof.checker.workspace.ranks import RankClaim, rank_claim
 from screwsynth.nlp.proof.statement.machine import Legs, legs_of
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Number
@@ -189,7 +189,7 @@ def test_a_leaf_across_a_singular_pose_is_rejected(robot: Legs) -> None:
     root = pose_root(turned(TurnKind.ANY_AXIS, 40))
     for tree in (bytes([Node.BOUNDED]), node_bytes(Node.CUT, 0, value=0.5) + bytes([Node.BOUNDED] * 2)):
         with pytest.raises(ProofError, match="could not be shown"):
-            show_on_leaves(rank(root, robot), root, tree)
+            root.show_on_leaves(rank(root, robot), tree)
 
 
 def rank(root: PoseRoot, robot: Legs) -> RankClaim:
@@ -265,7 +265,7 @@ def test_random_machines_are_accepted() -> None:
             continue
         root = pose_root(workspace)
         tree = record.tree(with_open=True)
-        show_on_leaves(rank(root, machine), root, tree)
+        root.show_on_leaves(rank(root, machine), tree)
         # The checker need not find the cuts again: those of the search are in the tree, 10 bytes and a leaf each.
         # Halves that surely fail are divided without a look, so that there may be more cuts than boxes tell.
         cuts, rest = divmod(len(tree) - 1, 11)
@@ -284,14 +284,14 @@ def test_a_robot_is_not_regular_by_the_rounding_of_its_constants() -> None:
     assert prove_rank(problem, problem.locked, most_boxes=1).outcome is not Outcome.PROVED
     root = pose_root(still)
     with pytest.raises(ProofError, match="could not be shown"):
-        show_on_leaves(rank_claim(case, model, root, "regular"), root, bytes([Node.BOUNDED]))
+        root.show_on_leaves(rank_claim(case, model, root, "regular"), bytes([Node.BOUNDED]))
     # The couples alone are a matrix of their own, and lose their rank where the platform is level, also in the middle.
     for each in turning:
         problem = build_problem(case, model, pose_box(each))
         assert prove_rank(problem, problem.unactuated).outcome is Outcome.REFUTED
         root = pose_root(each)
         with pytest.raises(ProofError, match="could not be shown"):
-            show_on_leaves(rank_claim(case, model, root, "constraints regular"), root, bytes([Node.BOUNDED]))
+            root.show_on_leaves(rank_claim(case, model, root, "constraints regular"), bytes([Node.BOUNDED]))
 
 
 @pytest.mark.parametrize("kind", list(TurnKind))
@@ -466,4 +466,4 @@ def test_leaves_that_are_no_boxes_of_the_workspace_count_for_nothing(robot: Legs
     root = pose_root(turned(TurnKind.ANY_AXIS, 20))
     far = np.concatenate([root.lower[:3], 0.9 * root.upper[3:]])
     whole = replace(root, lower=far, upper=np.maximum(far, root.upper))
-    assert show_on_leaves(rank(root, robot), whole, bytes([Node.OUTSIDE])) == (1, 0)
+    assert whole.show_on_leaves(rank(root, robot), bytes([Node.OUTSIDE])) == (1, 0)

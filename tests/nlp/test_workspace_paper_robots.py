@@ -32,7 +32,7 @@ from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, read_proo
 from screwsynth.nlp.proof.checker.tree import Node, node_bytes
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.checker.workspace.closed_loops import Assembly
-from screwsynth.nlp.proof.checker.workspace.pose_boxes import _PoseRule, show_on_leaves
+from screwsynth.nlp.proof.checker.workspace.pose_boxes import _PoseRule
 from screwsynth.nlp.proof.checker.workspace.statement import robot_claims
 from screwsynth.nlp.proof.statement.claims import REGULAR
 from screwsynth.nlp.proof.statement.machine import workspace_of_case
@@ -174,7 +174,7 @@ def test_boxes_with_another_assembly_do_not_belong_together() -> None:
     root = root_of(case)
     shown = rank_of(case)
     tree = node_bytes(Node.CUT, 2, value=0.5 * (root.lower[2] + root.upper[2])) + bytes([Node.BOUNDED] * 2)
-    show_on_leaves(shown, root, tree)
+    root.show_on_leaves(shown, tree)
     shown.finish()
     (whole,) = shown._shown
     shown.assembly.refuse_apart(whole)

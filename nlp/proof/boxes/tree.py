@@ -83,7 +83,11 @@ class TreeRecord:
         """
         if self._limbs:
             return self._tree_of_limbs(with_open=with_open)
-        parts, waiting = [self.begin], [self._root]
+        return self.begin + self.tree_below(self._root, with_open=with_open)
+
+    def tree_below(self, key: bytes, *, with_open: bool = False) -> bytes:
+        """Return the tree of a box with a key; see :meth:`tree`."""
+        parts, waiting = list[bytes](), [key]
         # A leaf of shared variables has numbers of its own, which an open box lacks.
         missing = bytes([Node.BOUNDED]) if with_open and not self.begin else None
         while waiting:

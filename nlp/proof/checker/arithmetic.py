@@ -106,8 +106,14 @@ class PolynomialArithmetic:
             self._steps.append((op, function.instruction_input(k), function.instruction_output(k)))
         self._offset = np.concatenate([[0], np.cumsum([function.numel_out(i) for i in range(function.n_out())])])
 
-    def __call__(self, lower: FloatArray, upper: FloatArray) -> list[Polynomial]:
-        """Return polynomials of the outputs' elements, column by column, over boxes with ends (n, N)."""
+    def __call__(self, lower: FloatArray, upper: FloatArray, given: Sequence[Polynomial] = ()) -> list[Polynomial]:
+        """Return polynomials of the outputs' elements, column by column, over boxes with ends (n, N).
+
+        Args:
+            lower: lower ends of the first inputs.
+            upper: upper ends.
+            given: values of the inputs after these.
+        """
         work: dict[int, Polynomial] = {}
         results: dict[int, Polynomial] = {}
         with np.errstate(all="ignore"):
@@ -115,7 +121,9 @@ class PolynomialArithmetic:
                 if op == ca.OP_OUTPUT:
                     results[int(self._offset[target[0]]) + target[1]] = work[source[0]]
                 elif op == ca.OP_INPUT:
-                    work[target[0]] = variable(source[1], lower[source[1]], upper[source[1]])
+                    i = source[1]
+                    is_box = i < len(lower)
+                    work[target[0]] = variable(i, lower[i], upper[i]) if is_box else given[i - len(lower)]
                 elif op == ca.OP_CONST:
                     work[target[0]] = self._constants[k]
                 elif op in _UNARY:

@@ -25,6 +25,7 @@ Lemmas are further claims on which others rest: lengths of ``one machine``, each
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Final, Literal
 
@@ -137,13 +138,53 @@ class Premises:
 
 
 @dataclass(frozen=True)
+class PathPremises:
+    """What a proof about a path says of its premises; everything else follows from the case.
+
+    Attributes:
+        file: name of the path's file, which tells tables from programs.
+        text: of the file.
+        of_case: whether the path is that of the case, in its place; else it was given beside the case.
+        between, angles, unit, start, offsets: choices that the file leaves open, as
+            :class:`~screwsynth.nlp.path.options.PathOptions` has them; ``between`` by its value.
+        legs, joint_centre: as in :class:`Premises`.
+        with_angles: whether angles of joints are replaced by closed forms; no premise, but a help for the check.
+    """
+
+    file: str
+    text: str
+    of_case: bool
+    between: str | None
+    angles: str
+    unit: str | None
+    start: tuple[float, ...] | None
+    offsets: Mapping[str, tuple[float, ...]]
+    legs: tuple[tuple[float, ...], ...]
+    joint_centre: float
+    with_angles: bool
+
+    def __post_init__(self) -> None:
+        # What is read cannot be copied.
+        object.__setattr__(self, "offsets", dict(self.offsets))
+
+
+#: By the word of a file, what its claims are about.
+_PREMISES: dict[Literal["program", "workspace", "path"], type[Statement] | type[Premises] | type[PathPremises]] = {
+    "program": Statement,
+    "workspace": Premises,
+    "path": PathPremises,
+}
+
+
+@dataclass(frozen=True)
 class Proof:
     """Proofs of claims about a case.
 
     Attributes:
         case: the case file's text.
         name: the case's name.
-        premises: the program of the case that the one claim is about, or what claims about a workspace rest on.
+        premises: the program of the case that the one claim is about, or what claims about a workspace or a path rest
+            on.
         claims: the claims that are proved.
         lemmas: claims that others rest on.
         unproved: claims without a proof.
@@ -151,7 +192,7 @@ class Proof:
 
     case: str
     name: str
-    premises: Statement | Premises
+    premises: Statement | Premises | PathPremises
     claims: tuple[ProofClaim, ...]
     lemmas: tuple[ProofClaim, ...] = ()
     unproved: tuple[Unproved, ...] = ()
@@ -168,7 +209,7 @@ class Proof:
             raise ProofError(
                 f"the trees of the proof have {size // 2**20} MB, and at most {LARGEST_TREES // 2**20} MB are read"
             )
-        about: Literal["program", "workspace"] = "program" if isinstance(self.premises, Statement) else "workspace"
+        about = next(word for word, kind in _PREMISES.items() if isinstance(self.premises, kind))
         claims, lemmas = (tuple(map(_table_of, some)) for some in (self.claims, self.lemmas))
         file = _File(
             _FORMAT, PROOF_FILES.newest, self.name, self.case, about, self.premises, claims, lemmas, self.unproved
@@ -204,7 +245,7 @@ class _File:
     schema: int
     name: str
     case: str
-    about: Literal["program", "workspace"]
+    about: Literal["program", "workspace", "path"]
     premises: object
     claims: tuple[_ClaimTable, ...]
     lemmas: tuple[_ClaimTable, ...]
@@ -233,17 +274,18 @@ def read_proof(text: str | bytes, source: str) -> Proof:
         if isinstance(table, dict) and table.get("format") == _FORMAT:
             check_version(PROOF_FILES, table, source)
         found = object_of(_File, table)
-        is_program = found.about == "program"
-        kind: type[Statement] | type[Premises] = Statement if is_program else Premises
+        is_program, kind = found.about == "program", _PREMISES[found.about]
         premises = object_of(kind, found.premises, "premises")
         _check_texts(found, premises.quantities if isinstance(premises, Premises) else ())
+        if isinstance(premises, PathPremises) and len(premises.text) > LARGEST_CASE:
+            raise ValueError(f"premises.text: has {len(premises.text)} characters, and at most {LARGEST_CASE} are read")
         kinds = [(each.name, each.reason) for each in found.claims]
         if is_program and (kinds != [(OPTIMUM, "program")] or found.lemmas or found.not_on_paper):
             raise ValueError(f"a proof about a program has one claim, {OPTIMUM}")
     except CaseError as error:
         raise ProofError(str(error)) from None
     except ValueError as error:
-        raise ProofError(f"{source}: is no proof as certify and workspace write it: {error}") from None
+        raise ProofError(f"{source}: is no proof as certify, workspace and path write it: {error}") from None
     budget, tables = TreeBudget(), (*found.claims, *found.lemmas)
     every = tuple(_claim_of(each, source, number, budget) for number, each in enumerate(tables))
     count = len(found.claims)

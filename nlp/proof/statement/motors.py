@@ -6,6 +6,9 @@ import itertools
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
+import casadi as ca
+from casadi import SX
+
 from ....models import Dimension
 from ....models.statics import DrivenJoint, driven_joints
 from ...case.case import Case
@@ -15,7 +18,8 @@ from ...case.limits.forces import ActuatorForce, ActuatorLimit, ActuatorPower, A
 from ...case.loads import Motion
 from ...case.motors import Motor, MotorNumber
 from ...case.task import Sense
-from .claims import Claim, ClaimKind
+from ...program.layout import Layout
+from .claims import ACTUATED, Claim, ClaimKind
 
 
 def motor_claims(case: Case) -> Iterator[Claim]:
@@ -30,6 +34,16 @@ def motor_claims(case: Case) -> Iterator[Claim]:
 def in_motion(case: Case) -> Case:
     """Return a case that states a motion, for limits on speeds and powers of a path, whose own motion is meant."""
     return replace(case, loading=case.loading._replace(motion=case.loading.motion or Motion(1.0)))
+
+
+def actuator_coordinates(layout: Layout) -> dict[str, SX]:
+    """Return the known coordinates (1, 1) of actuators by their names: lengths of legs, or positions from home."""
+    model, robot = layout.case.model, layout.robots[0]
+    found = {} if model.actuators else {leg.name: ca.norm_2(leg.span) for leg in robot.legs}
+    for quantity, values in zip(model.quantities, robot.quantities, strict=True):
+        if model.actuators and quantity.name in ACTUATED:
+            found |= {owner: values[k] for k, owner in enumerate(quantity.owners)}
+    return {each.name: found[each.name] for each in driven_joints(model) if each.name in found}
 
 
 def speed_claims(case: Case) -> Iterator[Claim]:

@@ -40,6 +40,7 @@ from .path_faults import first_faults, refuted
 from .path_knots import Sampling, knots_of
 from .path_motion import speeds_on_path
 from .path_ranks import rank_along, rank_at_start
+from .proof_record import ProofRecord
 from .robot.path_cover import PathCover
 from .robot.posed_robot import NotJudgedError
 from .verdict import Fault, Verdict, not_judged
@@ -62,6 +63,7 @@ def judge_path(
     sampling: Sampling | None = None,
     limits_alone: bool = False,
     progress: Callable[[str], None] | None = None,
+    record: ProofRecord | None = None,
 ) -> Judgement:
     """Judge a robot at every point of a path.
 
@@ -73,6 +75,7 @@ def judge_path(
         sampling: distance that knots of the path keep; None for no knots.
         limits_alone: whether numbers of actuators without a limit are left out.
         progress: called with the name of the next step.
+        record: record of the searches for a proof.
 
     Raises:
         CaseError: a dimension of the robot is free, or limits need a motion that neither the case nor the path states.
@@ -100,7 +103,7 @@ def judge_path(
             machines = Machines(moving, closed, design_along(moving, closed, box, cover))
         except NotJudgedError as error:
             reason = str(error)
-        judging = _AlongPath(moving, workspace, machines, cover, NumberSearch(gap))
+        judging = _AlongPath(moving, workspace, machines, cover, NumberSearch(gap, record=record))
         judging.is_timed, judging.with_all, judging.reason, judging.report = (
             path.is_timed,
             not limits_alone,
@@ -137,6 +140,8 @@ class _AlongPath(Judging):
         super().__init__(case, workspace, search=search)
         self._machines, self._cover = machines, cover
         self._faults: dict[Claim, Fault] = {}
+        if search.record is not None:
+            search.record.pieces = cover.pieces
         self.has_numbers = machines is not None
 
     @property
@@ -159,8 +164,11 @@ class _AlongPath(Judging):
         for name, matrix in ((REGULAR, family.locked), (CONSTRAINTS, family.unactuated)):
             if matrix is not None:
                 self.report(name)
-                at_start = self.case.model.rank < 6 and name == REGULAR
-                yield rank_at_start(family, matrix, cover) if at_start else rank_along(family, matrix, name, cover)
+                if self.case.model.rank < 6 and name == REGULAR:
+                    yield rank_at_start(family, matrix, cover)
+                    continue
+                recorder = None if self.search.record is None else self.search.record.tree(name)
+                yield rank_along(family, matrix, name, cover, recorder)
 
     def expressions(self) -> Iterator[Verdict]:
         """Yield the verdicts on expressions of the pose."""
@@ -193,7 +201,7 @@ class _AlongPath(Judging):
             yield from self._motors(subject)
             return
         # Powers are those in the path's motion, whether the case states another one or none.
-        speeds, case = speeds_on_path(self._robots, self._cover, self.search.gap), subject.case
+        speeds, case = speeds_on_path(self._robots, self._cover, self.search.gap, self.search.record), subject.case
         yield from speeds.verdicts
         moving = case if statics_hindrance(case.model) else in_motion(case)  # forces that are not known have no power
         if speeds.number is not None:
@@ -209,7 +217,8 @@ class _AlongPath(Judging):
 
     def finer(self, claim: Claim, gap: float, about: Directions | None) -> Verdict | None:
         """Return the verdict on a leg length with a finer gap; None with directions."""
-        return None if about is not None else self._robots.searched([claim], gap, is_enough=False)[0]
+        search = replace(self.search, gap=gap)
+        return None if about is not None else self._robots.searched([claim], search, is_enough=False)[0]
 
     def shown(self, verdict: Verdict) -> Verdict:
         """Return a verdict with the first known point that refutes it."""
@@ -221,7 +230,7 @@ class _AlongPath(Judging):
 
     def _motors(self, subject: Subject, speeds: Mapping[str, float] | None = None) -> Iterator[Verdict]:
         """Yield the verdicts on forces, powers and speeds in any direction, and keep the faults of these."""
-        found = list(motor_extremes(subject, with_all=self.with_all, speeds=speeds))
+        found = list(motor_extremes(subject, with_all=self.with_all, speeds=speeds, record=self.search.record))
         yield from found
         for _, group in itertools.groupby(refuted(found).values(), lambda each: each.motor and each.motor.place):
             wrong = list(group)
@@ -231,15 +240,15 @@ class _AlongPath(Judging):
 
     def _searched(self, claims: Sequence[Claim]) -> list[Verdict]:
         """Return the verdicts on numbers by one search; those without rules are open."""
-        machines, gap, reason = self._robots, self.search.gap, _NO_RULE
+        machines, search, reason = self._robots, self.search, _NO_RULE
         covered = [claim for claim in claims if machines.is_covered(claim)]
         found = dict[Claim, Verdict]()
         try:
-            found = dict(zip(covered, machines.searched(covered, gap) if covered else [], strict=True))
+            found = dict(zip(covered, machines.searched(covered, search) if covered else [], strict=True))
             # A number that cannot be decided ends the search of all.
             limited = [each for each in covered if each.limit is not None and len(covered) > 1]
             for claim in (each for each in limited if found[each].reason == TOO_SMALL):
-                (found[claim],) = machines.searched([claim], gap)
+                (found[claim],) = machines.searched([claim], search)
         except UncoveredError as error:  # of an equation of loops
             reason = str(error)
         return [found.get(claim) or verdict_of(claim, Minimum(reason=reason)) for claim in claims]

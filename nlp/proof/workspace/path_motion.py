@@ -13,12 +13,14 @@ from casadi import SX
 from ....models import FloatArray
 from ....models.statics import driven_joints
 from ...errors import UncoveredError
-from ..statement.claims import ACTUATED, Claim
-from ..statement.motors import speed_claims
+from ..boxes.tree import TreeRecord
+from ..statement.claims import Claim
+from ..statement.motors import actuator_coordinates, speed_claims
 from .numbers.bound_search import Minimum, smallest_values
 from .numbers.extremes import goal_of, verdict_of
 from .numbers.machines import Machines
 from .numbers.path_speeds import PathSpeeds, with_rates
+from .proof_record import ProofRecord
 from .robot.path_cover import PathCover
 from .robot.posed_robot import NotJudgedError
 from .verdict import Verdict
@@ -35,22 +37,26 @@ class SpeedsOnPath(NamedTuple):
     number: PathSpeeds | None
 
 
-def speeds_on_path(machines: Machines, cover: PathCover, gap: float) -> SpeedsOnPath:
+def speeds_on_path(machines: Machines, cover: PathCover, gap: float, record: ProofRecord | None = None) -> SpeedsOnPath:
     """Return the largest speed of each actuator of all machines along a path with times.
 
     Args:
         machines: all machines that are meant.
         cover: of the path.
         gap: as a part of a speed.
+        record: record of the search for a proof.
     """
     claims, number = list(speed_claims(machines.case)), None
+    recorder = None if record is None else TreeRecord()
     try:
         number = PathSpeeds(with_rates(machines.family, cover), coordinates_of(machines))
         goals = [
             goal_of(claim, wider, gap, is_enough=False)
             for claim, wider in zip(claims, _wider(number, cover).tolist(), strict=True)
         ]
-        every = smallest_values(number, goals)
+        every = smallest_values(number, goals, recorder)
+        if record is not None and recorder is not None:
+            record.boxes |= dict.fromkeys((claim.name for claim in claims), recorder)
     except (NotJudgedError, UncoveredError) as error:
         every = [Minimum(reason=str(error))] * len(claims)
     found = []
@@ -81,12 +87,7 @@ def coordinates_of(machines: Machines) -> SX:
         NotJudgedError: they are not known.
     """
     layout, family = machines.symbols.layout, machines.family
-    model, robot = layout.case.model, layout.robots[0]
-    found = {} if model.actuators else {leg.name: ca.norm_2(leg.span) for leg in robot.legs}
-    for quantity, values in zip(model.quantities, robot.quantities, strict=True):
-        if model.actuators and quantity.name in ACTUATED:
-            found |= {owner: values[k] for k, owner in enumerate(quantity.owners)}
-    names = [each.name for each in driven_joints(model)]
-    if not names or not found.keys() >= set(names):
+    found = actuator_coordinates(layout)
+    if not found or len(found) < len(driven_joints(layout.case.model)):
         raise NotJudgedError("the positions of its actuators are not known")
-    return machines.symbols.of(ca.vertcat(*[found[name] for name in names]), family.errors, family.problem.z)
+    return machines.symbols.of(ca.vertcat(*found.values()), family.errors, family.problem.z)

@@ -11,6 +11,7 @@ from ....models import FloatArray
 from ...errors import UncoveredError
 from ...interruption import one_search
 from ..boxes.search import TOO_SMALL, Effort, Order, joined, some
+from ..boxes.tree import TreeRecord
 from ..statement.claims import RANKS, REGULAR
 from .path_faults import pose_at
 from .ranks.loop_boxes import APART, LoopBoxes, loop_boxes_of
@@ -30,15 +31,19 @@ _PARTS = 64
 _SAMPLES = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
-def rank_along(problem: Problem, matrix: RankMatrix, name: str, cover: PathCover) -> Verdict:
-    """Return the verdict on the rank of a matrix along a path."""
-    place = _sign_change(problem, matrix, cover)
-    if place is not None:
-        return Verdict(RANKS[name], Outcome.REFUTED, pose=pose_at(problem, cover, place), place=place)
+def rank_along(
+    problem: Problem, matrix: RankMatrix, name: str, cover: PathCover, recorder: TreeRecord | None = None
+) -> Verdict:
+    """Return the verdict on the rank of a matrix along a path; the search is recorded for a proof."""
+    change = _sign_change(problem, matrix, cover)
+    if change is not None:
+        place, sides = change
+        pose, ends = pose_at(problem, cover, place), np.array([[each.segment + each.parameter] for each in sides])
+        return Verdict(RANKS[name], Outcome.REFUTED, pose=pose, place=place, sides=ends)
     effort = Effort()
     try:
         with one_search():
-            rule = RankRule(problem, matrix, None, lambda *_: None)
+            rule = RankRule(problem, matrix, recorder, lambda *_: None)
             search = rule.search(Order.NEWEST)
             # One piece that is too small leaves the claim open or refutes it, however many others there are.
             reason = effort.run(search, lambda: TOO_SMALL if search.state.small else None)
@@ -78,8 +83,8 @@ def rank_at_start(problem: Problem, matrix: RankMatrix, cover: PathCover) -> Ver
     return Verdict(RANKS[REGULAR], outcome, pose=pose, reason=EVERYWHERE, place=place)
 
 
-def _sign_change(problem: Problem, matrix: RankMatrix, cover: PathCover) -> Place | None:
-    """Return the first place between whose neighbours the determinant is proved to have opposite signs.
+def _sign_change(problem: Problem, matrix: RankMatrix, cover: PathCover) -> tuple[Place, tuple[Place, Place]] | None:
+    """Return the first place between whose neighbours the determinant is proved to have opposite signs, and these.
 
     The rows surely have values all the way between them.
     """
@@ -99,11 +104,12 @@ def _sign_change(problem: Problem, matrix: RankMatrix, cover: PathCover) -> Plac
             boxes = cover.boxes(np.stack([np.full(_PARTS, pieces[k, 0]), ends[:-1], ends[1:]], axis=1))
             if not signs.has_values(*(each[:, free] for each in boxes)):
                 continue
+            sides = place_in(pieces[k], low), place_in(pieces[k], high)
             for _ in range(_STEPS):
                 middle = 0.5 * (low + high)
                 sign = np.sign(signs.computed(cover.points(pieces[k : k + 1], middle)[:, free])[0])
                 low, high = (middle, high) if sign == values[k, j] else (low, middle)
-            return place_in(pieces[k], high)
+            return place_in(pieces[k], high), sides
     return None
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from ....models import FloatArray
 from ...program.nlp import Nlp
 from ..boxes.tree import TreeRecord
 from ..certificate.certificate import Certificate, CertificateStatus
@@ -13,6 +14,7 @@ from ..checker.proof_file import ProofClaim
 from ..checker.tree import Node
 from ..statement.claims import Claim
 from ..statement.tolerance import Directions
+from .path_trees import tree_of_path
 from .verdict import slack_of
 
 #: Name and sense of a claim.
@@ -33,6 +35,7 @@ class ProofRecord:
         firsts: bounds of the first-order pose error, for leg-length errors of one unit, by name.
         rests: bounds of the terms of second order of numbers of all robots within a tolerance.
         directions: fixed directions of a leg, by the name of the leg lengths of one robot at two poses.
+        pieces: (M, 3) pieces of a path with which its searches begin; None for a box of poses.
     """
 
     programs: dict[Key, ProofClaim] = field(default_factory=dict)
@@ -40,6 +43,15 @@ class ProofRecord:
     firsts: dict[str, float] = field(default_factory=dict)
     rests: dict[Key, float] = field(default_factory=dict)
     directions: dict[str, Directions] = field(default_factory=dict)
+    pieces: FloatArray | None = None
+    _nodes: dict[TreeRecord, bytes] = field(default_factory=dict)
+
+    def nodes(self, tree: TreeRecord) -> bytes:
+        """Return the tree of a search of boxes that is over, open ones being leaves."""
+        if tree not in self._nodes:
+            pieces = self.pieces
+            self._nodes[tree] = tree.tree(with_open=True) if pieces is None else tree_of_path(tree, pieces)
+        return self._nodes[tree]
 
     def tree(self, name: str) -> TreeRecord:
         """Return the tree of the search of a claim."""
@@ -69,7 +81,7 @@ class ProofRecord:
         beyond = sign * bound + max(room, _OUTWARDS * abs(bound))
         most = math.inf if claim.limit is None else sign * claim.limit
         bound = sign * max(min(beyond, most), sign * bound)
-        self.programs.setdefault(key, ProofClaim(*key, "boxes", bound, tree=tree.tree(with_open=True)))
+        self.programs.setdefault(key, ProofClaim(*key, "boxes", bound, tree=self.nodes(tree)))
 
     def _keep(self, claim: Claim, nlp: Nlp, bound: float, tree: bytes) -> None:
         """Keep the best bound of a program; of two programs of one name the first, as the check has it."""

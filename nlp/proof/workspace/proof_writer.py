@@ -27,11 +27,11 @@ _AS_BUILT = "the robot cannot be assembled with errors of its joint centres"
 _BY_MACHINES = "it is proved by a search of boxes for all machines together, which has no proof on paper"
 #: Reason of claims of kinds that the checker does not know.
 _NO_RULES = "claims of this kind have no proof on paper"
-_NOT_JUDGED = "it was not judged"
+NOT_JUDGED = "it was not judged"
 _NO_BOUND = "its search has no bound"
 _ONE_ASSEMBLY = "it is proved in home's assembly of the joints, and proofs on paper are about all assemblies"
 _NO_REACH = "the reach of limbs that it needs has no proof"
-_NO_LENGTHS = "the lengths of legs that it needs have no proof"
+NO_LENGTHS = "the lengths of legs that it needs have no proof"
 
 
 def proof_of(
@@ -104,10 +104,10 @@ class _Writer:
         if each.kind is ClaimKind.RANK:
             return self._rank(each.name)
         if each.label not in self.extremes:
-            raise ProofError(_NOT_JUDGED)
+            raise ProofError(NOT_JUDGED)
         found = self.extremes[each.label]
         if found.outcome is not Outcome.PROVED:
-            raise ProofError(_words(found))
+            raise ProofError(words_of(found))
         if each.kind is ClaimKind.EXPRESSION:
             return self._program(found)
         if each.kind is ClaimKind.LENGTHS:
@@ -118,11 +118,11 @@ class _Writer:
         """Return the claim that J, or the constraint wrenches, keep their rank, or the opposite."""
         found = self._judged.regularity if name == REGULAR else self._judged.constraints
         if found is None:
-            raise ProofError(_NOT_JUDGED)
+            raise ProofError(NOT_JUDGED)
         if found.outcome is Outcome.REFUTED and found.pose is not None:
             return self._singular(name, found, found.pose)
         if found.outcome is not Outcome.PROVED:
-            raise ProofError(_words(found))
+            raise ProofError(words_of(found))
         return ProofClaim(name, "", "regular", tree=self._record.tree(name).tree(with_open=True))
 
     def _singular(self, name: str, found: Verdict, pose: PoseNumbers) -> ProofClaim:
@@ -131,10 +131,10 @@ class _Writer:
             return ProofClaim(name, "", "singular", sides=tuple(map(tuple, found.sides.tolist())))
         machines = self.robot.machines
         if machines is None or found.reason:
-            raise ProofError(f"{_words(found)}; a computed pose has no proof")
+            raise ProofError(f"{words_of(found)}; a computed pose has no proof")
         # The determinant has the other sign for the largest errors in these directions too, and is farther from 0.
         if found.errors is None:
-            raise ProofError(_words(found))
+            raise ProofError(words_of(found))
         errors = found.errors.vectors.copy()
         errors *= INSIDE * machines.symbols.tolerance / np.linalg.norm(errors, axis=1).max()
         y = pose_box(self._judged.workspace).coordinates(pose)
@@ -169,22 +169,14 @@ class _Writer:
         """Return a claim with a tree of a search of its own."""
         if each.name not in self._record.boxes:
             raise ProofError(_ONE_ASSEMBLY)
-        record, is_motor = self._record.tree(each.name), each.kind is ClaimKind.MOTOR
+        record = self._record.tree(each.name)
         of_legs = self._case.joint_centre_tolerance and each.kind is ClaimKind.SPECTRUM
         if each.kind is ClaimKind.ERROR or of_legs:
             self._need_lengths([leg.name for leg in self._case.model.legs], ("min",))
         if each.kind is ClaimKind.ERROR:
             bound = self._record.firsts[each.name] * (1 + _OUTWARDS)
         else:
-            sign = found.sense.sign
-            # A proof of the limit is enough: the bound reached is often just beyond it, and takes longer to check. Of a
-            # number of an actuator the bound says which motor is needed.
-            room = _ROOM * abs(found.bound - found.reached) if is_motor else 0.0
-            beyond = sign * found.bound + _OUTWARDS * abs(found.bound) + room
-            limit = math.inf if each.limit is None else sign * each.limit
-            bound = sign * max(min(beyond, limit) if is_motor or each.limit is None else limit, sign * found.bound)
-            if not math.isfinite(bound) or not (is_motor or each.limit is not None or bound > 0):
-                raise ProofError(_NO_BOUND)
+            bound = bound_on_record(each, found)
         return ProofClaim(*each.label, "boxes", bound, tree=record.tree(with_open=True))
 
     def _need_lengths(self, legs: Sequence[str], senses: Sequence[str]) -> None:
@@ -194,7 +186,7 @@ class _Writer:
             ProofError: they have none.
         """
         if any((f"leg_length limb {leg}", sense) not in self.proved for leg in legs for sense in senses):
-            raise ProofError(_NO_LENGTHS)
+            raise ProofError(NO_LENGTHS)
 
     def lemmas(self) -> Iterator[ProofClaim]:
         """Yield the claims that those about every machine rest on."""
@@ -207,6 +199,25 @@ class _Writer:
                 yield ProofClaim(second_order_name(name), sense, "second order", rest)
 
 
-def _words(found: Verdict) -> str:
+def bound_on_record(claim: Claim, found: Verdict) -> float:
+    """Return the bound that a proof of a number that is no single expression states.
+
+    A proof of the limit is enough: the bound reached is often just beyond it, and takes longer to check. Of a number of
+    an actuator the bound says which motor is needed.
+
+    Raises:
+        ProofError: there is none.
+    """
+    sign, is_motor = found.sense.sign, claim.kind is ClaimKind.MOTOR
+    room = _ROOM * abs(found.bound - found.reached) if is_motor else 0.0
+    beyond = sign * found.bound + _OUTWARDS * abs(found.bound) + room
+    limit = math.inf if claim.limit is None else sign * claim.limit
+    bound = sign * max(min(beyond, limit) if is_motor or claim.limit is None else limit, sign * found.bound)
+    if not math.isfinite(bound) or not (is_motor or claim.limit is not None or bound > 0):
+        raise ProofError(_NO_BOUND)
+    return bound
+
+
+def words_of(found: Verdict) -> str:
     """Return an outcome and its reason."""
     return f"{found.outcome.value}: {found.reason}" if found.reason else found.outcome.value

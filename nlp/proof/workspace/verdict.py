@@ -56,8 +56,8 @@ class Verdict:
         seconds: wall time.
         place: place of the pose on a path; None on a box of poses.
         errors: joint-centre errors of the robot with this value, or of the singular one; None for the exact robot.
-        sides: (2, 6) coordinates of two poses at which the determinant of the rows is proved to have opposite signs,
-            where a rank is refuted so; else None.
+        sides: (2, 6) coordinates of two poses, or (2, 1) places of a path, segment plus parameter, at which the
+            determinant of the rows is proved to have opposite signs, where a rank is refuted so; else None.
         fault: first known point of a path that refutes the limit; None where it is not before ``place``.
     """
 

@@ -1,8 +1,8 @@
-"""Check of a proof of a workspace, without trust in who made it.
+"""Check of a proof of a workspace or a path, without trust in who made it.
 
 Everything is built again from the case: the box of poses, the robot, the expressions of numbers, and the claims that
-there must be. Trees of ``certify`` are checked by its checker. Every leaf of the other trees is shown again with affine
-forms (:mod:`.forms`), and signs of determinants with fractions.
+there must be. Poses of a path come from its file. Trees of ``certify`` are checked by its checker. Every leaf of the
+other trees is shown again with affine forms (:mod:`.forms`), and signs of determinants with fractions.
 """
 
 from __future__ import annotations
@@ -18,19 +18,22 @@ from casadi import SX
 from .....models import Dimension, rate_relations
 from ....case.case import Case
 from ....case.limits.constraint import LENGTH
+from ....case.motors import Motor
 from ....case.task import Sense
 from ....case.workspace import Workspace
 from ....errors import InputError, UncoveredError
+from ....path.path import ProgrammedPath
 from ....program.layout import Layout
 from ...statement.claims import ERRORS, REACH, Claim, ClaimKind
 from ...statement.machine import Legs, check_leg_error, workspace_of_case
+from ...statement.motors import actuator_coordinates
 from ...statement.posed_layout import extreme_program
 from ...statement.tolerance import Directions, length_of_one_machine, second_order_name
 from ..check import check_proof
-from ..proof_file import Premises, Proof, ProofClaim, ProofError
+from ..proof_file import PathPremises, Premises, Proof, ProofClaim, ProofError
 from ..tree import Node
 from .loop_claims import PosedLoops, posed_loops
-from .motion_matrix import PosedRobot
+from .motion_matrix import PosedRobot, Root
 from .motor_claims import MotorClaims
 from .number_claims import (
     ClearanceClaim,
@@ -41,14 +44,21 @@ from .number_claims import (
     change_of_jacobian,
     whole_errors,
 )
-from .pose_boxes import COORDINATES, BoxClaim, pose_root, show_on_leaves
+from .path_root import PathRoot
+from .pose_boxes import BoxClaim, pose_root
 from .ranks import rank_claim
 from .statement import (
     Machines,
+    RobotClaims,
+    case_along_path,
+    expected_along_path,
     expected_claims,
     hold_premises,
+    hold_robot,
+    in_path_motion,
     leg_error_of,
     refuse_other_lemmas,
+    robot_along_path,
     robot_claims,
 )
 
@@ -86,13 +96,13 @@ class CheckedClaim:
 
 @dataclass(frozen=True)
 class VerifiedWorkspace:
-    """A proof that holds.
+    """A proof of a workspace, or of a path, that holds.
 
     Attributes:
         claims: what it proves.
         numbers_at: assemblies that the claims about numbers cover, but for those of actuators under loads, which are
             about home's as ranks are; empty for a robot without loops.
-        workspace: the poses, with the dependent coordinates of the robot.
+        workspace: the poses, or a box about a path, with the dependent coordinates of the robot.
         leaves: number of claims about boxes in it.
         pieces: number of boxes that were evaluated to show them.
     """
@@ -117,10 +127,31 @@ def check_workspace_proof(proof: Proof, case: Case, *, leg_error: float = 0.0) -
         CaseError: the case has no workspace, or a free dimension.
         InputError: the error of legs is negative, or the robot is not six straight legs.
     """
+    check_leg_error(case, leg_error)
+    return _check(proof, lambda: _Checker(proof, case, leg_error))
+
+
+def check_path_proof(proof: Proof, case: Case, path: ProgrammedPath) -> VerifiedWorkspace:
+    """Check a proof of a path, by showing each of its claims again.
+
+    Args:
+        proof: the proof, whose premises about the path are held to it already; see :func:`.path_premises.hold_path`.
+        case: the case that it is about.
+        path: the path.
+
+    Raises:
+        ProofError: the proof is for another case, or a claim could not be shown; the message names the claim.
+        CaseError: a dimension of the case is free, or limits need a motion that neither case nor path states.
+        InputError: the path has no motion.
+    """
+    return _check(proof, lambda: _PathChecker(proof, case, path))
+
+
+def _check(proof: Proof, begun: Callable[[], _Checker]) -> VerifiedWorkspace:
+    """Check a proof by its checker."""
     if not proof.claims:
         raise ProofError("the proof claims nothing")
-    check_leg_error(case, leg_error)
-    checker = _Checker(proof, case, leg_error)
+    checker = begun()
     given = {(each.name, each.sense): each for each in proof.claims}
     expected = {each.label: each for each in checker.expected}
     # What a proof does not claim may be more than the claims that have proofs at all.
@@ -143,26 +174,30 @@ class _Checker:
     """A check of claims one after the other; later ones use the bounds of earlier ones."""
 
     def __init__(self, proof: Proof, case: Case, leg_error: float) -> None:
-        self.workspace = workspace = workspace_of_case(case)
-        premises = proof.premises
+        workspace, premises = workspace_of_case(case), proof.premises
         if not isinstance(premises, Premises):
             raise ProofError("the proof is not about a workspace")
-        self.robot = robot = robot_claims(case, workspace, {each.name for each in proof.claims})
+        robot = robot_claims(case, workspace, {each.name for each in proof.claims})
         hold_premises(case, workspace, robot.legs, leg_error, premises)
-        self._case, self._root, self._tolerance = case, pose_root(workspace), case.joint_centre_tolerance or 0.0
+        self._begin(proof, case, pose_root(workspace), robot, workspace)
+        self._eps = leg_error_of(case, leg_error)
+        try:
+            self.expected: list[Claim] = expected_claims(case, robot, premises.quantities, leg_error)
+        except InputError as error:
+            raise ProofError(f"the proof names a measure that the case does not have: {error}") from None
+
+    def _begin(self, proof: Proof, case: Case, root: Root, robot: RobotClaims, workspace: Workspace) -> None:
+        """Begin the check of a proof about the poses of a root."""
+        self.robot, self.workspace, self._case, self._root = robot, workspace, case, root
+        self._tolerance = case.joint_centre_tolerance or 0.0
         self._given = {(each.name, each.sense): each for each in proof.claims}
         self._firsts = {
             each.name: each.bound for each in proof.claims if each.name in _FIRSTS and each.bound is not None
         }
         self._lemmas = {(each.name, each.sense): each for each in proof.lemmas}
-        self._eps = leg_error_of(case, leg_error)
         self._bounds: dict[tuple[str, str], float] = {}
         self._shown: set[tuple[str, str]] = set()
         self.leaves = self.pieces = 0
-        try:
-            self.expected = expected_claims(case, robot, premises.quantities, leg_error)
-        except InputError as error:
-            raise ProofError(f"the proof names a measure that the case does not have: {error}") from None
 
     def check(self, each: Claim, given: ProofClaim) -> CheckedClaim:
         """Check one claim."""
@@ -194,14 +229,14 @@ class _Checker:
 
     def _show(self, claim: BoxClaim, tree: bytes) -> None:
         """Show a claim on every leaf of a tree."""
-        leaves, pieces = show_on_leaves(claim, self._root, tree)
+        leaves, pieces = self._root.show_on_leaves(claim, tree)
         self.leaves += leaves
         self.pieces += pieces
 
     def _rank(self, each: Claim, given: ProofClaim) -> CheckedClaim:
         """Check that J, or the constraint wrenches, keep their rank, or that J is singular between two points."""
         is_refuted, machines = given.reason == "singular", self.robot.machines
-        by_machine = is_refuted and any(len(side) > COORDINATES for side in given.sides)
+        by_machine = is_refuted and any(len(side) > self._root.coordinates for side in given.sides)
         if by_machine and machines is None:
             raise ProofError("the claim is about the exact machine")
         tolerance = self._tolerance if by_machine or not is_refuted else 0.0
@@ -242,9 +277,8 @@ class _Checker:
         if symbols is None:
             raise ProofError("'boxes' is no reason of this claim")
         bound, loops = _stated(given), self._loops
-        z, count = loops.robot.z, loops.robot.errors
-        split = z.numel() - count
-        number = NumberClaim(loops, symbols.of(claim.expression, z[split:, :], z[:split, :]), claim.sense, bound)
+        expression = symbols.of(claim.expression, loops.robot.of_errors, loops.robot.varying)
+        number = NumberClaim(loops, expression, claim.sense, bound)
         self._show(number, given.unpacked())
         number.finish()
         return bound
@@ -354,11 +388,16 @@ class _Checker:
                 if motor and each.motor and motor.whose == each.motor.whose
                 if self._given[one.label].has_tree_of(given)
             }
-            claims = MotorClaims(self._case, self._loops, self._root, list(same.values()))
+            coordinate = self._coordinate(each.motor)
+            claims = MotorClaims(self._case, self._loops, self._root, list(same.values()), coordinate)
             self._show(claims, given.unpacked())
             claims.finish()
             self._shown |= same.keys()
         return _stated(given)
+
+    def _coordinate(self, motor: Motor | None) -> SX | None:  # noqa: ARG002 - of a path with times
+        """Return the coordinate of an actuator whose rate is its speed; None for speeds in any motion of the case."""
+        return None
 
     @cached_property
     def _loops(self) -> PosedLoops:
@@ -371,6 +410,34 @@ class _Checker:
     def _posed(self) -> PosedRobot:
         """The robot as expressions of the pose."""
         return PosedRobot(self._case, self.robot.model, self._root)
+
+
+class _PathChecker(_Checker):
+    """A check of claims along a path."""
+
+    def __init__(self, proof: Proof, case: Case, path: ProgrammedPath) -> None:
+        premises = proof.premises
+        if not isinstance(premises, PathPremises):
+            raise ProofError("the proof is not about a path")
+        case = case_along_path(case, path)
+        root = PathRoot(case, path)
+        robot = robot_along_path(case, root, with_angles=premises.with_angles)
+        hold_robot(case, robot.legs, premises)
+        self._is_timed = path.is_timed
+        self._begin(proof, case, root, robot, root.workspace)
+        self.expected = expected_along_path(case, robot, is_timed=path.is_timed)
+        if path.is_timed:
+            self._case = in_path_motion(case)
+
+    def _coordinate(self, motor: Motor | None) -> SX | None:
+        """Return the coordinate of an actuator whose rate is its speed; None for speeds in any motion of the case."""
+        symbols = self.robot.followed
+        if motor is None or symbols is None or not self._is_timed:
+            return None
+        known, robot = actuator_coordinates(symbols.layout), self._loops.robot
+        if motor.actuator not in known:
+            raise ProofError("the positions of the robot's actuators are not known")
+        return symbols.of(known[motor.actuator], robot.of_errors, robot.varying)
 
 
 def _stated(given: ProofClaim) -> float:

@@ -24,11 +24,11 @@ import numpy as np
 from casadi import SX
 from numpy.typing import NDArray
 
-from .....models.arrays import FloatArray, values_at
+from .....models.arrays import FloatArray
 from .....models.rows import independent_rows
 from ..polynomials import middles
 from ..proof_file import ProofError
-from .forms import PRODUCT, UP, AffineMatrix, FormArithmetic, Forms, inverses, off_identity
+from .forms import PRODUCT, UP, AffineMatrix, Forms, inverses, off_identity
 from .motion_matrix import PosedRobot
 from .pose_boxes import box_words
 
@@ -54,14 +54,12 @@ class LoopPoints:
     """Points at which some equations (k, 1) of a robot's loops hold."""
 
     def __init__(self, robot: PosedRobot, equations: SX) -> None:
-        self._size = robot.size
-        outputs = [ca.densify(equations), ca.densify(ca.jacobian(equations, robot.z))]
-        self._function = ca.Function("loops", [robot.z], outputs)
+        self._size, self._values, self._slopes = robot.size, robot.function(equations), robot.slopes(equations)
 
     def at(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return left sides (B, k) and their derivatives (B, k, n) at points (B, n), for coordinates of size 1."""
-        g, J = values_at(self._function, z)
-        return g[:, :, 0], J * self._size
+        (g,) = self._values(z)
+        return g[:, :, 0], self._slopes(z) * self._size
 
     @np.errstate(all="ignore")
     def closed(
@@ -117,7 +115,7 @@ def start_of(robot: PosedRobot) -> FloatArray:
 
 def is_home(robot: PosedRobot, z: FloatArray) -> bool:
     """Return whether a closed point (n,) fulfils all loop equations, in home's working mode; not where it is NaN."""
-    loops, signs = (each.full() for each in ca.Function("mode", [robot.z], [robot.loops, robot.signs])(z))
+    loops, signs = robot.function(robot.loops, robot.signs)(z[None])
     return bool(np.isfinite(z).all() and (np.abs(loops) <= _OTHER).all() and (signs > 0).all())
 
 
@@ -194,7 +192,7 @@ class Assembly:
         (middle,) = self.moved(start[None], robot.centre[None][:, self.independent])
         self.start = middle if is_home(robot, middle) else start
         columns = ca.jacobian(equations, robot.z)[:, self.dependent]
-        self._arithmetic = FormArithmetic(robot.z, ca.vertcat(SX(0, 1), equations, ca.vec(ca.densify(columns))))
+        self._arithmetic = robot.forms(ca.vertcat(SX(0, 1), equations, ca.vec(ca.densify(columns))))
 
     def _determined(self, start: FloatArray) -> list[int]:
         """Return the coordinates that follow from others: dependent ones of the pose, and all unknowns."""
@@ -212,6 +210,10 @@ class Assembly:
         """Return the closed points (B, n) on the way from closed points to other independent coordinates (B, f)."""
         return self.points.closed(z, self.dependent, to=to, steps=_WAY)
 
+    def near(self, to: FloatArray) -> FloatArray:
+        """Return closed points (B, n) at independent coordinates (B, f), on the way from the start."""
+        return self.moved(np.broadcast_to(self.start, (len(to), len(self.start))), to)
+
     def followed(self, forms: Forms, closed: Enclosed) -> Forms:
         """Return forms of all coordinates as forms of the independent ones, along closed points."""
         dependent, slopes = forms.a[:, :, self.dependent], forms.a[:, :, self.independent]
@@ -228,7 +230,7 @@ class Assembly:
         Those at the centres (B, n) are computed from the start where they are not given.
         """
         if near is None:
-            near = self.moved(np.broadcast_to(self.start, (len(lower), len(self.start))), middles(lower, upper)[0])
+            near = self.near(middles(lower, upper)[0])
         free, D, size = self.independent, self.dependent, self._size
         (B, f), k = lower.shape, self._count
         low, high = np.full_like(near, np.nan), np.full_like(near, np.nan)
@@ -282,7 +284,12 @@ class Assembly:
         """Return whether boxes hold a closed point (N, n), which is shown in a small box about it."""
         D, at = self.dependent, near[:, self.independent]
         small = self.enclosed(at, at, near)
-        inside = (small.lower >= boxes.lower[which])[:, D] & (small.upper <= boxes.upper[which])[:, D]
+        # Where the relation puts it: a coordinate that stands still has boxes that are no wider than this one.
+        centre, radius = (each[:, D] for each in middles(small.lower, small.upper))
+        off, rest = radius * small.off, radius * (np.abs(small.T).sum(axis=2) + small.rho) * UP
+        rest += PRODUCT * (np.abs(centre) + np.abs(off) + rest)
+        low, high = centre + off - rest, centre + off + rest
+        inside = (low >= boxes.lower[which][:, D]) & (high <= boxes.upper[which][:, D])
         return np.asarray(small.is_known & inside.all(axis=1))
 
     def refuse_apart(self, boxes: ClosedBoxes) -> None:

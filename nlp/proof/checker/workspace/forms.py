@@ -6,7 +6,7 @@ Over a box of coordinates ``z_i = c_i + r_i e_i``, ``|e_i| <= 1``, an expression
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import casadi as ca
@@ -144,20 +144,31 @@ class SparseMatrices(NamedTuple):
         return [part.matrix(at, shape) for part, at, shape in zip(parts, self.at, self.shapes, strict=True)]
 
 
+#: Returns polynomials of further inputs over boxes with ends (B, n).
+Given = Callable[[FloatArray, FloatArray], Sequence[Polynomial]]
+
+
 class FormArithmetic:
     """Affine forms of a vector of expressions (R, 1) of symbols (n, 1).
+
+    Args:
+        z: the symbols: coordinates of boxes, then further inputs.
+        expressions: the expressions.
+        given: returns polynomials of the further inputs; None without any.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule.
     """
 
-    def __init__(self, z: SX, expressions: SX) -> None:
+    def __init__(self, z: SX, expressions: SX, given: Given | None = None) -> None:
+        self._given = given
         self.function = ca.Function("forms", [z], ca.cse([ca.densify(expressions)]))
         self._arithmetic = PolynomialArithmetic(self.function)
 
     def __call__(self, lower: FloatArray, upper: FloatArray) -> Values:
         """Return the expressions over boxes with ends (B, n)."""
-        return Values(self._arithmetic(lower.T, upper.T), lower.shape)
+        given = () if self._given is None else self._given(lower, upper)
+        return Values(self._arithmetic(lower.T, upper.T, given), lower.shape)
 
 
 @np.errstate(all="ignore")

@@ -6,6 +6,7 @@ Errors of joint centres are coordinates of the forms, which are never cut.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import casadi as ca
@@ -19,9 +20,11 @@ from ....errors import UncoveredError
 from ...statement.tolerance import BuiltModel
 from ..proof_file import ProofError
 from .closed_loops import Assembly, ClosedBoxes, Enclosed, needed_equations, start_of
-from .forms import FormArithmetic, Values
-from .motion_matrix import PosedRobot
-from .pose_boxes import COORDINATES, Attempt, PoseRoot
+from .forms import Values
+from .motion_matrix import PosedRobot, Root
+from .path_loops import PathAssembly
+from .path_root import PathRoot
+from .pose_boxes import Attempt, PoseRoot
 
 #: Errors at which equations and screws that were left out are tested, in parts of the robot's length, part of the
 #: workspace about its middle in which the poses lie, number of tests, and largest residual of a closed loop.
@@ -36,23 +39,25 @@ _MOST_KEPT = 2**24
 
 
 class PosedLoops(NamedTuple):
-    """A robot over a workspace with its closed loops, and the numbers by which it differs from its machines.
+    """A robot over a workspace or a path with its closed loops, and the numbers by which its machines differ.
 
     Attributes:
         robot: the robot.
-        start: (n,) closed loops near the middle of the workspace.
+        start: (n,) closed loops near the middle of the workspace, or at the first point.
         assembly: the loops that change continuously from there.
         tolerance: largest error of each joint centre in the machines that are meant.
+        needed: loop equations that do not follow from others.
     """
 
     robot: PosedRobot
     start: FloatArray
     assembly: Assembly
     tolerance: float
+    needed: Sequence[int]
 
 
 def posed_loops(
-    case: Case, model: Model, root: PoseRoot, tolerance: float = 0.0, built: BuiltModel | None = None
+    case: Case, model: Model, root: Root, tolerance: float = 0.0, built: BuiltModel | None = None
 ) -> PosedLoops:
     """Return a robot with closed loops.
 
@@ -70,6 +75,8 @@ def posed_loops(
         ProofError: no closed loops are found in the middle of the workspace, they are singular there or leave a joint
             free, an expression has an operation without a rule, or errors take freedoms from the robot.
     """
+    if isinstance(root, PathRoot):
+        return _along_path(case, model, root, posed_loops(case, model, root.box, tolerance, built), built)
     robot = PosedRobot(case, model, root)
     start = start_of(robot)
     needed = needed_equations(robot, start)
@@ -84,7 +91,19 @@ def posed_loops(
         _refuse_other_freedoms(robot, assembly)
     if len(needed) < robot.equations.numel():
         _refuse_narrow(robot, assembly, root)
-    return PosedLoops(robot, start, assembly, tolerance)
+    return PosedLoops(robot, start, assembly, tolerance, needed)
+
+
+def _along_path(case: Case, model: Model, root: PathRoot, about: PosedLoops, built: BuiltModel | None) -> PosedLoops:
+    """Return a robot with closed loops along a path, from those in a box about it; see :func:`posed_loops`."""
+    robot, poses = PosedRobot(case, model if built is None else built.model, root), len(about.robot.free)
+    following = [about.robot.free.index(k) for k in root.box.dependent]
+    start = np.concatenate([[0.0], about.start[following], about.start[poses:]])
+    try:
+        assembly = PathAssembly(robot, robot.equations[about.needed, :], start, len(root.poses))
+    except UncoveredError as error:
+        raise ProofError(f"the check has no rule for {error}") from None
+    return PosedLoops(robot, assembly.start, assembly, about.tolerance, about.needed)
 
 
 def _refuse_narrow(robot: PosedRobot, assembly: Assembly, root: PoseRoot) -> None:
@@ -131,12 +150,13 @@ class LoopClaim(ABC):
     """
 
     def __init__(self, loops: PosedLoops, expressions: SX) -> None:
-        robot, _, self.assembly, self.tolerance = loops
+        robot, self.assembly, self.tolerance = loops.robot, loops.assembly, loops.tolerance
         # Independent coordinates as those of poses.
         self.free = [robot.free[j] for j in self.assembly.independent if j < len(robot.free)]
         self.errors, self._shown, self._kept = robot.errors, list[ClosedBoxes](), 0
+        self.coordinates = robot.coordinates
         try:
-            self._entries = FormArithmetic(robot.z, expressions)
+            self._entries = robot.forms(expressions)
         except UncoveredError as error:
             raise ProofError(f"the check has no rule for {error}") from None
 
@@ -175,11 +195,11 @@ class LoopClaim(ABC):
             raise ProofError(f"the claim takes more than {most:,} boxes with closed loops, and no more are kept")
 
     def closed(self, lower: FloatArray, upper: FloatArray) -> Enclosed:
-        """Return the closed loops over boxes (B, 6) for all errors, or over boxes (B, 6 + e) of poses and errors."""
-        if lower.shape[1] == COORDINATES:
+        """Return the closed loops over boxes (B, c) for all errors, or over boxes (B, c + e) of poses and errors."""
+        if lower.shape[1] == self.coordinates:
             errors = np.full((len(lower), self.errors), self.tolerance)
             lower, upper = np.hstack([lower, -errors]), np.hstack([upper, errors])
-        own = [*self.free, *range(COORDINATES, COORDINATES + self.errors)]
+        own = [*self.free, *range(self.coordinates, self.coordinates + self.errors)]
         return self.assembly.enclosed(lower[:, own], upper[:, own])
 
     def values(self, closed: Enclosed) -> Values:

@@ -22,15 +22,17 @@ by that number, so that they are polynomials.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import reduce
+from typing import TypeAlias
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
 from .....models import Actuator, FloatArray, Model, Substitution, Wrench, WrenchKind, rate_relations
+from .....models.arrays import values_at
 from .....models.instance import length_of
 from .....models.member import scaled_twists
 from .....models.rows import independent_rows
@@ -39,10 +41,14 @@ from ....case.pose import Free
 from ....case.workspace import TurnKind
 from ...statement.machine import has_straight_legs
 from ..proof_file import ProofError
+from .forms import FormArithmetic
+from .path_root import PathRoot
 from .pose_boxes import PoseRoot
 
 #: Singular values below this part of the largest are zero at the middle of the workspace.
 _ZERO = 1e-9
+#: The poses of a workspace, or those of a path.
+Root: TypeAlias = "PoseRoot | PathRoot"
 
 
 class PosedRobot:
@@ -57,9 +63,13 @@ class PosedRobot:
     Attributes:
         z: (n, 1) symbols: those of the six coordinates of the pose that vary, then the unknowns, then errors.
         errors: number of components of errors.
-        free: indices of the varying coordinates among the six.
+        coordinates: number of coordinates of boxes.
+        free: indices of the varying coordinates among those of boxes.
         dependent: places among these of the coordinates that follow from the others.
-        centre: (n,) the middle of the workspace, with unknowns and errors of 0.
+        given: (g, 1) symbols whose values follow from the coordinates of boxes; see :class:`.pose_boxes.PoseSymbols`.
+        varying: (v, 1) symbols of the pose, and of the unknowns.
+        of_errors: (e, 1) symbols of the errors.
+        centre: (n,) the middle of the workspace, or the first point of a path, with unknowns and errors of 0.
         size: (n,) by which coordinates are comparable: half ranges, sizes of the unknowns, and the tolerance.
         length: characteristic size of the robot, factor of the angular velocities.
         position: (3, 1) the platform's origin, length.
@@ -74,11 +84,11 @@ class PosedRobot:
         signs: (s, 1) numbers that are positive in home's working mode.
     """
 
-    def __init__(self, case: Case, model: Model, root: PoseRoot) -> None:
-        middle, symbols = 0.5 * root.lower + 0.5 * root.upper, Substitution.identity(model).all
-        self.free: list[int] = np.flatnonzero(root.upper > root.lower).tolist()
+    def __init__(self, case: Case, model: Model, root: Root) -> None:
+        symbols, self._root = Substitution.identity(model).all, root
+        self.coordinates = root.coordinates
+        self.free, head, self.given, y, varying = root.symbols()
         self.dependent = [j for j, k in enumerate(self.free) if k in root.dependent]
-        y = [SX.sym(f"y{k}") if k in self.free else SX(float(middle[k])) for k in range(6)]
         unknowns = ca.vertcat(SX(0, 1), *[SX.sym(item.name) for item in model.unknowns])
         values = [float(v) for name in case.parameters for v in case.components(name) if not isinstance(v, Free)]
         errors = SX.sym("errors", symbols[0].numel() - len(values))
@@ -86,7 +96,8 @@ class PosedRobot:
         self.model, self.position = model, ca.vertcat(*y[:3])
         self.length = length_of(model, [*values, *[0.0] * errors.numel()])
         self.rotation = turned / self.scale
-        self.z, self.errors = ca.vertcat(SX(0, 1), *[y[k] for k in self.free], unknowns, errors), errors.numel()
+        self.z, self.errors = ca.vertcat(SX(0, 1), *head, unknowns, errors), errors.numel()
+        self.varying, self.of_errors = ca.vertcat(SX(0, 1), *varying, unknowns), errors
 
         def put(expressions: Iterable[SX], rotation: SX = self.rotation) -> list[SX]:
             """Return expressions of the model with those of the coordinates in the place of its symbols."""
@@ -111,7 +122,7 @@ class PosedRobot:
 
         sizes = np.array(ca.evalf(stacked(each.size for each in model.unknowns))).ravel()
         ends = np.full(self.errors, case.joint_centre_tolerance or 0.0)
-        self.centre = np.concatenate([middle[self.free], np.zeros(len(sizes) + len(ends))])
+        self.centre = np.concatenate([root.middle[self.free], np.zeros(len(sizes) + len(ends))])
         self.size = np.concatenate([(0.5 * (root.upper - root.lower))[self.free], sizes, ends])
         arms = scaled(model.pose.rotation @ leg.platform for leg in model.legs)
         self.legs = tuple(zip(put(leg.base for leg in model.legs), arms, strict=True))
@@ -134,17 +145,54 @@ class PosedRobot:
 
     def at(self, expression: SX, z: FloatArray) -> FloatArray:
         """Return the values of a matrix of expressions at a point (n,); at points (n, P) side by side."""
-        return np.asarray(ca.Function("values", [self.z], [ca.densify(expression)])(z).full())
+        function = ca.Function("values", [self.z, self.given], [ca.densify(expression)])
+        given = self.values_given(z.T.reshape(-1, len(z))).T
+        return np.asarray(function(z, given).full())
+
+    def function(self, *outputs: SX) -> Callable[[FloatArray], list[FloatArray]]:
+        """Return a function of points (P, n) with the values (P, rows, columns) of matrices of expressions."""
+        function = ca.Function("values", [self.z, self.given], [ca.densify(each) for each in outputs])
+        return lambda z: values_at(function, z, self.values_given(z))
+
+    def forms(self, expressions: SX) -> FormArithmetic:
+        """Return the forms of expressions (R, 1) over boxes.
+
+        Raises:
+            UncoveredError: an expression holds an operation without a rule.
+        """
+        return FormArithmetic(ca.vertcat(self.z, self.given), expressions, self._root.given)
+
+    def values_given(self, z: FloatArray) -> FloatArray:
+        """Return the values (P, g) that follow from points (P, n)."""
+        return self._root.values_at(z[:, :1])
+
+    def slopes(self, expressions: SX) -> Callable[[FloatArray], FloatArray]:
+        """Return a function of points (P, n) with the derivatives (P, k, n) of expressions (k, 1) by coordinates."""
+        own, through = (ca.jacobian(expressions, each) for each in (self.z, self.given))
+        values, root = self.function(own, through), self._root
+
+        def at(z: FloatArray) -> FloatArray:
+            found, by_given = values(z)
+            if by_given.shape[2]:
+                found[:, :, 0] += (by_given @ root.slopes_at(z[:, :1])[:, :, None])[:, :, 0]
+            return found
+
+        return at
 
 
-def turned_rotation(root: PoseRoot, turn: list[SX]) -> tuple[SX, SX]:
-    """Return the rotation (3, 3) with three coordinates times a positive number, and this number: polynomials."""
+def turned_rotation(root: Root, turn: list[SX]) -> tuple[SX, SX]:
+    """Return the rotation (3, 3) with its coordinates times a positive number, and this number: polynomials.
 
-    def of_quaternion(r: SX) -> tuple[SX, SX]:
-        """Return the rotation of the quaternion (1, r), times its squared size."""
+    Four coordinates are those of a quaternion of any size but zero.
+    """
+
+    def of_quaternion(r: SX, w: SX | int = 1) -> tuple[SX, SX]:
+        """Return the rotation of the quaternion (w, r), times its squared size."""
         square = ca.sumsqr(r)
-        return (1 - square) * SX.eye(3) + 2 * r @ r.T + 2 * ca.skew(r), 1 + square
+        return (w * w - square) * SX.eye(3) + 2 * r @ r.T + 2 * w * ca.skew(r), w * w + square
 
+    if len(turn) > 3:
+        return of_quaternion(ca.vertcat(*turn[1:]), turn[0])
     if root.kind is TurnKind.ROLL_PITCH_YAW:
         single = [of_quaternion(t * SX.eye(3)[:, k]) for k, t in enumerate(turn)]
         return reduce(lambda done, each: (each[0] @ done[0], each[1] * done[1]), single)

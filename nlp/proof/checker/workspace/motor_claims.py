@@ -6,6 +6,9 @@ the force ``-(W . x_k)``, by virtual work. Loads of any direction add multiples 
 in a motion x of the platform is ``row . x / |force|`` with its own row. Else the motions of the platform are ``X u``,
 and of the left inverses of X, which all return the rates, a speed is by definition that of least size.
 
+Along a path with times the coordinate q of the actuator has the rate ``q_X X' + q_u u'`` with the rates X' of the pose,
+and ``L_u u' = -L_X X'`` for the loop equations L and the coordinates u that follow from others: the speed is its size.
+
 All are an affine function of the coordinates, multiples of sizes of affine vectors, and a rest: but for the rest they
 are convex, so that the corners of a box decide. Rotations about any axis lie in a ball, where ``n . r <= sqrt(b)`` for
 unit vectors n. A multiple of the difference is added: it is at least 0 at every pose, and less at corners outside.
@@ -30,8 +33,8 @@ from ....case.task import Sense
 from .closed_loops import Enclosed
 from .forms import PRODUCT, UP, AffineMatrix, SparseMatrices, solved
 from .loop_claims import LoopClaim, PosedLoops
-from .motion_matrix import driven_matrices
-from .pose_boxes import COORDINATES, Attempt, PoseRoot
+from .motion_matrix import Root, driven_matrices
+from .pose_boxes import COORDINATES, Attempt
 
 #: Part of a bound by which a number at a pose must be beyond it to show that a claim is wrong: far more than rounding.
 _WRONG = 1e-6
@@ -68,12 +71,19 @@ class MotorClaims(LoopClaim):
     Args:
         case: with its loads and motions.
         loops: the robot, whose loops demand no relation of the actuators' rates.
-        root: the box of poses.
+        root: the box of poses, or the path.
         claims: the numbers, with their bounds.
+        coordinate: (1, 1) of the actuator in the coordinates of the robot, whose rate along the path is the speed; None
+            for the speed in any motion of the case.
     """
 
     def __init__(
-        self, case: Case, loops: PosedLoops, root: PoseRoot, claims: Sequence[tuple[Motor, Sense, float]]
+        self,
+        case: Case,
+        loops: PosedLoops,
+        root: Root,
+        claims: Sequence[tuple[Motor, Sense, float]],
+        coordinate: SX | None = None,
     ) -> None:
         robot, motor, motion = loops.robot, claims[0][0], case.loading.motion or Motion()
         self._numbers = [_number_of(*each) for each in claims]
@@ -91,22 +101,25 @@ class MotorClaims(LoopClaim):
             D = D[:, motor.place]
         moment = forces[motor.place].T / robot.length if self._is_six_legs else SX(1, 3)
         self._ball = math.sqrt(root.ball) * (1 + _UNIT) if root.is_ball else math.inf
-        turn = [z for z, k in zip(ca.vertsplit(robot.z), robot.free, strict=False) if k >= 3]
+        turn = [z for z, k in zip(ca.vertsplit(robot.z), robot.free, strict=False) if k >= 3 and root.is_ball]
+        rates = _rates(loops, coordinate if self._has_speeds else None)
+        self._has_rates = coordinate is not None
         scaled = ca.vertcat(wrench[:3], wrench[3:] / robot.length)
-        every = [A, D, scaled.T, moment, ca.horzcat(SX(1, 0), *turn), *arms]
+        every = [A, D, scaled.T, moment, ca.horzcat(SX(1, 0), *turn), *rates, *arms]
         self._matrices = SparseMatrices.of([ca.sparsify(each) for each in every])
         super().__init__(loops, self._matrices.entries)
 
     def examined(self, closed: Enclosed) -> Attempt:
         """Try to show the claims over closed loops."""
         forms = self.assembly.followed(self.values(closed).forms(), closed)
-        A, D, wrench, moment, turn, *arms = self._matrices.forms(forms)
+        A, D, wrench, moment, turn, L_u, L_t, q_u, q_t, *arms = self._matrices.forms(forms)
         y, known, shares = solved(A, D)
         x, k = y.part(slice(0, 6)), self._place if D.M.shape[2] > 1 else 0
         ends: dict[float | None, tuple[FloatArray, FloatArray]] = {}
         for part in dict.fromkeys(part for number in self._numbers for part in number.parts):
             if part is None:
-                speed, is_known = self._speed(x, moment)
+                of_path = _along_path(L_u, L_t, q_u, q_t) if self._has_rates else None
+                speed, is_known = of_path or self._speed(x, moment)
                 known = known & is_known
                 ends[part] = self._largest(speed, turn)
             else:
@@ -197,6 +210,37 @@ class MotorClaims(LoopClaim):
         """Return the largest change (B,) of a column by errors of joint centres, each a vector of at most unit size."""
         own = vector.A[:, len(self.free) :].reshape(len(vector.A), -1, 3, vector.A.shape[2])
         return np.asarray(np.sqrt((own**2).sum(axis=(2, 3))).sum(axis=1) * UP)
+
+
+def _rates(loops: PosedLoops, coordinate: SX | None) -> list[SX]:
+    """Return the derivatives of loop equations, and of a coordinate: by those that follow, and by time along the path.
+
+    There are none without a coordinate.
+    """
+    robot, (D, k) = loops.robot, (loops.assembly.dependent, len(loops.needed))
+    if coordinate is None:
+        return [SX(k, k), SX(k, 1), SX(1, k), SX(1, 1)]
+    stated, rates = robot.given[: robot.given.numel() // 2, :], robot.given[robot.given.numel() // 2 :, :]
+    L, found = robot.equations[loops.needed, :], list[SX]()
+    for each in (L, coordinate):
+        found += [ca.jacobian(each, robot.z)[:, D], ca.jacobian(each, stated) @ rates]
+    return [ca.sparsify(each) for each in found]
+
+
+def _along_path(
+    L_u: AffineMatrix, L_t: AffineMatrix, q_u: AffineMatrix, q_t: AffineMatrix
+) -> tuple[_Sum, NDArray[np.bool_]]:
+    """Return the size of a coordinate's rate along the path, and where it is known."""
+    known, rate = np.ones(len(q_t.M), dtype=bool), q_t
+    if L_u.M.shape[1]:
+        following, known, _ = solved(L_u, L_t)
+        of_loops = q_u.matmul(following)
+        M, A = rate.M - of_loops.M, rate.A - of_loops.A
+        # The differences round by a part of the numbers in them.
+        sizes = np.abs(rate.M) + np.abs(of_loops.M) + rate.spread + of_loops.spread
+        rate = AffineMatrix(M, A, (rate.E + of_loops.E + PRODUCT * sizes) * UP)
+    fixed = AffineMatrix(*(np.zeros_like(each) for each in rate))
+    return _Sum(fixed, [(1.0, rate)]), known
 
 
 def _transposed(matrix: AffineMatrix) -> AffineMatrix:

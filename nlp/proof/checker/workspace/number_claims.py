@@ -153,7 +153,7 @@ class LegInverse:
         A = ca.vertcat(*[ca.vertcat(row.force, row.moment / length).T for row in robot.rows])
         sizes = ca.vertcat(*[ca.norm_2(A[k, :3]) for k in range(6)])
         unit = A / ca.repmat(sizes, 1, 6) if is_unit else SX(0, 6)
-        self._is_unit, self._forms = is_unit, FormArithmetic(robot.z, ca.vertcat(sizes, ca.vec(A.T), ca.vec(unit.T)))
+        self._is_unit, self._forms = is_unit, robot.forms(ca.vertcat(sizes, ca.vec(A.T), ca.vec(unit.T)))
 
     def inverse(
         self, lower: FloatArray, upper: FloatArray
@@ -276,7 +276,7 @@ class ClearanceClaim:
         # Differences of the ends of the two legs, times the scale: from foot to tip, tip to foot, and tip to tip.
         spans = robot.scale * (robot.position - foot), robot.scale * (robot.position - other_foot)
         ends = -spans[0] - other_arm, spans[1] + arm, arm - other_arm
-        self._forms = FormArithmetic(robot.z, ca.vertcat(*[ca.vertcat(end, robot.scale) for end in ends]))
+        self._forms = robot.forms(ca.vertcat(*[ca.vertcat(end, robot.scale) for end in ends]))
 
     def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
         """Try to show the claim on boxes (B, 6)."""

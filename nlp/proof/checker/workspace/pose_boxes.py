@@ -7,12 +7,13 @@ rotations about any axis are a ball in it. Nodes of a tree are ``cut``, ``bounde
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import NamedTuple, Protocol
 
 import numpy as np
+from casadi import SX
 from numpy.typing import NDArray
 
 from .....models import FloatArray
@@ -20,6 +21,7 @@ from ....case.pose import Free, Value, ends_of
 from ....case.workspace import TurnKind, Workspace
 from ..bisection import Shown, show
 from ..fractions import tangent_ends
+from ..polynomials import Polynomial
 from ..proof_file import ProofError
 from ..tree import Node, TreeReader, ahead, blocks_of
 
@@ -30,6 +32,24 @@ POSITION = 3
 #: Part of itself by which tangents move outwards where they multiply an axis: its doubles are of length 1 to rounding.
 #: A fixed angle's coordinate is a rounded tangent too.
 _AXIS = Fraction(1, 2**50)
+
+
+class PoseSymbols(NamedTuple):
+    """A pose as symbols and numbers.
+
+    Attributes:
+        free: indices of the coordinates of boxes that vary.
+        head: their symbols.
+        given: (g, 1) further symbols, whose values follow from those of boxes.
+        pose: the coordinates of a pose, symbols or numbers.
+        varying: those of them that are symbols.
+    """
+
+    free: list[int]
+    head: list[SX]
+    given: SX
+    pose: list[SX]
+    varying: list[SX]
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +65,7 @@ class PoseRoot:
         ball, inner_ball: the same of the squared size of a Cayley vector; infinite without a ball.
         dependent: indices of the coordinates that follow from the others: their ends leave no pose out, and a ball is
             one of the other components.
+        at: (6,) the pose at which closed loops begin; None for the middle.
     """
 
     kind: TurnKind
@@ -56,6 +77,34 @@ class PoseRoot:
     ball: float
     inner_ball: Fraction | None
     dependent: tuple[int, ...] = ()
+    at: FloatArray | None = None
+
+    @property
+    def coordinates(self) -> int:
+        """Number of coordinates."""
+        return len(self.lower)
+
+    @property
+    def middle(self) -> FloatArray:
+        """The pose (6,) at which closed loops begin."""
+        return 0.5 * self.lower + 0.5 * self.upper if self.at is None else self.at
+
+    def symbols(self) -> PoseSymbols:
+        """Return the coordinates as symbols, and as numbers where they do not vary."""
+        free: list[int] = np.flatnonzero(self.upper > self.lower).tolist()
+        pose = [SX.sym(f"y{k}") if k in free else SX(float(each)) for k, each in enumerate(self.middle)]
+        own = [pose[k] for k in free]
+        return PoseSymbols(free, own, SX(0, 1), pose, own)
+
+    def given(self, lower: FloatArray, upper: FloatArray) -> Sequence[Polynomial]:  # noqa: ARG002 - those of paths
+        """Return the values that follow from coordinates of boxes (B, n): none."""
+        return ()
+
+    def values_at(self, along: FloatArray) -> FloatArray:
+        """Return these values (P, 0) at points."""
+        return np.zeros((len(along), 0))
+
+    slopes_at = values_at
 
     @property
     def _turns(self) -> list[int]:
@@ -75,6 +124,15 @@ class PoseRoot:
             for k, ((low, high), each) in enumerate(zip(self.inner, at, strict=True))
         )
         return inside and (self.inner_ball is None or sum(at[k] * at[k] for k in self._turns) <= self.inner_ball)
+
+    def show_on_leaves(self, claim: BoxClaim, tree: bytes) -> tuple[int, int]:
+        """Show a claim on the leaves of a tree, and return the numbers of leaves and of boxes examined."""
+        leaves = pieces = 0
+        for count, boxes in ahead(_read_boxes(self, tree), lambda block: int(block[1].size)):
+            rule = _PoseRule(claim, self, *boxes)
+            leaves += count
+            pieces += show(rule, rule.lower, rule.upper)
+        return leaves, pieces
 
     def contracted(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
         """Return boxes (B, 6) with their ends moved to the ball, never past a pose, and which (B,) may have poses."""
@@ -160,16 +218,6 @@ class BoxClaim(Protocol):
 
     def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
         """Try to show the claim on boxes (B, 6)."""
-
-
-def show_on_leaves(claim: BoxClaim, root: PoseRoot, tree: bytes) -> tuple[int, int]:
-    """Show a claim on the leaves of a tree of a workspace, and return the numbers of leaves and of boxes examined."""
-    leaves = pieces = 0
-    for count, boxes in ahead(_read_boxes(root, tree), lambda block: int(block[1].size)):
-        rule = _PoseRule(claim, root, *boxes)
-        leaves += count
-        pieces += show(rule, rule.lower, rule.upper)
-    return leaves, pieces
 
 
 def _read_boxes(root: PoseRoot, tree: bytes) -> Iterator[tuple[int, FloatArray]]:

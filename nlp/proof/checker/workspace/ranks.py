@@ -32,8 +32,8 @@ from ..proof_file import ProofError
 from .closed_loops import Enclosed
 from .forms import UP, AffineMatrix, inverses
 from .loop_claims import LoopClaim, PosedLoops, posed_loops
-from .motion_matrix import motion_matrix
-from .pose_boxes import COORDINATES, Attempt, PoseRoot
+from .motion_matrix import Root, motion_matrix
+from .pose_boxes import Attempt
 
 #: Part of the size of a row by which its entries may be off: numbers of a robot that should be 0 are rounding error.
 _CONSTANTS = 1e-13
@@ -44,7 +44,7 @@ _AFTER, _BEFORE = [1, 2, 0], [2, 0, 1]
 
 
 def rank_claim(
-    case: Case, model: Model, root: PoseRoot, name: str, tolerance: float = 0.0, built: BuiltModel | None = None
+    case: Case, model: Model, root: Root, name: str, tolerance: float = 0.0, built: BuiltModel | None = None
 ) -> RankClaim:
     """Return the claim that a robot's J, or its constraint wrenches alone, keep their rank.
 
@@ -85,8 +85,8 @@ class RankClaim(LoopClaim):
         """Try to show the claim over closed loops."""
         return self._examined(self._matrices(closed))
 
-    def show_sign_change(self, root: PoseRoot, sides: Sequence[Sequence[float]]) -> None:
-        """Show that the determinant has opposite signs at two points (6 + e,): a pose, and errors of joint centres.
+    def show_sign_change(self, root: Root, sides: Sequence[Sequence[float]]) -> None:
+        """Show that the determinant has opposite signs at two points (c + e,): a pose, and errors of joint centres.
 
         The entries have values along the whole way between them, and poses and errors are convex in their coordinates:
         the determinant changes continuously, and is 0 at a point.
@@ -94,12 +94,12 @@ class RankClaim(LoopClaim):
         # The matrix is J itself, with rows that are neither normalised nor zero, over poses without loops.
         if self._shape != (6, 6) or self._freedoms or self.assembly.dependent:
             raise ProofError("only robots with six rows and without loops have proofs of singular poses")
-        points = [np.array(each, dtype=float) for each in sides]
-        if len(points) != 2 or any(y.shape != (COORDINATES + self.errors,) for y in points):
+        points, poses = [np.array(each, dtype=float) for each in sides], self.coordinates
+        if len(points) != 2 or any(y.shape != (poses + self.errors,) for y in points):
             raise ProofError("the claim has no two poses")
-        if not all(np.isfinite(y).all() and root.holds(y[:COORDINATES]) for y in points):
+        if not all(np.isfinite(y).all() and root.holds(y[:poses]) for y in points):
             raise ProofError("a pose is not one of the workspace")
-        for error in np.concatenate([y[COORDINATES:] for y in points]).reshape(-1, 3).tolist():
+        for error in np.concatenate([y[poses:] for y in points]).reshape(-1, 3).tolist():
             if sum(Fraction(each) ** 2 for each in error) > Fraction(self.tolerance) ** 2:
                 raise ProofError("a joint centre of the machine is off by more than the tolerance")
         signs = self._signs_at(np.stack(points))
@@ -109,7 +109,7 @@ class RankClaim(LoopClaim):
             way = points[0] + np.linspace(0, 1, count + 1)[:, None] * (points[1] - points[0])
             way[[0, -1]] = points
             matrices = self._matrices(self.closed(np.minimum(way[:-1], way[1:]), np.maximum(way[:-1], way[1:])))
-            if all(np.isfinite(each).all() for each in matrices) and all(root.holds(y[:COORDINATES]) for y in way):
+            if all(np.isfinite(each).all() for each in matrices) and all(root.holds(y[:poses]) for y in way):
                 return
         raise ProofError("the determinant is not shown to change continuously between the two poses")
 

@@ -13,11 +13,18 @@ from casadi import SX
 from .....models import Model, WrenchKind
 from .....models.joints import RobotError
 from .....models.joints.model.closedform import closed_form
+from .....models.statics import statics_hindrance
 from ....case.case import Case
+from ....case.checks import check_determined_joints
+from ....case.limits.legs import LegLength
+from ....case.motors import MotorNumber
 from ....case.task import Sense
 from ....case.workspace import Workspace
+from ....errors import InputError
+from ....path.path import ProgrammedPath
 from ....program.layout import Layout
 from ...statement.claims import (
+    ACTUATED,
     CONSTRAINTS,
     ERRORS,
     RANKS,
@@ -32,7 +39,7 @@ from ...statement.claims import (
     searched_claims,
 )
 from ...statement.machine import Legs, legs_of
-from ...statement.motors import motor_claims
+from ...statement.motors import in_motion, motor_claims, speed_claims
 from ...statement.posed_layout import closed_layout, posed_layout, reach_claims
 from ...statement.tolerance import (
     BuiltModel,
@@ -44,9 +51,10 @@ from ...statement.tolerance import (
     second_order_name,
 )
 from ..premises import exact
-from ..proof_file import Premises, ProofClaim, ProofError, workspace_numbers
-from .motion_matrix import turned_rotation
-from .pose_boxes import PoseRoot, pose_root
+from ..proof_file import PathPremises, Premises, ProofClaim, ProofError, workspace_numbers
+from .motion_matrix import Root, turned_rotation
+from .path_root import PathRoot
+from .pose_boxes import pose_root
 
 #: Part of the largest coordinate by which joint centres may differ: the same case gives other last digits elsewhere.
 _SAME = 1e-9
@@ -72,10 +80,12 @@ class Machines:
         RobotError: the robot cannot be assembled with errors of its joint centres.
     """
 
-    def __init__(self, case: Case, model: Model, root: PoseRoot) -> None:
-        self._case, self.model, self.root, self._at = case, model, root, _coordinates(root)
+    def __init__(self, case: Case, model: Model, root: Root, *, with_angles: bool = True) -> None:
+        self._case, self.model, self.root, self._at = case, model, root, coordinates_of(root)
         tolerance = case.joint_centre_tolerance or 0.0
-        self.symbols: MachineLayout = machine_layout(case, built_model(case.model), tolerance, self._at)
+        self.symbols: MachineLayout = machine_layout(
+            case, built_model(case.model, with_angles=with_angles), tolerance, self._at
+        )
 
     @cached_property
     def design(self) -> Layout:
@@ -102,7 +112,7 @@ class Machines:
 
 @dataclass(frozen=True, eq=False)
 class RobotClaims:
-    """The robot that claims about a workspace are about.
+    """The robot that claims about a workspace, or a path, are about.
 
     Attributes:
         legs: joint centres of six straight legs; None for another robot.
@@ -143,7 +153,7 @@ def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> 
             return _followed(legs, closed.model, workspace, machines.symbols, is_open=is_open, machines=machines)
     if workspace.dependent:
         symbols = machine_layout(
-            case, BuiltModel(closed.model, (), closed.reaches), 0.0, _coordinates(pose_root(workspace))
+            case, BuiltModel(closed.model, (), closed.reaches), 0.0, coordinates_of(pose_root(workspace))
         )
         return _followed(legs, closed.model, workspace, symbols, is_open=is_open)
     layout = posed_layout(case, workspace)
@@ -154,6 +164,49 @@ def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> 
         return RobotClaims(legs, closed_layout(case, closed, workspace), closed.model, place, every, numbers_at)
     numbers_at = "every assembly" if is_open else ""
     return RobotClaims(legs, layout, closed.model, place, every, numbers_at)
+
+
+def case_along_path(case: Case, path: ProgrammedPath) -> Case:
+    """Return a case whose claims are about a path, whose own motion is meant by limits on speeds and powers.
+
+    Raises:
+        CaseError: a dimension is free, the pose does not determine driven joints, or limits need a motion that neither
+            case nor path states.
+        InputError: the path has no motion.
+    """
+    if not len(path):
+        raise InputError(f"{path.source}: has no motion")
+    case.fixed_parameters("a path is judged with fixed dimensions")
+    check_determined_joints(case.model, "path", case.source)
+    if not path.is_timed:
+        case.require_motion(", or a path that states times")
+    return in_motion(case) if case.without_motion else case
+
+
+def robot_along_path(case: Case, root: PathRoot, *, with_angles: bool) -> RobotClaims:
+    """Return the robot of a case with fixed dimensions along a path; its loops are followed from the first point.
+
+    Args:
+        case: the case.
+        root: of the path.
+        with_angles: whether angles of joints are replaced by closed forms, which jump where a joint turns all round.
+
+    Raises:
+        ProofError: the robot cannot be assembled with errors of its joint centres.
+    """
+    closed, machines = closed_form(case.model, with_angles=with_angles), None
+    if case.joint_centre_tolerance:
+        try:
+            machines = Machines(case, closed.model, root, with_angles=with_angles)
+        except RobotError as error:
+            raise ProofError(str(error)) from None
+    symbols = (
+        machine_layout(case, BuiltModel(closed.model, (), closed.reaches), 0.0, coordinates_of(root))
+        if machines is None
+        else machines.symbols
+    )
+    is_open = bool(case.model.unknowns)
+    return _followed(legs_of(case), closed.model, root.workspace, symbols, is_open=is_open, machines=machines)
 
 
 def _followed(
@@ -172,7 +225,7 @@ def _followed(
     return replace(whole, dependent=dependent, followed=symbols)
 
 
-def _coordinates(root: PoseRoot) -> PoseCoordinates:
+def coordinates_of(root: Root) -> PoseCoordinates:
     """Return the coordinates of a box as those of a layout."""
 
     def rotation(turn: SX) -> SX:
@@ -201,6 +254,36 @@ def expected_claims(case: Case, robot: RobotClaims, quantities: Sequence[str], l
     if robot.legs is None:
         return [each for each in every if each.kind is not ClaimKind.SPECTRUM]
     return [*every, *(ERRORS if leg_error_of(case, leg_error) > 0 else ())]
+
+
+def expected_along_path(case: Case, robot: RobotClaims, *, is_timed: bool) -> list[Claim]:
+    """Return the claims about a case along a path; one with times has speeds and powers of its own motion."""
+    ranks = [REGULAR, *([CONSTRAINTS] if _has_constraints(robot.model) else [])]
+    names = [each.name for each in case.model.quantities if each.name in (*ACTUATED, LegLength.key)]
+    every = [
+        *(Claim(name, Sense.MIN, kind=ClaimKind.RANK) for name in ranks),
+        *robot.reaches,
+        *claims_of(robot.layout, names, with_objective=False),
+        *robot.dependent,
+        *length_claims(case),
+        *searched_claims(case),
+    ]
+    if is_timed:
+        of_loads = (each for each in motor_claims(in_path_motion(case)) if each.motor)
+        every += [*speed_claims(case), *(each for each in of_loads if _number_of(each) is not MotorNumber.SPEED)]
+    else:
+        every += motor_claims(case)
+    return [each for each in every if robot.legs is not None or each.kind is not ClaimKind.SPECTRUM]
+
+
+def _number_of(claim: Claim) -> MotorNumber | None:
+    """Return the number of an actuator that a claim is about."""
+    return None if claim.motor is None else claim.motor.number
+
+
+def in_path_motion(case: Case) -> Case:
+    """Return a case whose actuators have powers in the motion of a path, where forces are known."""
+    return case if statics_hindrance(case.model) else in_motion(case)
 
 
 def refuse_other_lemmas(lemmas: Sequence[ProofClaim], expected: Sequence[Claim]) -> None:
@@ -237,6 +320,11 @@ def hold_premises(case: Case, workspace: Workspace, legs: Legs | None, leg_error
     if given.leg_error != leg_error:
         stated = f"the proof is for legs that are off by at most {exact(given.leg_error)} {case.units.length}"
         raise ProofError(f"{stated}, and not {exact(leg_error)}: see --leg-error")
+    hold_robot(case, legs, given)
+
+
+def hold_robot(case: Case, legs: Legs | None, given: Premises | PathPremises) -> None:
+    """Refuse a proof whose file names other joint centres, or another tolerance on them, than the case has."""
     numbers = legs_numbers(legs)
     same = list(map(len, numbers)) == list(map(len, given.legs))
     if not same or not np.allclose(given.legs, numbers, rtol=0.0, atol=_SAME * np.abs(numbers).max(initial=0.0)):

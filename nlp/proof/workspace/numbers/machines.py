@@ -127,15 +127,16 @@ class Machines:
             with suppress(UncoveredError):  # an equation of loops
                 yield from self._by_search(covered, gap, is_enough=True)
 
-    def searched(self, claims: Sequence[Claim], gap: float, *, is_enough: bool = True) -> list[Verdict]:
+    def searched(self, claims: Sequence[Claim], search: NumberSearch, *, is_enough: bool = True) -> list[Verdict]:
         """Return the extremes of numbers that have rules, all by one search.
 
         Args:
             claims: the numbers, in the symbols of machines.
-            gap: as a part of a number.
+            search: gap and record.
             is_enough: whether bounds within limits are enough whatever the gap is.
         """
-        return list(self._by_search(claims, gap, is_enough=is_enough, small=_SMALL if is_enough else 0.0))
+        small = _SMALL if is_enough else 0.0
+        return list(self._by_search(claims, search.gap, is_enough=is_enough, small=small, record=search.record))
 
     def is_covered(self, claim: Claim) -> bool:
         """Return whether a number has no operation without a rule."""
@@ -211,7 +212,7 @@ class Machines:
             gap: as a part of a number.
             is_enough: whether bounds within limits are enough whatever the gap is.
             small: length, in parts of the robot's, or angle, of which the gap is a part too: numbers may be 0 at home.
-            record: record of the search of one number for a proof.
+            record: record of the search for a proof; along a path also of one that stopped.
 
         Raises:
             UncoveredError: an expression holds an operation without a rule.
@@ -226,9 +227,11 @@ class Machines:
         goals = [goal_of(claim, gap * own, gap, is_enough=is_enough) for claim, own in zip(claims, least, strict=True)]
         recorder = None if record is None else TreeRecord()
         every = smallest_values(Expressions(self.family, ca.vertcat(*map(self.number, claims))), goals, recorder)
-        if record is not None and recorder is not None and not every[0].reason:
-            sign = -claims[0].sense.sign
-            record.followed(claims[0], sign * every[0].bound, sign * every[0].value, recorder)
+        if record is not None and recorder is not None:
+            for claim, own in zip(claims, every, strict=True):
+                if problem.cover is not None or not own.reason:
+                    sign = -claim.sense.sign
+                    record.followed(claim, sign * own.bound, sign * own.value, recorder)
         for claim, found in zip(claims, every, strict=True):
             is_known = math.isfinite(found.value)
             pose = problem.box.pose(problem.pose_of(found.at)) if is_known else None

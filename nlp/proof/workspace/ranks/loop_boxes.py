@@ -23,6 +23,7 @@ from ....evidence.closed_loops import inverses
 from ...boxes.search import SMALL, Boxes, Order, Rule, Search, bisected, joined, some
 from ...boxes.tree import TreeRecord
 from ...enclosure.forms import Encloser, Forms
+from ..path_trees import record_halves
 from ..robot.path_cover import PathCover
 from ..robot.posed_model import RankMatrix
 from ..robot.posed_robot import Problem
@@ -442,7 +443,9 @@ class LoopRule(Rule[Followed]):
 
     def divided(self, boxes: Boxes[Followed]) -> Boxes[Followed]:
         """Return the parts of boxes, with their dependent coordinates."""
-        if self._recorder is not None:
+        if self._recorder is not None and self._problem.cover is not None:
+            record_halves(self._recorder, boxes.more.along)
+        elif self._recorder is not None:
             along = np.array(self._problem.free)[boxes.split]
             self._recorder.cuts(*self._poses(boxes.lower, boxes.upper), along)
         parts = self.parts(boxes)
@@ -485,7 +488,7 @@ class LoopRule(Rule[Followed]):
     def _contracted(self, boxes: LoopBoxes) -> LoopBoxes:
         """Return boxes contracted to the workspace, and record where they lead."""
         found, kept = contracted_boxes(self._problem, boxes)
-        if self._recorder is not None:
+        if self._recorder is not None and self._problem.cover is None:
             before, after = (self._poses(each.lower, each.upper) for each in (boxes, found))
             self._recorder.contractions(before, after, ~kept)
         return found if kept.all() else some(found, kept)

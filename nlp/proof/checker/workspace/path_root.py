@@ -1,0 +1,198 @@
+"""The poses of a path as coordinates of boxes: the place along the path, and those of the pose that follow from others.
+
+A tree of a path has one tree for each segment, in their order, whose nodes halve or cut the place.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+from numpy.typing import NDArray
+
+from .....models import FloatArray
+from ....case.case import Case
+from ....case.pose import Free, Value, ends_of
+from ....case.workspace import LARGEST_TURN, TurnKind, Turns, Workspace
+from ....errors import CaseError
+from ....evidence.dependent import dependent_of, robot_size
+from ....path.path import ProgrammedPath
+from ..bisection import Shown, show
+from ..polynomials import Polynomial
+from ..proof_file import ProofError
+from ..tree import Node, TreeReader, ahead, blocks_of
+from .path_poses import PathPoses
+from .pose_boxes import POSITION, BoxClaim, PoseRoot, PoseSymbols
+
+#: Part of its size, or of 1, by which the range of a coordinate is wider than along the path.
+_ROOM = 1e-9
+#: Parts of a robot's size, or angle, by which a coordinate moves that stands still but for rounding.
+_STILL = 1e-9
+
+
+class PathRoot:
+    """The poses of a path.
+
+    Args:
+        case: with fixed dimensions.
+        path: with a segment at least.
+
+    Attributes:
+        poses: coordinates along the path.
+        box: a box about all poses, which begins at the first one.
+        workspace: the same, with the coordinates that the robot cannot choose; those stand still, and have no range.
+        stated: (v,) indices of the coordinates of a pose that vary, and do not follow from others.
+        coordinates: number of coordinates of a piece: the place along the path.
+        lower, upper, middle, dependent: of the place, and of the coordinates that follow from others; see
+            :class:`.pose_boxes.PoseRoot`.
+
+    Raises:
+        ProofError: the path moves a coordinate that the robot cannot choose.
+    """
+
+    coordinates = 1
+    is_ball, ball = False, math.inf
+
+    def __init__(self, case: Case, path: ProgrammedPath) -> None:
+        self.poses, self._is_timed = PathPoses(path), path.is_timed
+        low, high = self.poses.ranges()
+        self.workspace = _workspace(case, low, high, is_tangents=self.poses.is_tangents)
+        following, varying = [each.index for each in self.workspace.dependent], self.poses.varying
+        for each in self.workspace.dependent:
+            k, ends = each.index, (each.lower, each.upper)
+            low[k], high[k] = map(math.tan, (0.5 * end for end in ends)) if k >= POSITION else ends
+        self.stated = [k for k in varying if k not in following]
+        room = np.zeros(len(low))
+        room[self.stated] = _ROOM * (1 + np.abs([low, high]).max(axis=0))[self.stated]
+        first, lower, upper = 0.5 * low + 0.5 * high, low - room, high + room
+        first[self.stated] = self.poses.at(np.zeros(1))[0][0, [varying.index(k) for k in self.stated]]
+        moving = sorted({*self.stated, *following})
+        values = [
+            Free(a, b) if k in moving else a
+            for k, (a, b) in enumerate(zip(lower.tolist(), upper.tolist(), strict=True))
+        ]
+        kind = TurnKind.ROLL_PITCH_YAW if self.poses.is_tangents else TurnKind.ANY_AXIS
+        none = np.zeros(3)
+        self.box = PoseRoot(kind, none, tuple(values), lower, upper, (), math.inf, None, tuple(following), first)
+        self.kind, self.axis, self.values = kind, none, self.box.values
+        self.lower = np.array([0.0, *lower[following]])
+        self.upper = np.array([float(len(path)), *upper[following]])
+        self.middle = np.array([0.0, *first[following]])
+        self.dependent = tuple(range(1, 1 + len(following)))
+        self._columns = [varying.index(k) for k in self.stated]
+
+    def symbols(self) -> PoseSymbols:
+        """Return the coordinates as symbols; given are those of a place, and their rates of a path with times."""
+        pose = list(self.box.symbols().pose)
+        following = [pose[k] for k in self.box.dependent]
+        stated = ca.vertcat(SX(0, 1), *[pose[k] for k in self.stated])
+        rates = SX.sym("rates", len(self.stated) * self._is_timed)
+        varying = [pose[k] for k in sorted({*self.stated, *self.box.dependent})]
+        free = list(range(1 + len(following)))
+        return PoseSymbols(free, [SX.sym("along"), *following], ca.vertcat(stated, rates), pose, varying)
+
+    def given(self, lower: FloatArray, upper: FloatArray) -> Sequence[Polynomial]:
+        """Return the stated coordinates over pieces (B, n), and their rates by seconds of a timed path."""
+        low, high = lower[:, 0], upper[:, 0]
+        values, slopes = ([each[k] for k in self._columns] for each in self.poses.over(low, high))
+        if not self._is_timed:
+            return values
+        inverse = self.poses.inverse_seconds(self.poses.segments(low, high))
+        return [*values, *(each * inverse for each in slopes)]
+
+    def values_at(self, along: FloatArray) -> FloatArray:
+        """Return these values (P, g) at places (P, 1): computed."""
+        place = np.clip(along[:, 0], 0.0, len(self.poses))
+        values, slopes = (each[:, self._columns] for each in self.poses.at(place))
+        if not self._is_timed:
+            return values
+        inverse = self.poses.inverse_seconds(self.poses.segments(place, place)).P[0]
+        return np.hstack([values, slopes * inverse[:, None]])
+
+    def slopes_at(self, along: FloatArray) -> FloatArray:
+        """Return the derivatives (P, g) of the coordinates by the place at places (P, 1): computed; 0 of rates."""
+        slopes = self.poses.at(np.clip(along[:, 0], 0.0, len(self.poses)))[1][:, self._columns]
+        return np.hstack([slopes, np.zeros((len(slopes), slopes.shape[1] * self._is_timed))])
+
+    def holds(self, y: FloatArray) -> bool:
+        """Return whether a point (1,) is a place of the path."""
+        return bool(0 <= y[0] <= len(self.poses))
+
+    def show_on_leaves(self, claim: BoxClaim, tree: bytes) -> tuple[int, int]:
+        """Show a claim on the leaves of a tree, and return the numbers of leaves and of pieces examined."""
+        leaves = pieces = 0
+        for each in ahead(self._read_pieces(tree), lambda block: int(block.size)):
+            rule = _PieceRule(claim, *each)
+            leaves += each.shape[2]
+            pieces += show(rule, rule.lower, rule.upper)
+        return leaves, pieces
+
+    def _read_pieces(self, tree: bytes) -> Iterator[FloatArray]:
+        """Yield the leaves of a tree in blocks: ends (2, 1, L) of pieces."""
+        reader, inner = TreeReader(tree), frozenset({Node.HALF, Node.CUT})
+        ends = (np.array([float(k), k + 1.0])[:, None] for k in range(len(self.poses)))
+        every = (leaf for low, high in ends for leaf in reader.walk(low, high, inner))
+        for block in blocks_of(every, 2):
+            pieces = list[tuple[FloatArray, FloatArray]]()
+            for kind, _, low, high in block:
+                if kind != Node.BOUNDED:
+                    raise ProofError(f"the tree holds {kind} where a piece must be closed or cut")
+                pieces.append((low, high))
+            yield np.array(pieces).transpose(1, 2, 0)
+        reader.finish()
+
+
+class _PieceRule:
+    """The rule of a claim about pieces (1, L) of a path."""
+
+    block, most_pieces = 256, 5_000
+    width: FloatArray = np.ones(1)
+
+    def __init__(self, claim: BoxClaim, lower: FloatArray, upper: FloatArray) -> None:
+        self._claim, self.lower, self.upper = claim, lower, upper
+
+    def examine(self, lower: FloatArray, upper: FloatArray, _: NDArray[np.intp]) -> Shown:
+        """Examine pieces with ends (1, N)."""
+        found = self._claim.attempt(lower.T, upper.T)
+        return Shown(found.holds, np.ones_like(lower), lower, upper, found.is_wrong)
+
+    def sentence(self, claim: int) -> str:
+        """Return the sentence that a claim could not be shown."""
+        k = int(np.floor(0.5 * self.lower[0, claim] + 0.5 * self.upper[0, claim]))
+        low, high = (each[0, claim] - k for each in (self.lower, self.upper))
+        return f"the claim could not be shown for segment {k + 1} from {low:.6g} to {high:.6g} of it"
+
+
+def _workspace(case: Case, low: FloatArray, high: FloatArray, *, is_tangents: bool) -> Workspace:
+    """Return a workspace about a path with these ends (c,) of coordinates; those that follow from others stand still.
+
+    Raises:
+        ProofError: the path moves one of these.
+    """
+    turns = Turns(TurnKind.ANY_AXIS, (Free(-LARGEST_TURN, LARGEST_TURN),))
+    position = _values(low[:POSITION], high[:POSITION])
+    if not is_tangents:
+        return Workspace(position, turns)
+    angles = tuple(_values(*(2 * np.arctan(each[POSITION:]) for each in (low, high))))
+    stated = [*position, *angles]
+    about = Workspace(position, Turns(TurnKind.ROLL_PITCH_YAW, angles))
+    try:
+        found = dependent_of(replace(case, workspace=about), about)
+    except CaseError as error:
+        raise ProofError(error.fault) from None
+    following = [each.index for each in found.dependent]
+    length = _STILL * robot_size(case, [sum(ends_of(each)) / 2 for each in position])
+    moved = [found.names[k] for k in following if np.ptp(ends_of(stated[k])) > (length if k < POSITION else _STILL)]
+    if moved:
+        raise ProofError(f"the path moves {' and '.join(moved)}, which this robot cannot choose")
+    still = [sum(ends_of(each)) / 2 if k in following else each for k, each in enumerate(stated)]
+    return replace(found, position=still[:POSITION], turns=replace(found.turns, angles=tuple(still[POSITION:])))
+
+
+def _values(low: FloatArray, high: FloatArray) -> list[Value]:
+    """Return ranges, or fixed numbers where both ends are one."""
+    return [Free(a, b) if b > a else a for a, b in zip(low.tolist(), high.tolist(), strict=True)]

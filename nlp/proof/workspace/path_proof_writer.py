@@ -1,0 +1,121 @@
+"""Proof file of a judgement along a path: the claims that the records of its searches prove."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from ..checker.proof_file import PathPremises, Proof, ProofClaim, ProofError, Unproved
+from ..checker.workspace.path_root import PathRoot
+from ..checker.workspace.statement import case_along_path, expected_along_path, robot_along_path
+from ..statement.claims import Claim, ClaimKind
+from .path_closing import closed_form_along
+from .proof_writer import NO_LENGTHS, NOT_JUDGED, bound_on_record, words_of
+from .verdict import Outcome
+
+if TYPE_CHECKING:
+    from ...case.case import Case
+    from .judgement import Judgement
+    from .proof_record import Key, ProofRecord
+
+#: Reason of claims of kinds without a record, and of a pose that is singular but for rounding.
+_NO_RECORD = "claims of this kind along a path have no proof record"
+_COMPUTED = "a computed pose has no proof"
+
+
+def path_proof_of(case: Case, judged: Judgement, record: ProofRecord, text: str, premises: PathPremises) -> Proof:
+    """Return the proof of what is proved along a path, or refuted by two places, and the claims that have none.
+
+    Args:
+        case: the case that was judged, as it was read.
+        judged: the verdicts.
+        record: of the searches that led to them.
+        text: the case file's text.
+        premises: of the path.
+    """
+    premises = replace(premises, with_angles=closed_form_along(case, judged.path).has_angles)
+    own, path = case_along_path(case, judged.path), judged.path
+    writer, unproved = _Writer(judged, record), list[Unproved]()
+    try:
+        robot = robot_along_path(own, PathRoot(own, path), with_angles=premises.with_angles)
+        expected = expected_along_path(own, robot, is_timed=path.is_timed)
+    except ProofError as error:
+        every = [*writer.ranks, *writer.numbers]
+        return Proof(text, case.name, premises, (), (), tuple(Unproved(*key, str(error)) for key in every))
+    for each in expected:
+        try:
+            writer.proved[each.label] = writer.proof(each)
+        except ProofError as error:
+            unproved.append(Unproved(*each.label, str(error)))
+    known = {each.label for each in expected}
+    unproved += [Unproved(*key, _NO_RECORD) for key in writer.numbers if key not in known]
+    return Proof(text, case.name, premises, tuple(writer.proved.values()), (), tuple(unproved))
+
+
+class _Writer:
+    """Writer of the proofs of claims along a path.
+
+    Args:
+        judged: the verdicts.
+        record: of the searches that led to them.
+
+    Attributes:
+        ranks, numbers: the verdicts by their labels; of two of one label the first.
+        proved: the claims so far.
+    """
+
+    def __init__(self, judged: Judgement, record: ProofRecord) -> None:
+        self._record = record
+        self.ranks = {(each.name, ""): each for each in judged.ranks}
+        self.numbers = {(each.name, each.sense.value): each for each in reversed(judged.extremes)}
+        self.proved: dict[Key, ProofClaim] = {}
+
+    def proof(self, each: Claim) -> ProofClaim:
+        """Return a claim with its proof; one that rests on others comes after them.
+
+        Raises:
+            ProofError: it has none, with the reason.
+        """
+        if each.kind is ClaimKind.RANK:
+            return self._rank(each.name)
+        if each.label not in self.numbers:
+            raise ProofError(NOT_JUDGED)
+        found = self.numbers[each.label]
+        if each.kind is ClaimKind.EXPRESSION:
+            # A bound is shown although it is not as fine as it was to be: others rest on lengths of legs.
+            is_bounded = found.limit is None and found.outcome is not Outcome.REFUTED
+            if found.outcome is not Outcome.PROVED and not is_bounded:
+                raise ProofError(words_of(found))
+            if each.label not in self._record.programs:
+                raise ProofError(words_of(found) if found.reason else _NO_RECORD)
+            return self._record.programs[each.label]
+        if found.outcome is not Outcome.PROVED:
+            raise ProofError(words_of(found))
+        if each.kind is ClaimKind.LENGTHS:
+            self._need_lengths(found.name.partition(" limb ")[2])
+            return ProofClaim(*each.label, "lengths", found.bound)
+        if each.name not in self._record.boxes:
+            raise ProofError(_NO_RECORD)
+        tree = self._record.nodes(self._record.tree(each.name))
+        return ProofClaim(*each.label, "boxes", bound_on_record(each, found), tree=tree)
+
+    def _rank(self, name: str) -> ProofClaim:
+        """Return the claim that J, or the constraint wrenches, keep their rank, or the opposite."""
+        found = self.ranks.get((name, ""))
+        if found is None:
+            raise ProofError(NOT_JUDGED)
+        if found.sides is not None:
+            return ProofClaim(name, "", "singular", sides=tuple(map(tuple, found.sides.tolist())))
+        if found.outcome is not Outcome.PROVED:
+            computed = f"; {_COMPUTED}" if found.outcome is Outcome.REFUTED else ""
+            raise ProofError(f"{words_of(found)}{computed}")
+        return ProofClaim(name, "", "regular", tree=self._record.nodes(self._record.tree(name)))
+
+    def _need_lengths(self, leg: str) -> None:
+        """Refuse a claim where the lengths of the leg that it rests on have no proof.
+
+        Raises:
+            ProofError: they have none.
+        """
+        if any((f"leg_length limb {leg}", sense) not in self.proved for sense in ("min", "max")):
+            raise ProofError(NO_LENGTHS)
