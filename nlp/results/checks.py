@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from .jsondata import JsonObject, Vector
+from ..system.jsonvalues import JsonObject, Vector
 from .parts import SCHEMA, SchemaVersion
 from .regression import CaseCheck, PublishedCheck, decimals_of
 from .text import Line, TextTable, Tone, in_part

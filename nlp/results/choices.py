@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from ...models import Dimension
 from ..case.choices import chosen_settings, listed_numbers
 from ..solver.status import Status
-from .jsondata import Absent, JsonObject, Vector
+from ..system.jsonvalues import Absent, JsonObject, Vector
 
 if TYPE_CHECKING:
     from ..solver.solution import Choice, Rounding, Solution

@@ -10,9 +10,9 @@ from ..case.task import Method, Sense
 from ..evidence.optimality import PointKind
 from ..proof.certificate.certificate import CertificateStatus
 from ..solver.status import Status
+from ..system.jsonvalues import Absent, Inline, JsonObject, Vector
 from ..system.strictjson import Size
 from .choices import ChoiceData, RoundingData
-from .jsondata import Absent, Inline, JsonObject, Vector
 from .objective import ObjectiveData
 from .parts import (
     Bound,

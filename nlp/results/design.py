@@ -12,8 +12,8 @@ from ..evidence.sensitivity import sensitivities
 from ..evidence.tolerance import tolerance_loss
 from ..program.nlp import Nlp
 from ..program.relaxation import RelaxedLimit
+from ..system.jsonvalues import finite_or_none, vector
 from ..units import rate_unit
-from .jsondata import finite_or_none, vector
 from .parts import JointGradientData, LimitData, MarginData, RelaxationData, SensitivityData, ToleranceData
 from .rounding import NOISE
 

@@ -6,9 +6,9 @@ from ...models import FloatArray
 from ..evidence.principal_motions import PrincipalMotion, analyse_tasks
 from ..evidence.state import RobotState
 from ..program.nlp import Nlp
+from ..system.jsonvalues import Absent, Inline, JsonObject, Vector, vector
 from .design import limits_data, margins_data
 from .jointdata import MotionData, motion_data
-from .jsondata import Absent, Inline, JsonObject, Vector, vector
 from .objective import ObjectiveData, objective_data
 from .parts import HeadData, LimitData, MarginData, RobotData, TaskData, VersionsData, ViolationData
 from .point import head_data, objective, robot_data, task_data, versions, violations

@@ -11,10 +11,10 @@ from ..case.task import Sense
 from ..evidence.optimality import Evidence
 from ..program.nlp import Nlp
 from ..proof.certificate.certificate import Certificate
+from ..system.jsonvalues import Absent, Inline, JsonObject, vector
 from .choices import ChoiceData, choice_data
 from .data import ActiveData, CertificateData, OptimalityData
 from .design import unit_of_side
-from .jsondata import Absent, Inline, JsonObject, vector
 from .objective import ObjectiveData, certified_objective
 from .parts import HeadData, VersionsData
 from .point import head_data, stated_pose_notice, versions

@@ -13,7 +13,7 @@ from ..evidence.singularities import Singularity, SingularityKey, clause_of
 from ..evidence.state import RobotState
 from ..program.free_joints import free_joints
 from ..program.nlp import Nlp
-from .jsondata import Absent, JsonObject, Vector3, Vector6, finite_or_none, vector
+from ..system.jsonvalues import Absent, JsonObject, Vector3, Vector6, finite_or_none, vector
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

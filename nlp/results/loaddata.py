@@ -9,7 +9,7 @@ from ..case.forces import dimension_of_force, dimension_of_speed
 from ..evidence.loads import LoadState, loads_at
 from ..evidence.state import RobotState, evaluate
 from ..program.nlp import Nlp
-from .jsondata import Absent, JsonObject, Matrix, Vector3, Vector6, finite_or_none, matrix, vector
+from ..system.jsonvalues import Absent, JsonObject, Matrix, Vector3, Vector6, finite_or_none, matrix, vector
 
 
 class ActuatorForceData(JsonObject):

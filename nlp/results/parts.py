@@ -10,9 +10,9 @@ from typing import Annotated, Final, Literal, TypeAlias
 from ..case.overrides import Settings
 from ..case.pose import OverPoses
 from ..case.task import Sense
+from ..system.jsonvalues import Absent, Inline, JsonObject, Vector, Vector3, Vector6
 from ..system.strictjson import Size
 from .jointdata import FreeJointData, JointsData, MotionData
-from .jsondata import Absent, Inline, JsonObject, Vector, Vector3, Vector6
 from .loaddata import LoadingData
 
 #: Version of a result, the newest of :data:`screwsynth.models.fileversions.RESULT_FILES`.

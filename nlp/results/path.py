@@ -13,7 +13,7 @@ from ..case.task import Sense
 from ..proof.statement.claims import ACTUATED
 from ..proof.workspace.numbers.extremes import Extreme
 from ..proof.workspace.verdict import Outcome
-from .jsondata import Absent, Inline, JsonObject
+from ..system.jsonvalues import Absent, Inline, JsonObject
 from .objective import unit_of_claim
 from .parts import HeadData, SettingsData, VersionsData, settings_data
 from .pathtable import knot_motion

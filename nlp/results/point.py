@@ -22,9 +22,9 @@ from ..evidence.margins import measured_numbers, measured_slack
 from ..evidence.state import RobotState, StatedPose, evaluate, stated_poses
 from ..program.nlp import Nlp
 from ..program.pairs import with_pairs_at
+from ..system.jsonvalues import Vector, matrix, vector
 from .design import unit_of_side
 from .jointdata import free_joints_data, joints_data, motion_data
-from .jsondata import Vector, matrix, vector
 from .loaddata import loading_data
 from .objective import pose_objective
 from .parts import (

@@ -31,8 +31,8 @@ from ..interruption import Milestone, is_requested, reached
 from ..program.formulation import formulate_each
 from ..solver.multistart import solve_program
 from ..solver.solve import solve
+from ..system.jsonvalues import JsonValue, json_data
 from .data import CaseResult
-from .jsondata import JsonValue, json_data
 from .parts import RobotData
 from .result import result_of
 

@@ -12,6 +12,7 @@ from ..proof.certificate.certificate import Certificate
 from ..solver.multistart import ProgramSolution
 from ..solver.solution import Combination, Solution, TaskOutcome
 from ..solver.starts import Optimum, StartStatus
+from ..system.jsonvalues import finite_or_none, vector
 from .choices import ChoiceData, RoundingData, choice_data, rounding_data
 from .data import (
     CaseResult,
@@ -26,7 +27,6 @@ from .data import (
 )
 from .design import limits_data, margins_data, relaxation_data, sensitivity_data, tolerance_data
 from .evidence import certificate_data, optimality_data
-from .jsondata import finite_or_none, vector
 from .objective import objective_data, over_workspace
 from .point import head_data, objective, robot_data, versions, violations
 

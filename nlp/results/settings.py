@@ -10,9 +10,9 @@ from ..case.case import Case
 from ..case.overrides import ENDS, Settings
 from ..case.pose import Free, Pose, RotationForm
 from ..errors import InputError
+from ..system.jsonvalues import Vector
 from .data import CombinedResult, SolveResult
 from .evaluation import EvaluationResult
-from .jsondata import Vector
 from .parts import PoseData, RobotData, settings_from_data
 from .path import PathResult
 from .posewording import rotation_form, rotation_numbers

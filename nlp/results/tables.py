@@ -206,7 +206,7 @@ def optimum_table(solution: ProgramSolution, robot: RobotData | None = None) -> 
 
 def origin_table(versions: VersionsData, search: Search | None = None, seconds: float = 0.0) -> TextTable:
     """Return versions, and of a search seed, starts and time: all that the numbers depend on."""
-    rows = [(name, str(getattr(versions, name))) for name in versions.marks]
+    rows = [(name, str(getattr(versions, name))) for name in versions.fields]
     if search is not None:
         rows += [("seed", str(search.seed)), ("starts", str(search.starts)), ("seconds", f"{seconds:.3g}")]
     return TextTable(("", ""), tuple(rows), "versions")

@@ -14,9 +14,9 @@ from ..solver.solution import Solution
 from ..solver.status import Status
 from ..solver.tradeoff import Tradeoff, TradeoffPoint, tradeoff
 from ..system.csvtext import csv_text
+from ..system.jsonvalues import Absent, Inline, JsonObject, Vector, finite_or_none
 from ..units import slope_unit
 from .data import CaseResult, SolveResult
-from .jsondata import Absent, Inline, JsonObject, Vector, finite_or_none
 from .parts import HeadData, LimitData, PoseData, VersionsData
 from .point import head_data, stated_pose_notice, versions
 from .result import result_of

@@ -12,8 +12,8 @@ from ..case.task import Sense
 from ..proof.statement.claims import ACTUATED
 from ..proof.statement.machine import has_straight_legs
 from ..proof.workspace.verdict import Outcome
+from ..system.jsonvalues import Absent, Inline, JsonObject, Vector, Vector3, finite_or_none, vector
 from ..units import Units
-from .jsondata import Absent, Inline, JsonObject, Vector, Vector3, finite_or_none, vector
 from .objective import unit_of_claim
 from .parts import HeadData, SettingsData, VersionsData, settings_data
 from .point import head_data, versions

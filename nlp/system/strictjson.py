@@ -41,6 +41,16 @@ class Size(NamedTuple):
     entries: int
 
 
+class Made(NamedTuple):
+    """Mark of an annotation of which a field has another value than JSON.
+
+    Attributes:
+        of: returns the field's value from that of the annotation.
+    """
+
+    of: Callable[[Any], object]
+
+
 class WrongValueError(ValueError):
     """A value that its type does not allow.
 
@@ -161,6 +171,8 @@ def _compound(kind: object, value: object, key: str, read: ObjectReader | None) 
         for mark in arguments[1:]:
             if isinstance(mark, Size) and isinstance(found, tuple) and len(found) != mark.entries:
                 raise WrongValueError(key, f"must have {mark.entries} entries, got {len(found)}")
+            if isinstance(mark, Made):
+                found = mark.of(found)
         return found
     if origin is Literal:
         if not any(type(value) is type(each) and value == each for each in arguments):

@@ -28,12 +28,12 @@ from screwsynth.nlp.output.report.markup import html_table, paragraphs
 from screwsynth.nlp.output.report.report import report_of
 from screwsynth.nlp.output.report.webpage import page_of
 from screwsynth.nlp.results import data, parts
-from screwsynth.nlp.results.jsondata import Absent, Inline, JsonObject
 from screwsynth.nlp.results.regression import check_case
 from screwsynth.nlp.results.schema import RESULTS, result_from_json, result_schema
 from screwsynth.nlp.results.summary import case_summary
 from screwsynth.nlp.results.text import Line, TextTable, Tone
 from screwsynth.nlp.solver import multistart, starts
+from screwsynth.nlp.system.jsonvalues import Absent, Inline, JsonObject
 
 Json = dict[str, Any]
 
