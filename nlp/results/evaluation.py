@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from ...models import FloatArray
+from ..evidence.margins import Margin
 from ..evidence.principal_motions import PrincipalMotion, analyse_tasks
 from ..evidence.state import RobotState
 from ..program.nlp import Nlp
@@ -10,7 +11,7 @@ from ..system.jsonvalues import Absent, Inline, JsonObject, Vector, vector
 from .design import limits_data, margins_data
 from .jointdata import MotionData, motion_data
 from .objective import ObjectiveData, objective_data
-from .parts import HeadData, LimitData, MarginData, RobotData, TaskData, VersionsData, ViolationData
+from .parts import HeadData, LimitData, RobotData, TaskData, VersionsData, ViolationData
 from .point import head_data, objective, robot_data, task_data, versions, violations
 
 
@@ -76,7 +77,7 @@ class EvaluationResult(JsonObject):
     robot: Inline[RobotData]
     tasks: tuple[EvaluatedTaskData, ...]
     violated: tuple[ViolationData, ...]
-    margins: tuple[MarginData, ...]
+    margins: tuple[Margin, ...]
     limits: tuple[LimitData, ...]
     principal_motions: PrincipalMotionsData
     versions: VersionsData

@@ -10,7 +10,8 @@ from typing import Annotated, Final, Literal, TypeAlias
 from ..case.overrides import Settings
 from ..case.pose import OverPoses
 from ..case.task import Sense
-from ..system.jsonvalues import Absent, Inline, JsonObject, Vector, Vector3, Vector6
+from ..program.nlp import Bound
+from ..system.jsonvalues import Absent, Inline, JsonObject, Known, Vector, Vector3, Vector6
 from ..system.strictjson import Size
 from .jointdata import FreeJointData, JointsData, MotionData
 from .loaddata import LoadingData
@@ -19,8 +20,6 @@ from .loaddata import LoadingData
 SchemaVersion: TypeAlias = Literal[1]
 SCHEMA: Final = 1
 
-#: A side of a limit: from below, from above, or both at once.
-Bound: TypeAlias = Literal["min", "max", "equal"]
 #: Values of a quantity by the limb or joint that has it.
 ByOwner: TypeAlias = Mapping[str, float]
 #: Numbers that replace those of a case file, by the names of ``--set``; an infinite one is a text.
@@ -229,34 +228,6 @@ class ViolationData(JsonObject):
     unit: Absent[str]
 
 
-class MarginData(JsonObject):
-    """Margin of a point in a limit at one leg, joint or pose.
-
-    Attributes:
-        name: the limit, and where.
-        key: dotted key, below limits, of the number in the case.
-        bound: side of it.
-        value: measured there; null where it is not finite.
-        limit: number of the case.
-        margin: distance from the limit, positive inside.
-        unit: of value, limit and margin.
-        active: whether the point lies on the limit.
-        violated: whether the point lies outside of the limit by more than rounding error.
-        cost: derivative of the optimal F by the limit; null where the point is no optimum.
-    """
-
-    name: str
-    key: str
-    bound: Bound
-    value: float | None
-    limit: float
-    margin: float | None
-    unit: str
-    active: bool
-    violated: bool
-    cost: float | None
-
-
 class LimitData(JsonObject):
     """A limiting number of the case, over all legs, joints and poses.
 
@@ -276,72 +247,8 @@ class LimitData(JsonObject):
     limit: float
     unit: str
     nearest: str
-    value: float | None
-    margin: float | None
+    value: Known
+    margin: Known
     active: tuple[str, ...]
     violated: tuple[str, ...]
     cost: float | None
-
-
-class RelaxationData(JsonObject):
-    """A number of an infeasible case that must be moved, with all the others of its list, for the case to be feasible.
-
-    Attributes:
-        key: dotted key, below limits, of the number.
-        limit: as it is.
-        needed: as it would have to be; where limits hold over a workspace or along a path, at least so far from it.
-        unit: of both.
-    """
-
-    key: str
-    limit: float
-    needed: float
-    unit: str
-
-
-class SensitivityData(JsonObject):
-    """Sensitivity of the optimal F to a fixed number.
-
-    Attributes:
-        name: of the number.
-        value: of the number.
-        unit: of the value.
-        derivative: of the optimal F by the number; absent where there is none.
-        hindrance: why there is none, in words.
-    """
-
-    name: str
-    value: float
-    unit: str
-    derivative: Absent[float]
-    hindrance: Absent[str]
-
-
-class JointGradientData(JsonObject):
-    """Derivatives of F by the error of a joint centre.
-
-    Attributes:
-        limb: of the joint.
-        plate: base or platform.
-        gradient: in the plate's frame.
-    """
-
-    limb: str
-    plate: str
-    gradient: Vector3
-
-
-class ToleranceData(JsonObject):
-    """Loss of F by inexact joint centres.
-
-    Attributes:
-        joint_centre: largest error of every joint centre.
-        loss: worst loss of F, to first order.
-        loss_there: loss of F with the errors that are worst to first order.
-        joints: derivatives of F by each joint's error.
-    """
-
-    joint_centre: float
-    loss: float
-    loss_there: float
-    joints: tuple[JointGradientData, ...]

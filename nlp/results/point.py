@@ -18,12 +18,11 @@ from ..case.loads import NO_LOADING
 from ..evidence.conventions import dependence_of
 from ..evidence.kkt import FEASIBLE, linearise
 from ..evidence.loads import loads_at
-from ..evidence.margins import measured_numbers, measured_slack
+from ..evidence.margins import measured_numbers, measured_slack, unit_of_side
 from ..evidence.state import RobotState, StatedPose, evaluate, stated_poses
 from ..program.nlp import Nlp
 from ..program.pairs import with_pairs_at
 from ..system.jsonvalues import Vector, matrix, vector
-from .design import unit_of_side
 from .jointdata import free_joints_data, joints_data, motion_data
 from .loaddata import loading_data
 from .objective import pose_objective

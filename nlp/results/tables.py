@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from ..evidence.kkt import ACTIVE
@@ -17,11 +18,12 @@ if TYPE_CHECKING:
 
     from ..case.case import Case
     from ..case.settings import Search
+    from ..evidence.margins import Margin
     from ..program.nlp import Nlp
     from ..solver.multistart import ProgramSolution
     from .data import SolveResult
     from .evaluation import PrincipalMotionsData
-    from .parts import LimitData, MarginData, RobotData, VersionsData
+    from .parts import LimitData, RobotData, VersionsData
     from .path import PathProofData
     from .workspace import WorkspaceProofData
 
@@ -91,14 +93,14 @@ def limit_table(limits: Sequence[LimitData], F: float = 0.0, title: str = "") ->
     )
 
 
-def _text(value: float | None, size: float) -> str:
+def _text(value: float, size: float) -> str:
     """Return a number's text, 0 where it is rounding error beside a size."""
-    return "none" if value is None else number(value, size, digits=6)
+    return number(value, size, digits=6) if math.isfinite(value) else "none"
 
 
-def _margin_text(margin: float | None, beside: float, word: str) -> str:
+def _margin_text(margin: float, beside: float, word: str) -> str:
     """Return a margin's text; at an active limit its error is that of the test for active limits."""
-    if margin is None:
+    if not math.isfinite(margin):
         return "none"
     return number(margin, beside, digits=6, part=_ON_LIMIT if word == "active" else NOISE)
 
@@ -134,7 +136,7 @@ def outcome_table(combined: CombinedData, tasks: Sequence[SolveResult] = ()) -> 
     return TextTable(headers, tuple(rows), "tasks", extra=1)
 
 
-def margin_table(margins: Sequence[MarginData]) -> TextTable:
+def margin_table(margins: Sequence[Margin]) -> TextTable:
     """Return every margin: violated and active ones first."""
     rows = []
     for row in sorted(margins, key=lambda each: (not each.violated, not each.active)):

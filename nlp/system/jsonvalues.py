@@ -1,16 +1,16 @@
 """Frozen values that JSON writes as objects: their base class, the declarations of their fields, and the conversion.
 
-A value of any room is declared once. A subclass of :class:`JsonObject` declares its fields as a dataclass does, and type
-checkers treat it as a dataclass; an annotation also states what JSON, its schema and its reader need: whether a field may
-be absent, under which key it stands, and the dimension of a number that results have in the case's unit.
+A value of any room is declared once. A subclass of :class:`JsonObject` declares its fields as a dataclass does, and
+type checkers treat it as a dataclass. An annotation also states what JSON, its schema and its reader need: whether a
+field may be absent, its key, and the dimension of a number that results have in the case's unit.
 
-It is no dataclass, because ``dataclass`` compiles methods for each class, which takes 0.4 ms: forty classes would make a
-short command a thirtieth slower.
+It is no dataclass, because ``dataclass`` compiles methods for each class, which takes 0.4 ms: forty classes would make
+a short command a thirtieth slower.
 """
 
 import enum
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import (
     TYPE_CHECKING,
     Annotated,
@@ -62,6 +62,9 @@ class Measure(enum.Enum):
 Absent: TypeAlias = Annotated[_T | None, Mark.ABSENT]
 #: A field whose own fields are written in its place.
 Inline: TypeAlias = Annotated[_T, Mark.INLINE]
+#: A number of the object's dimension, and a derivative by such a number.
+Shown: TypeAlias = Annotated[float, Measure.NUMBER]
+Slope: TypeAlias = Annotated[_T, Measure.SLOPE]
 #: A field that JSON never has.
 Hidden: TypeAlias = Annotated[_T, Mark.HIDDEN]
 
@@ -139,6 +142,11 @@ class JsonObject:
         if units is not None and "dimension" in copied:
             copied["dimension"] = Dimension.NUMBER
         return cls(**copied, **given)
+
+    @classmethod
+    def of_each(cls, rows: Iterable[object], units: Units | None = None) -> "tuple[Self, ...]":
+        """Return an object for each of several values; arguments are those of :meth:`of`."""
+        return tuple(cls.of(row, units) for row in rows)
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"{type(self).__name__} is frozen: {name} cannot be set")
