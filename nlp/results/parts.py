@@ -10,10 +10,12 @@ from typing import Annotated, Final, Literal, TypeAlias
 from ..case.overrides import Settings
 from ..case.pose import OverPoses
 from ..case.task import Sense
+from ..evidence.screwvalues import ScrewMotion
+from ..program.free_joints import FreeJoint
 from ..program.nlp import Bound
 from ..system.jsonvalues import Absent, Inline, JsonObject, Known, Vector, Vector3, Vector6
 from ..system.strictjson import Size
-from .jointdata import FreeJointData, JointsData, MotionData
+from .jointdata import JointsData
 from .loaddata import LoadingData
 
 #: Version of a result, the newest of :data:`screwsynth.models.fileversions.RESULT_FILES`.
@@ -113,7 +115,7 @@ class TaskData(JsonObject):
 
     name: str
     sense: Sense
-    motion: Inline[MotionData]
+    motion: Inline[ScrewMotion]
     stated_point: Absent[Vector3]
 
 
@@ -198,14 +200,14 @@ class RobotData(JsonObject):
     rank: int
     singular: bool
     singular_values: Vector
-    free_motions: tuple[MotionData, ...]
+    free_motions: tuple[ScrewMotion, ...]
     task_is_free: Absent[bool]
     quantities: Mapping[str, ByOwner]
     limited_quantities: Absent[Mapping[str, ByOwner]]
     characteristic_length: Absent[float]
     length_dependence: Absent[float]
     joints: Absent[JointsData]
-    free_joints: Absent[tuple[FreeJointData, ...]]
+    free_joints: Absent[tuple[FreeJoint, ...]]
     loading: Inline[LoadingData | None]
     several: Inline[PosesData | None]
 

@@ -19,11 +19,13 @@ from ..evidence.conventions import dependence_of
 from ..evidence.kkt import FEASIBLE, linearise
 from ..evidence.loads import loads_at
 from ..evidence.margins import measured_numbers, measured_slack, unit_of_side
+from ..evidence.screwvalues import motion_of
 from ..evidence.state import RobotState, StatedPose, evaluate, stated_poses
+from ..program.free_joints import FreeJoint, free_joints
 from ..program.nlp import Nlp
 from ..program.pairs import with_pairs_at
 from ..system.jsonvalues import Vector, matrix, vector
-from .jointdata import free_joints_data, joints_data, motion_data
+from .jointdata import joints_data
 from .loaddata import loading_data
 from .objective import pose_objective
 from .parts import (
@@ -94,14 +96,14 @@ def robot_data(nlp: Nlp, x: FloatArray, state: RobotState, task: int | None) -> 
         members=tuple(row.member for row in case.model.rows),
         rates=None if task is None else vector(state.rates),
         singular=state.is_singular,
-        free_motions=tuple(motion_data(twist) for twist in state.free_twists),
+        free_motions=tuple(motion_of(twist) for twist in state.free_twists),
         task_is_free=None if task is None else state.is_zero,
         quantities=_quantities(case, state),
         limited_quantities=limited[0] if limited else None,
         characteristic_length=case.characteristic_length if case.model.has_couples else None,
         length_dependence=None if dependence is None else dependence.length,
         joints=joints_data(nlp, x, state, dependence, with_task=task is not None),
-        free_joints=free_joints_data(nlp, x),
+        free_joints=FreeJoint.of_each(free_joints(nlp, x), case.units) or None,
         loading=loading_data(nlp, x, state) if case.loading != NO_LOADING else None,
         several=several,
     )
@@ -175,7 +177,7 @@ def task_data(case: Case, task: int) -> TaskData:
     chosen = case.tasks[task]
     return TaskData.of(
         chosen,
-        motion=motion_data(chosen.twist),
+        motion=motion_of(chosen.twist),
         stated_point=None if chosen.point is None else vector(np.asarray(chosen.point, dtype=np.float64)),
     )
 

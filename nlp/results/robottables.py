@@ -35,8 +35,8 @@ from .text import FEWEST_FOLDED, Figure, TextTable
 if TYPE_CHECKING:
     from ..evidence.optimality import ActiveSide
     from ..evidence.sensitivity import Sensitivity
+    from ..program.free_joints import FreeJoint
     from .data import CombinedData, SolveResult
-    from .jointdata import FreeJointData
     from .parts import ByOwner, PoseData, PosesData, PoseStateData, RobotData, TaskData
 
 #: So many fixed numbers are shown where others are free; those that F feels most, where that is known.
@@ -219,7 +219,7 @@ def _pose_rows(case: Case, k: int, found: PoseData, reasons: _Reasons) -> list[_
     return [*rows, _Row(last.place, cells, last.felt), last]
 
 
-def _free_joint_rows(case: Case, joints: Sequence[FreeJointData], reasons: _Reasons) -> list[_Row]:
+def _free_joint_rows(case: Case, joints: Sequence[FreeJoint], reasons: _Reasons) -> list[_Row]:
     """Return the rows of driven joints whose positions the pose does not determine."""
     rows = []
     for each in joints:

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     from ..case.case import Case
     from ..case.settings import Search
     from ..evidence.margins import Margin
+    from ..evidence.principal_motions import TaskAnalysis
     from ..program.nlp import Nlp
     from ..solver.multistart import ProgramSolution
     from .data import SolveResult
-    from .evaluation import PrincipalMotionsData
     from .parts import LimitData, RobotData, VersionsData
     from .path import PathProofData
     from .workspace import WorkspaceProofData
@@ -38,7 +38,7 @@ _EIGENVECTOR = 1e-6
 MOST_OPTIMA = 12
 
 
-def principal_table(motions: PrincipalMotionsData, units: Units, size: float) -> TextTable:
+def principal_table(motions: TaskAnalysis, units: Units, size: float) -> TextTable:
     """Return the motions at which F is stationary: those of unit rotation, then translations of unit speed.
 
     Args:

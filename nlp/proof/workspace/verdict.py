@@ -13,7 +13,7 @@ from .robot.pose_box import PoseBox, PoseNumbers
 #: Part of a limit by which a value may be beyond it and still count as on it: rounding.
 _ON_LIMIT = 1e-9
 #: How a singular pose of a structure is known that is singular at every pose.
-EVERYWHERE = SingularityKind.ARCHITECTURE.value
+EVERYWHERE = SingularityKind.ARCHITECTURE.clause
 
 
 class Outcome(enum.Enum):
