@@ -10,13 +10,13 @@ from typing import Annotated, Final, Literal, TypeAlias
 from ..case.overrides import Settings
 from ..case.pose import OverPoses
 from ..case.task import Sense
+from ..evidence.loads import ActuatorLoading
 from ..evidence.screwvalues import ScrewMotion
 from ..program.free_joints import FreeJoint
 from ..program.nlp import Bound
 from ..system.jsonvalues import Absent, Inline, JsonObject, Known, Vector, Vector3, Vector6
 from ..system.strictjson import Size
 from .jointdata import JointsData
-from .loaddata import LoadingData
 
 #: Version of a result, the newest of :data:`screwsynth.models.fileversions.RESULT_FILES`.
 SchemaVersion: TypeAlias = Literal[1]
@@ -208,7 +208,7 @@ class RobotData(JsonObject):
     length_dependence: Absent[float]
     joints: Absent[JointsData]
     free_joints: Absent[tuple[FreeJoint, ...]]
-    loading: Inline[LoadingData | None]
+    loading: Inline[ActuatorLoading | None]
     several: Inline[PosesData | None]
 
 

@@ -17,7 +17,7 @@ from ..case.case import Case
 from ..case.loads import NO_LOADING
 from ..evidence.conventions import dependence_of
 from ..evidence.kkt import FEASIBLE, linearise
-from ..evidence.loads import loads_at
+from ..evidence.loads import loading_of, loads_at
 from ..evidence.margins import measured_numbers, measured_slack, unit_of_side
 from ..evidence.screwvalues import motion_of
 from ..evidence.state import RobotState, StatedPose, evaluate, stated_poses
@@ -26,7 +26,6 @@ from ..program.nlp import Nlp
 from ..program.pairs import with_pairs_at
 from ..system.jsonvalues import Vector, matrix, vector
 from .jointdata import joints_data
-from .loaddata import loading_data
 from .objective import pose_objective
 from .parts import (
     SCHEMA,
@@ -104,7 +103,7 @@ def robot_data(nlp: Nlp, x: FloatArray, state: RobotState, task: int | None) -> 
         length_dependence=None if dependence is None else dependence.length,
         joints=joints_data(nlp, x, state, dependence, with_task=task is not None),
         free_joints=FreeJoint.of_each(free_joints(nlp, x), case.units) or None,
-        loading=loading_data(nlp, x, state) if case.loading != NO_LOADING else None,
+        loading=loading_of(nlp, x, state) if case.loading != NO_LOADING else None,
         several=several,
     )
 
