@@ -5,17 +5,17 @@ Numbers are in the case's units. Nothing is ever NaN or infinite, but an infinit
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Final, Literal, TypeAlias
+from typing import Final, Literal, TypeAlias
 
 from ..case.overrides import Settings
 from ..case.pose import OverPoses
 from ..case.task import Sense
 from ..evidence.loads import ActuatorLoading
 from ..evidence.screwvalues import ScrewMotion
+from ..evidence.state import PlatformPose
 from ..program.free_joints import FreeJoint
 from ..program.nlp import Bound
 from ..system.jsonvalues import Absent, Inline, JsonObject, Known, Vector, Vector3, Vector6
-from ..system.strictjson import Size
 from .jointdata import JointsData
 
 #: Version of a result, the newest of :data:`screwsynth.models.fileversions.RESULT_FILES`.
@@ -26,7 +26,6 @@ SCHEMA: Final = 1
 ByOwner: TypeAlias = Mapping[str, float]
 #: Numbers that replace those of a case file, by the names of ``--set``; an infinite one is a text.
 SettingsData: TypeAlias = Mapping[str, float | Vector | Literal["inf", "-inf"]]
-RotationMatrix: TypeAlias = Annotated[tuple[Vector3, ...], Size(3)]
 Jacobian: TypeAlias = tuple[Vector6, ...]
 
 
@@ -87,22 +86,6 @@ class VersionsData(JsonObject):
     python: str
 
 
-class PoseData(JsonObject):
-    """A pose of the platform.
-
-    Attributes:
-        position: of the platform's origin, in the world frame.
-        axis: unit axis of the rotation.
-        angle: of the rotation about the axis.
-        rotation_matrix: rows of the rotation matrix.
-    """
-
-    position: Vector3
-    axis: Vector3
-    angle: float
-    rotation_matrix: RotationMatrix
-
-
 class TaskData(JsonObject):
     """A task of the case.
 
@@ -137,7 +120,7 @@ class PoseStateData(JsonObject):
     """
 
     F: float
-    pose: PoseData
+    pose: PlatformPose
     jacobian: Jacobian
     rates: Vector
     rank: int
@@ -156,7 +139,7 @@ class PosesData(JsonObject):
         poses: the robot at every pose.
     """
 
-    stated_poses: tuple[PoseData, ...]
+    stated_poses: tuple[PlatformPose, ...]
     over_poses: OverPoses
     poses: tuple[PoseStateData, ...]
 
@@ -191,7 +174,7 @@ class RobotData(JsonObject):
     """
 
     parameters: Mapping[str, float | Vector]
-    pose: PoseData
+    pose: PlatformPose
     task: Absent[TaskData]
     limbs: tuple[str, ...]
     members: tuple[str, ...]

@@ -11,7 +11,7 @@ from types import MappingProxyType
 import casadi as ca
 import numpy as np
 
-from ...models import Dimension, FloatArray, Quantity
+from ...models import FloatArray, Quantity
 from .. import __version__
 from ..case.case import Case
 from ..case.loads import NO_LOADING
@@ -20,18 +20,17 @@ from ..evidence.kkt import FEASIBLE, linearise
 from ..evidence.loads import loading_of, loads_at
 from ..evidence.margins import measured_numbers, measured_slack, unit_of_side
 from ..evidence.screwvalues import motion_of
-from ..evidence.state import RobotState, StatedPose, evaluate, stated_poses
+from ..evidence.state import PlatformPose, RobotState, evaluate, stated_poses
 from ..program.free_joints import FreeJoint, free_joints
 from ..program.nlp import Nlp
 from ..program.pairs import with_pairs_at
-from ..system.jsonvalues import Vector, matrix, vector
+from ..system.jsonvalues import Vector, vector
 from .jointdata import joints_data
 from .objective import pose_objective
 from .parts import (
     SCHEMA,
     ByOwner,
     HeadData,
-    PoseData,
     PosesData,
     PoseStateData,
     RobotData,
@@ -160,15 +159,11 @@ def _pose_state(nlp: Nlp, x: FloatArray, k: int, limited: Mapping[str, ByOwner] 
     )
 
 
-def pose_data(case: Case, pose: RobotState | StatedPose) -> PoseData:
+def pose_data(case: Case, pose: RobotState | PlatformPose) -> PlatformPose:
     """Return a pose in the case's units; without rotation its axis is z, unless the case holds another one."""
     is_held = any(each.rotation.axis is not None for each in case.poses)
-    return PoseData(
-        position=vector(pose.position),
-        axis=vector(pose.axis) if is_held or abs(pose.angle) > TURNED else (0.0, 0.0, 1.0),
-        angle=case.units.shown(pose.angle, Dimension.ANGLE),
-        rotation_matrix=matrix(pose.rotation),
-    )
+    unturned = {} if is_held or abs(pose.angle) > TURNED else {"axis": (0.0, 0.0, 1.0)}
+    return PlatformPose.of(pose, case.units, **unturned)
 
 
 def task_data(case: Case, task: int) -> TaskData:

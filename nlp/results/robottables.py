@@ -35,9 +35,10 @@ from .text import FEWEST_FOLDED, Figure, TextTable
 if TYPE_CHECKING:
     from ..evidence.optimality import ActiveSide
     from ..evidence.sensitivity import Sensitivity
+    from ..evidence.state import PlatformPose
     from ..program.free_joints import FreeJoint
     from .data import CombinedData, SolveResult
-    from .parts import ByOwner, PoseData, PosesData, PoseStateData, RobotData, TaskData
+    from .parts import ByOwner, PosesData, PoseStateData, RobotData, TaskData
 
 #: So many fixed numbers are shown where others are free; those that F feels most, where that is known.
 _FIXED = 6
@@ -192,7 +193,7 @@ def design_table(
     return TextTable(headers, cells, "design", folded=folded, folded_words=words, named=named)
 
 
-def _pose_rows(case: Case, k: int, found: PoseData, reasons: _Reasons) -> list[_Row]:
+def _pose_rows(case: Case, k: int, found: PlatformPose, reasons: _Reasons) -> list[_Row]:
     """Return the rows of a stated pose: position, and rotation in the form in which the case states it."""
     prefix, pose = case.pose_prefixes[k], case.poses[k]
     largest = max(map(abs, found.position))

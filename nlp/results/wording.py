@@ -346,7 +346,9 @@ def choice_lines(
     tone = Tone.PLAIN if is_answer else Tone.FAULT
     if choice is not None:
         chosen = ", ".join(
-            f"{each.name} = {each.value:.7g} {each.unit}".rstrip() for each in choice.numbers if each.value is not None
+            f"{each.name} = {each.value:.7g} {each.unit}".rstrip()
+            for each in choice.numbers
+            if math.isfinite(each.value)
         )
         yield Line(f"{chosen}: {choice.statement}" if is_answer else choice.statement, label="values", tone=tone)
     if rounding is not None:
