@@ -175,7 +175,7 @@ def check_case(name: str, solved: dict[str, CaseResult] | None = None) -> CaseCh
     return CaseCheck(
         name=case.name,
         title=case.title,
-        passed=all(row.passed for row in (*expected, *published)),
+        passed=all(row.passed for row in expected) and all(row.passed for row in published),
         seconds=time.perf_counter() - began,
         expected=expected,
         published=published,
@@ -201,8 +201,9 @@ def _check_expected(case: Case, result: CaseResult, data: JsonData) -> list[Expe
     expect, rows = case.expect, list[ExpectedCheck]()
 
     def add(quantity: str, expected: float | bool | str, computed: object, tolerance: float, *, passed: bool) -> None:
-        row = {"quantity": quantity, "expected": expected, "computed": computed, "tolerance": tolerance}
-        rows.append(ExpectedCheck(**row, passed=passed))
+        rows.append(
+            ExpectedCheck(quantity=quantity, expected=expected, computed=computed, tolerance=tolerance, passed=passed)
+        )
 
     add("status", "an answer", result.status.value, 0.0, passed=result.status.is_answer)
     if expect.F is not None:
