@@ -16,7 +16,7 @@ from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.proof.statement.claims import claims_of
 from screwsynth.nlp.proof.statement.posed_layout import posed_layout
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
-from screwsynth.nlp.proof.workspace.numbers.extremes import prove_extreme
+from screwsynth.nlp.proof.workspace.numbers.extremes import NumberSearch, prove_extreme
 
 # The machine of LinuxCNC's hexapod kinematics; see cases/hexapod-machining.toml.
 TEXT = """
@@ -70,7 +70,7 @@ def by_dimension(case: Case) -> None:
         for claim in claims_of(layout):
             kind = "F" if claim.name == "F" else "length"
             began = time.process_time()
-            boxes[kind] += prove_extreme(layout, claim, time_limit=60, jobs=1).boxes
+            boxes[kind] += prove_extreme(layout, claim, NumberSearch(jobs=1), time_limit=60).boxes
             seconds[kind] += time.process_time() - began
         print(
             f"{free} free: regular {regular.boxes:,} boxes {1e3 * taken:.1f} ms; 12 lengths {boxes['length']:,} boxes "

@@ -24,8 +24,8 @@ from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.proof.checker.proof_file import read_proof
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
-from screwsynth.nlp.proof.workspace.paper_record import PaperRecord
-from screwsynth.nlp.proof.workspace.proof_writer import paper_of
+from screwsynth.nlp.proof.workspace.proof_record import ProofRecord
+from screwsynth.nlp.proof.workspace.proof_writer import proof_of
 
 #: Length by which moments are divided, and the largest error of a leg's length.
 _LENGTH, _LEG_ERROR = 10.0, 0.008
@@ -44,12 +44,12 @@ def case_of(tolerance: float | None, degrees: float = 20.0) -> Case:
 
 def measure(case: Case, *, numbers: bool = True, objective: bool = False, leg_error: float = 0.0) -> FloatArray:
     """Return leaves, boxes of the check, and CPU seconds of search and check of a case's proof."""
-    record, began = PaperRecord(), time.process_time()
+    record, began = ProofRecord(), time.process_time()
     judged = judge_workspace(
-        case, jobs=1, time_limit=None, with_limits=numbers, with_objective=objective, leg_error=leg_error, paper=record
+        case, jobs=1, time_limit=None, with_limits=numbers, with_objective=objective, leg_error=leg_error, record=record
     )
     searched = time.process_time() - began
-    proof = read_proof(paper_of(judged, record, "", leg_error=leg_error).as_text(), "proof")
+    proof = read_proof(proof_of(judged, record, "", leg_error=leg_error).as_text(), "proof")
     began = time.process_time()
     checked = check_workspace_proof(proof, case, leg_error=leg_error)
     return np.array([checked.leaves, checked.pieces, searched, time.process_time() - began])

@@ -16,8 +16,8 @@ from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.proof.checker.proof_file import ProofError, read_proof
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
-from screwsynth.nlp.proof.workspace.paper_record import PaperRecord
-from screwsynth.nlp.proof.workspace.proof_writer import paper_of
+from screwsynth.nlp.proof.workspace.proof_record import ProofRecord
+from screwsynth.nlp.proof.workspace.proof_writer import proof_of
 
 _PART, _DEGREES = 0.02, 5.0
 
@@ -31,10 +31,10 @@ def measure(name: str) -> str:
     place = [Free(each - _PART * size, each + _PART * size) for each in model.home]
     workspace = Workspace(place, Turns(TurnKind.ROLL_PITCH_YAW, (Free(-angle, angle),) * 3))
     case = Case(model, values, list(model.home), [Task([0, 0, 0, 0, 0, 1])], workspace=workspace)
-    began, record = time.process_time(), PaperRecord()
-    judged = judge_workspace(case, with_limits=False, paper=record)
+    began, record = time.process_time(), ProofRecord()
+    judged = judge_workspace(case, with_limits=False, record=record)
     searched = time.process_time()
-    proof = read_proof(paper_of(judged, record, "").as_text(), name)
+    proof = read_proof(proof_of(judged, record, "").as_text(), name)
     begin = time.process_time()
     try:
         checked = check_workspace_proof(proof, case)

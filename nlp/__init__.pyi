@@ -111,15 +111,13 @@ from .proof.workspace.axis_ranges import PairRange as PairRange
 from .proof.workspace.axis_ranges import RangeEnd as RangeEnd
 from .proof.workspace.axis_ranges import RangeStop as RangeStop
 from .proof.workspace.axis_ranges import axis_ranges as axis_ranges
-from .proof.workspace.judge import Judgement as Judgement
 from .proof.workspace.judge import judge_workspace as judge_workspace
-from .proof.workspace.numbers.extremes import Extreme as Extreme
+from .proof.workspace.judgement import Judgement as Judgement
 from .proof.workspace.path_check import check_path as check_path
-from .proof.workspace.path_judge import PathJudgement as PathJudgement
 from .proof.workspace.scale import Scale as Scale
 from .proof.workspace.scale import largest_scale as largest_scale
 from .proof.workspace.verdict import Outcome as Outcome
-from .proof.workspace.verdict import RankVerdict as RankVerdict
+from .proof.workspace.verdict import Verdict as Verdict
 from .results.regression import CaseCheck as CaseCheck
 from .results.regression import check as check
 from .results.result import result_of as result_of

@@ -25,7 +25,7 @@ from legs import Array, Poses, twist_of
 from randomcases import text_of
 from robots import FOLDER, numbers
 
-from screwsynth.nlp import Extreme, Judgement, Outcome, judge_workspace, load_case
+from screwsynth.nlp import Judgement, Outcome, Verdict, judge_workspace, load_case
 
 Tables = dict[str, Any]
 BLOCK = 2048
@@ -203,7 +203,7 @@ class Values:
         return np.asarray(self.asked.errors * found / np.maximum(np.linalg.norm(found, axis=2, keepdims=True), 1e-300))
 
 
-def name_of(extreme: Extreme) -> str:
+def name_of(extreme: Verdict) -> str:
     """Return the name of an answer's number among :class:`Values`."""
     name = re.sub(
         r"(joint\.\S+?)(\.first|\.second)? joint .*", lambda m: m[1] + (m[2] or "").replace(".", " "), extreme.name
@@ -389,7 +389,7 @@ class Attack:
     def _said(self, taken: Taken) -> str:
         return f"at {taken.at.tolist()} (inside: {self.asked.has(taken.at)}, off by {taken.away:.1e})"
 
-    def _pose_of(self, each: Extreme, name: str, taken: Taken, what: str) -> None:
+    def _pose_of(self, each: Verdict, name: str, taken: Taken, what: str) -> None:
         """Attack the pose of a number: it is in the workspace, the robot takes it, and has the number there."""
         if taken.there is None:
             return

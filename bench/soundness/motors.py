@@ -26,7 +26,7 @@ from randomcases import random_legs, text_of
 from robots import close, motions
 from workspaces import Machines
 
-from screwsynth.nlp import CaseError, Extreme, Judgement, judge_workspace, load_case
+from screwsynth.nlp import CaseError, Judgement, Verdict, judge_workspace, load_case
 
 SAMPLES, BLOCK, ROUNDING = 100_000, 4096, 1e-9
 #: Poses that are tried at most: those of fewer freedoms may close outside of the workspace.
@@ -264,7 +264,7 @@ def steepest(subject: Subject, at: Points, level: Array, number: Array) -> tuple
     return both, np.where(better, found[rows, number], level.ravel()).reshape(level.shape)
 
 
-def key_of(each: Extreme) -> Key:
+def key_of(each: Verdict) -> Key:
     """Return the number of a claim."""
     motor = each.motor
     opposite = {"force": "backwards", "power": "braking"} if motor.is_backwards or each.sense.sign < 0 else {}

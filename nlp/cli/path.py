@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from ..path.options import PathOptions
     from ..proof.workspace.path_knots import Sampling
-    from ..results.workspace import WorkspacePose
+    from ..results.verdicts import WorkspacePose
 
 
 def path(

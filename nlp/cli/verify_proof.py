@@ -39,7 +39,7 @@ def verify_proof(
     from ..proof.checker.proof_file import LARGEST_PROOF, Statement, read_proof
     from ..results.text import Line
     from ..system.reading import read_limited
-    from .paper import verify_paper
+    from .proofs import verified_lines
 
     is_given = {"--above": above is not None, "--all-assemblies": all_assemblies, "--leg-error": leg_error != 0}
     given = read_proof(read_limited(proof, LARGEST_PROOF), proof)
@@ -56,7 +56,7 @@ def verify_proof(
     if isinstance(given.premises, Statement):
         lines: Iterable[Line] = _verify(given.premises, given.claims[0], loaded, above, all_assemblies=all_assemblies)
     else:
-        lines = verify_paper(given, loaded, leg_error)
+        lines = verified_lines(given, loaded, leg_error)
     whose = "the case is the one that the proof carries; " if case is None else ""
     first, *others = lines
     options.show([first, Line(f"{whose}checked by screwsynth {__version__}"), *others], whole=whole)

@@ -11,10 +11,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ..case.case import Case
-    from ..proof.workspace.judge import Judgement
-    from ..proof.workspace.paper_record import PaperRecord
+    from ..proof.workspace.judgement import Judgement
+    from ..proof.workspace.proof_record import ProofRecord
     from ..proof.workspace.slices.slices import Slice
-    from ..results.workspace import WorkspacePose, WorkspaceResult
+    from ..results.verdicts import WorkspacePose
+    from ..results.workspace import WorkspaceResult
 
 
 def workspace(
@@ -42,9 +43,9 @@ def workspace(
     from ..proof.statement.machine import workspace_of_case
     from ..results.posewording import evaluate_command
     from ..results.workspace import scale_data, workspace_of
-    from .paper import paper_record, paper_text
+    from .proofs import proof_record, proof_text
 
-    record = paper_record(proof, json_file)
+    record = proof_record(proof, json_file)
     answer_after(Milestone.BOUND)
     (loaded, text, inputs), chosen = options.read_machine(case, settings, of)
     workspace_of_case(loaded)
@@ -75,7 +76,7 @@ def workspace(
         plot=lambda: contents.slices_figure(loaded, slices),
         plot_pose=lambda: _worst(loaded, result, plot_pose),
         html=lambda: contents.workspace_page(contents.WorkspaceReport(loaded, text, result, slices, command)),
-        proof=lambda: paper_text(proof, judged, record, text, quantities or (), leg_error),
+        proof=lambda: proof_text(proof, judged, record, text, quantities or (), leg_error),
     )
 
 
@@ -86,7 +87,7 @@ def _judge_with_progress(
     time: float | None,
     leg_error: float,
     jobs: int | None,
-    paper: PaperRecord | None,
+    record: ProofRecord | None,
 ) -> Judgement:
     """Judge a machine with a line of progress on standard error, where standard error is a terminal."""
     from ..proof.workspace.judge import TIME_LIMIT, judge_workspace
@@ -103,7 +104,7 @@ def _judge_with_progress(
                 f"regular poses: {boxes:,} boxes, {left:,} left, {seconds:.0f} s"
             ),
             progress=lambda name, done, total: show(f"{name}: {done} of {total} numbers done"),
-            paper=paper,
+            record=record,
         )
 
 

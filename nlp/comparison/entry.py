@@ -15,7 +15,7 @@ from ..case.task import Sense
 from ..evidence.mobility import Mobility, mobility_of
 from ..evidence.state import evaluate
 from ..proof.certificate.certificate import Certificate
-from ..proof.workspace.judge import Judgement
+from ..proof.workspace.judgement import Judgement
 from ..proof.workspace.verdict import Outcome
 from ..solver.certified import Certified
 from ..solver.solution import Solution, TaskOutcome

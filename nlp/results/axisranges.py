@@ -15,8 +15,8 @@ from .parts import HeadData, VersionsData
 from .point import head_data, versions
 from .rounding import number
 from .text import Line, TextTable, Tone, in_part
+from .verdicts import WorkspacePose, pose_data
 from .wording import title_line
-from .workspace import WorkspacePose, pose_data
 
 if TYPE_CHECKING:
     from ..proof.workspace.axis_ranges import AxisRanges, RangeEnd, RangeStop

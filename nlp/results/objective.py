@@ -15,8 +15,7 @@ from ..system.jsonvalues import Absent, JsonObject, finite_or_none
 from ..units import objective_unit
 
 if TYPE_CHECKING:
-    from ..proof.workspace.judge import Judgement
-    from ..proof.workspace.path_judge import PathJudgement
+    from ..proof.workspace.judgement import Judgement
     from ..solver.certified import Certified
 
 
@@ -76,7 +75,7 @@ def certified_objective(certified: "Certified") -> ObjectiveData | None:
     return objective_data(solution.case, value, certificate)
 
 
-def over_workspace(case: Case, judged: "Judgement | PathJudgement") -> float:
+def over_workspace(case: Case, judged: "Judgement") -> float:
     """Return a proven bound of what a case optimises over every pose of a workspace or path; NaN without one."""
     measure = case.tasks[0].measure
     bounds = [each.bound for each in judged.extremes if each.key.startswith(f"{measure or ObjectiveLimit.key}.")]

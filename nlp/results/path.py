@@ -11,20 +11,19 @@ from ...models.statics import driven_joints
 from ..case.pathfile import PLACE
 from ..case.task import Sense
 from ..proof.statement.claims import ACTUATED
-from ..proof.workspace.numbers.extremes import Extreme
-from ..proof.workspace.verdict import Outcome
 from ..system.jsonvalues import Absent, Inline, JsonObject
-from .objective import unit_of_claim
+from .exchange import ExchangeData, exchange_fields
 from .parts import HeadData, SettingsData, VersionsData, settings_data
 from .pathtable import knot_motion
 from .point import head_data, versions
-from .workspace import BindingData, DesignData, WorkspacePose, pose_data
+from .verdicts import VerdictData, WorkspacePose, pose_data, verdict_fields
 
 if TYPE_CHECKING:
     from ..case.overrides import Settings
-    from ..proof.workspace.path_judge import PathJudgement, RankOnPath
+    from ..proof.workspace.judgement import Judgement
     from ..proof.workspace.path_knots import Knots
-    from ..solver.over_path import PathProof
+    from ..proof.workspace.verdict import Fault, Verdict
+    from ..solver.semi_infinite import ExchangeProof
     from ..units import Units
 
 
@@ -46,38 +45,19 @@ class PathFaultData(JsonObject):
     pose: WorkspacePose
 
 
-class PathClaimData(JsonObject):
-    """A claim about every point of a path.
+class PathVerdictData(VerdictData):
+    """Verdict on a claim about every point of a path.
 
     Attributes:
-        name: the claim.
-        unit: of its values; absent of a rank.
-        sense: whether the smallest or the largest value is meant; absent of a rank.
-        limit: the limit; absent without one.
-        outcome: of the limit or the rank, or, without a limit, of the gap.
-        bound: proven: no point has a smaller, or larger, value; null where nothing is proved, and of a rank.
-        reached: the smallest or largest value known; null without one, and of a rank.
-        line: line of the file, or row of a table, of the segment that reaches it, or that refutes or leaves open a
-            rank; null where none is known.
-        segment: its index, from 0.
-        parameter: along the segment, from 0 to 1.
-        pose: there.
-        reason: for an open outcome, or how a singular pose was found; absent without one.
-        fault: the first point known, in the order of the path, that refutes the claim; absent of other outcomes.
+        line: line of the file, or row of a table, of the segment with the pose; null where none is known.
+        segment: index of this segment, from 0.
+        parameter: parameter along it, from 0 to 1.
+        fault: first known point, in the order of the path, that refutes the claim; absent of other outcomes.
     """
 
-    name: str
-    unit: Absent[str]
-    sense: Absent[Sense]
-    limit: Absent[float]
-    outcome: Outcome
-    bound: float | None
-    reached: float | None
     line: int | None
     segment: int | None
     parameter: float | None
-    pose: WorkspacePose | None
-    reason: Absent[str]
     fault: Absent[PathFaultData]
 
 
@@ -157,7 +137,7 @@ class PathData(JsonObject):
     untimed: Absent[int]
     idle: tuple[IdleData, ...]
     dependent: Absent[tuple[str, ...]]
-    claims: tuple[PathClaimData, ...]
+    claims: tuple[PathVerdictData, ...]
     actuators: tuple[PathActuatorData, ...]
     knots: Absent[PathKnotsData]
 
@@ -201,34 +181,23 @@ class PlaceData(JsonObject):
     yaw: float
 
 
-class PathProofData(JsonObject):
+class PathProofData(ExchangeData):
     """Proof of a design along its path, by exchange of poses.
 
     Attributes:
-        proved: whether all ranks and limits are proved at every point.
-        joint_centre: the proof is about all machines whose joint centres are off by at most this; absent where it is
-            about the exact machine alone.
-        tighter: part of themselves by which the program's limits at the poses are tighter than the case's.
-        designs: each design that was judged; the last is the answer.
-        poses: of the constraints.
         file: name of the path's file.
-        segments: their number.
-        place: of the path's frame.
-        claims: ranks first.
+        segments: number of its segments.
+        place: place of the path's frame.
+        claims: verdicts, ranks first.
     """
 
-    proved: bool
-    joint_centre: Absent[float]
-    tighter: float
-    designs: tuple[DesignData, ...]
-    poses: tuple[BindingData, ...]
     file: str
     segments: int
     place: PlaceData
-    claims: tuple[PathClaimData, ...]
+    claims: tuple[PathVerdictData, ...]
 
 
-def path_result(judged: "PathJudgement", settings: "Settings | None" = None) -> PathResult:
+def path_result(judged: "Judgement", settings: "Settings | None" = None) -> PathResult:
     """Return the verdicts on a path as a result.
 
     Args:
@@ -254,83 +223,45 @@ def path_result(judged: "PathJudgement", settings: "Settings | None" = None) -> 
     )
 
 
-def path_proof_data(proof: "PathProof") -> PathProofData:
+def path_proof_data(proof: "ExchangeProof") -> PathProofData:
     """Return the proof of a solved design as a result."""
     judged = proof.judgement
-    units = judged.case.units
+    place = zip(PLACE.items(), proof.place, strict=True)
     return PathProofData(
-        proved=proof.is_proved,
-        joint_centre=judged.case.joint_centre_tolerance,
-        tighter=proof.tighter,
-        designs=tuple(DesignData(F=F, unproved=count) for F, count in proof.history),
-        poses=tuple(BindingData(claim=each.name, pose=pose_data(each.pose, units)) for each in proof.poses),
+        **exchange_fields(proof),
         file=judged.path.source,
         segments=len(judged.path),
-        place=PlaceData(
-            **{
-                name: units.shown(value, dimension)
-                for (name, dimension), value in zip(PLACE.items(), proof.place, strict=True)
-            }
-        ),
+        place=PlaceData(**{name: judged.case.units.shown(value, dimension) for (name, dimension), value in place}),
         claims=_claims(judged),
     )
 
 
-def _claims(judged: "PathJudgement") -> tuple[PathClaimData, ...]:
-    """Return the claims, ranks first."""
-    ranks = [_claim_data(each, judged) for each in judged.ranks]
-    return (*ranks, *(_number_data(each, judged) for each in judged.extremes))
+def _claims(judged: "Judgement") -> tuple[PathVerdictData, ...]:
+    """Return the verdicts, ranks first."""
+    return tuple(_verdict(each, judged) for each in judged.verdicts)
 
 
-def _number_data(each: "Extreme", judged: "PathJudgement") -> PathClaimData:
-    """Return a claim about a number in the case's units."""
-    units = judged.case.units
-
-    def shown(value: float | None) -> float | None:
-        return units.shown(value, each.dimension) if value is not None and math.isfinite(value) else None
-
-    return _claim_data(
-        each,
-        judged,
-        unit=unit_of_claim(judged.case, each.name, each.dimension),
-        sense=each.sense,
-        limit=shown(each.limit),
-        bound=shown(each.bound),
-        reached=shown(each.reached),
-    )
-
-
-def _claim_data(each: "RankOnPath | Extreme", judged: "PathJudgement", **values: object) -> PathClaimData:
-    """Return a claim with its place, and the values of a number."""
-    place = each.place if each.pose is not None else None
-    none = dict.fromkeys(("unit", "sense", "limit", "bound", "reached"))
-    return PathClaimData(
-        name=each.name,
-        outcome=each.outcome,
+def _verdict(each: "Verdict", judged: "Judgement") -> PathVerdictData:
+    """Return a verdict with its place."""
+    place, fault = each.place if each.pose is not None else None, each.first_fault
+    return PathVerdictData(
+        **verdict_fields(each, judged.case),
         line=None if place is None else int(judged.path.lines[place.segment]),
         segment=None if place is None else place.segment,
         parameter=None if place is None else place.parameter,
-        pose=None if each.pose is None else pose_data(each.pose, judged.case.units),
-        reason=each.reason or None,
-        fault=_fault_data(each, judged) if each.outcome is Outcome.REFUTED else None,
-        **(none | values),
+        fault=None if fault is None else _fault(each, fault, judged),
     )
 
 
-def _fault_data(each: "RankOnPath | Extreme", judged: "PathJudgement") -> PathFaultData | None:
-    """Return the first point known that refutes a claim."""
-    units, place, pose, value = judged.case.units, each.place, each.pose, None
-    if isinstance(each, Extreme):
-        place, value, pose = judged.faults.get((each.name, each.sense), (each.place, each.reached, each.pose))
-        value = units.shown(value, each.dimension)
-    if place is None or pose is None:
-        return None
+def _fault(each: "Verdict", fault: "Fault", judged: "Judgement") -> PathFaultData:
+    """Return the first known point that refutes a claim."""
+    units = judged.case.units
     return PathFaultData(
-        value=value,
-        line=int(judged.path.lines[place.segment]),
-        segment=place.segment,
-        parameter=place.parameter,
-        pose=pose_data(pose, units),
+        value=None if each.is_rank else units.shown(fault.value, each.dimension),
+        line=int(judged.path.lines[fault.place.segment]),
+        segment=fault.place.segment,
+        parameter=fault.place.parameter,
+        pose=pose_data(fault.pose, units),
     )
 
 
@@ -348,7 +279,7 @@ def _knots_data(units: "Units", knots: "Knots") -> PathKnotsData:
     )
 
 
-def _actuators(judged: "PathJudgement") -> Iterator[PathActuatorData]:
+def _actuators(judged: "Judgement") -> Iterator[PathActuatorData]:
     """Yield the ranges of the actuators."""
     units, accelerations = judged.case.units, dict[str, float]()
     if judged.knots is not None and judged.path.is_timed:

@@ -6,25 +6,34 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from ..case.pathfile import PLACE
-from ..case.pose import Free, RotationForm
+from ..case.pose import Free
 from ..case.task import Sense
 from ..proof.workspace.verdict import Outcome
-from .posewording import pose_words
 from .rounding import number
 from .text import Line, TextTable, Tone, in_part
+from .verdictwording import (
+    SHOWN,
+    answer_line,
+    answer_words,
+    exchange_lines,
+    following_lines,
+    machine_lines,
+    open_lines,
+    outcome_lines,
+    proof_line,
+    tightest_table,
+    verdict_table,
+)
 from .wording import title_line
 from .workspacemotors import TONES
-from .workspaceposes import SHOWN
-from .workspacewording import exchange_lines, following_lines, machine_lines, open_lines, outcome_lines, tightest_table
 
 if TYPE_CHECKING:
     from ..case.case import Case
-    from .path import PathClaimData, PathData, PathFaultData, PathProofData, PathResult
-    from .workspace import WorkspacePose
+    from .path import PathData, PathFaultData, PathProofData, PathResult, PathVerdictData
+    from .verdicts import WorkspacePose
 
 #: So many words that move nothing are shown.
 _SHOWN = 6
-_ORDER = (Outcome.REFUTED, Outcome.OPEN, Outcome.PROVED)
 
 
 def path_summary(
@@ -47,7 +56,7 @@ def path_summary(
         words = ", ".join(f"{each.word} (line {each.line})" for each in path.idle[:_SHOWN])
         rest = len(path.idle) - _SHOWN
         yield Line(words + (f", and {rest} more" if rest > 0 else ""), label="moves nothing")
-    yield Line(verdict_words(result), label="verdict", tone=Tone.ANSWER if result.proved else Tone.NO_ANSWER)
+    yield answer_line(verdict_words(result), is_proved=result.proved)
     yield from following_lines(path.dependent or (), path.claims)
     wrong = first_refuted(result)
     if wrong is not None and wrong.fault is not None:
@@ -66,10 +75,10 @@ def path_summary(
     if path.time is not None or path.knots is not None:
         yield _actuator_table(path)
     yield from in_part("tightest limits", tightest_table(limited, "tightest limits along the path"))
-    yield from in_part("every number", claims_table(case, path.claims))
+    yield from in_part("every number", along_table(case, path.claims))
 
 
-def _other_faults(path: PathData, first: PathClaimData | None) -> Iterator[Line]:
+def _other_faults(path: PathData, first: PathVerdictData | None) -> Iterator[Line]:
     """Yield the faults of other claims than the first, in the order of the path; a few belong to the answer."""
     others = [(each, each.fault) for each in path.claims if each.fault is not None and each is not first]
     others.sort(key=lambda pair: (pair[1].segment, pair[1].parameter) if pair[1] is not None else (0, 0.0))
@@ -79,12 +88,11 @@ def _other_faults(path: PathData, first: PathClaimData | None) -> Iterator[Line]
             yield Line(fault_words(each, fault), label="refuted", tone=Tone.FAULT, part=part)
 
 
-def claims_table(case: Case, claims: Sequence[PathClaimData]) -> Iterator[TextTable]:
-    """Yield the table of the numbers among claims."""
-    rows = [_row(case, each) for each in claims if each.sense is not None]
-    if rows:
-        headers = ("number", "unit", "value", "limit", "proven bound", "reached", "outcome", "line", "at")
-        yield TextTable(headers, tuple(rows), name="claims", title="numbers at every point of the path")
+def along_table(case: Case, verdicts: Sequence[PathVerdictData]) -> Iterator[TextTable]:
+    """Yield the table of the numbers among verdicts."""
+    rows = [each for each in verdicts if each.sense is not None]
+    title, lines = "numbers at every point of the path", [each.line for each in rows]
+    yield from verdict_table(case, "claims", title, rows, lines=lines)
 
 
 def _untimed_words(path: PathData) -> str:
@@ -136,30 +144,21 @@ def _actuator_table(path: PathData) -> TextTable:
     return TextTable(headers, tuple(rows), name="actuators", title=title)
 
 
-def checked_claims(result: PathResult) -> list[PathClaimData]:
+def checked_claims(result: PathResult) -> list[PathVerdictData]:
     """Return the claims that are demanded of every point: ranks, and numbers with limits."""
     return [each for each in result.path.claims if each.sense is None or each.limit is not None]
 
 
 def verdict_words(result: PathResult) -> str:
     """Return the answer: whether everything is proved, or how many claims are refuted, open and proved."""
-    if result.proved:
-        return "everything is proved at every point"
-    checked = checked_claims(result)
-    counts = ", ".join(f"{sum(each.outcome is one for each in checked)} {one.value}" for one in _ORDER)
-    return f"not everything is proved: {counts}"
+    outcomes = [each.outcome for each in checked_claims(result)]
+    return answer_words(outcomes, "at every point", is_proved=result.proved)
 
 
 def path_proof_lines(case: Case, proof: PathProofData) -> Iterator[Line]:
     """Yield the proof of a solved design along its path."""
     whole = f"{proof.file}, {proof.segments:,} segment{'s' * (proof.segments != 1)}: "
-    if proof.proved:
-        words = "proved: regular and within the limits at every point"
-        yield Line(whole + words, label="path", tone=Tone.ANSWER)
-    else:
-        count = proof.designs[-1].unproved
-        words = f"not proved: {count} claim{'' if count == 1 else 's'} refuted or open"
-        yield Line(whole + words, label="path", tone=Tone.NO_ANSWER)
+    yield proof_line(proof, "path", "point", whole)
     stated = case.path
     for (name, dimension), value in zip(PLACE.items(), () if stated is None else stated.place, strict=False):
         if value != 0:
@@ -178,14 +177,14 @@ def tightest_along(proof: PathProofData) -> Iterator[TextTable]:
     yield from tightest_table(proof.claims, "tightest limits along the path")
 
 
-def first_refuted(result: PathResult) -> PathClaimData | None:
+def first_refuted(result: PathResult) -> PathVerdictData | None:
     """Return the claim that is refuted at the first known point in the order of the path; None without one."""
     claims = [(each, each.fault) for each in checked_claims(result)]
     places = [(fault.segment, fault.parameter, k) for k, (_, fault) in enumerate(claims) if fault is not None]
     return claims[min(places)[2]][0] if places else None
 
 
-def fault_words(each: PathClaimData, fault: PathFaultData) -> str:
+def fault_words(each: PathVerdictData, fault: PathFaultData) -> str:
     """Return a refuted claim at its first known point."""
     where = f"line {fault.line}, {number(fault.parameter, 1.0)} of its segment"
     if each.limit is None or fault.value is None:
@@ -195,23 +194,8 @@ def fault_words(each: PathClaimData, fault: PathFaultData) -> str:
     return f"{where}: {each.name} goes {side} {limit}"
 
 
-def _place_words(each: PathClaimData) -> str:
+def _place_words(each: PathVerdictData) -> str:
     """Return the place of a claim, after a comma."""
     if each.line is None or each.parameter is None:
         return ""
     return f", in line {each.line}, {number(each.parameter, 1.0)} of its segment"
-
-
-def _row(case: Case, each: PathClaimData) -> tuple[str | Line, ...]:
-    """Return the row of a number."""
-    return (
-        each.name,
-        each.unit or "",
-        "smallest" if each.sense is Sense.MIN else "largest",
-        "" if each.limit is None else number(each.limit),
-        "" if each.bound is None else number(each.bound),
-        "" if each.reached is None else number(each.reached),
-        Line(each.outcome.value, tone=TONES[each.outcome], after=f": {each.reason}" if each.reason else ""),
-        "" if each.line is None else str(each.line),
-        "" if each.pose is None else pose_words(case, each.pose, RotationForm.RPY),
-    )

@@ -34,8 +34,7 @@ from .point import head_data, objective, robot_data, versions, violations
 
 if TYPE_CHECKING:
     from ..solver.certified import Certified
-    from ..solver.over_path import PathProof
-    from ..solver.semi_infinite import WorkspaceProof
+    from ..solver.semi_infinite import ExchangeProof
     from .path import PathProofData
     from .workspace import WorkspaceProofData
 
@@ -44,8 +43,8 @@ def task_result(
     solution: ProgramSolution,
     task: int = 0,
     certificate: Certificate | None = None,
-    workspace: WorkspaceProof | None = None,
-    path: PathProof | None = None,
+    workspace: ExchangeProof | None = None,
+    path: ExchangeProof | None = None,
     choice: ChoiceData | None = None,
     rounding: RoundingData | None = None,
 ) -> SolveResult:
@@ -92,14 +91,14 @@ def task_result(
     )
 
 
-def _proof_data(workspace: WorkspaceProof) -> WorkspaceProofData | None:
+def _proof_data(workspace: ExchangeProof) -> WorkspaceProofData | None:
     """Return the proof over the workspace."""
     from .workspace import proof_data  # noqa: PLC0415 - few cases have one, and it loads the room of proofs
 
     return proof_data(workspace)
 
 
-def _path_data(path: PathProof) -> PathProofData:
+def _path_data(path: ExchangeProof) -> PathProofData:
     """Return the proof along the path."""
     from .path import path_proof_data  # noqa: PLC0415 - few cases have one, and it loads the room of proofs
 

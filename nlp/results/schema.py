@@ -172,9 +172,12 @@ def _type_without_none(annotation: object) -> object:
 
 def _descriptions(kind: type[JsonObject]) -> dict[str, str]:
     """Return the descriptions of a type's fields by name, from the attributes in its docstring."""
-    text = inspect.cleandoc(kind.__doc__ or "").partition("Attributes:\n")[2]
-    found = re.findall(r"^    (\w+): (.*(?:\n        .*)*)", text, flags=re.MULTILINE)
-    return {name: re.sub(r"\s+", " ", words) for name, words in found}
+    found: dict[str, str] = {}
+    for each in reversed(kind.__mro__):
+        text = inspect.cleandoc(each.__doc__ or "").partition("Attributes:\n")[2]
+        rows = re.findall(r"^    (\w+): (.*(?:\n        .*)*)", text, flags=re.MULTILINE)
+        found |= {name: re.sub(r"\s+", " ", words) for name, words in rows}
+    return found
 
 
 Result: TypeAlias = (

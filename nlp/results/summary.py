@@ -112,7 +112,8 @@ def _proof_lines(case: Case, result: CaseResult) -> Iterator[Line]:
     """Yield the proof of a design over a workspace, or along a path."""
     if result.workspace is not None:
         # Few cases have a proof, and what shows it loads the room of proofs.
-        from .workspacewording import machine_lines, proof_lines  # noqa: PLC0415
+        from .verdictwording import machine_lines  # noqa: PLC0415
+        from .workspacewording import proof_lines  # noqa: PLC0415
 
         yield from proof_lines(result.workspace)
         yield from machine_lines(case, result.workspace.joint_centre)
@@ -125,7 +126,7 @@ def _proof_lines(case: Case, result: CaseResult) -> Iterator[Line]:
 def _proof_digest(result: CaseResult) -> Summary:
     """Yield the tightest claims of the proof of a design."""
     if result.workspace is not None:
-        from .workspacewording import tightest_table  # noqa: PLC0415 - as above
+        from .verdictwording import tightest_table  # noqa: PLC0415 - as above
 
         yield from tightest_table(result.workspace.extremes)
     if result.path is not None:

@@ -4,137 +4,28 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from ...models import Dimension
 from ...models.statics import driven_joints
 from ..case.loads import NO_LOADING
 from ..case.motors import MotorNumber
 from ..case.task import Sense
 from ..proof.statement.claims import ACTUATED
-from ..proof.statement.machine import has_straight_legs
-from ..proof.workspace.verdict import Outcome
-from ..system.jsonvalues import Absent, Inline, JsonObject, Vector, Vector3, finite_or_none, vector
+from ..proof.workspace.verdict import Outcome, Verdict
+from ..system.jsonvalues import Absent, Inline, JsonObject, Vector
 from ..units import Units
-from .objective import unit_of_claim
+from .exchange import ExchangeData, exchange_fields
 from .parts import HeadData, SettingsData, VersionsData, settings_data
 from .point import head_data, versions
+from .verdicts import RegularData, VerdictData, WorkspacePose, pose_data, rank_data, verdict_data
 
 if TYPE_CHECKING:
     from ..case.case import Case
     from ..case.overrides import Settings
-    from ..proof.statement.machine import JointErrors
-    from ..proof.workspace.judge import Judgement
-    from ..proof.workspace.numbers.extremes import Extreme
-    from ..proof.workspace.robot.pose_box import PoseNumbers
+    from ..proof.workspace.judgement import Judgement
     from ..proof.workspace.scale import Scale
-    from ..proof.workspace.verdict import RankVerdict
-    from ..solver.semi_infinite import WorkspaceProof
+    from ..solver.semi_infinite import ExchangeProof
 
 #: Outcomes, the worst one last.
 _WORSE = (Outcome.PROVED, Outcome.OPEN, Outcome.REFUTED)
-
-
-class WorkspacePose(JsonObject):
-    """A pose of the platform.
-
-    Attributes:
-        position: origin of the platform frame in the world frame.
-        axis: unit axis of the rotation; z without rotation.
-        angle: about it.
-    """
-
-    position: Vector3
-    axis: Vector3
-    angle: float
-
-
-class CentreData(JsonObject):
-    """Error of a joint centre.
-
-    Attributes:
-        joint: label of the joint, limb and place, or leg and plate.
-        error: in the world frame at home, or in that of the leg's plate, length.
-    """
-
-    joint: str
-    error: Vector3
-
-
-class MachineData(JsonObject):
-    """Errors of the joint centres of a machine.
-
-    Attributes:
-        base: of the base joints of six straight legs, in the world frame, length; absent for another robot.
-        platform: of their platform joints, in the platform frame, length; absent for another robot.
-        centres: of another robot; absent for six straight legs.
-    """
-
-    base: Absent[tuple[Vector3, ...]]
-    platform: Absent[tuple[Vector3, ...]]
-    centres: Absent[tuple[CentreData, ...]]
-
-
-class RegularData(JsonObject):
-    """Verdict on the claim that J has full rank at every pose.
-
-    Attributes:
-        outcome: ``proved``; ``refuted``, with a singular pose; ``open``, with the middle of the widest box that is
-            left.
-        pose: that pose; absent where the claim is proved.
-        between: two poses at which the determinant of the rows is proved to have opposite signs; absent where the
-            claim is not refuted so.
-        boxes: number of boxes examined.
-        open: number of boxes left.
-        share: part of the box of poses in boxes that are left.
-        seconds: wall time.
-        engine: ``c``, or ``none`` where no search was made.
-        reason: for stopping early, or how a singular pose was found that is not between two; absent without one.
-        machine: that is singular at the pose; absent where the claim is not refuted, or the exact machine is.
-    """
-
-    outcome: Outcome
-    pose: Absent[WorkspacePose]
-    between: Absent[tuple[WorkspacePose, ...]]
-    boxes: int
-    open: int
-    share: float
-    seconds: float
-    engine: str
-    reason: Absent[str]
-    machine: Absent[MachineData]
-
-
-class ExtremeData(JsonObject):
-    """The smallest or the largest value of a number over the workspace.
-
-    Attributes:
-        name: of the number.
-        unit: of its values; empty for a plain number.
-        sense: whether the smallest or the largest value is meant.
-        bound: proven: no pose has a smaller, or larger, value; null where nothing is proved.
-        reached: the smallest or largest value known; null without one.
-        key: dotted key, below ``limits``, of the limit in the case; absent without one.
-        limit: the limit; absent without one.
-        outcome: of the limit, or, without one, of the gap asked for.
-        pose: at which the value is reached; null without one.
-        boxes: number of boxes examined.
-        seconds: wall time.
-        reason: for an open outcome; absent without one.
-        machine: that reaches the value at the pose; absent for the exact machine.
-    """
-
-    name: str
-    unit: str
-    sense: Sense
-    bound: float | None
-    reached: float | None
-    key: Absent[str]
-    limit: Absent[float]
-    outcome: Outcome
-    pose: WorkspacePose | None
-    boxes: int
-    seconds: float
-    reason: Absent[str]
-    machine: Absent[MachineData]
 
 
 class MotorEndData(JsonObject):
@@ -224,74 +115,33 @@ class WorkspaceResult(JsonObject):
     dependent: Absent[tuple[str, ...]]
     regular: RegularData
     constraints: Absent[RegularData]
-    extremes: tuple[ExtremeData, ...]
+    extremes: tuple[VerdictData, ...]
     motors: Absent[tuple[MotorData, ...]]
     scale: Absent[ScaleData]
     versions: VersionsData
 
 
-class BindingData(JsonObject):
-    """A pose at which a claim is a constraint of the program.
-
-    Attributes:
-        claim: that the pose refuted.
-        pose: the pose.
-    """
-
-    claim: str
-    pose: WorkspacePose
-
-
-class DesignData(JsonObject):
-    """A design on the way to the proven one.
-
-    Attributes:
-        F: of the design.
-        unproved: number of claims about the workspace that it does not keep, or that stay open.
-    """
-
-    F: float
-    unproved: int
-
-
-class WorkspaceProofData(JsonObject):
+class WorkspaceProofData(ExchangeData):
     """Proof of a design over its workspace, by exchange of poses.
 
     Attributes:
-        proved: whether J is regular at every pose, and every limit holds there.
-        joint_centre: the proof is about all machines whose joint centres are off by at most this; absent where it is
-            about the exact machine alone.
-        tighter: part of themselves by which the program's limits at the poses are tighter than the case's;
-            absent in results of earlier versions.
-        designs: each design that was judged; the last is the answer.
-        poses: of the constraints.
         regular: whether J has full rank at every pose.
         extremes: smallest and largest values.
     """
 
-    proved: bool
-    joint_centre: Absent[float]
-    tighter: Absent[float]
-    designs: tuple[DesignData, ...]
-    poses: tuple[BindingData, ...]
     regular: RegularData
-    extremes: tuple[ExtremeData, ...]
+    extremes: tuple[VerdictData, ...]
 
 
-def proof_data(proof: "WorkspaceProof | None") -> WorkspaceProofData | None:
+def proof_data(proof: "ExchangeProof | None") -> WorkspaceProofData | None:
     """Return the proof of a solved design as a result."""
     if proof is None:
         return None
     judged = proof.judgement
-    units = judged.case.units
     return WorkspaceProofData(
-        proved=proof.is_proved,
-        joint_centre=judged.case.joint_centre_tolerance,
-        tighter=proof.tighter,
-        designs=tuple(DesignData(F=F, unproved=count) for F, count in proof.history),
-        poses=tuple(BindingData(claim=each.name, pose=pose_data(each.pose, units)) for each in proof.poses),
-        regular=_regular_data(judged.regularity, judged.case),
-        extremes=tuple(_extreme_data(each, judged.case) for each in judged.extremes),
+        **exchange_fields(proof),
+        regular=rank_data(judged.regularity, judged),
+        extremes=tuple(verdict_data(each, judged.case) for each in judged.extremes),
     )
 
 
@@ -318,9 +168,9 @@ def workspace_of(
         proved=judged.is_proved,
         poses=poses_of(judged),
         dependent=judged.workspace.dependent_names or None,
-        regular=_regular_data(judged.regularity, case),
-        constraints=None if judged.constraints is None else _regular_data(judged.constraints, case),
-        extremes=tuple(_extreme_data(each, case) for each in judged.extremes if each.motor is None or each.key),
+        regular=rank_data(judged.regularity, judged),
+        constraints=None if judged.constraints is None else rank_data(judged.constraints, judged),
+        extremes=tuple(verdict_data(each, case) for each in judged.extremes if each.motor is None or each.key),
         motors=tuple(_motors(judged)) or None,
         scale=scale,
         versions=versions(),
@@ -338,7 +188,7 @@ def _motors(judged: "Judgement") -> Iterator[MotorData]:
     case = judged.case
     if case.loading == NO_LOADING:
         return
-    found: dict[tuple[MotorNumber, str, str], list[Extreme]] = {}
+    found: dict[tuple[MotorNumber, str, str], list[Verdict]] = {}
     for each in judged.extremes:
         if each.motor is not None:
             found.setdefault((each.motor.number, each.motor.actuator, each.motor.load), []).append(each)
@@ -361,9 +211,9 @@ def _motors(judged: "Judgement") -> Iterator[MotorData]:
         )
 
 
-def _motor_end(parts: "Sequence[Extreme]", case: "Case") -> MotorEndData:
+def _motor_end(parts: "Sequence[Verdict]", case: "Case") -> MotorEndData:
     """Return an end of a number of an actuator: the farthest of its parts, and the worst of their outcomes."""
-    every = [_extreme_data(each, case) for each in parts]
+    every = [verdict_data(each, case) for each in parts]
     farthest = max(parts, key=lambda each: each.sense.sign * each.reached if math.isfinite(each.reached) else -math.inf)
     shown = every[list(parts).index(farthest)]
     bounds = [each.bound for each in every]
@@ -387,58 +237,8 @@ def scale_data(found: "Scale", units: Units) -> ScaleData:
     )
 
 
-def pose_data(pose: "PoseNumbers", units: Units) -> WorkspacePose:
-    """Return a pose in a case's units."""
-    return WorkspacePose.of(pose, angle=units.shown(pose.angle, Dimension.ANGLE))
-
-
 def _fixed(value: object) -> float:
     """Return a fixed number."""
     if not isinstance(value, float):
         raise TypeError("a judged machine has fixed dimensions")
     return value
-
-
-def _regular_data(found: "RankVerdict", case: "Case") -> RegularData:
-    """Return the verdict on regularity."""
-    sides = None
-    if found.sides is not None:
-        sides = tuple(pose_data(found.box.pose(y), case.units) for y in found.sides)
-    return RegularData.of(
-        found,
-        pose=None if found.pose is None else pose_data(found.pose, case.units),
-        between=sides,
-        reason=found.reason or None,
-        machine=_machine_data(found.errors, case),
-    )
-
-
-def _machine_data(errors: "JointErrors | None", case: "Case") -> MachineData | None:
-    """Return the errors of a machine; None for the exact one. Lengths are in the case's unit already."""
-    if errors is None:
-        return None
-    each = tuple(map(vector, errors.vectors))
-    if has_straight_legs(case.model):
-        return MachineData(base=each[::2], platform=each[1::2], centres=None)
-    centres = tuple(CentreData(joint=name, error=error) for name, error in zip(errors.names, each, strict=True))
-    return MachineData(base=None, platform=None, centres=centres)
-
-
-def _extreme_data(each: "Extreme", case: "Case") -> ExtremeData:
-    """Return an extreme in a case's units."""
-    units = case.units
-
-    def shown(value: float) -> float | None:
-        return units.shown(value, each.dimension) if math.isfinite(value) else finite_or_none(value)
-
-    return ExtremeData.of(
-        each,
-        unit=unit_of_claim(case, each.name, each.dimension),
-        bound=shown(each.bound),
-        reached=shown(each.reached),
-        key=each.key or None,
-        limit=None if each.limit is None else units.shown(each.limit, each.dimension),
-        pose=None if each.pose is None else pose_data(each.pose, units),
-        reason=each.reason or None,
-        machine=_machine_data(each.errors, case),
-    )

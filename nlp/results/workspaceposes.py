@@ -10,14 +10,14 @@ from ..case.task import Sense
 from ..proof.workspace.verdict import Outcome
 from .rounding import number, ordered
 from .text import Line
+from .verdictwording import SHOWN
 
 if TYPE_CHECKING:
-    from .workspace import ExtremeData, WorkspacePose, WorkspaceResult
+    from .verdicts import VerdictData, WorkspacePose
+    from .workspace import WorkspaceResult
 
 #: Beginning of the keys of limits that no single pose refutes, but two: the shortest and the longest length of a leg.
 _OVER_POSES = "actuator."
-#: So many refuted claims, and open ones, are shown in full in a short view.
-SHOWN = 2
 #: Beginning of the names of the lengths of legs.
 _LENGTH = "leg_length limb "
 
@@ -108,7 +108,7 @@ def seeing_lines(result: WorkspaceResult, command: Callable[[WorkspacePose], str
         yield Line(f"{left}: --all, --csv FILE and --json FILE list them", label="other refuted claims")
 
 
-def _at_poses(result: WorkspaceResult, each: ExtremeData) -> Iterator[PosedClaim]:
+def _at_poses(result: WorkspaceResult, each: VerdictData) -> Iterator[PosedClaim]:
     """Yield an extreme with the poses at which it is reached."""
     worst = "smallest" if each.sense is Sense.MIN else "largest"
     value = "" if each.reached is None else f" {worst} {number(each.reached)} {each.unit}".rstrip()
@@ -129,14 +129,14 @@ def _at_poses(result: WorkspaceResult, each: ExtremeData) -> Iterator[PosedClaim
         yield PosedClaim(f"{each.name}:{value}{limit}", each.outcome, each.pose, each.key or "", _beyond(each))
 
 
-def _lengths(extremes: Sequence[ExtremeData], limb: str) -> list[ExtremeData]:
+def _lengths(extremes: Sequence[VerdictData], limb: str) -> list[VerdictData]:
     """Return the smallest and the largest length of a leg."""
     return [each for each in extremes if each.name == f"{_LENGTH}{limb}"]
 
 
-def _beyond(each: ExtremeData) -> float:
+def _beyond(each: VerdictData) -> float:
     """Return how far a number is beyond its limit, as a part of the limit; negative where it is kept."""
-    if each.limit is None or each.reached is None:
+    if each.limit is None or each.reached is None or each.sense is None:
         return float("-inf")
     sign = each.sense.sign
     return sign * (each.reached - each.limit) / (abs(each.limit) or 1.0)

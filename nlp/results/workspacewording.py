@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
@@ -11,36 +10,36 @@ from ..case.case import Case
 from ..case.motors import MotorNumber
 from ..case.pose import ends_of
 from ..case.task import Sense
-from ..case.workspace import POSITION
 from ..interruption import STOPPED
 from ..proof.workspace.verdict import EVERYWHERE, Outcome
 from .posewording import pose_words
-from .rounding import number, ordered
+from .rounding import number
 from .text import Line, TextTable, Tone, in_part
-from .wording import counted, title_line
+from .verdictwording import (
+    answer_line,
+    answer_words,
+    exchange_lines,
+    following_lines,
+    machine_lines,
+    open_lines,
+    outcome_lines,
+    proof_line,
+    refuting_machine,
+    tightest_table,
+    verdict_table,
+)
+from .wording import title_line
 from .workspacemotors import TONES, ends_of_motor, motor_tables
-from .workspaceposes import SHOWN, seeing_lines
+from .workspaceposes import seeing_lines
 
 if TYPE_CHECKING:
-    from .path import PathClaimData, PathProofData
-    from .workspace import (
-        ExtremeData,
-        MachineData,
-        RegularData,
-        ScaleData,
-        WorkspacePose,
-        WorkspaceProofData,
-        WorkspaceResult,
-    )
-
-#: So many claims are in the digest, and so many kinds of limits in the count of an outcome.
-_TIGHTEST, _GROUPS = 5, 6
-_ORDER = (Outcome.REFUTED, Outcome.OPEN, Outcome.PROVED)
+    from .verdicts import RegularData, VerdictData, WorkspacePose
+    from .workspace import ScaleData, WorkspaceProofData, WorkspaceResult
 
 
 def verdict_lines(case: Case, result: WorkspaceResult) -> Iterator[Line]:
     """Yield the verdict on a machine, what it is about, and F."""
-    yield Line(verdict_words(result), label="verdict", tone=Tone.ANSWER if result.proved else Tone.NO_ANSWER)
+    yield answer_line(verdict_words(result), is_proved=result.proved)
     yield from machine_lines(case, result.joint_centre)
     yield from _dependent_lines(result)
     for low, high in zip(result.extremes, result.extremes[1:], strict=False):
@@ -59,30 +58,11 @@ def _dependent_lines(result: WorkspaceResult) -> Iterator[Line]:
     yield from following_lines(result.dependent or (), result.extremes)
 
 
-def following_lines(names: Sequence[str], claims: Sequence[ExtremeData | PathClaimData]) -> Iterator[Line]:
-    """Yield the proved range of each dependent coordinate of the pose."""
-    for name in names:
-        ends = {each.sense: each for each in claims if each.name == name}
-        bounds = [ends[sense].bound if sense in ends else None for sense in (Sense.MIN, Sense.MAX)]
-        size = _size_of(name, claims)
-        low, high = ("unknown" if each is None else number(each, size) for each in bounds)
-        unit = next((each.unit or "" for each in ends.values()), "")
-        words = f"{name} {low} to {high} {unit}".rstrip() if None not in bounds else f"{name}, no range is proved"
-        yield Line(words, label="follows")
-
-
-def _size_of(name: str, claims: Sequence[ExtremeData | PathClaimData]) -> float:
-    """Return a size beside which a coordinate is rounding: that of the positions of poses; 0 for a rotation."""
-    poses = [each.pose for each in claims if each.pose is not None] if name in POSITION else []
-    return max((abs(part) for pose in poses for part in pose.position), default=0.0)
-
-
 def verdict_words(result: WorkspaceResult) -> str:
     """Return the verdict in one clause: counts of ranks and limits, and of numbers without a limit that stay open."""
-    claims = [each.outcome for each in (result.regular, result.constraints) if each is not None]
-    claims += [each.outcome for each in result.extremes if each.limit is not None]
-    counts = ", ".join(f"{claims.count(each)} {each.value}" for each in _ORDER)
-    words = "everything is proved for every pose" if result.proved else f"not everything is proved: {counts}"
+    outcomes = [each.outcome for each in (result.regular, result.constraints) if each is not None]
+    outcomes += [each.outcome for each in result.extremes if each.limit is not None]
+    words = answer_words(outcomes, "for every pose", is_proved=result.proved)
     ends = [
         end for each in result.motors or () if each.number is not MotorNumber.COORDINATE for end in ends_of_motor(each)
     ]
@@ -91,64 +71,6 @@ def verdict_words(result: WorkspaceResult) -> str:
     if not shown:
         return words
     return f"{words}; {shown} number{' without a limit stays' if shown == 1 else 's without a limit stay'} open"
-
-
-def machine_lines(case: Case, joint_centre: float | None) -> Iterator[Line]:
-    """Yield the machines that a verdict is about, where it is about more than the exact one."""
-    if joint_centre is not None:
-        words = f"every one whose joint centres are off by at most {joint_centre:g} {case.units.length}".rstrip()
-        yield Line(words, label="machines")
-
-
-def tightest_table(
-    extremes: Sequence[ExtremeData | PathClaimData], title: str = "tightest limits over every pose"
-) -> Iterator[TextTable]:
-    """Yield the claims that are nearest to their limits: refuted ones first, then open ones."""
-    limited = [each for each in extremes if each.limit is not None]
-    limited.sort(key=lambda each: (_ORDER.index(each.outcome), ordered(_room(each))))
-    seen: dict[str, ExtremeData | PathClaimData] = {}
-    for each in limited:
-        # The nearest of each limit stands for all legs and joints.
-        key = getattr(each, "key", None) or f"{each.name.partition(' ')[0]} {each.sense}"
-        seen.setdefault(f"{each.outcome} {key}", each)
-    rows = [
-        (
-            each.name,
-            _limit_words(each),
-            "none" if each.bound is None else number(each.bound),
-            "none" if each.reached is None else number(each.reached),
-            Line(each.outcome.value, tone=TONES[each.outcome]),
-        )
-        for each in list(seen.values())[:_TIGHTEST]
-    ]
-    if rows:
-        headers = ("nearest to its limit", "limit", "proven", "reached", "outcome")
-        yield TextTable(headers, tuple(rows), name="tightest", title=title)
-
-
-def _room(each: ExtremeData | PathClaimData) -> float:
-    """Return the distance of a claim's bound from its limit, as a part of the limit; negative beyond it."""
-    limit = each.limit or 0.0
-    value = each.bound if each.bound is not None else each.reached
-    if value is None:
-        return 0.0
-    return (value - limit if each.sense is Sense.MIN else limit - value) / (abs(limit) or 1.0)
-
-
-def refuting_machine(case: Case, name: str, machine: MachineData) -> TextTable:
-    """Return the errors of the joint centres of the machine that refutes a claim."""
-    unit = case.units.length
-    if machine.centres is not None:
-        off = [(each.joint, ", ".join(f"{part:.6g}" for part in each.error)) for each in machine.centres]
-        return TextTable(
-            ("joint", f"off by\n{unit}"), tuple(off), name="machine", title=f"the machine that refutes: {name}"
-        )
-    rows = [
-        (leg.name, *(", ".join(f"{part:.6g}" for part in each) for each in (base, platform)))
-        for leg, base, platform in zip(case.model.legs, machine.base or (), machine.platform or (), strict=True)
-    ]
-    headers = ("leg", f"base joint off by\n{unit}", f"platform joint off by\n{unit}")
-    return TextTable(headers, tuple(rows), name="machine", title=f"the machine that refutes: {name}")
 
 
 def _needs_line(case: Case, result: WorkspaceResult) -> Iterator[Line]:
@@ -203,42 +125,7 @@ def _about_lines(case: Case) -> Iterator[Line]:
         yield Line(f"the pose ({words}){turned}", label="about")
 
 
-def outcome_lines(claims: Sequence[ExtremeData | PathClaimData]) -> Iterator[Line]:
-    """Yield in one line each how many limits are proved, refuted and open, and which of them wholly."""
-    every = Counter(map(_limit_of, claims))
-    for outcome in _ORDER:
-        counts = Counter(_limit_of(each) for each in claims if each.outcome is outcome)
-        if not counts:
-            continue
-        texts = []
-        for name, count in counts.items():
-            size = every[name]
-            share = f"{count} of {size}" if count < size else "the" if size == 1 else f"all {size}"
-            texts.append(f"{share} {name}")
-        words = f"{counted(counts.total(), 'limit')}: {', '.join(texts[:_GROUPS])}"
-        words += f" and {len(texts) - _GROUPS} more kinds" if len(texts) > _GROUPS else ""
-        yield Line(words, label=outcome.value, tone=TONES[outcome])
-
-
-def _limit_of(claim: ExtremeData | PathClaimData) -> str:
-    """Return the name of a claim's limit, the same for all limbs, joints and actuators."""
-    return claim.name.partition(" ")[0].partition(".")[0]
-
-
-def open_lines(claims: Sequence[ExtremeData | PathClaimData]) -> Iterator[Line]:
-    """Yield the open claims with their reasons; the first ones belong to the answer."""
-    found = [each for each in claims if each.outcome is Outcome.OPEN]
-    for k, each in enumerate(found):
-        reason = f": {each.reason}" if each.reason else ""
-        yield Line(f"{each.name} {_limit_words(each)}{reason}", label="open", part="open claims" if k >= SHOWN else "")
-
-
-def _limit_words(each: ExtremeData | PathClaimData) -> str:
-    """Return the limit of a number with its sense and unit."""
-    return f"{'>=' if each.sense is Sense.MIN else '<='} {number(each.limit or 0.0)} {each.unit}".rstrip()
-
-
-def _machine_lines(case: Case, extremes: Sequence[ExtremeData]) -> Iterator[TextTable]:
+def _machine_lines(case: Case, extremes: Sequence[VerdictData]) -> Iterator[TextTable]:
     """Yield the machine of the first limit that is refuted by one within the tolerance."""
     for each in extremes:
         if each.outcome is Outcome.REFUTED and each.machine is not None:
@@ -248,31 +135,9 @@ def _machine_lines(case: Case, extremes: Sequence[ExtremeData]) -> Iterator[Text
 
 def proof_lines(proof: WorkspaceProofData | None) -> Iterator[Line]:
     """Yield the proof of a solved design over its workspace."""
-    if proof is None:
-        return
-    if proof.proved:
-        yield Line("proved: regular and within the limits at every pose", label="workspace", tone=Tone.ANSWER)
-    else:
-        count = proof.designs[-1].unproved
-        words = f"not proved: {count} claim{'' if count == 1 else 's'} refuted or open"
-        yield Line(words, label="workspace", tone=Tone.NO_ANSWER)
-    yield from exchange_lines(proof, "workspace")
-
-
-def exchange_lines(proof: WorkspaceProofData | PathProofData, where: str) -> Iterator[Line]:
-    """Yield the designs of an exchange, and the number of its poses.
-
-    Args:
-        proof: of a solved design.
-        where: of what the poses are.
-    """
-    steps = ", ".join(f"{each.F:.7g} ({each.unproved} refuted or open)" for each in proof.designs)
-    yield Line(f"F = {steps}", label="designs")
-    count = len(proof.poses)
-    words = f"{count} pose{'' if count == 1 else 's'} of the {where} became constraints"
-    tighter = count and proof.tighter
-    after = f", tighter than the limits by {tighter:g} of the program's number" if tighter else ""
-    yield Line(words, label="exchange", after=after)
+    if proof is not None:
+        yield proof_line(proof, "workspace", "pose")
+        yield from exchange_lines(proof, "workspace")
 
 
 def proof_tables(case: Case, proof: WorkspaceProofData) -> Iterator[TextTable]:
@@ -280,14 +145,12 @@ def proof_tables(case: Case, proof: WorkspaceProofData) -> Iterator[TextTable]:
     yield from _tables(case, proof.extremes)
 
 
-def _tables(case: Case, extremes: Sequence[ExtremeData]) -> Iterator[TextTable]:
+def _tables(case: Case, extremes: Sequence[VerdictData]) -> Iterator[TextTable]:
     """Yield the numbers with a limit, and those without."""
     limited = [each for each in extremes if each.limit is not None]
+    yield from verdict_table(case, "limits", "limits over every pose", limited)
     others = [each for each in extremes if each.limit is None]
-    titles = (("limits", "limits over every pose", limited), ("ranges", "numbers over every pose", others))
-    for name, title, rows in titles:
-        if rows:
-            yield _table(case, name, title, rows)
+    yield from verdict_table(case, "ranges", "numbers over every pose", others)
 
 
 def _regular_lines(case: Case, regular: RegularData, label: str = "regular", of: str = "") -> Iterator[Line]:
@@ -314,30 +177,6 @@ def _search_lines(case: Case, regular: RegularData, label: str) -> Iterator[Line
         yield refuting_machine(case, "regular", regular.machine)
     word = "box" if regular.boxes == 1 else "boxes"
     yield Line(f"{regular.boxes:,} {word} in {regular.seconds:.2f} s, engine {regular.engine}", label=label)
-
-
-def _table(case: Case, name: str, title: str, rows: list[ExtremeData]) -> TextTable:
-    """Return a table of extremes."""
-    cells = []
-    for each in rows:
-        worst = "smallest" if each.sense is Sense.MIN else "largest"
-        known = [Line(each.outcome.value, tone=TONES[each.outcome], after=f": {each.reason}" if each.reason else "")]
-        limit = [] if name == "ranges" else ["" if each.limit is None else number(each.limit)]
-        cells.append(
-            (
-                each.name,
-                each.unit,
-                worst,
-                *limit,
-                "" if each.bound is None else number(each.bound),
-                "" if each.reached is None else number(each.reached),
-                *known,
-                "" if each.pose is None else pose_words(case, each.pose),
-            )
-        )
-    limits = () if name == "ranges" else ("limit",)
-    headers = ("number", "unit", "value", *limits, "proven bound", "reached", "outcome", "at")
-    return TextTable(headers, tuple(cells), name=name, title=title)
 
 
 def _scale_lines(case: Case, scale: ScaleData) -> Iterator[Line]:

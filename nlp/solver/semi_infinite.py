@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Generic, NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,13 +37,13 @@ from ..interruption import is_requested, one_call
 from ..path.path import SymbolicPose
 from ..program.nlp import Nlp
 from ..proof.enclosure.engine import kernel
+from ..proof.statement.claims import REGULAR
 from ..proof.statement.machine import JointErrors, workspace_of_case
 from ..proof.statement.posed_layout import reach_claims
-from ..proof.workspace.judge import Judgement, judge_workspace
-from ..proof.workspace.numbers.extremes import Extreme, prove_extreme
-from ..proof.workspace.ranks.ranks import not_judged
-from ..proof.workspace.robot.pose_box import pose_box
-from ..proof.workspace.verdict import Outcome
+from ..proof.workspace.judge import judge_workspace
+from ..proof.workspace.judgement import Judgement
+from ..proof.workspace.numbers.extremes import NumberSearch, prove_extreme
+from ..proof.workspace.verdict import Outcome, Verdict, not_judged
 from .frames import Frame, excursion_from, excursion_to
 from .multistart import ProgramSolution
 from .pose_constraints import TIGHTER, BindingPose, PoseConstraints, with_margin
@@ -62,21 +62,19 @@ MOST_EXCHANGES = 40
 
 #: Solves a program, from points that come before those that the search samples.
 SolveOne = Callable[[Nlp, Sequence[FloatArray]], ProgramSolution]
-#: Verdicts on a design, and the proof that they make at the end of an exchange.
-Judged = TypeVar("Judged")
-Proof = TypeVar("Proof")
 
 
 @dataclass(frozen=True, eq=False)
-class WorkspaceProof:
-    """The proof of a design over its workspace.
+class ExchangeProof:
+    """The proof of a design over a workspace or along a path, by exchange of poses.
 
     Attributes:
-        judgement: of the design.
+        judgement: judgement of the design.
         poses: poses of the constraints, in the order in which they were found.
         history: F, and the number of claims that were not proved, of each design in turn.
-        first: the design that keeps the limits at the stated pose alone: its judgement.
+        first: judgement of the first design, which keeps the limits at the stated poses alone.
         tighter: part of themselves by which the limits of the constraints are tighter than those of the case.
+        place: (6,) place of a path's frame: position, then roll, pitch and yaw, radians; empty for a workspace.
     """
 
     judgement: Judgement
@@ -84,64 +82,45 @@ class WorkspaceProof:
     history: tuple[tuple[float, int], ...]
     first: Judgement
     tighter: float = TIGHTER
+    place: tuple[float, ...] = ()
 
     @property
     def is_proved(self) -> bool:
         """Whether the design is regular and keeps its limits at every pose."""
-        return not _faults(self.judgement)
+        return self.judgement.is_proved
 
 
-class Judging(NamedTuple, Generic[Judged]):
+class JudgedDesign(NamedTuple):
     """A design judged at every pose of a set.
 
     Attributes:
-        design: with the poses for which it is judged as its workspace.
-        judgement: of the design.
+        design: the design, with the poses for which it is judged as its workspace.
+        judgement: its judgement.
         faults: a pose for each claim that is not proved, None for one that is open without a pose.
     """
 
     design: Case
-    judgement: Judged
+    judgement: Judgement
     faults: Sequence[BindingPose | None]
 
 
-class Exchange(NamedTuple, Generic[Judged]):
-    """An exchange that led to an answer.
-
-    Attributes:
-        found: solution of the last program.
-        judgement: of its design.
-        poses: of the constraints, in the order in which they were found.
-        history: F, and the number of claims that were not proved, of each design in turn.
-        first: judgement of the first design.
-        tighter: part of themselves by which the limits of the constraints are tighter than those of the case.
-    """
-
-    found: ProgramSolution
-    judgement: Judged
-    poses: tuple[BindingPose, ...]
-    history: tuple[tuple[float, int], ...]
-    first: Judged
-    tighter: float
-
-
-class SemiInfinite(NamedTuple, Generic[Judged, Proof]):
+class SemiInfinite(NamedTuple):
     """A program whose limits hold at every pose of a set.
 
     Attributes:
         nlp: the program without constraints from poses.
         constraints: such constraints, none yet.
-        judge: judges the design of a solution.
-        proof: returns the proof that an exchange ends with.
+        judge: judges the design of a solution, with a gap.
+        in_world: returns a proof at a point (n,) of the program with its poses in the world frame.
     """
 
     nlp: Nlp
     constraints: PoseConstraints
-    judge: Callable[[ProgramSolution, float], Judging[Judged]]
-    proof: Callable[[Exchange[Judged]], Proof]
+    judge: Callable[[ProgramSolution, float], JudgedDesign]
+    in_world: Callable[[ExchangeProof, FloatArray], ExchangeProof]
 
 
-def over_workspace(case: Case, nlp: Nlp) -> SemiInfinite[Judgement, WorkspaceProof]:
+def over_workspace(case: Case, nlp: Nlp) -> SemiInfinite:
     """Return a program of a case whose limits hold over its workspace.
 
     Args:
@@ -154,24 +133,23 @@ def over_workspace(case: Case, nlp: Nlp) -> SemiInfinite[Judgement, WorkspacePro
         robot = nlp.program.robot
         frame = Frame(SymbolicPose(robot.position, robot.rotation))
 
-    def judge(solved: ProgramSolution, gap: float) -> Judging[Judgement]:
+    def judge(solved: ProgramSolution, gap: float) -> JudgedDesign:
         design = design_of(case, solved.nlp, solved.x)
         found = _judged(with_objective(design, solved.F), gap)
-        faults = _faults(found)
+        faults = list(faults_of(found))
         if frame is not None:
             move = partial(excursion_from, Frame.at(frame.place, nlp, solved.x[: nlp.n]))
             faults = [None if each is None else each.moved(move) for each in faults]
         # The level is no limit of the case.
-        return Judging(design, replace(found, case=design), faults)
+        return JudgedDesign(design, replace(found, case=design), faults)
 
-    def proof(done: Exchange[Judgement]) -> WorkspaceProof:
-        poses = done.poses
-        if frame is not None:
-            move = partial(excursion_to, Frame.at(frame.place, nlp, done.found.x[: nlp.n]))
-            poses = tuple(each.moved(move) for each in poses)
-        return WorkspaceProof(done.judgement, poses, done.history, done.first, done.tighter)
+    def in_world(proof: ExchangeProof, x: FloatArray) -> ExchangeProof:
+        if frame is None:
+            return proof
+        move = partial(excursion_to, Frame.at(frame.place, nlp, x[: nlp.n]))
+        return replace(proof, poses=tuple(each.moved(move) for each in proof.poses))
 
-    return SemiInfinite(nlp, PoseConstraints(nlp, case, frame=frame), judge, proof)
+    return SemiInfinite(nlp, PoseConstraints(nlp, case, frame=frame), judge, in_world)
 
 
 def check_exchange(case: Case) -> None:
@@ -191,8 +169,8 @@ def check_exchange(case: Case) -> None:
 
 @one_call
 def exchanged(
-    problem: SemiInfinite[Judged, Proof], solve_one: SolveOne, first: Sequence[FloatArray] = ()
-) -> tuple[ProgramSolution, Proof | None]:
+    problem: SemiInfinite, solve_one: SolveOne, first: Sequence[FloatArray] = ()
+) -> tuple[ProgramSolution, ExchangeProof | None]:
     """Return the solution of a program whose limits hold at every pose of a set, and the proof; None without an answer.
 
     A design that is not proved at the end of the exchange is no answer. Where the work is to stop, it is the last one
@@ -204,8 +182,8 @@ def exchanged(
         first: points (n,) of the program to start from.
     """
     nlp, constraints = problem.nlp, problem.constraints
-    binding, history, judgements = list[BindingPose](), list[tuple[float, int]](), list[Judged]()
-    found, parts, done = solve_one(nlp, first), list(_PARTS), None
+    binding, history, judgements = list[BindingPose](), list[tuple[float, int]](), list[Judgement]()
+    found, parts, last = solve_one(nlp, first), list(_PARTS), None
     while found.status.is_answer:
         gap = GAP * (parts[0] or _PARTS[-2])
         design, judged, faults = problem.judge(found, gap)
@@ -215,17 +193,17 @@ def exchanged(
         fresh = constraints.added(design, fresh, found.x, gap / GAP)
         if faults:
             found = replace(found, status=Status.INTERRUPTED if is_requested() else Status.NOT_PROVED)
-        done = Exchange(found, judged, tuple(binding), tuple(history), judgements[0], TIGHTER * parts[0])
+        proof = ExchangeProof(judged, tuple(binding), tuple(history), judgements[0], TIGHTER * parts[0])
+        last = found, problem.in_world(proof, found.x)
         if not faults or not fresh or len(history) >= MOST_EXCHANGES or is_requested():
-            return found, problem.proof(done)
+            return last
         binding += fresh
         nlp = constraints.program
         start = np.concatenate([found.x, nlp.start[len(found.x) :]])
         found, parts = _solve_within(nlp, solve_one, start, parts)
-    if done is None or found.status is not Status.INTERRUPTED:
+    if last is None or found.status is not Status.INTERRUPTED:
         return found, None
-    judged_last = replace(done.found, status=Status.INTERRUPTED)
-    return judged_last, problem.proof(done._replace(found=judged_last))
+    return replace(last[0], status=Status.INTERRUPTED), last[1]
 
 
 def _solve_within(
@@ -280,9 +258,9 @@ def _judged(case: Case, gap: float) -> Judgement:
     # Poses that the robot cannot take say nothing of the reach of its limbs.
     if closed.reaches and not workspace.dependent:
         layout, claims = reach_claims(case, closed, workspace)
-        found = tuple(prove_extreme(layout, claim, gap=gap, jobs=1) for claim in claims)
+        found = tuple(prove_extreme(layout, claim, NumberSearch(gap, 1)) for claim in claims)
         if any(each.outcome is not Outcome.PROVED for each in found):
-            return Judgement(case, workspace, not_judged(pose_box(workspace), _UNREACHED), found)
+            return Judgement(case, workspace, (not_judged(REGULAR, _UNREACHED), *found))
     return judge_workspace(case, gap=gap, jobs=1, with_objective=False)
 
 
@@ -305,22 +283,18 @@ def design_of(case: Case, nlp: Nlp, x: FloatArray) -> Case:
     return replace(case, parameters=parameters, position=pose.position, rotation=rotation)
 
 
-def _faults(judged: Judgement) -> list[BindingPose | None]:
-    """Return a pose for each claim that is not proved; None for one that is open without a pose."""
-    faults: list[BindingPose | None] = []
-    regular = judged.regularity
-    if regular.outcome is not Outcome.PROVED:
-        faults.append(
-            None
-            if regular.y is None
-            else BindingPose("regular", regular.box.pose(regular.y), None, _errors(regular.errors))
-        )
-    if judged.constraints is not None and judged.constraints.outcome is not Outcome.PROVED:
-        faults.append(None)
-    return [*faults, *faults_of_numbers(judged.extremes)]
+def faults_of(judged: Judgement) -> Iterator[BindingPose | None]:
+    """Yield a pose for each claim that is not proved; None for one that is open without a pose.
+
+    A constraint for the rank of the constraint wrenches does not exist.
+    """
+    for each in (rank for rank in judged.ranks if rank.fails):
+        is_known = each.name == REGULAR and each.pose is not None
+        yield BindingPose(each.name, each.pose, None, _errors(each.errors)) if is_known and each.pose else None
+    yield from _faults_of_numbers(judged.extremes)
 
 
-def faults_of_numbers(extremes: Sequence[Extreme]) -> Iterator[BindingPose | None]:
+def _faults_of_numbers(extremes: Sequence[Verdict]) -> Iterator[BindingPose | None]:
     """Yield a pose for each number whose limit is not proved; None for one that is open without a pose."""
     by_name = {(each.name, each.sense): each for each in extremes}
     for each in extremes:

@@ -24,8 +24,7 @@ from .status import Status
 
 if TYPE_CHECKING:
     from .. import Picture
-    from .over_path import PathProof
-    from .semi_infinite import WorkspaceProof
+    from .semi_infinite import ExchangeProof
 
 
 class Answer:
@@ -220,8 +219,8 @@ class Solution(Whole, Shown, Answer):
     outcomes: tuple[TaskOutcome, ...]
     combination: Combination | None
     seconds: float
-    workspace: WorkspaceProof | None = None
-    path: PathProof | None = None
+    workspace: ExchangeProof | None = None
+    path: ExchangeProof | None = None
     choice: Choice | None = None
     rounding: Rounding | None = None
 

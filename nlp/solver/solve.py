@@ -26,7 +26,7 @@ from .status import Phase, PhaseProgress, Status, no_phase
 if TYPE_CHECKING:
     from .semi_infinite import SemiInfinite
 
-    Everywhere: TypeAlias = Callable[[Case, Nlp], SemiInfinite[Any, Any]]
+    Everywhere: TypeAlias = Callable[[Case, Nlp], SemiInfinite]
 
 #: Called after each start with the task or method that is being solved, the number of starts done, the number of all,
 #: and the best objective so far.

@@ -10,7 +10,7 @@ a short command a thirtieth slower.
 
 import enum
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import (
     TYPE_CHECKING,
     Annotated,
@@ -113,7 +113,8 @@ class JsonObject:
         kinds = cls.__annotations__
         if any(isinstance(kind, str) for kind in kinds.values()):
             raise TypeError(f"{cls.__name__}: its annotations are read at run time, and must not be text")
-        cls.fields = {name: _field(name, kind) for name, kind in kinds.items()}
+        # A subclass has the fields of its base first.
+        cls.fields = {**cls.fields, **{name: _field(name, kind) for name, kind in kinds.items()}}
 
     def __init__(self, **values: object) -> None:
         # A default is an attribute of the class.
@@ -203,9 +204,16 @@ def kinds_of(kind: type[JsonObject]) -> dict[str, object]:
     A type whose module few commands need stands in an annotation as text, such as ``Absent["ProofData"]``. Who calls
     this has imported that module.
     """
-    objects = {each.__name__: each for each in JsonObject.__subclasses__()}
+    objects = {each.__name__: each for each in _subclasses(JsonObject)}
     found = get_type_hints(kind, localns=objects, include_extras=True)
     return {name: found[name] for name, each in kind.fields.items() if each.mark is not Mark.HIDDEN}
+
+
+def _subclasses(kind: type[JsonObject]) -> Iterator[type[JsonObject]]:
+    """Yield the subclasses of a type, and theirs."""
+    for each in kind.__subclasses__():
+        yield each
+        yield from _subclasses(each)
 
 
 def json_data(value: JsonObject) -> dict[str, JsonValue]:

@@ -8,7 +8,7 @@ from builders import Array, case_from, case_of, starter_tables
 from measures import circle_joints
 from numpy.typing import ArrayLike
 
-from screwsynth.nlp import Case, Extreme, PathJudgement, ProgrammedPath, Sense
+from screwsynth.nlp import Case, Judgement, ProgrammedPath, Sense, Verdict
 from screwsynth.nlp.path.gcode import read_program
 from screwsynth.nlp.path.options import Between, PathOptions
 from screwsynth.nlp.path.poses_csv import read_poses
@@ -93,6 +93,6 @@ def table(
     return read_poses(f"{names}\n{text}", "poses.csv", case.units, PathOptions(between=between))
 
 
-def extreme(judged: PathJudgement, name: str, sense: Sense) -> Extreme:
+def extreme(judged: Judgement, name: str, sense: Sense) -> Verdict:
     (found,) = (each for each in judged.extremes if (each.name, each.sense) == (name, sense))
     return found

@@ -28,7 +28,7 @@ from screwsynth.nlp.interruption import seconds_left
 from screwsynth.nlp.program.epigraph import formulate_worst
 from screwsynth.nlp.program.nlp import Nlp
 from screwsynth.nlp.proof.boxes import optimum
-from screwsynth.nlp.proof.boxes.engine import Engine, Examination, Verdict, search_tape
+from screwsynth.nlp.proof.boxes.engine import BoxState, Engine, Examination, search_tape
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.checker.check import check_proof
@@ -108,7 +108,7 @@ def test_the_kernel_agrees_with_the_reference_box_by_box(case: Case) -> None:
     cuts = (reference.cut_lower == other.cut_lower) & (reference.cut_upper == other.cut_upper)
     agree = same & cuts.all(axis=0)
     assert agree.mean() > 0.99
-    opened = agree & (reference.verdict == Verdict.OPEN)
+    opened = agree & (reference.verdict == BoxState.OPEN)
     np.testing.assert_allclose(other.lower[:, opened], reference.lower[:, opened], rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(other.upper[:, opened], reference.upper[:, opened], rtol=1e-9, atol=1e-9)
     assert (reference.split == other.split)[opened].mean() > 0.99
@@ -217,7 +217,7 @@ def test_nan_in_a_bound_does_not_close_a_box() -> None:
     low, high = nlp.lower[:, None].copy(), nlp.upper[:, None].copy()
     low[2], high[2] = np.nan, np.nan
     for engine in (Engine(form), NumpyEngine(form)):
-        assert engine.examine(low, high, 1e300).verdict[0] == Verdict.OPEN
+        assert engine.examine(low, high, 1e300).verdict[0] == BoxState.OPEN
 
 
 def test_nothing_outside_the_box_is_taken_for_a_better_point() -> None:
@@ -540,11 +540,11 @@ def test_minors_exclude_wide_boxes_and_nothing_that_keeps_the_limit() -> None:
         engine(replace(form, conditions=tuple(alone)), 1).examine(bad - half, bad + half, -np.inf).verdict
         for engine in (Engine, NumpyEngine)
     )
-    assert (excluded == Verdict.INFEASIBLE).all()
+    assert (excluded == BoxState.INFEASIBLE).all()
     np.testing.assert_array_equal(by_reference, excluded)
     estimate = tuple(each for each in form.conditions if each.kind is not Kind.FOLLOWS)
     by_estimate = Engine(replace(form, conditions=estimate), 1).examine(bad - half, bad + half, -np.inf).verdict
-    assert not (by_estimate == Verdict.INFEASIBLE).any()
+    assert not (by_estimate == BoxState.INFEASIBLE).any()
 
 
 def condition_number(case: Case, position: Array, turn: Array, length: float) -> float:

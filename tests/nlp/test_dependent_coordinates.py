@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from builders import PUSH_UP, ends
 
-from screwsynth.nlp import Extreme, Judgement, Outcome
+from screwsynth.nlp import Judgement, Outcome, Verdict
 
 BENCH = Path(__file__).parents[2] / "bench" / "soundness"
 SAMPLES = 300
@@ -75,7 +75,7 @@ def sampled(bench: ModuleType, own: Any) -> dict[str, tuple[float, float]]:
     return {name: (found.pose[:, k].min(), found.pose[:, k].max()) for k, name in enumerate(own.names)}
 
 
-def extreme(bench: ModuleType, found: Judgement, name: str, sense: str) -> Extreme:
+def extreme(bench: ModuleType, found: Judgement, name: str, sense: str) -> Verdict:
     """The smallest or largest value of a coordinate; the angle of a rotation about z is its yaw."""
     (own,) = (each for each in found.extremes if bench.name_of(each) == name and each.sense.value == sense)
     return own

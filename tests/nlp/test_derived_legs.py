@@ -25,9 +25,9 @@ from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.formats.solved.mechanism_of import mechanism_of
 from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, read_proof
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
-from screwsynth.nlp.proof.workspace.judge import Judgement
-from screwsynth.nlp.proof.workspace.paper_record import PaperRecord
-from screwsynth.nlp.proof.workspace.proof_writer import paper_of
+from screwsynth.nlp.proof.workspace.judgement import Judgement
+from screwsynth.nlp.proof.workspace.proof_record import ProofRecord
+from screwsynth.nlp.proof.workspace.proof_writer import proof_of as proof_written
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.starter.text import starter_case
 
@@ -264,17 +264,17 @@ def ends_of(judged: Judgement) -> dict[tuple[str, str], float]:
 
 
 @pytest.fixture(scope="module", params=[None, 0.02], ids=["exact", "as built"])
-def workspaces(request: pytest.FixtureRequest) -> tuple[float, list[tuple[Case, Judgement, PaperRecord]]]:
+def workspaces(request: pytest.FixtureRequest) -> tuple[float, list[tuple[Case, Judgement, ProofRecord]]]:
     """Both descriptions judged over a workspace, every machine within a tolerance too, with records for a proof."""
     more = {"tolerance": {"joint_centre": request.param}} if request.param else {}
     found = []
     for case in both(FIXED, HELD, workspace=WORKSPACE, **more):
-        record = PaperRecord()
-        found.append((case, judge_workspace(case, with_objective=False, paper=record), record))
+        record = ProofRecord()
+        found.append((case, judge_workspace(case, with_objective=False, record=record), record))
     return request.param or 0.0, found
 
 
-Workspaces = tuple[float, list[tuple[Case, Judgement, PaperRecord]]]
+Workspaces = tuple[float, list[tuple[Case, Judgement, ProofRecord]]]
 
 
 def test_bounds_over_a_workspace_contain_every_machine_and_agree(workspaces: Workspaces) -> None:
@@ -311,9 +311,9 @@ def test_bounds_over_a_workspace_contain_every_machine_and_agree(workspaces: Wor
     assert all(room < 0.5 + 3 * tolerance for (name, _), room in worst.items() if name.startswith("leg_length"))
 
 
-def proof_of(judged: Judgement, record: PaperRecord) -> Proof:
+def proof_of(judged: Judgement, record: ProofRecord) -> Proof:
     """The proof as its file has it."""
-    return read_proof(paper_of(judged, record, "").as_text(), "again")
+    return read_proof(proof_written(judged, record, "").as_text(), "again")
 
 
 def test_the_proof_on_paper_is_accepted_and_an_altered_one_is_not(workspaces: Workspaces) -> None:
@@ -387,8 +387,8 @@ def tripod_pose(z: float, turn: Array, errors: Array) -> tuple[Array, Array]:
 @pytest.mark.parametrize("tolerance", soaked([0.0, 0.001], [0.001]))
 def test_a_robot_with_fewer_freedoms_and_loops(tolerance: float) -> None:
     more = {"tolerance": {"joint_centre": tolerance}} if tolerance else {}
-    case, record = case_from({**TRIPOD, **more}), PaperRecord()
-    judged = judge_workspace(case, with_objective=False, paper=record, gap=0.01)
+    case, record = case_from({**TRIPOD, **more}), ProofRecord()
+    judged = judge_workspace(case, with_objective=False, record=record, gap=0.01)
     # Lengths on paper are of every assembly, in which strokes are longer: these are not on paper.
     checked = check_workspace_proof(proof_of(judged, record), case).claims
     assert "actuator.stroke_max limb 1" not in {each.name for each in checked}

@@ -23,7 +23,7 @@ from numpy_engine.second_order import enclose_second, monomials
 from random_graphs import random_boxes, random_function
 
 from screwsynth.nlp import UncoveredError, formulate, load_case
-from screwsynth.nlp.proof.boxes.engine import Engine, Verdict, search_tape
+from screwsynth.nlp.proof.boxes.engine import BoxState, Engine, search_tape
 from screwsynth.nlp.proof.checker.arithmetic import PolynomialArithmetic
 from screwsynth.nlp.proof.checker.polynomials import middles, places
 from screwsynth.nlp.proof.enclosure.forms import Encloser
@@ -328,8 +328,8 @@ def test_no_point_of_any_scale_that_reaches_a_level_is_cut_off() -> None:
                         continue
                     box = low[:, k : k + 1], high[:, k : k + 1]
                     found = engine.examine(*box, level)
-                    assert found.verdict[0] in (Verdict.OPEN, Verdict.MONOTONE)
-                    if found.verdict[0] == Verdict.OPEN:
+                    assert found.verdict[0] in (BoxState.OPEN, BoxState.MONOTONE)
+                    if found.verdict[0] == BoxState.OPEN:
                         assert ((found.lower[:, 0] <= point) & (point <= found.upper[:, 0])).all()
                         cuts += bool((found.lower > box[0]).any() or (found.upper < box[1]).any())
     assert cuts > 5

@@ -42,7 +42,7 @@ from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem
 from screwsynth.nlp.proof.workspace.scale import largest_scale
-from screwsynth.nlp.proof.workspace.verdict import Outcome, RankVerdict
+from screwsynth.nlp.proof.workspace.verdict import Outcome, Verdict
 
 ROOT = Path(screwsynth.nlp.__file__).parent
 #: The code whose instructions are counted: all of the searches, or their loops alone, where most mistakes would be.
@@ -97,7 +97,7 @@ def at_instruction(n: int, error: type[BaseException], watched: tuple[str, ...])
         sys.settrace(before)
 
 
-def from_regularity(found: RankVerdict) -> Claim:
+def from_regularity(found: Verdict) -> Claim:
     assert found.outcome is not Outcome.PROVED or (found.open, found.share) == (0, 0.0)
     return Claim(found.outcome is Outcome.PROVED, -found.share, found.reason == STOPPED)
 
@@ -110,7 +110,7 @@ def six_legs_problem() -> Problem:
     return build_problem(case_of_legs(Legs(rng.normal(size=(6, 3)), rng.normal(size=(6, 3)))), HEXAPOD, box)
 
 
-def regular(*, most_boxes: int | None = None, progress: Callable[..., None] | None = None) -> RankVerdict:
+def regular(*, most_boxes: int | None = None, progress: Callable[..., None] | None = None) -> Verdict:
     problem = six_legs_problem()
     return prove_rank(problem, problem.locked, most_boxes=most_boxes, progress=progress)
 

@@ -16,7 +16,7 @@ from screwsynth.nlp import Case
 from screwsynth.nlp.case.loads import Load, Loading, Motion
 from screwsynth.nlp.case.motors import Motor, MotorNumber
 from screwsynth.nlp.case.task import Sense
-from screwsynth.nlp.cli.paper import _premises
+from screwsynth.nlp.cli.proofs import _premises
 from screwsynth.nlp.proof.checker.workspace.check import VerifiedWorkspace
 from screwsynth.nlp.proof.checker.workspace.forms import AffineMatrix, solved
 from screwsynth.nlp.proof.checker.workspace.loop_claims import PosedLoops, posed_loops

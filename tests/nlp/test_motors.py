@@ -29,17 +29,16 @@ from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.proof.statement.machine import Legs
 from screwsynth.nlp.proof.statement.motors import motor_claims
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
-from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme
 from screwsynth.nlp.proof.workspace.numbers.searched import Subject, motor_extremes
 from screwsynth.nlp.proof.workspace.slices.slice_limits import KEPT, UNDECIDED
 from screwsynth.nlp.proof.workspace.slices.slices import slices_of
-from screwsynth.nlp.proof.workspace.verdict import Outcome
+from screwsynth.nlp.proof.workspace.verdict import Outcome, Verdict
 from screwsynth.nlp.results.workspace import workspace_of
 from screwsynth.nlp.results.workspacemotors import motor_tables
 from screwsynth.nlp.results.workspacewording import verdict_words
 
 #: Key of a number: what, of which actuator, under which load, and the sense.
-Numbers = dict[tuple[str, int, str, Sense], Extreme]
+Numbers = dict[tuple[str, int, str, Sense], Verdict]
 
 
 def motors_of(case: Case, **options: float) -> Numbers:

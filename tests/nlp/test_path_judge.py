@@ -27,7 +27,8 @@ from path_cases import (
 
 from screwsynth.nlp import Outcome, PathOptions, ProgrammedPath, Sense, Units, interruption, judge_workspace
 from screwsynth.nlp.path.gcode import read_program
-from screwsynth.nlp.proof.workspace.path_judge import covered, judge_path
+from screwsynth.nlp.proof.workspace.path_domain import covered
+from screwsynth.nlp.proof.workspace.path_judge import judge_path
 
 #: Points of each segment at which machines are measured.
 SAMPLES = np.linspace(0, 1, 4001)

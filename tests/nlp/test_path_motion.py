@@ -26,7 +26,7 @@ from path_cases import (
     turns_of,
 )
 
-from screwsynth.nlp import Case, Extreme, Outcome, PathOptions, ProgrammedPath, Sense, inverse
+from screwsynth.nlp import Case, Outcome, PathOptions, ProgrammedPath, Sense, Verdict, inverse
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.output.pictures.pathpanels import PathPicture, path_picture
 from screwsynth.nlp.output.pictures.paths import path_figure
@@ -35,7 +35,8 @@ from screwsynth.nlp.path.options import Between
 from screwsynth.nlp.path.orientation import ORDERS
 from screwsynth.nlp.path.poses_csv import read_poses
 from screwsynth.nlp.path.sampling import WayKind, spread_points, way_of
-from screwsynth.nlp.proof.workspace.path_judge import PathJudgement, judge_path
+from screwsynth.nlp.proof.workspace.judgement import Judgement
+from screwsynth.nlp.proof.workspace.path_judge import judge_path
 from screwsynth.nlp.proof.workspace.path_knots import Knots, Sampling
 from screwsynth.nlp.proof.workspace.path_samples import samples_of
 from screwsynth.nlp.proof.workspace.robot.path_cover import PathCover
@@ -62,7 +63,7 @@ def sampled_speeds(case: Case, path: ProgrammedPath) -> Array:
     return np.concatenate([speeds_on(case, path, k) for k in np.flatnonzero(np.isfinite(path.durations))])
 
 
-def largest(judged: PathJudgement, number: str) -> list[Extreme]:
+def largest(judged: Judgement, number: str) -> list[Verdict]:
     return [each for each in judged.extremes if each.name.startswith(number) and each.sense is Sense.MAX]
 
 

@@ -17,7 +17,8 @@ from screwsynth.nlp.path.options import Between, PathOptions
 from screwsynth.nlp.path.path import Kind, ProgrammedPath
 from screwsynth.nlp.path.poses_csv import read_poses
 from screwsynth.nlp.proof.workspace import path_faults
-from screwsynth.nlp.proof.workspace.path_judge import PathJudgement, judge_path
+from screwsynth.nlp.proof.workspace.judgement import Judgement
+from screwsynth.nlp.proof.workspace.path_judge import judge_path
 
 MM = Units("mm", "deg", "N")
 SLERP = PathOptions(between=Between.SLERP)
@@ -251,7 +252,7 @@ def joints(path: ProgrammedPath) -> Array:
     return np.concatenate(found)
 
 
-def extremes_of(judged: PathJudgement, name: str) -> list[tuple[Sense, float, float]]:
+def extremes_of(judged: Judgement, name: str) -> list[tuple[Sense, float, float]]:
     found = [(each.sense, each.bound, each.reached) for each in judged.extremes if each.name == name]
     assert found, name
     return found

@@ -19,8 +19,9 @@ from screwsynth.nlp.path.frame import PathFrame
 from screwsynth.nlp.path.options import Between, PathOptions
 from screwsynth.nlp.path.orientation import ORDERS
 from screwsynth.nlp.path.poses_csv import read_poses
-from screwsynth.nlp.proof.workspace import path_judge
-from screwsynth.nlp.proof.workspace.path_judge import PathJudgement, judge_path
+from screwsynth.nlp.proof.workspace import path_domain
+from screwsynth.nlp.proof.workspace.judgement import Judgement
+from screwsynth.nlp.proof.workspace.path_judge import judge_path
 from screwsynth.nlp.proof.workspace.robot.long_turns import LongTurns, turns_of_path
 from screwsynth.nlp.proof.workspace.robot.path_turns import LinearAngles, PathTurns, Tangents
 from screwsynth.nlp.proof.workspace.robot.pose_box import UNTURNED
@@ -283,7 +284,7 @@ def lines(case: Case, rows: Array, order: str) -> ProgrammedPath:
     return program(case, "\n".join(["F60", *(f"G1 {each}" for each in words), "M2"]), angles=order)
 
 
-def outcomes(judged: PathJudgement) -> list[tuple[str, Outcome]]:
+def outcomes(judged: Judgement) -> list[tuple[str, Outcome]]:
     return [(each.name, each.outcome) for each in (*judged.ranks, *judged.extremes)]
 
 
@@ -293,7 +294,7 @@ def test_both_rules_of_roll_pitch_and_yaw_agree(longest: float, monkeypatch: pyt
     path = replace(table(case, WAY), durations=np.array([4.0, 3.0]))
     own = judge_path(case, path)
     general = LinearAngles(path.knots[:, 3:], path.order, UNTURNED)
-    monkeypatch.setattr(path_judge, "turns_of_path", lambda _: general)
+    monkeypatch.setattr(path_domain, "turns_of_path", lambda _: general)
     other = judge_path(case, path)
     assert outcomes(own) == outcomes(other)
     assert own.is_proved == (longest == 36.0)
@@ -317,7 +318,7 @@ def test_every_number_is_the_same_in_all_coordinates(monkeypatch: pytest.MonkeyP
         turns_of_path(replace(path, between=Between.SLERP)),
         LinearAngles(path.knots[:, 3:], path.order, (8, 1, -2, 3)),
     ):
-        monkeypatch.setattr(path_judge, "turns_of_path", lambda _, turns=turns: turns)
+        monkeypatch.setattr(path_domain, "turns_of_path", lambda _, turns=turns: turns)
         judged.append(judge_path(case, path))
     own, *others = judged
     assert len(own.extremes) == 36

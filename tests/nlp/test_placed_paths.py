@@ -23,7 +23,9 @@ from screwsynth.nlp.path.orientation import ORDERS
 from screwsynth.nlp.path.path import Kind, ProgrammedPath
 from screwsynth.nlp.path.placing import placed
 from screwsynth.nlp.path.reader import path_of_case
-from screwsynth.nlp.proof.workspace.path_judge import PathJudgement, covered, judge_path
+from screwsynth.nlp.proof.workspace.judgement import Judgement
+from screwsynth.nlp.proof.workspace.path_domain import covered
+from screwsynth.nlp.proof.workspace.path_judge import judge_path
 from screwsynth.nlp.proof.workspace.robot.long_turns import turns_of_path
 
 Matrix = list[list[Decimal]]
@@ -196,7 +198,7 @@ def legs(own: ProgrammedPath, place: Sequence[float], count: int = 401) -> Array
     return np.asarray(np.linalg.norm(tips @ R.T + np.array(place[:3]) - BASE, axis=2))
 
 
-def range_of(judged: PathJudgement, name: str) -> tuple[float, float]:
+def range_of(judged: Judgement, name: str) -> tuple[float, float]:
     low, high = (extreme(judged, name, sense).bound for sense in (Sense.MIN, Sense.MAX))
     return low, high
 

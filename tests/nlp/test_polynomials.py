@@ -18,7 +18,7 @@ from random_graphs import N, random_function
 from screwsynth.models import robot_function
 from screwsynth.nlp import Case, Search, Sense, Task, UncoveredError, formulate, load_case, solve_program
 from screwsynth.nlp.case.pose import Free, Rotation
-from screwsynth.nlp.proof.boxes.engine import Engine, Verdict, value_tape
+from screwsynth.nlp.proof.boxes.engine import BoxState, Engine, value_tape
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.checker.arithmetic import PolynomialArithmetic
@@ -274,12 +274,12 @@ def test_tangents_are_those_of_the_reference(name: str) -> None:
     assert (one.verdict == other.verdict).mean() > 0.98
     same = one.verdict == other.verdict
     np.testing.assert_allclose(other.bound[same], one.bound[same], rtol=1e-9)
-    opened = same & (one.verdict == Verdict.OPEN) & (one.cut_lower == other.cut_lower).all(axis=0)
+    opened = same & (one.verdict == BoxState.OPEN) & (one.cut_lower == other.cut_lower).all(axis=0)
     np.testing.assert_allclose(other.lower[:, opened], one.lower[:, opened], rtol=1e-8, atol=1e-8)
     np.testing.assert_array_equal(one.split[opened], other.split[opened])
     # They close boxes that are open without, and leave none open that is not.
     without = NumpyEngine(form, tangents=False).examine(lower, upper, threshold)
-    left, before = (each.verdict == Verdict.OPEN for each in (one, without))
+    left, before = (each.verdict == BoxState.OPEN for each in (one, without))
     assert (left <= before).all()
     assert name == "two poses" or left.sum() < before.sum()
     # Points of the box that keep the conditions have no larger value than the bound.

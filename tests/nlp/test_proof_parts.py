@@ -25,7 +25,7 @@ from screwsynth.nlp.errors import InputError, UncoveredError
 from screwsynth.nlp.program.layout import assemble, lay_out
 from screwsynth.nlp.proof.boxes import search as boxes_search
 from screwsynth.nlp.proof.boxes.engine import Engine
-from screwsynth.nlp.proof.boxes.search import TOO_SMALL, WHOLE, Boxes, Effort, Order, Rule, Search, Verdicts, some
+from screwsynth.nlp.proof.boxes.search import TOO_SMALL, WHOLE, Boxes, BoxResults, Effort, Order, Rule, Search, some
 from screwsynth.nlp.proof.boxes.symmetry import grouped, halved, mirrors
 from screwsynth.nlp.proof.boxes.tree import TreeRecord
 from screwsynth.nlp.proof.certificate import branch_and_bound
@@ -62,7 +62,7 @@ class Peak(Rule[np.ndarray]):
         parts = boxes_search.bisected(boxes)
         return parts._replace(more=parts.more + 1)
 
-    def examine(self, boxes: Boxes[np.ndarray]) -> Verdicts[np.ndarray]:
+    def examine(self, boxes: Boxes[np.ndarray]) -> BoxResults[np.ndarray]:
         nearest = np.clip(self.top, boxes.lower, boxes.upper)
         width = boxes.upper - boxes.lower
         bound = 1 - np.abs(nearest - self.top).sum(axis=1) + width.sum(axis=1)
@@ -70,7 +70,7 @@ class Peak(Rule[np.ndarray]):
         self.seen.append(np.hstack([boxes.lower, boxes.upper])[done])
         found = boxes._replace(bound=bound, split=np.argmax(width, axis=1))
         closed = float(bound[done].max(initial=-math.inf))
-        return Verdicts(some(found, ~done), closed, len(bound))
+        return BoxResults(some(found, ~done), closed, len(bound))
 
 
 def search_of(rule: Peak, order: Order, least: float = 0.0) -> Search[Peak]:
@@ -114,7 +114,7 @@ class Better(Peak):
 
     found = False
 
-    def examine(self, boxes: Boxes[np.ndarray]) -> Verdicts[np.ndarray]:
+    def examine(self, boxes: Boxes[np.ndarray]) -> BoxResults[np.ndarray]:
         verdicts = super().examine(boxes)
         is_last = not self.found and len(verdicts.left.split) == 1
         self.found |= is_last

@@ -11,7 +11,7 @@ from numpy_engine.intervals import midpoints
 from numpy_engine.second_order import Forms, enclose_second, monomials
 
 from screwsynth.nlp import UncoveredError, formulate, load_case
-from screwsynth.nlp.proof.boxes.engine import Engine, Examination, Verdict, value_tape
+from screwsynth.nlp.proof.boxes.engine import BoxState, Engine, Examination, value_tape
 from screwsynth.nlp.proof.enclosure.tape import Tape, compile_tape
 from screwsynth.nlp.proof.statement.standard_form import Condition, StandardForm, standard_form
 
@@ -142,7 +142,7 @@ def test_the_first_pass_is_that_of_the_reference_on_random_graphs() -> None:
         infinite += int((~np.isfinite(one.bound)).sum())
     assert agree > 0.995 * verdicts.sum()
     assert infinite > 30
-    assert (verdicts[[Verdict.OPEN, Verdict.BOUNDED, Verdict.INFEASIBLE]] > 10).all()
+    assert (verdicts[[BoxState.OPEN, BoxState.BOUNDED, BoxState.INFEASIBLE]] > 10).all()
 
 
 def boxes_near(form: StandardForm, point: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -169,7 +169,7 @@ def assert_engines_agree(form: StandardForm, lower: np.ndarray, upper: np.ndarra
     assert len(set(one.verdict.tolist())) > 2
     same = (one.verdict == other.verdict) & np.isfinite(one.bound)
     np.testing.assert_allclose(other.bound[same], one.bound[same], rtol=1e-10)
-    opened = same & (one.verdict == Verdict.OPEN) & (one.cut_lower == other.cut_lower).all(axis=0)
+    opened = same & (one.verdict == BoxState.OPEN) & (one.cut_lower == other.cut_lower).all(axis=0)
     np.testing.assert_allclose(other.lower[:, opened], one.lower[:, opened], rtol=1e-9, atol=1e-9)
     assert (one.split == other.split)[opened].mean() > 0.95
 
@@ -200,10 +200,10 @@ def test_no_point_above_the_threshold_is_cut_off(name: str) -> None:
     good = np.flatnonzero(feasible & (values[0] > threshold * (1 + 1e-9)))
     # A point of a monotone box may be improved beyond it, and one of a box on a face on that face.
     is_cut = (
-        (found.cut_lower != -1).all(axis=0) & (found.cut_upper != -1).all(axis=0) & (found.verdict != Verdict.MONOTONE)
+        (found.cut_lower != -1).all(axis=0) & (found.cut_upper != -1).all(axis=0) & (found.verdict != BoxState.MONOTONE)
     )
     good = good[is_cut[of[good]]]
-    assert (found.verdict[of[good]] == Verdict.OPEN).all()
+    assert (found.verdict[of[good]] == BoxState.OPEN).all()
     inside = (x[:, good] >= found.lower[:, of[good]]) & (x[:, good] <= found.upper[:, of[good]])
     assert inside.all()
     assert good.size > 200

@@ -57,8 +57,8 @@ from screwsynth.nlp.results.rounding import listed, number
 from screwsynth.nlp.results.summary import case_summary, evaluation_summary
 from screwsynth.nlp.results.tables import limit_table, margin_table, optimum_table
 from screwsynth.nlp.results.text import Line, TextTable, Tone
+from screwsynth.nlp.results.verdicts import WorkspacePose
 from screwsynth.nlp.results.wording import certificate_lines, headline, motion_words, task_words
-from screwsynth.nlp.results.workspace import WorkspacePose
 
 #: A command on a shipped case, and whether everything of it is printed too.
 COMMANDS = [

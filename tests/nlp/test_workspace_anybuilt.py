@@ -396,7 +396,7 @@ def test_a_machine_far_off_is_singular() -> None:
         angles = turns + side * half
         plates.append(radius * np.stack([np.cos(angles), np.sin(angles), np.zeros(6)], axis=1))
     robot = Legs(plates[0] + found.errors.vectors[::2], plates[1] + found.errors.vectors[1::2])
-    assert singular_part(robot, found.box.pose(found.y)) < 1e-8
+    assert singular_part(robot, found.pose) < 1e-8
 
 
 def test_what_is_not_covered_is_open_with_the_reason() -> None:

@@ -26,7 +26,7 @@ from screwsynth.nlp.proof.statement.machine import Legs, legs_of, workspace_of_c
 from screwsynth.nlp.proof.statement.posed_layout import posed_layout
 from screwsynth.nlp.proof.statement.tolerance import built_model
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal, Number
-from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme, prove_extreme
+from screwsynth.nlp.proof.workspace.numbers.extremes import prove_extreme
 from screwsynth.nlp.proof.workspace.numbers.machines import Machines as EveryMachine
 from screwsynth.nlp.proof.workspace.numbers.pose_error import pose_errors
 from screwsynth.nlp.proof.workspace.numbers.strokes import _better
@@ -34,6 +34,7 @@ from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examined, Examiner, 
 from screwsynth.nlp.proof.workspace.ranks.rank_rule import RankTest
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem, family_of
+from screwsynth.nlp.proof.workspace.verdict import Verdict
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.results.workspace import WorkspaceResult
 
@@ -138,7 +139,7 @@ def built(robot: Legs, errors: FloatArray) -> Legs:
     return Legs(robot.base + errors[::2], robot.platform + errors[1::2])
 
 
-def beyond(each: Extreme, values: FloatArray) -> float:
+def beyond(each: Verdict, values: FloatArray) -> float:
     """Distance of the worst of some values beyond a proven bound; negative within it."""
     return float(values.max() - each.bound if each.sense is Sense.MAX else each.bound - values.min())
 
@@ -259,8 +260,8 @@ def test_a_machine_within_the_tolerance_that_is_singular_refutes(case: Case) -> 
     assert exact.outcome is Outcome.PROVED
     assert found.outcome is Outcome.REFUTED
     assert np.linalg.norm(found.errors.vectors, axis=1).max() <= 0.8
-    assert box.holds(found.y)
-    assert singular_part(built(robot, found.errors.vectors), box.pose(found.y)) < 1e-12
+    assert box.holds(box.coordinates(found.pose))
+    assert singular_part(built(robot, found.errors.vectors), found.pose) < 1e-12
 
 
 def test_closed_forms_of_the_worst_machine(case: Case) -> None:

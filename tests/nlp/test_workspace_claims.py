@@ -25,14 +25,16 @@ from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.output.pictures.workspaces import drawing_at, slices_legend
 from screwsynth.nlp.proof.statement.machine import legs_of
 from screwsynth.nlp.proof.workspace import judge
-from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
-from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme, prove_extreme
+from screwsynth.nlp.proof.workspace.judge import judge_workspace
+from screwsynth.nlp.proof.workspace.judgement import Judgement
+from screwsynth.nlp.proof.workspace.numbers.extremes import prove_extreme
 from screwsynth.nlp.proof.workspace.ranks.krawczyk import Coordinates, no_relation
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import LoopBoxes
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box, scaled
 from screwsynth.nlp.proof.workspace.scale import ACCURACY, largest_scale
 from screwsynth.nlp.proof.workspace.slices.slice_limits import UNDECIDED, LimitState, SliceLimits
 from screwsynth.nlp.proof.workspace.slices.slices import slices_of
+from screwsynth.nlp.proof.workspace.verdict import Verdict
 from screwsynth.nlp.results.workspace import WorkspaceResult, workspace_of
 from screwsynth.nlp.results.workspaceposes import refuted_claims, seeing_lines, worst_claim
 from screwsynth.nlp.results.workspacewording import verdict_words
@@ -75,7 +77,7 @@ def test_the_objective_over_a_small_box_about_home_is_bounded(name: str) -> None
         assert abs(each.bound - each.reached) <= 1.001e-3 * abs(each.reached)
 
 
-def opened(*args: Any, **options: Any) -> Extreme:  # noqa: ANN401
+def opened(*args: Any, **options: Any) -> Verdict:  # noqa: ANN401
     """A search that leaves what has no limit open."""
     found = prove_extreme(*args, **options)
     return found if found.limit is not None else replace(found, outcome=Outcome.OPEN, reason="for a test")

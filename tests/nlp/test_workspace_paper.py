@@ -48,8 +48,8 @@ from screwsynth.nlp.proof.statement.machine import Legs, legs_of
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Number
 from screwsynth.nlp.proof.workspace.numbers.jacobian_numbers import WorstError
 from screwsynth.nlp.proof.workspace.numbers.pose_error import PoseErrors, with_rest
-from screwsynth.nlp.proof.workspace.paper_record import PaperRecord
-from screwsynth.nlp.proof.workspace.proof_writer import paper_of
+from screwsynth.nlp.proof.workspace.proof_record import ProofRecord
+from screwsynth.nlp.proof.workspace.proof_writer import proof_of
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
@@ -78,16 +78,16 @@ def case_of(text: str = TEXT) -> Case:
 
 
 @pytest.fixture(scope="module")
-def judged() -> tuple[Judgement, PaperRecord]:
-    record = PaperRecord()
+def judged() -> tuple[Judgement, ProofRecord]:
+    record = ProofRecord()
     # Lengths of legs are asked for once more, without their limit.
-    found = judge_workspace(case_of(), quantities=["leg_length"], gap=0.05, leg_error=LEG_ERROR, paper=record)
+    found = judge_workspace(case_of(), quantities=["leg_length"], gap=0.05, leg_error=LEG_ERROR, record=record)
     return found, record
 
 
 @pytest.fixture(scope="module")
-def proof(judged: tuple[Judgement, PaperRecord]) -> Proof:
-    return paper_of(*judged, TEXT, quantities=["leg_length"], leg_error=LEG_ERROR)
+def proof(judged: tuple[Judgement, ProofRecord]) -> Proof:
+    return proof_of(*judged, TEXT, quantities=["leg_length"], leg_error=LEG_ERROR)
 
 
 @pytest.fixture(scope="module")
@@ -106,7 +106,7 @@ def random_boxes(root: PoseRoot, count: int, width: float, rng: np.random.Genera
     return lower, upper
 
 
-def test_a_proof_with_every_kind_of_claim_holds(proof: Proof, judged: tuple[Judgement, PaperRecord]) -> None:
+def test_a_proof_with_every_kind_of_claim_holds(proof: Proof, judged: tuple[Judgement, ProofRecord]) -> None:
     assert not proof.unproved
     again = read_proof(proof.as_text(), "again")
     assert unpacked(again) == proof
@@ -125,12 +125,12 @@ def test_a_proof_with_every_kind_of_claim_holds(proof: Proof, judged: tuple[Judg
         assert sign * bound >= sign * each.reached - 1e-9 * abs(each.reached)
 
 
-def test_an_error_without_the_other_one_is_not_on_paper(judged: tuple[Judgement, PaperRecord]) -> None:
+def test_an_error_without_the_other_one_is_not_on_paper(judged: tuple[Judgement, ProofRecord]) -> None:
     found, record = judged
     names = ["position error", "rotation error"]
     for name in names:
         opened = [replace(each, outcome=Outcome.OPEN) if each.name == name else each for each in found.extremes]
-        proof = paper_of(replace(found, extremes=tuple(opened)), record, TEXT, leg_error=LEG_ERROR)
+        proof = proof_of(replace(found, verdicts=(*found.ranks, *opened)), record, TEXT, leg_error=LEG_ERROR)
         assert sorted(each.name for each in proof.unproved) == names
         assert not any(each.name in names for each in proof.claims)
 

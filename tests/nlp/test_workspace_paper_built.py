@@ -40,6 +40,7 @@ from screwsynth.nlp.proof.checker.workspace.ranks import RankClaim, rank_claim
 from screwsynth.nlp.proof.checker.workspace.statement import Machines
 from screwsynth.nlp.proof.statement.machine import Legs
 from screwsynth.nlp.proof.statement.tolerance import Directions, length_of_one_machine, second_order_name
+from screwsynth.nlp.proof.workspace.numbers.extremes import NumberSearch
 from screwsynth.nlp.proof.workspace.numbers.searched import Subject, searched_extremes
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 
@@ -413,7 +414,9 @@ def test_asked_singular_values_of_the_exact_machine_are_on_paper() -> None:
     # Without a length of legs above the errors nothing is known of other machines, and none of the two is proved.
     case = case_of()
     subject = Subject(case, case.model, problem_of(case))
-    for extreme in searched_extremes(replace(subject, case=replace(case, limits=Limits())), ASKED[1:], gap=0.1):
+    for extreme in searched_extremes(
+        replace(subject, case=replace(case, limits=Limits())), ASKED[1:], NumberSearch(0.1)
+    ):
         assert (extreme.outcome, "too large" in extreme.reason) == (Outcome.OPEN, True)
 
 

@@ -26,7 +26,7 @@ from workspace_cases import (
 
 from screwsynth.models import FloatArray
 from screwsynth.models.joints.closedform import closed_form
-from screwsynth.nlp import Case, Extreme, Judgement, Loading, Motion, Outcome
+from screwsynth.nlp import Case, Judgement, Loading, Motion, Outcome, Verdict
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, read_proof, workspace_numbers
 from screwsynth.nlp.proof.checker.tree import Node, node_bytes
@@ -34,14 +34,15 @@ from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.checker.workspace.closed_loops import Assembly
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import _PoseRule, show_on_leaves
 from screwsynth.nlp.proof.checker.workspace.statement import robot_claims
+from screwsynth.nlp.proof.statement.claims import REGULAR
 from screwsynth.nlp.proof.statement.machine import workspace_of_case
 from screwsynth.nlp.proof.workspace.numbers.machines import Machines
 from screwsynth.nlp.proof.workspace.numbers.searched import Subject, motor_extremes
-from screwsynth.nlp.proof.workspace.paper_record import PaperRecord
-from screwsynth.nlp.proof.workspace.proof_writer import paper_of
-from screwsynth.nlp.proof.workspace.ranks.ranks import not_judged
+from screwsynth.nlp.proof.workspace.proof_record import ProofRecord
+from screwsynth.nlp.proof.workspace.proof_writer import proof_of as written
 from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularPose
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
+from screwsynth.nlp.proof.workspace.verdict import not_judged
 
 Proved = tuple[Case, Proof]
 
@@ -245,20 +246,20 @@ def test_claims_name_the_assemblies_of_their_numbers(name: str, reached: bool, w
 
 
 @cache
-def proof_of(name: str) -> tuple[dict[tuple[str, str], Extreme], Proof]:
+def proof_of(name: str) -> tuple[dict[tuple[str, str], Verdict], Proof]:
     """The numbers of a robot's actuators alone, and their proof as its file has it."""
     return motors_on_paper(robot_of(name))
 
 
-def motors_on_paper(case: Case) -> tuple[dict[tuple[str, str], Extreme], Proof]:
-    record, closed = PaperRecord(), closed_form(case.model)
+def motors_on_paper(case: Case) -> tuple[dict[tuple[str, str], Verdict], Proof]:
+    record, closed = ProofRecord(), closed_form(case.model)
     box = box_of(case)
     meant = build_problem(case, closed.model, box)
     if case.joint_centre_tolerance:
         meant = Machines(case, closed, meant).family
-    found = tuple(motor_extremes(Subject(case, closed.model, meant), paper=record))
-    judged = Judgement(case, workspace_of_case(case), not_judged(box, "not asked for"), found)
-    proof = read_proof(paper_of(judged, record, "").as_text(), "again")
+    found = tuple(motor_extremes(Subject(case, closed.model, meant), record=record))
+    judged = Judgement(case, workspace_of_case(case), (not_judged(REGULAR, "not requested"), *found))
+    proof = read_proof(written(judged, record, "").as_text(), "again")
     return {(each.name, each.sense.value): each for each in found}, proof
 
 

@@ -341,8 +341,8 @@ def check_shown(case: Case, judged: Judgement) -> int:
     """Check what refutes by what ``evaluate`` shows there; return the number of refutations."""
     count = 0
     for rank, is_of_constraints in zip(judged.ranks, (False, True), strict=False):
-        if rank.outcome is Outcome.REFUTED and rank.y is not None:
-            found, freedoms = shown(case, rank.box.pose(rank.y))
+        if rank.outcome is Outcome.REFUTED and rank.pose is not None:
+            found, freedoms = shown(case, rank.pose)
             assert freedoms > 6 - case.model.generic.constraints if is_of_constraints else found.is_singular
             count += 1
     for each in judged.extremes:
@@ -419,24 +419,26 @@ def test_a_singular_pose_of_another_working_mode_refutes_nothing() -> None:
     # Newton's method alone finds a pose that is singular with an arm bent the other way.
     other = prove_rank(problem, problem.locked, most_boxes=4000)
     assert other.outcome is Outcome.REFUTED
-    assert not shown(case, box.pose(other.y))[0].is_singular
-    assert not homes.is_singular(other.y, None, constraints=False)
+    assert not shown(case, other.pose)[0].is_singular
+    assert not homes.is_singular(box.coordinates(other.pose), None, constraints=False)
     search = SingularSearch(problem, problem.locked, lambda at: homes.is_singular(at.y, at.errors, constraints=False))
     found = prove_rank(problem, problem.locked, most_boxes=4000, look=search.look)
     assert found.outcome is Outcome.REFUTED
-    assert shown(case, box.pose(found.y))[0].is_singular
+    assert shown(case, found.pose)[0].is_singular
 
 
 def test_ranks_are_refuted_by_what_is_shown_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     case = planar(0.13426, 19.47242, 3)
     problem, homes = problem_of(case), Homes(case, box_of(case), (), None)
     found = prove_ranks(problem, homes.is_singular)
-    judged = Judgement(case, case.workspace, found.regular, (), found.constraints)
+    judged = Judgement(case, case.workspace, found)
     assert check_shown(case, judged) == 1
-    assert [homes.is_singular(found.regular.y, None, constraints=each) for each in (False, True)] == [True, False]
+    assert [
+        homes.is_singular(box_of(case).coordinates(found[0].pose), None, constraints=each) for each in (False, True)
+    ] == [True, False]
     monkeypatch.setattr(Homes, "is_singular", lambda *_, **__: False)
     with within(0.2):
-        assert prove_ranks(problem, homes.is_singular).regular.outcome is Outcome.OPEN
+        assert prove_ranks(problem, homes.is_singular)[0].outcome is Outcome.OPEN
 
 
 @pytest.mark.parametrize(

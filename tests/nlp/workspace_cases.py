@@ -19,8 +19,8 @@ from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import PoseRoot, pose_root
 from screwsynth.nlp.proof.checker.workspace.ranks import RankClaim, rank_claim
 from screwsynth.nlp.proof.statement.machine import Legs, workspace_of_case
-from screwsynth.nlp.proof.workspace.paper_record import PaperRecord
-from screwsynth.nlp.proof.workspace.proof_writer import paper_of
+from screwsynth.nlp.proof.workspace.proof_record import ProofRecord
+from screwsynth.nlp.proof.workspace.proof_writer import proof_of
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem
 
@@ -160,9 +160,9 @@ def rank_of(case: Case, *given: Any) -> RankClaim:  # noqa: ANN401 - a tolerance
 def written(
     case: Case, text: str = "", *, quantities: tuple[str, ...] = (), leg_error: float = 0.0, **options: object
 ) -> tuple[Judgement, Proof]:
-    record, asked = PaperRecord(), {"quantities": quantities, "leg_error": leg_error}
-    judged = judge_workspace(case, paper=record, **asked, **options)
-    return judged, paper_of(judged, record, text, **asked)
+    record, asked = ProofRecord(), {"quantities": quantities, "leg_error": leg_error}
+    judged = judge_workspace(case, record=record, **asked, **options)
+    return judged, proof_of(judged, record, text, **asked)
 
 
 def on_paper(case: Case, text: str = "", **options: object) -> tuple[Judgement, Proof]:

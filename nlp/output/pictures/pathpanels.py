@@ -15,10 +15,10 @@ from ...case.forces import dimension_of_speed
 from ...case.motors import MotorNumber
 from ...case.task import Sense
 from ...path.sampling import Way, WayKind, way_of
-from ...proof.workspace.path_judge import PathJudgement
+from ...proof.workspace.judgement import Judgement
 from ...proof.workspace.path_samples import PathSamples, SampledNumber, motor_numbers
 from ...proof.workspace.verdict import Outcome
-from ...results.path import PathClaimData, PathResult
+from ...results.path import PathResult, PathVerdictData
 from ...results.pathwording import checked_claims
 from ...results.rounding import number
 
@@ -122,7 +122,7 @@ class PathPicture:
         bands: segments that are not proved.
     """
 
-    judged: PathJudgement
+    judged: Judgement
     samples: PathSamples
     result: PathResult
     way: Way
@@ -185,7 +185,7 @@ class PathPicture:
         return notes
 
 
-def path_picture(judged: PathJudgement, samples: PathSamples, result: PathResult) -> PathPicture:
+def path_picture(judged: Judgement, samples: PathSamples, result: PathResult) -> PathPicture:
     """Return the content of a picture of a judged path."""
     way = way_of(judged.path)
     units = {WayKind.TIME: ", s", WayKind.LENGTH: f", {judged.case.units.length}", WayKind.SEGMENTS: ""}
@@ -205,7 +205,7 @@ def path_picture(judged: PathJudgement, samples: PathSamples, result: PathResult
     )
 
 
-def _coordinates(judged: PathJudgement, samples: PathSamples) -> Iterator[PathPanel]:
+def _coordinates(judged: Judgement, samples: PathSamples) -> Iterator[PathPanel]:
     """Yield the coordinates of the actuators, those of a kind in a panel."""
     joints = samples.joints
     if joints is None:
@@ -222,7 +222,7 @@ def _coordinates(judged: PathJudgement, samples: PathSamples) -> Iterator[PathPa
         yield PathPanel(words, judged.case.units.label(dimension), tuple(curves), tuple(factor * x for x in limits))
 
 
-def _speeds(judged: PathJudgement, samples: PathSamples) -> Iterator[PathPanel]:
+def _speeds(judged: Judgement, samples: PathSamples) -> Iterator[PathPanel]:
     """Yield the speeds along a path whose segments have times, or else the largest ones of the case's motions."""
     units, every = judged.case.units, motor_numbers(samples.numbers, MotorNumber.SPEED).get("", [])
     limited = {each.claim.motor.actuator: each.limit for each in every if each.claim.motor and each.limit is not None}
@@ -239,14 +239,14 @@ def _speeds(judged: PathJudgement, samples: PathSamples) -> Iterator[PathPanel]:
         yield from _of_motors(judged, every, "largest speeds in the motions of the case")
 
 
-def _forces(judged: PathJudgement, samples: PathSamples) -> Iterator[PathPanel]:
+def _forces(judged: Judgement, samples: PathSamples) -> Iterator[PathPanel]:
     """Yield the forces of the actuators under each load."""
     found = motor_numbers(samples.numbers, MotorNumber.FORCE)
     for load, every in list(found.items())[:_LOADS]:
         yield from _of_motors(judged, every, f"forces, load {load}")
 
 
-def _of_motors(judged: PathJudgement, every: Sequence[SampledNumber], title: str) -> Iterator[PathPanel]:
+def _of_motors(judged: Judgement, every: Sequence[SampledNumber], title: str) -> Iterator[PathPanel]:
     """Yield panels of numbers of actuators, those of one unit in each."""
     units = judged.case.units
     for dimension in dict.fromkeys(each.claim.reading.dimension for each in every):
@@ -303,7 +303,7 @@ def _bands(samples: PathSamples, result: PathResult, way: Way) -> Iterator[PathB
             yield PathBand(float(way.knots[own[0]]), float(way.knots[own[-1] + 1]), kind == 2)
 
 
-def _is_open(claim: PathClaimData) -> bool:
+def _is_open(claim: PathVerdictData) -> bool:
     return claim.outcome is Outcome.OPEN
 
 

@@ -12,7 +12,7 @@ from ...results.checks import published_table
 from ...results.data import CertificateData, CombinedData, CombinedResult, SolveResult
 from ...results.jointwording import limb_part_table
 from ...results.objective import objective_words
-from ...results.pathwording import claims_table, path_proof_lines
+from ...results.pathwording import along_table, path_proof_lines
 from ...results.point import task_data
 from ...results.robottables import combined_design_table, robot_tables, solved_design_table
 from ...results.rounding import number, size_of_F
@@ -119,7 +119,7 @@ def path_section(report: Report) -> Markup:
     if result.path is None:
         return Markup("")
     lines = path_proof_lines(report.case, result.path)
-    tables = claims_table(report.case, [each for each in result.path.claims if each.limit is not None])
+    tables = along_table(report.case, [each for each in result.path.claims if each.limit is not None])
     return join_markup([paragraphs(lines), *(html_table(each, each.title, id=f"path-{each.name}") for each in tables)])
 
 

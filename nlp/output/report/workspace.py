@@ -11,9 +11,11 @@ from ...proof.workspace.slices.slices import Slice
 from ...results.posewording import pose_words
 from ...results.rounding import number
 from ...results.text import TextTable
-from ...results.workspace import WorkspacePose, WorkspaceResult
+from ...results.verdicts import WorkspacePose
+from ...results.verdictwording import machine_lines
+from ...results.workspace import WorkspaceResult
 from ...results.workspaceposes import refuted_claims, worst_claim
-from ...results.workspacewording import machine_lines, verdict_words, workspace_summary
+from ...results.workspacewording import verdict_words, workspace_summary
 from ...system.jsonvalues import json_data
 from ..pictures.figures import picture
 from ..pictures.workspaces import Kind, drawing_at, slice_images, slices_legend, slices_notes

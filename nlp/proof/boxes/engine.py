@@ -82,8 +82,8 @@ def pieces(count: int, jobs: int) -> Sequence[tuple[int, int]]:
     return found
 
 
-class Verdict(enum.IntEnum):
-    """Verdict on a box: open, or closed by a rule. The numbers are those of ``kernel/examination.h``."""
+class BoxState(enum.IntEnum):
+    """BoxState on a box: open, or closed by a rule. The numbers are those of ``kernel/examination.h``."""
 
     OPEN = 0
     BOUNDED = 1  # its bound does not exceed the threshold
@@ -97,7 +97,7 @@ class Examination:
     """Results for B boxes.
 
     Attributes:
-        verdict: (B,) :class:`Verdict`.
+        verdict: (B,) :class:`BoxState`.
         reason: (B,) index of the condition that cannot hold, or of the variable that is monotone or emptied.
         bound: (B,) upper bound over the feasible part of the box; infinite where a value may be undefined.
         lower, upper: (n, B) the part of the box left by contraction, or the face that it collapsed on.
@@ -240,7 +240,9 @@ class Engine:
         found = self.examine(lower, upper, threshold, (rows, *matters))
         vectors, H = rows[3 : 3 + 4 * n].reshape(4, n, -1), rows[3 + 4 * n :][: n * n].reshape(n, n, -1)
         sides = rows[3 + 4 * n + n * n :].reshape(m, 4, count)
-        closing = (Verdict.INFEASIBLE, Verdict.MONOTONE, Verdict.EMPTIED) if tilts is None else (Verdict.INFEASIBLE,)
+        closing = (
+            (BoxState.INFEASIBLE, BoxState.MONOTONE, BoxState.EMPTIED) if tilts is None else (BoxState.INFEASIBLE,)
+        )
         return LimbModels(
             **vars(found),
             is_possible=~np.isin(found.verdict, closing),

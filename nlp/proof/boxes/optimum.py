@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from ....models import FloatArray
 from ..checker.tree import Node, node_bytes
 from ..statement.standard_form import StandardForm
-from .engine import BLOCK, COLLAPSED, Engine, Examination, Verdict
+from .engine import BLOCK, COLLAPSED, BoxState, Engine, Examination
 from .incumbent import Incumbent, LimbPoint
-from .search import SMALL, WHOLE, Boxes, Order, Rule, Search, Verdicts
+from .search import SMALL, WHOLE, Boxes, BoxResults, Order, Rule, Search
 from .tree import TreeRecord, halves_of, keys_of
 
 #: Widths, in parts of the whole box, below which a box is not bisected: one without a finite bound, which is taken to
@@ -57,25 +57,25 @@ class OptimumRule(Rule[tuple[()]]):
         """The engine, which takes seconds to build for long expressions: the first step does, which can be stopped."""
         return Engine(self._form, self._jobs, tangents=self._recorder is None)
 
-    def examine(self, boxes: Boxes[tuple[()]]) -> Verdicts[tuple[()]]:
+    def examine(self, boxes: Boxes[tuple[()]]) -> BoxResults[tuple[()]]:
         """Return bounds of boxes, and improve the incumbent."""
         found = self._engine.examine(boxes.lower.T, boxes.upper.T, self.target)
         self._turn += 1
         self._improve(found)
-        bounded = found.verdict == Verdict.BOUNDED
+        bounded = found.verdict == BoxState.BOUNDED
         closed = float(found.bound[bounded].max(initial=-math.inf))
         # A checker with other arithmetic needs the room up to the threshold to show these boxes again.
         if (bounded.any() and self._recorder is not None) or self._is_contracted_by_value(found):
             closed = max(closed, self.target)
         # Most boxes of a block may be closed: only the open ones are looked at here, since this is no work for threads.
-        rest = np.flatnonzero(found.verdict == Verdict.OPEN)
+        rest = np.flatnonzero(found.verdict == BoxState.OPEN)
         lower, upper = found.lower[:, rest].T, found.upper[:, rest].T
         # A box that collapsed to one that cannot be bisected, such as a corner, has not been examined as that box yet.
         moved = ((lower != boxes.lower[rest]) | (upper != boxes.upper[rest])).any(axis=1)
         left = Boxes(lower, upper, np.fmin(found.bound[rest], boxes.bound[rest]), found.split[rest].astype(np.intp), ())
-        return Verdicts(left, closed, len(boxes.split), moved, reasons=(found, rest))
+        return BoxResults(left, closed, len(boxes.split), moved, reasons=(found, rest))
 
-    def record(self, boxes: Boxes[tuple[()]], found: Verdicts[tuple[()]], split: NDArray[np.intp]) -> None:
+    def record(self, boxes: Boxes[tuple[()]], found: BoxResults[tuple[()]], split: NDArray[np.intp]) -> None:
         """Record a block of boxes; a contraction closes the part cut off."""
         if self._recorder is None:
             return
@@ -84,7 +84,7 @@ class OptimumRule(Rule[tuple[()]]):
         _, halves = halves_of(left.lower, left.upper, np.maximum(split, 0))
         parts = {k: halves[j] if split[j] >= 0 else (moved[j],) for j, k in enumerate(rest) if split[j] != SMALL}
         for k, key in enumerate(keys):
-            if k in parts or examined.verdict[k] != Verdict.OPEN:
+            if k in parts or examined.verdict[k] != BoxState.OPEN:
                 text = _node_of(examined, k, boxes.upper[k], self._functions)
                 cut = node_bytes(Node.HALF, int(examined.split[k])) if len(parts.get(k, ())) == 2 else b""
                 self._recorder.add(key, text + cut, *parts.get(k, ()))
@@ -104,7 +104,7 @@ class OptimumRule(Rule[tuple[()]]):
         """Return whether a contraction excluded points because of their value, which is at most the threshold."""
         # A box that is closed by its bound needs no contraction. The bound of a proof keeps the distance from what its
         # checker must show.
-        count, rest = self._functions, (found.verdict != Verdict.BOUNDED) | (self._recorder is not None)
+        count, rest = self._functions, (found.verdict != BoxState.BOUNDED) | (self._recorder is not None)
         return any(
             # Numbers from 0 to count - 1, in one comparison: negative ones are large without a sign.
             bool(((why.view(np.uint32) < count) & rest).any())
@@ -115,11 +115,11 @@ class OptimumRule(Rule[tuple[()]]):
 def _node_of(found: Examination, k: int, upper: FloatArray, functions: int) -> bytes:
     """Return the bytes of box number ``k``, with upper ends (n,), up to those of a bisection or of its parts."""
     verdict, reason = int(found.verdict[k]), int(found.reason[k])
-    if verdict == Verdict.BOUNDED:
+    if verdict == BoxState.BOUNDED:
         return bytes([Node.BOUNDED])
-    if verdict in (Verdict.INFEASIBLE, Verdict.MONOTONE):
-        return node_bytes(Node.INFEASIBLE if verdict == Verdict.INFEASIBLE else Node.MONOTONE, reason)
-    only = [reason] if verdict == Verdict.EMPTIED else range(len(upper))
+    if verdict in (BoxState.INFEASIBLE, BoxState.MONOTONE):
+        return node_bytes(Node.INFEASIBLE if verdict == BoxState.INFEASIBLE else Node.MONOTONE, reason)
+    only = [reason] if verdict == BoxState.EMPTIED else range(len(upper))
     return b"".join(_contraction(found, k, i, float(upper[i]), functions) for i in only)
 
 

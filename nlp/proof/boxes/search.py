@@ -107,7 +107,7 @@ class Order(enum.Enum):
     LARGEST = "the boxes with the largest bounds; of many, those of the step with the largest one"
 
 
-class Verdicts(NamedTuple, Generic[Columns]):
+class BoxResults(NamedTuple, Generic[Columns]):
     """Results for boxes.
 
     Attributes:
@@ -146,10 +146,10 @@ class Rule(ABC, Generic[Columns]):
         return bisected(boxes)
 
     @abstractmethod
-    def examine(self, boxes: Boxes[Columns]) -> Verdicts[Columns]:
+    def examine(self, boxes: Boxes[Columns]) -> BoxResults[Columns]:
         """Return the results for boxes."""
 
-    def record(self, boxes: Boxes[Columns], found: Verdicts[Columns], split: NDArray[np.intp]) -> None:
+    def record(self, boxes: Boxes[Columns], found: BoxResults[Columns], split: NDArray[np.intp]) -> None:
         """Record a step for a proof.
 
         Args:
@@ -280,7 +280,7 @@ class Search(Generic[AnyRule]):
             return self.rule.divided(boxes)
         return joined([some(boxes, ~is_cut), self.rule.divided(some(boxes, is_cut))])
 
-    def _divisions(self, found: Verdicts[Any]) -> NDArray[np.intp]:
+    def _divisions(self, found: BoxResults[Any]) -> NDArray[np.intp]:
         """Return the coordinates to bisect of the parts that are left: see :meth:`Rule.record`."""
         lower, upper, bound, split, _ = found.left
         place = np.arange(len(split)), np.maximum(split, 0)

@@ -94,6 +94,8 @@ class Claim:
         return self.name, "" if self.kind is ClaimKind.RANK else self.sense.value
 
 
+#: Claims that J, and that the constraint wrenches alone, have full rank, by name.
+RANKS = {name: Claim(name, Sense.MIN, kind=ClaimKind.RANK) for name in (REGULAR, CONSTRAINTS)}
 #: Errors of the platform's position and rotation, for machines within their tolerances.
 ERRORS = (
     Claim("position error", Sense.MAX, reading=LENGTH, kind=ClaimKind.ERROR),

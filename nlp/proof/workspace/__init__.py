@@ -1,12 +1,13 @@
-"""A robot judged over a whole box of poses: proofs, counterexamples, and the boxes that are left open.
+"""Judgement of a robot over a domain, a box of poses or a tool path: proofs, counterexamples, and open claims.
 
 The rooms and modules import each other in this order:
 
-* ``verdict``; ``paper_record`` (what searches keep for a proof); ``robot`` (a robot as expressions over the box),
-  ``ranks`` (of its matrices), ``numbers`` (their extremes, also over every machine within a tolerance);
-* ``path_motion``, ``path_tubes``, ``path_knots``, ``path_judge`` (a programmed path: speeds by its times, how far the
-  platform is from it between knots, the knots, and all claims);
-* ``home_poses`` (machines at single poses, in home's assembly), ``judge`` (all claims about a machine), ``scale`` (the
-  largest box), ``slices`` (for pictures), ``proof_writer`` (proofs as files);
-* ``path_judge`` (a path); ``edge_samples``, ``alone`` and ``axis_ranges`` (how far a pose can move).
+* ``verdict`` (of one claim), ``proof_record`` (records of searches for a proof file), ``robot`` (a robot as expressions
+  over the box), ``ranks`` (ranks of its matrices), ``numbers`` (their extremes, also over every robot within a
+  tolerance), ``path_motion``, ``path_tubes``, ``path_knots`` (speeds along a tool path, and its knots);
+* ``judgement`` (all verdicts), ``judging`` (steps that are the same over every domain), ``home_poses`` (single poses in
+  the home assembly mode), ``judge`` (a box of poses), ``scale`` (the largest box), ``proof_writer`` (proof files),
+  ``slices`` (pictures);
+* ``path_domain``, ``path_faults``, ``path_ranks``, ``path_judge`` (a tool path);
+* ``edge_samples``, ``alone`` and ``axis_ranges`` (free travel from a pose).
 """

@@ -28,15 +28,14 @@ from ...interruption import is_requested, one_call, one_search, why_stopped, wit
 from ...path.options import Between
 from ...path.orientation import ORDERS, roll_pitch_yaw
 from ...path.path import Kind, ProgrammedPath
-from ..statement.claims import CONSTRAINTS, REGULAR
 from .alone import AXES, box_about, coordinates_alone
 from .edge_samples import EdgeSamples
-from .judge import Judgement, judge_workspace
-from .numbers.extremes import Extreme
-from .path_judge import PathJudgement, RankOnPath, judge_path
+from .judge import judge_workspace
+from .judgement import Judgement
+from .path_judge import judge_path
 from .robot.pose_box import PoseNumbers, pose_box
 from .robot.posed_robot import NotJudgedError, build_problem
-from .verdict import Outcome, RankVerdict
+from .verdict import Outcome, Verdict
 
 _T = TypeVar("_T")
 #: Seconds for all judgements where the caller does not say; the part of the time that one takes at most, so that a
@@ -67,7 +66,7 @@ class RangeStop:
 
     name: str
     outcome: Outcome
-    extreme: Extreme | None
+    extreme: Verdict | None
     value: float
     pose: PoseNumbers | None
     reason: str
@@ -384,7 +383,7 @@ def _largest(judge: _Judge, tolerance: float, guess: float = 1.0) -> _Found:
             part = 0.5 * (proved + failed)
 
 
-def _judged(case: Case, start: FloatArray, *ends: FloatArray) -> PathJudgement:
+def _judged(case: Case, start: FloatArray, *ends: FloatArray) -> Judgement:
     """Judge a machine on lines from a pose to others, one after the other."""
     count = len(ends)
     path = ProgrammedPath(
@@ -396,32 +395,24 @@ def _judged(case: Case, start: FloatArray, *ends: FloatArray) -> PathJudgement:
         return judge_path(case, path, gap=_GAP, time_limit=None, limits_alone=True)
 
 
-def _failures(judged: PathJudgement | Judgement) -> Iterator[_Failed]:
+def _failures(judged: Judgement) -> Iterator[_Failed]:
     """Yield the claims that are not proved, with the part of the path at which each fails, the first one first.
 
     A refuted claim comes before an open one at the same place. Of claims over several points, and of boxes, the place
     is the end.
     """
-    ranks: Sequence[RankOnPath | RankVerdict] = judged.ranks
-    faults = judged.faults if isinstance(judged, PathJudgement) else {}
     found = []
-    for name, rank in zip((REGULAR, CONSTRAINTS), ranks, strict=False):
-        if rank.outcome is not Outcome.PROVED:
-            place = rank.place if isinstance(rank, RankOnPath) and rank.outcome is Outcome.REFUTED else None
-            stop = RangeStop(name, rank.outcome, None, math.nan, rank.pose, rank.reason)
-            found.append(_Failed(place.parameter if place else 1.0, stop, is_first=place is not None))
-    for each in judged.extremes:
-        if each.fails:
-            key = each.name, each.sense
-            place, value, pose = faults.get(key, (each.place, each.reached, each.pose))
-            if each.outcome is not Outcome.REFUTED or _is_over_poses(each):
-                place = None
-            stop = RangeStop(each.name, each.outcome, each, value, pose, each.reason)
-            part = place.parameter if place else 1.0
-            found.append(_Failed(part, stop, is_first=part < 1 or key in faults))
+    for each in (verdict for verdict in judged.verdicts if verdict.fails):
+        fault, value, pose = each.first_fault, each.reached, each.pose
+        if fault is not None:
+            _, value, pose = fault
+        stop = RangeStop(each.name, each.outcome, None if each.is_rank else each, value, pose, each.reason)
+        part = 1.0 if fault is None or _is_over_poses(each) else fault.place.parameter
+        is_first = fault is not None and (part < 1 or each.is_rank or each.fault is not None)
+        found.append(_Failed(part, stop, is_first=is_first))
     yield from sorted(found, key=lambda each: (each.part, each.stop.outcome is not Outcome.REFUTED))
 
 
-def _is_over_poses(each: Extreme) -> bool:
+def _is_over_poses(each: Verdict) -> bool:
     """Return whether a limit is about several poses at once, such as that on a stroke."""
     return each.key.startswith(f"{Actuator.key}.")

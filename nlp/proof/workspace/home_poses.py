@@ -28,10 +28,9 @@ from ..statement.claims import REACH, Claim, claims_of
 from ..statement.machine import JointErrors
 from ..statement.posed_layout import extreme_program
 from ..statement.tolerance import coordinate_layout
-from .numbers.extremes import Extreme
 from .numbers.machines import Machines
 from .robot.pose_box import PoseBox, pose_coordinates
-from .verdict import Outcome, slack_of
+from .verdict import Outcome, Verdict, slack_of
 
 #: Reasons for a claim that poses of other assemblies leave open.
 _ELSEWHERE = "poses beyond the limit are known only in other assemblies of the joints than home's"
@@ -102,7 +101,7 @@ class Homes:
         found, generic = mobility_of(self._nlp, x, state), self._nlp.program.model.generic
         return found is None or generic is None or found.constraint_rank < generic.constraints
 
-    def shown(self, each: Extreme) -> Extreme:
+    def shown(self, each: Verdict) -> Verdict:
         """Return an extreme with its value in home's assembly, and open where only another one refutes it."""
         if not self.case.model.unknowns or each.pose is None or each.key == REACH:
             return each

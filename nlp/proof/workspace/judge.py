@@ -1,89 +1,47 @@
-"""A machine judged over its whole workspace."""
+"""Judgement of a robot over a box of poses."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
 from ....models.joints.closedform import closed_form
 from ...case.case import Case
-from ...case.task import Sense
 from ...case.workspace import Workspace
-from ...interruption import is_requested, one_call, within
+from ...interruption import one_call, within
 from ..enclosure.engine import kernel
-from ..statement.claims import REACH, SPECTRAL, Claim, claims_of, dependent_claims
+from ..statement.claims import REACH, REGULAR, SPECTRAL, Claim, claims_of, dependent_claims
 from ..statement.machine import check_leg_error, has_straight_legs, workspace_of_case
 from ..statement.posed_layout import closed_layout, posed_layout, reach_claims
 from ..statement.tolerance import Directions, coordinate_layout, length_of_one_machine
 from .home_poses import Homes
+from .judgement import Judgement
+from .judging import Judging
 from .numbers.bound_search import Minimum
-from .numbers.extremes import GAP, Extreme, extreme_of, prove_extreme
+from .numbers.extremes import GAP, NumberSearch, prove_extreme, verdict_of
 from .numbers.machines import Machines
 from .numbers.pose_error import pose_errors
-from .numbers.searched import Subject, motor_extremes, searched_extremes
-from .numbers.strokes import with_strokes
-from .ranks.ranks import RankProgress, Ranks, not_judged, prove_ranks
+from .numbers.searched import Subject, motor_extremes
+from .ranks.ranks import RankProgress, prove_ranks
 from .robot.pose_box import pose_box, pose_coordinates
 from .robot.posed_robot import NotJudgedError, Problem, build_problem
-from .verdict import Outcome, RankVerdict
+from .verdict import Outcome, Verdict, not_judged
 
 if TYPE_CHECKING:
-    from .paper_record import PaperRecord
+    from .proof_record import ProofRecord
 
-#: Seconds for all searches together where none are asked for: those of singular values have no other end in six
-#: dimensions. Of what is left, each takes half at most.
+#: Seconds for all searches together where no time is stated: those of singular values have no other end in six
+#: dimensions. Of the time left, each takes half at most.
 TIME_LIMIT = 60.0
 _PART = 0.5
-#: Gap of the proof on paper of a limit that is known to hold: it is made finer where the limit needs it.
+#: Gap of the recorded search of a limit that is known to hold: it is made finer where the limit needs it.
 _AS_NEEDED = 1.0
 #: Reason for numbers of a robot that does not have all poses.
-_OUT_OF_REACH = "not every machine within the tolerance is proved to reach every pose"
-
-
-@dataclass(frozen=True, eq=False)
-class Judgement:
-    """Verdicts on a machine over its workspace; with a tolerance on joint centres, on every machine within it.
-
-    Attributes:
-        case: the case, its dimensions fixed.
-        workspace: the poses.
-        regularity: whether J has full rank at every pose.
-        extremes: of the reach of limbs, limits, lengths of legs, measures and tasks, in this order.
-        constraints: whether the constraint wrenches alone keep their rank; None for a robot without any.
-    """
-
-    case: Case
-    workspace: Workspace
-    regularity: RankVerdict
-    extremes: tuple[Extreme, ...]
-    constraints: RankVerdict | None = None
-
-    @property
-    def ranks(self) -> tuple[RankVerdict, ...]:
-        """Verdicts on ranks."""
-        return (self.regularity,) if self.constraints is None else (self.regularity, self.constraints)
-
-    @property
-    def verdicts(self) -> tuple[RankVerdict | Extreme, ...]:
-        """Verdicts on ranks, then on numbers."""
-        return (*self.ranks, *self.extremes)
-
-    @property
-    def is_regular(self) -> bool:
-        """Whether all ranks are proved to be full."""
-        return not any(each.fails for each in self.ranks)
-
-    @property
-    def is_proved(self) -> bool:
-        """Whether all ranks are proved to be full, and every limit holds; a number without a limit is information."""
-        return not any(each.fails for each in self.verdicts)
-
-    @property
-    def is_refuted(self) -> bool:
-        """Whether a pose is known that is singular or outside of a limit."""
-        return any(each.outcome is Outcome.REFUTED for each in self.verdicts)
+_OUT_OF_REACH = "not proved: a robot within the joint-centre tolerance may not reach every pose"
+#: Called before each number with its name, the number of those done, and of all of its kind.
+Progress = Callable[[str, int, int], None]
 
 
 @one_call
@@ -100,214 +58,196 @@ def judge_workspace(
     until_fault: bool = False,
     leg_error: float = 0.0,
     rank_progress: RankProgress | None = None,
-    progress: Callable[[str, int, int], None] | None = None,
-    paper: PaperRecord | None = None,
+    progress: Progress | None = None,
+    record: ProofRecord | None = None,
 ) -> Judgement:
-    """Prove, for every pose of a case's workspace, that its machine is regular and keeps its limits, or find a pose.
+    """Prove, for every pose of a case's workspace, that its robot is regular and keeps its limits, or find a pose.
 
     Args:
         case: a case with fixed dimensions.
         workspace: the poses; those of the case if left out.
-        quantities: names of measures of the robot whose smallest and largest values are asked for.
-        gap: allowed distance of a bound from the best value known, as a part of it.
+        quantities: names of measures of the robot whose smallest and largest values are requested.
+        gap: allowed distance of a bound from the best known value, as a part of it.
         time_limit: seconds for all searches together, which then stop with the bounds reached; None for no limit. A
-            search takes at most half of what is left, and those of actuators even shares of it.
-        jobs: threads.
+            search takes at most half of the time left, and those of actuators even shares of it.
+        jobs: number of threads.
         with_limits: whether numbers are bounded at all, and not regularity alone.
         with_objective: whether F of each task is bounded, and numbers of actuators without a limit are.
+        until_fault: whether the work ends at the first rank or limit that is not proved.
         leg_error: largest error of a leg's length, length. With it, or with a tolerance of the case for joint centres,
             the errors of the platform's pose are bounded, where F is.
-        until_fault: whether the work ends at the first rank or limit that is not proved.
         rank_progress: called during the search for singular poses.
-        progress: called before each number with its name, the number of those done, and of all of its kind.
-        paper: records the searches for a proof.
+        progress: called before each number.
+        record: record of the searches for a proof.
 
     Raises:
         CaseError: the case has no workspace, or a free dimension.
-        InputError: the robot has no such measure, the error of legs is negative or not for it, or there is no C kernel.
+        InputError: the robot has no such measure, the leg error is negative or not for it, or there is no C kernel.
     """
     workspace = workspace_of_case(case if workspace is None else replace(case, workspace=workspace))
     kernel()  # before any work where it is missing
     check_leg_error(case, leg_error)
+    search = NumberSearch(gap, jobs, record)
     with within(time_limit, _PART):
-        whole = (case, workspace, quantities, leg_error, with_objective, gap, jobs, progress, paper)
-        numbers = _Numbers(*whole, at_once=until_fault)
-        homes, meant = Homes(case, numbers.box, numbers.names, numbers.machines), numbers.meant
-        ranks = (
-            Ranks(not_judged(numbers.box, numbers.reason), None)
-            if meant is None
-            else prove_ranks(meant, homes.is_singular, rank=case.model.rank, progress=rank_progress, paper=paper)
-        )
-        judged = Judgement(case, workspace, ranks.regular, (), ranks.constraints)
-        if not with_limits or (until_fault and not judged.is_regular):
-            return judged
-        for each in numbers.extremes():
-            numbers.found.append(each)
-            if until_fault and each.fails:
-                break
-        return replace(judged, extremes=tuple(homes.shown(each) for each in numbers.found))
+        judging = _OverBox(case, workspace, quantities, search, until_fault=until_fault)
+        judging.with_objective, judging.leg_error = with_objective, leg_error
+        judging.progress, judging.rank_progress = progress, rank_progress
+        return judging.judgement(with_numbers=with_limits)
 
 
-@dataclass(eq=False)
-class _Numbers:
-    """The numbers of a machine over its workspace.
+class _OverBox(Judging):
+    """A judgement over a box of poses.
 
     Attributes:
-        case, workspace, quantities, leg_error, with_objective, gap, jobs, progress, paper: as in
-            :func:`judge_workspace`.
-        at_once: whether verdicts alone are asked for: limits are then decided by one search where that can.
-        box: the poses.
-        closed: the robot without unknowns in closed form.
-        names: measures that are numbers of the robot.
-        machines: every machine within the tolerance; None where the design is judged, or none.
-        meant: the design, or these machines, over the workspace; None where they are not judged.
-        reason: why they are not; else empty.
-        found: the extremes so far. Lengths that a stroke needs more finely take the place of those before.
+        with_objective, leg_error, progress, rank_progress: as in :func:`judge_workspace`.
     """
 
-    case: Case
-    workspace: Workspace
-    quantities: Sequence[str]
-    leg_error: float
-    with_objective: bool
-    gap: float
-    jobs: int | None
-    progress: Callable[[str, int, int], None] | None
-    paper: PaperRecord | None
-    at_once: bool = False
+    with_objective, leg_error = True, 0.0
+    progress: Progress | None = None
+    rank_progress: RankProgress | None = None
 
-    def __post_init__(self) -> None:
-        self.box, self.closed = pose_box(self.workspace), closed_form(self.case.model)
-        self.names = [name for name in self.quantities if name not in SPECTRAL]
-        self.machines: Machines | None = None
-        self.meant: Problem | None = None
-        self.reason = ""
+    def __init__(
+        self, case: Case, workspace: Workspace, measures: Sequence[str], search: NumberSearch, *, until_fault: bool
+    ) -> None:
+        super().__init__(case, workspace, measures, search, until_fault=until_fault)
+        self._box, self._closed = pose_box(workspace), closed_form(case.model)
+        self._names = [name for name in measures if name not in SPECTRAL]
+        # All robots within the tolerance; None without one. The design, or these, over the box; None where not judged.
+        self._machines: Machines | None = None
+        self._problem: Problem | None = None
+        self._reason = ""
         try:
-            design = build_problem(self.case, self.closed.model, self.box)
-            if self.case.joint_centre_tolerance:
-                self.machines = Machines(self.case, self.closed, design)
-            self.meant = design if self.machines is None else self.machines.family
+            design = build_problem(case, self._closed.model, self._box)
+            if case.joint_centre_tolerance:
+                self._machines = Machines(case, self._closed, design)
+            self._problem = design if self._machines is None else self._machines.family
         except NotJudgedError as error:
-            self.reason = str(error)
-        self.found: list[Extreme] = []
-        self._claims: Sequence[Claim] = ()
-        self._prove: Callable[..., Extreme] = prove_extreme
+            self._reason = str(error)
+        self._homes = Homes(case, self._box, self._names, self._machines)
+        # Proves a claim about a leg length more finely: the last one that proved claims.
+        self._prove: Callable[[Claim, NumberSearch], Verdict] | None = None
 
-    def extremes(self) -> Iterator[Extreme]:
-        """Yield the extremes of the reach of limbs, limits, lengths of legs, measures, tasks, and errors of the pose.
-
-        Each has to be among those found before the next one is proved.
-
-        Raises:
-            InputError: the robot has no measure of a name.
-        """
-        yield from self._of_design() if self.machines is None else self._of_machines(self.machines)
-        lengths = [each for each in self.found if each.name.startswith("leg_length limb ") and each.sense is Sense.MIN]
-        shortest = min((each.bound for each in lengths), default=0.0)
-        subject = Subject(self.case, self.closed.model, self.meant, self.reason, shortest)
-        count = len(self.found)
-        whole = with_strokes(subject, self.found, self._finer)
-        self.found, strokes = whole[:count], whole[count:]
-        yield from strokes
-        yield from searched_extremes(subject, self.quantities, gap=self.gap, paper=self.paper)
-        yield from motor_extremes(subject, with_all=self.with_objective, paper=self.paper)
-        if has_straight_legs(self.case.model) and self.with_objective:
-            yield from pose_errors(subject, self.leg_error, paper=self.paper)
-
-    def _of_machines(self, machines: Machines) -> Iterator[Extreme]:
-        """Yield the extremes of expressions over all machines."""
-        reaches, claims = machines.symbols.claims(self.names, with_objective=self.with_objective)
-        prove = partial(machines.extreme, jobs=self.jobs, paper=self.paper)
-        yield from self._proved([*reaches, *dependent_claims(machines.symbols.layout.robots[0], self.workspace)], prove)
-        if any(each.fails and each.key == REACH for each in self.found):
-            yield from (extreme_of(claim, Minimum(reason=_OUT_OF_REACH)) for claim in claims)
-        else:
-            yield from self._proved(claims, prove)
-
-    def _of_design(self) -> Iterator[Extreme]:
-        """Yield the extremes of expressions of the design."""
-        case, closed, workspace = self.case, self.closed, self.workspace
-        if workspace.dependent:
-            yield from self._followed(self.meant)
+    def ranks(self) -> Iterator[Verdict]:
+        """Yield the verdicts on ranks."""
+        if self._problem is None:
+            yield not_judged(REGULAR, self._reason)
             return
+        is_singular, rank = self._homes.is_singular, self.case.model.rank
+        yield from prove_ranks(
+            self._problem, is_singular, rank=rank, progress=self.rank_progress, record=self.search.record
+        )
+
+    def shown(self, verdict: Verdict) -> Verdict:
+        """Return a verdict on a number with its value in the home assembly mode."""
+        return verdict if verdict.is_rank else self._homes.shown(verdict)
+
+    def subject(self, shortest: float) -> Subject:
+        """Return the robot of which the other numbers are."""
+        return Subject(self.case, self._closed.model, self._problem, self._reason, shortest)
+
+    def actuators(self, subject: Subject) -> Iterator[Verdict]:
+        """Yield the verdicts on actuators, and on errors of the pose."""
+        yield from motor_extremes(subject, with_all=self.with_objective, record=self.search.record)
+        if has_straight_legs(self.case.model) and self.with_objective:
+            yield from pose_errors(subject, self.leg_error, self.search.record)
+
+    def expressions(self) -> Iterator[Verdict]:
+        """Yield the verdicts on expressions of the pose."""
+        if self._machines is not None:
+            yield from self._within_tolerance(self._machines)
+        elif self.workspace.dependent:
+            yield from self._followed(self._problem)
+        else:
+            yield from self._of_design()
+
+    def _within_tolerance(self, machines: Machines) -> Iterator[Verdict]:
+        """Yield the verdicts on expressions of all robots within the tolerance."""
+        reaches, claims = machines.symbols.claims(self._names, with_objective=self.with_objective)
+        dependent = dependent_claims(machines.symbols.layout.robots[0], self.workspace)
+        yield from self._proved([*reaches, *dependent], machines.extreme)
+        if any(each.fails and each.key == REACH for each in self.verdicts.values()):
+            yield from (verdict_of(claim, Minimum(reason=_OUT_OF_REACH)) for claim in claims)
+        else:
+            yield from self._proved(claims, machines.extreme)
+
+    def _of_design(self) -> Iterator[Verdict]:
+        """Yield the verdicts on expressions of the design."""
+        case, closed, workspace = self.case, self._closed, self.workspace
         if closed.reaches:
             layout, reaches = reach_claims(case, closed, workspace)
-            yield from self._proved(reaches, partial(prove_extreme, layout, jobs=self.jobs, paper=self.paper))
-        is_reached = not any(each.fails for each in self.found)
+            yield from self._proved(reaches, partial(prove_extreme, layout))
+        is_reached = not any(each.fails for each in self.verdicts.values() if not each.is_rank)
         # Without unknowns there are fewer coordinates. Where a limb does not reach, its loop has to be kept.
         is_closed = closed.reaches and is_reached
         layout = closed_layout(case, closed, workspace) if is_closed else posed_layout(case, workspace)
-        claims = claims_of(layout, self.names, with_objective=self.with_objective)
-        is_together = self.meant is not None and (bool(closed.model.unknowns) or (self.at_once and is_reached))
-        decided = self._in_home(self.meant, is_reached=is_reached) if self.meant and is_together else []
-        yield from self._proved(claims, partial(prove_extreme, layout, jobs=self.jobs, paper=self.paper), decided)
+        claims = claims_of(layout, self._names, with_objective=self.with_objective)
+        is_together = bool(closed.model.unknowns) or (self.until_fault and is_reached)
+        decided = self._in_home(self._problem, is_reached=is_reached) if self._problem and is_together else ()
+        yield from self._proved(claims, partial(prove_extreme, layout), decided)
 
-    def _followed(self, design: Problem | None) -> Iterator[Extreme]:
-        """Yield the extremes of a design with dependent coordinates of the pose, in the home assembly mode.
+    def _followed(self, design: Problem | None) -> Iterator[Verdict]:
+        """Yield the verdicts on expressions of a design with dependent coordinates, in the home assembly mode.
 
         No other search keeps to the poses that the robot can take.
         """
         if design is None:
-            layout = coordinate_layout(self.case, pose_coordinates(self.box))
+            layout = coordinate_layout(self.case, pose_coordinates(self._box))
             claims = [
                 *dependent_claims(layout.robots[0], self.workspace),
-                *claims_of(layout, self.names, with_objective=False),
+                *claims_of(layout, self._names, with_objective=False),
             ]
-            yield from (extreme_of(claim, Minimum(reason=self.reason)) for claim in claims)
+            yield from (verdict_of(claim, Minimum(reason=self._reason)) for claim in claims)
             return
-        alone = Machines(self.case, self.closed, design)
-        reaches, claims = alone.symbols.claims(self.names, with_objective=self.with_objective)
+        machines = Machines(self.case, self._closed, design)
+        reaches, claims = machines.symbols.claims(self._names, with_objective=self.with_objective)
         # The range of a dependent coordinate is part of the answer, however wide its limits are.
-        every = [*reaches, *dependent_claims(alone.symbols.layout.robots[0], self.workspace), *claims]
+        every = [*reaches, *dependent_claims(machines.symbols.layout.robots[0], self.workspace), *claims]
         limited = [claim for claim in (*reaches, *claims) if claim.limit is not None]
-        decided = {(each.name, each.sense, each.key): each for each in alone.followed(limited, gap=self.gap)}
-        prove = partial(alone.extreme, jobs=self.jobs, paper=self.paper)
-        yield from self._proved(every, prove, [each for each in decided.values() if each.outcome is not Outcome.OPEN])
+        decided = (each for each in machines.followed(limited, self.search.gap) if each.outcome is not Outcome.OPEN)
+        yield from self._proved(every, machines.extreme, decided)
 
-    def _in_home(self, design: Problem, *, is_reached: bool) -> Iterator[Extreme]:
-        """Yield the extremes of a design with loops that are decided in the assembly of home.
+    def _in_home(self, design: Problem, *, is_reached: bool) -> Iterator[Verdict]:
+        """Yield the verdicts on expressions of a design with loops that are decided in the home assembly mode.
 
-        Loop equations as conditions of a program hold in every assembly, and F has no bound where one of these is
-        singular. The loops are followed here, and the design is the only machine within no tolerance.
+        Loop equations as conditions of a program hold in every assembly mode, and F has no bound where one of these is
+        singular. The loops are followed here, and the design is the only robot within no tolerance.
         """
-        alone = Machines(self.case, self.closed, design)
-        claims = alone.symbols.claims(self.names, with_objective=self.with_objective)[1]
-        limited = alone.followed([claim for claim in claims if claim.limit is not None], gap=self.gap)
+        machines = Machines(self.case, self._closed, design)
+        claims = machines.symbols.claims(self._names, with_objective=self.with_objective)[1]
+        limited = machines.followed([claim for claim in claims if claim.limit is not None], self.search.gap)
         yield from (each for each in limited if each.outcome is not Outcome.OPEN)
-        for claim in claims if is_reached and self.closed.model.unknowns else ():
+        for claim in claims if is_reached and self._closed.model.unknowns else ():
             if claim.limit is None:
-                yield alone.extreme(claim, gap=self.gap, jobs=self.jobs)
+                yield machines.extreme(claim, replace(self.search, record=None))
 
     def _proved(
-        self, claims: Sequence[Claim], prove: Callable[..., Extreme], decided: Iterable[Extreme] = ()
-    ) -> Iterator[Extreme]:
-        """Yield the extremes of claims; those that are decided are searched again for the paper alone."""
-        self._claims, self._prove = claims, prove
-        # What is proved of the design says nothing of the machines that are meant.
-        uncovered = self.reason if self.case.joint_centre_tolerance else ""
+        self, claims: Sequence[Claim], prove: Callable[[Claim, NumberSearch], Verdict], decided: Iterable[Verdict] = ()
+    ) -> Iterator[Verdict]:
+        """Yield the verdicts on claims; those that are decided are searched again for the proof record alone."""
+        self._prove = prove
+        # What is proved of the design says nothing of other robots within the tolerance.
+        uncovered = self._reason if self.case.joint_centre_tolerance else ""
         known = {(each.name, each.sense, each.key): each for each in decided}
-        for done, claim in enumerate(claims):
+        for done, claim in enumerate(replace(each, uncovered=uncovered) for each in claims):
             if self.progress is not None:
                 self.progress(claim.name, done, len(claims))
-            own = known.get((claim.name, claim.sense, claim.key))
-            is_limit = own is not None and own.limit is not None
-            if own is None or (self.paper is not None and not (is_limit and own.outcome is not Outcome.PROVED)):
-                gap = _AS_NEEDED if is_limit else self.gap
-                again = prove(replace(claim, uncovered=uncovered), gap=gap)
-                own = own or again
-            yield own
+            verdict = known.get((claim.name, claim.sense, claim.key))
+            is_limit = verdict is not None and verdict.limit is not None
+            is_refuted = is_limit and verdict is not None and verdict.outcome is not Outcome.PROVED
+            if verdict is None or (self.search.record is not None and not is_refuted):
+                again = prove(claim, replace(self.search, gap=_AS_NEEDED) if is_limit else self.search)
+                verdict = verdict or again
+            yield replace(verdict, claim=claim)
 
-    def _finer(self, leg: int, sense: Sense, gap: float, about: Directions | None) -> Extreme | None:
-        """Return a length of a leg, proved more finely; None where the work is requested to stop.
-
-        With directions it is less the part of its errors along them, which no pose changes.
-        """
-        if is_requested() or (about is not None and self.machines is None):
+    def finer(self, claim: Claim, gap: float, about: Directions | None) -> Verdict | None:
+        """Return the verdict on a leg length with a finer gap."""
+        search, machines = replace(self.search, gap=gap), self._machines
+        if self._prove is None or (about is not None and machines is None):
             return None
-        if about is None or self.machines is None:
-            claim = next(each for each in self._claims if each.legs == (leg,) and each.sense is sense)
-        else:
-            claim = length_of_one_machine(self.machines.symbols, leg, sense, about)
-            if self.paper is not None:
-                self.paper.directions[claim.name] = about
-        return self._prove(claim, gap=gap)
+        if about is None or machines is None:
+            return self._prove(claim, search)
+        (leg,), record = claim.legs, search.record
+        of_one = length_of_one_machine(machines.symbols, leg, claim.sense, about)
+        if record is not None:
+            record.directions[of_one.name] = about
+        return self._prove(of_one, search)

@@ -9,7 +9,8 @@ from ...case.case import Case
 from ...path.options import PathOptions
 from ...path.path import ProgrammedPath
 from ...path.reader import path_of_case, read_path
-from .path_judge import GAP, TIME_LIMIT, PathJudgement, judge_path
+from .judgement import Judgement
+from .path_judge import GAP, TIME_LIMIT, judge_path
 
 
 def check_path(
@@ -20,7 +21,7 @@ def check_path(
     gap: float = GAP,
     time_limit: float | None = TIME_LIMIT,
     progress: Callable[[str], None] | None = None,
-) -> PathJudgement:
+) -> Judgement:
     """Judge a machine at every point of a path: regular, and within every limit of the case.
 
     Args:

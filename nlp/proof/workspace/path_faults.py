@@ -3,33 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from ....models import FloatArray
-from ...case.task import Sense
 from ..statement.claims import Claim
 from .numbers.bound_search import Number
-from .numbers.extremes import Extreme, goal_of
+from .numbers.extremes import goal_of
 from .ranks.followed import closed_along
 from .robot.path_cover import PathCover, Place, place_in
 from .robot.pose_box import PoseNumbers
 from .robot.posed_robot import Problem
-from .verdict import Outcome
+from .verdict import Fault, Outcome, Verdict
 
 #: Points at which the first one beyond a limit is looked for: of all segments together, and least and most of each one.
 _ALL_SAMPLES, _LEAST_SAMPLES, _MOST_SAMPLES = 50_000, 5, 129
 #: Bisections between two of them.
 _STEPS = 80
-
-
-class Fault(NamedTuple):
-    """A point of a path that refutes a limit: its place, the value, and the pose."""
-
-    place: Place
-    value: float
-    pose: PoseNumbers
 
 
 def pose_at(problem: Problem, cover: PathCover, place: Place) -> PoseNumbers:
@@ -45,23 +35,20 @@ def pose_at(problem: Problem, cover: PathCover, place: Place) -> PoseNumbers:
     return problem.box.pose(problem.pose_of(closed if np.isfinite(closed).all() else z))
 
 
-def refuted(claims: Sequence[Claim], found: Sequence[Extreme]) -> dict[int, tuple[Claim, Extreme]]:
-    """Return the claims that are refuted, with their extremes, by their places."""
-    pairs = enumerate(zip(claims, found, strict=True))
-    return {k: pair for k, pair in pairs if pair[1].outcome is Outcome.REFUTED}
+def refuted(verdicts: Sequence[Verdict]) -> dict[int, Verdict]:
+    """Return the refuted ones of verdicts, by their places."""
+    return {k: each for k, each in enumerate(verdicts) if each.outcome is Outcome.REFUTED}
 
 
-def first_faults(
-    numbers: Number, wrong: Mapping[int, tuple[Claim, Extreme]], cover: PathCover
-) -> dict[tuple[str, Sense], Fault]:
+def first_faults(numbers: Number, wrong: Mapping[int, Verdict], cover: PathCover) -> dict[Claim, Fault]:
     """Return the first known points of the design that are beyond limits, where they are before those of worst values.
 
     Args:
-        numbers: of claims.
-        wrong: those of them that are refuted, by their places, with their extremes.
-        cover: of the path.
+        numbers: numbers of claims.
+        wrong: verdicts that refute some of these claims, by the places of the numbers.
+        cover: boxes of the path.
     """
-    problem, found = numbers.problem, dict[tuple[str, Sense], Fault]()
+    problem, found = numbers.problem, dict[Claim, Fault]()
     if not wrong:
         return found
     left, near = dict(wrong), closed_along(problem, cover)
@@ -69,8 +56,8 @@ def first_faults(
         if not left:
             break
         sampled = _Sampled(numbers, cover, cover.pieces[rows], near[rows])
-        for k, (claim, worst) in list(left.items()):
-            goal = goal_of(claim)
+        for k, worst in list(left.items()):
+            claim, goal = worst.claim, goal_of(worst.claim)
             first = sampled.first(k, (goal.limit or 0.0) - goal.slack, worst.place)
             if first is None:
                 continue
@@ -78,7 +65,7 @@ def first_faults(
             place, value = first
             if place <= (worst.place or place):
                 value = claim.reading.from_value(-claim.sense.sign * value)
-                found[claim.name, claim.sense] = Fault(place, value, pose_at(problem, cover, place))
+                found[claim] = Fault(place, value, pose_at(problem, cover, place))
     return found
 
 

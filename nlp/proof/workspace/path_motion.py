@@ -16,11 +16,12 @@ from ...errors import UncoveredError
 from ..statement.claims import ACTUATED, Claim
 from ..statement.motors import speed_claims
 from .numbers.bound_search import Minimum, smallest_values
-from .numbers.extremes import Extreme, extreme_of, goal_of
+from .numbers.extremes import goal_of, verdict_of
 from .numbers.machines import Machines
 from .numbers.path_speeds import PathSpeeds, with_rates
 from .robot.path_cover import PathCover
 from .robot.posed_robot import NotJudgedError
+from .verdict import Verdict
 
 #: Number of places at which the width of a bound over machines is taken.
 _POINTS, _SEED = 64, 0
@@ -30,7 +31,7 @@ class SpeedsOnPath(NamedTuple):
     """Largest speeds of actuators, and what they were searched with: None where nothing is known of them."""
 
     claims: Sequence[Claim]
-    extremes: Sequence[Extreme]
+    verdicts: Sequence[Verdict]
     number: PathSpeeds | None
 
 
@@ -56,7 +57,7 @@ def speeds_on_path(machines: Machines, cover: PathCover, gap: float) -> SpeedsOn
     for claim, each in zip(claims, every, strict=True):
         problem = machines.family.problem
         pose = problem.box.pose(problem.pose_of(each.at)) if math.isfinite(each.value) else None
-        found.append(extreme_of(claim, each, pose))
+        found.append(verdict_of(claim, each, pose))
     return SpeedsOnPath(claims, found, number)
 
 

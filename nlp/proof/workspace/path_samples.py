@@ -28,16 +28,16 @@ from ...path.sampling import Points, spread_points, twists_at
 from ...program.layout import robot_length
 from ..statement.claims import Claim, searched_claims
 from ..statement.motors import in_motion, motor_claims, speed_claims
+from .judgement import Judgement
 from .numbers.expressions import Expressions
 from .numbers.machines import Machines
 from .numbers.motors import Motors
 from .numbers.searched import Subject
 from .path_closing import closed_form_along
-from .path_judge import PathJudgement, covered
+from .path_domain import covered
 from .robot.path_cover import Place
 from .robot.pose_box import PoseNumbers, pose_box
 from .robot.posed_robot import NotJudgedError, build_problem
-from .verdict import Outcome
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -114,7 +114,7 @@ class PathSamples:
         return np.full(len(self.points.parameters), np.nan)
 
 
-def samples_of(judged: PathJudgement, most: int = MOST_POINTS) -> PathSamples:
+def samples_of(judged: Judgement, most: int = MOST_POINTS) -> PathSamples:
     """Return a judged machine at points of its path, among them all places that a verdict names.
 
     Args:
@@ -142,16 +142,15 @@ def samples_of(judged: PathJudgement, most: int = MOST_POINTS) -> PathSamples:
     return PathSamples(points, poses, joints, speeds, numbers, left_out, keys, margins)
 
 
-def places_of(judged: PathJudgement) -> list[Place]:
+def places_of(judged: Judgement) -> list[Place]:
     """Return the places of the verdicts on ranks and limits that are not proved."""
-    found = [each.place for each in judged.ranks if each.outcome is not Outcome.PROVED]
-    found += [each.place for each in judged.extremes if each.fails]
+    found = [each.place for each in judged.verdicts if each.fails]
     found += [each.place for each in judged.faults.values()]
     return sorted({each for each in found if each is not None})
 
 
 def _numbers(
-    judged: PathJudgement, poses: Poses, joints: InversePoses | None
+    judged: Judgement, poses: Poses, joints: InversePoses | None
 ) -> tuple[tuple[SampledNumber, ...], tuple[str, ...]]:
     """Return the numbers of claims at poses, and the keys of limits without values."""
     case, closed = judged.case, closed_form_along(judged.case, judged.path)

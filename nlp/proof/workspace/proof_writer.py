@@ -7,16 +7,15 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ....models import FloatArray
 from ..checker.proof_file import Premises, Proof, ProofClaim, ProofError, Unproved, workspace_numbers
 from ..checker.workspace.statement import expected_claims, legs_numbers, robot_claims
 from ..statement.claims import ERRORS, REACH, REGULAR, Claim, ClaimKind, one_machine_name
 from ..statement.machine import INSIDE, legs_of, workspace_of_case
 from ..statement.tolerance import second_order_name
-from .judge import Judgement
-from .numbers.extremes import Extreme
-from .paper_record import Key, PaperRecord
-from .verdict import Outcome, RankVerdict
+from .judgement import Judgement
+from .proof_record import Key, ProofRecord
+from .robot.pose_box import PoseNumbers, pose_box
+from .verdict import Outcome, Verdict
 
 #: Part by which the bound of an error of first order is moved outwards, so that boxes at the worst pose have room.
 _OUTWARDS = 1e-6
@@ -35,8 +34,8 @@ _NO_REACH = "the reach of limbs that it needs has no proof"
 _NO_LENGTHS = "the lengths of legs that it needs have no proof"
 
 
-def paper_of(
-    judged: Judgement, record: PaperRecord, text: str, *, quantities: Sequence[str] = (), leg_error: float = 0.0
+def proof_of(
+    judged: Judgement, record: ProofRecord, text: str, *, quantities: Sequence[str] = (), leg_error: float = 0.0
 ) -> Proof:
     """Return the proof of what is proved, or refuted by two poses, and the claims that have none.
 
@@ -86,7 +85,7 @@ class _Writer:
         proved: the claims so far.
     """
 
-    def __init__(self, judged: Judgement, record: PaperRecord) -> None:
+    def __init__(self, judged: Judgement, record: ProofRecord) -> None:
         self._case, self._judged, self._record = judged.case, judged, record
         self._reaches = [each for each in judged.extremes if each.key == REACH]
         reached = {each.name for each in self._reaches if each.outcome is Outcome.PROVED}
@@ -120,14 +119,14 @@ class _Writer:
         found = self._judged.regularity if name == REGULAR else self._judged.constraints
         if found is None:
             raise ProofError(_NOT_JUDGED)
-        if found.outcome is Outcome.REFUTED and found.y is not None:
-            return self._singular(name, found, found.y)
+        if found.outcome is Outcome.REFUTED and found.pose is not None:
+            return self._singular(name, found, found.pose)
         if found.outcome is not Outcome.PROVED:
             raise ProofError(_words(found))
-        return ProofClaim(name, "", "regular", tree=self._record.own(name).tree(with_open=True))
+        return ProofClaim(name, "", "regular", tree=self._record.tree(name).tree(with_open=True))
 
-    def _singular(self, name: str, found: RankVerdict, y: FloatArray) -> ProofClaim:
-        """Return the opposite of a claim about a rank, which is refuted at a pose (6,)."""
+    def _singular(self, name: str, found: Verdict, pose: PoseNumbers) -> ProofClaim:
+        """Return the opposite of a claim about a rank, which is refuted at a pose."""
         if found.sides is not None:
             return ProofClaim(name, "", "singular", sides=tuple(map(tuple, found.sides.tolist())))
         machines = self.robot.machines
@@ -138,10 +137,11 @@ class _Writer:
             raise ProofError(_words(found))
         errors = found.errors.vectors.copy()
         errors *= INSIDE * machines.symbols.tolerance / np.linalg.norm(errors, axis=1).max()
+        y = pose_box(self._judged.workspace).coordinates(pose)
         sides = [np.concatenate([y, each.ravel()]) for each in (np.zeros_like(errors), errors)]
         return ProofClaim(name, "", "singular", sides=tuple(tuple(side.tolist()) for side in sides))
 
-    def _program(self, found: Extreme) -> ProofClaim:
+    def _program(self, found: Verdict) -> ProofClaim:
         """Return a claim with a tree of the search of ``certify``."""
         # The search needs the reach of all limbs for the closed forms, and so do the claims on paper.
         is_reached = all(each.outcome is Outcome.PROVED for each in self._reaches) and not self.robot.dependent
@@ -152,7 +152,7 @@ class _Writer:
             raise ProofError(_BY_MACHINES if self._case.joint_centre_tolerance else _ONE_ASSEMBLY)
         return program
 
-    def _of_lengths(self, found: Extreme) -> ProofClaim:
+    def _of_lengths(self, found: Verdict) -> ProofClaim:
         """Return a claim about a telescoping leg, from its lengths or from those of one machine."""
         directions = self._record.directions.get(one_machine_name(found.name))
         if directions is None and self._case.model.unknowns:
@@ -165,11 +165,11 @@ class _Writer:
         sides = tuple(directions.base.tolist()), tuple(directions.platform.tolist())
         return ProofClaim(found.name, found.sense.value, "one machine", found.bound, sides=sides)
 
-    def _boxes(self, each: Claim, found: Extreme) -> ProofClaim:
+    def _boxes(self, each: Claim, found: Verdict) -> ProofClaim:
         """Return a claim with a tree of a search of its own."""
         if each.name not in self._record.boxes:
             raise ProofError(_ONE_ASSEMBLY)
-        record, is_motor = self._record.own(each.name), each.kind is ClaimKind.MOTOR
+        record, is_motor = self._record.tree(each.name), each.kind is ClaimKind.MOTOR
         of_legs = self._case.joint_centre_tolerance and each.kind is ClaimKind.SPECTRUM
         if each.kind is ClaimKind.ERROR or of_legs:
             self._need_lengths([leg.name for leg in self._case.model.legs], ("min",))
@@ -207,6 +207,6 @@ class _Writer:
                 yield ProofClaim(second_order_name(name), sense, "second order", rest)
 
 
-def _words(found: Extreme | RankVerdict) -> str:
+def _words(found: Verdict) -> str:
     """Return an outcome and its reason."""
     return f"{found.outcome.value}: {found.reason}" if found.reason else found.outcome.value

@@ -9,9 +9,9 @@ from ...case.case import Case
 from ...case.pose import Free
 from ...case.workspace import LARGEST_TURN, Workspace
 from ...interruption import is_requested, one_call, seconds_left, why_stopped, within
-from ..statement.claims import CONSTRAINTS, REGULAR
 from ..statement.machine import workspace_of_case
-from .judge import Judgement, judge_workspace
+from .judge import judge_workspace
+from .judgement import Judgement
 from .robot.pose_box import PoseNumbers, scaled
 from .verdict import Outcome
 
@@ -90,12 +90,11 @@ def largest_scale(
     known = proved or None
     if fault is None:
         return Scale(known, failed, False, "", None, reason)
-    names = [REGULAR, CONSTRAINTS][: len(fault.ranks)] + [f"{each.name}: {each.key}" for each in fault.extremes]
-    faults = [(name, each) for name, each in zip(names, fault.verdicts, strict=True) if each.fails]
     # A refuted claim before an open one.
-    name, worst = min(faults, key=lambda each: each[1].outcome is not Outcome.REFUTED)
-    claim, is_refuted = f"{name}, {worst.outcome.value}", worst.outcome is Outcome.REFUTED
-    return Scale(known, failed, is_refuted, claim, worst.pose, reason)
+    worst = min((each for each in fault.verdicts if each.fails), key=lambda each: each.outcome is not Outcome.REFUTED)
+    name = worst.name if worst.is_rank else f"{worst.name}: {worst.key}"
+    is_refuted = worst.outcome is Outcome.REFUTED
+    return Scale(known, failed, is_refuted, f"{name}, {worst.outcome.value}", worst.pose, reason)
 
 
 def _next(proved: float, failed: float, most: float) -> float | None:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from screwsynth.models import FloatArray
-from screwsynth.nlp.proof.boxes.engine import UNMOVED, Verdict
+from screwsynth.nlp.proof.boxes.engine import UNMOVED, BoxState
 from screwsynth.nlp.proof.enclosure.forms import Ends
 from screwsynth.nlp.proof.enclosure.tape import Tape
 
@@ -95,7 +95,7 @@ def first_pass(
     if not squared:
         return found.result
     tangents = tangent_forms(_some(every, slice(R, None)), squared, functions)
-    rest = np.flatnonzero((found.result.verdict == Verdict.OPEN) & tangents.usable)
+    rest = np.flatnonzero((found.result.verdict == BoxState.OPEN) & tangents.usable)
     expressions, steep = _some(every, slice(functions, R)), tangents.forms
     forms = Forms(
         *(np.concatenate([getattr(part, name)[..., rest] for part in (steep, expressions)]) for name in vars(every))
@@ -136,9 +136,9 @@ def _pass(
     bound = np.where(defined, np.fmin(forms.hi[:J].min(axis=0), L.bound()), np.inf)
     impossible = (forms.lo > 0) | (equation[:, None] & (forms.hi < 0))
     impossible[:J] = False
-    verdict = np.where(impossible.any(axis=0), Verdict.INFEASIBLE, Verdict.OPEN)
+    verdict = np.where(impossible.any(axis=0), BoxState.INFEASIBLE, BoxState.OPEN)
     is_bounded = bound <= threshold
-    verdict = np.where(is_bounded, Verdict.BOUNDED, verdict).astype(np.int32)
+    verdict = np.where(is_bounded, BoxState.BOUNDED, verdict).astype(np.int32)
     reason = np.where(is_bounded, 0, impossible.argmax(axis=0)).astype(np.int32)
     for r in range(len(equation)):
         for sign in (1.0, -1.0):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from screwsynth.models import FloatArray
-from screwsynth.nlp.proof.boxes.engine import LimbModels, Verdict
+from screwsynth.nlp.proof.boxes.engine import BoxState, LimbModels
 
 from .bounding import NumpyEngine
 from .intervals import midpoints
@@ -44,7 +44,7 @@ class NumpyLimbEngine:
         impossible, binding = engine.states(low, high)
         left = engine.collapse_monotone(model, binding, lower, upper, m)
         engine.contract(model, L, left, box, -np.inf)
-        closed = np.isin(left.verdict, (Verdict.MONOTONE, Verdict.EMPTIED)) & defined
+        closed = np.isin(left.verdict, (BoxState.MONOTONE, BoxState.EMPTIED)) & defined
         stops = (binding | impossible)[:, None] & engine.depends[:, :m, None]
         is_equation = engine.equation[:, None, None]
         g_lo, g_hi = model.gradient_lo[:, :m], model.gradient_hi[:, :m]

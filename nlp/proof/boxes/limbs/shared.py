@@ -21,7 +21,7 @@ from ...checker.tree import Node, leaf_bytes, node_bytes
 from ...enclosure.forms import TINY, ULP
 from ..engine import Engine, LimbModels, Threads
 from ..optimum import LEAST_WIDTHS
-from ..search import SMALL, WHOLE, Boxes, Order, Rule, Search, Verdicts, some
+from ..search import SMALL, WHOLE, Boxes, BoxResults, Order, Rule, Search, some
 from ..tree import TreeRecord, halves_of, keys_of
 from .decomposition import LimbBound, OwnBoxes, bound_limb, first_largest_of_lists, tilts_of
 
@@ -158,14 +158,14 @@ class SharedRule(Rule[SharedColumns]):
         """The part with shared variables alone."""
         return Engine(self.common_form, 1, self._m)
 
-    def examine(self, boxes: Boxes[SharedColumns]) -> Verdicts[SharedColumns]:
+    def examine(self, boxes: Boxes[SharedColumns]) -> BoxResults[SharedColumns]:
         """Return bounds of shared boxes, and improve the incumbent; the first steps prepare one limb each."""
         if len(self._engines) < len(self._separation.limbs):
             form = self._separation.limbs[len(self._engines)].form
             # Minus a limb's function, for lower models.
             self._opposites.append(Engine(replace(form, functions=(-form.functions[0],)), 1, self._m))
             self._engines.append(Engine(form, 1, self._m))
-            return Verdicts(boxes, -math.inf, 0)
+            return BoxResults(boxes, -math.inf, 0)
         before = self._incumbent.value
         self._turn += 1
         with np.errstate(all="ignore"):
@@ -176,9 +176,9 @@ class SharedRule(Rule[SharedColumns]):
             left, alive, emptied = self._branch(boxes, sums, below)
         # What contraction or dropping of own boxes excluded may reach the threshold.
         examined, reasons = sum(own.of.size + own.count for own in boxes.more.own), (sums, alive, emptied)
-        return Verdicts(left, self.target, examined, is_better=self._incumbent.value > before, reasons=reasons)
+        return BoxResults(left, self.target, examined, is_better=self._incumbent.value > before, reasons=reasons)
 
-    def record(self, boxes: Boxes[SharedColumns], found: Verdicts[SharedColumns], split: NDArray[np.intp]) -> None:
+    def record(self, boxes: Boxes[SharedColumns], found: BoxResults[SharedColumns], split: NDArray[np.intp]) -> None:
         """Record bisections and leaves, with the room up to the target shared out among limbs and common part."""
         if self._recorder is None or found.reasons is None:
             return

@@ -20,6 +20,7 @@ from ....program.layout import Layout
 from ...statement.claims import (
     CONSTRAINTS,
     ERRORS,
+    RANKS,
     REGULAR,
     SPECTRAL,
     Claim,
@@ -191,7 +192,7 @@ def expected_claims(case: Case, robot: RobotClaims, quantities: Sequence[str], l
     ranks = [REGULAR, *([CONSTRAINTS] if _has_constraints(robot.model) else [])]
     claims = claims_of(robot.layout, [name for name in quantities if name not in SPECTRAL])
     every = [
-        *(Claim(name, Sense.MIN, kind=ClaimKind.RANK) for name in ranks),
+        *(RANKS[name] for name in ranks),
         *robot.reaches,
         *robot.dependent,
         *claims,

@@ -18,7 +18,7 @@ from casadi import SX
 
 from .....models import FloatArray
 from ....interruption import one_search
-from ...boxes.search import TOO_SMALL, Boxes, Effort, Order, Verdicts, joined, some
+from ...boxes.search import TOO_SMALL, Boxes, BoxResults, Effort, Order, joined, some
 from ...boxes.tree import TreeRecord
 from ...enclosure.forms import Forms
 from ..ranks.loop_boxes import (
@@ -215,7 +215,7 @@ class SmallestValues(LoopRule):
         pairs = [goal.levels(*each) for goal, *each in zip(self._goals, *known, strict=True)]
         return np.array(pairs)[:, 1 if len(pairs) > 1 else 0]
 
-    def examine(self, boxes: Boxes[Followed]) -> Verdicts[Followed]:
+    def examine(self, boxes: Boxes[Followed]) -> BoxResults[Followed]:
         """Return bounds of boxes, and take note of small values in them."""
         self._number.levels = self._levels()
         found = self.examined(boxes)
@@ -231,7 +231,7 @@ class SmallestValues(LoopRule):
         # Bounds over long and narrow boxes are wide, those of loops above all. A box of a dwell has no width.
         split = coordinates_to_split(left.shares * np.sqrt(width / np.where(widest > 0, widest, 1.0)), width)
         parts = self.boxes_of(left, (-left.smallest).max(axis=1), split, left.smallest)
-        return Verdicts(parts, -float(found.smallest[done].min(initial=np.inf)), len(done))
+        return BoxResults(parts, -float(found.smallest[done].min(initial=np.inf)), len(done))
 
     def _try(self, found: Examined) -> None:
         """Take note of values in the boxes with the smallest bounds of each number."""

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .....models import Dimension, FloatArray, axis_angle_from_matrix, frozen_array
-from ....case.motors import Motor
+from .....models import FloatArray, axis_angle_from_matrix, frozen_array
 from ....case.task import Sense
 from ....errors import UncoveredError
 from ....interruption import is_requested, one_search, why_stopped
@@ -25,13 +24,12 @@ from ...certificate.certificate import Certificate, CertificateStatus
 from ...statement.claims import Claim
 from ...statement.machine import JointErrors
 from ...statement.posed_layout import extreme_program, varies
-from ..robot.path_cover import Place
 from ..robot.pose_box import PoseNumbers
-from ..verdict import Outcome, slack_of
+from ..verdict import Outcome, Verdict, slack_of
 from .bound_search import Goal, Minimum
 
 if TYPE_CHECKING:
-    from ..paper_record import PaperRecord
+    from ..proof_record import ProofRecord
 
 #: Returns the errors of the machine that is worst at a pose, to first order, and the value of its expression.
 WorstMachine = Callable[[PoseNumbers], tuple[JointErrors, float]]
@@ -47,60 +45,35 @@ _NEAR_ZERO = 1e-6
 CLOSE = "the limit is closer to the value reached than bounds can tell"
 
 
-@dataclass(frozen=True, eq=False)
-class Extreme:
-    """The smallest or the largest value of a number over a workspace.
+@dataclass(frozen=True)
+class NumberSearch:
+    """Search of the smallest and the largest values of numbers.
 
     Attributes:
-        name: of the number, in the words of a case.
-        sense: whether the smallest or the largest value is meant.
-        dimension: of the number.
-        key: dotted key, below ``limits``, of the limit in the case; empty without one.
-        limit: the limit, radians for angles; None without one.
-        bound: proven: no pose has a smaller, or a larger, value; radians for angles; infinite where nothing is proved.
-        reached: the smallest or largest value known; NaN without one.
-        pose: the pose at which it is reached; None without one.
-        outcome: of the limit, or, without one, of the gap asked for.
-        boxes: number of boxes examined.
-        seconds: wall time.
-        reason: for an open outcome; else empty.
-        errors: of the joint centres of the machine that reaches the value; None for the exact machine.
-        motor: the actuator and its number, of claims about motors.
-        place: on a path, of the value reached; None for a workspace.
+        gap: largest distance of a bound from the best known value, as a part of it.
+        jobs: number of threads; None for all processors.
+        record: record of the searches for a proof; None without a proof.
     """
 
-    name: str
-    sense: Sense
-    dimension: Dimension
-    key: str
-    limit: float | None
-    bound: float
-    reached: float
-    pose: PoseNumbers | None
-    outcome: Outcome
-    boxes: int
-    seconds: float
-    reason: str
-    errors: JointErrors | None = None
-    motor: Motor | None = None
-    place: Place | None = None
-
-    @property
-    def fails(self) -> bool:
-        """Whether it has a limit that is not proved to hold; a number without a limit is information."""
-        return self.limit is not None and self.outcome is not Outcome.PROVED
+    gap: float = GAP
+    jobs: int | None = None
+    record: ProofRecord | None = None
 
 
-def extreme_of(
+#: The search with the gap of numbers.
+DEFAULT = NumberSearch()
+
+
+def verdict_of(
     claim: Claim, found: Minimum, pose: PoseNumbers | None = None, *, errors: JointErrors | None = None
-) -> Extreme:
-    """Return the extreme of a number from the smallest value of its expression, or of minus it for the largest one.
+) -> Verdict:
+    """Return the verdict on a number from the smallest value of its expression, or of minus it for the largest one.
 
     Args:
         claim: the number, with its limit.
         found: without a reason where it is as good as asked for.
         pose: at which the value is reached.
-        errors: of the machine that reaches it, as for :class:`Extreme`.
+        errors: of the machine that reaches it, as for :class:`.Verdict`.
     """
     sign, read, limit = claim.sense.sign, claim.reading.from_value, claim.limit
     is_bounded, is_reached, reason = math.isfinite(found.bound), math.isfinite(found.value), found.reason
@@ -115,22 +88,18 @@ def extreme_of(
         # What is proved of the exact machine is nothing about the others, and refutes all the same.
         bound, reason = sign * math.inf, claim.uncovered
         outcome = outcome if outcome is Outcome.REFUTED else Outcome.OPEN
-    return Extreme(
-        name=claim.name,
-        sense=claim.sense,
-        dimension=claim.reading.dimension,
-        key=claim.key,
-        limit=None if limit is None else read(limit),
-        bound=bound,
-        reached=read(-sign * found.value) if is_reached else math.nan,
-        pose=pose,
-        outcome=outcome,
+    return Verdict(
+        claim,
+        outcome,
+        bound,
+        read(-sign * found.value) if is_reached else math.nan,
+        pose,
+        reason if outcome is Outcome.OPEN else "",
         boxes=found.boxes,
+        open=found.open,
         seconds=found.seconds,
-        reason=reason if outcome is Outcome.OPEN else "",
-        errors=errors,
-        motor=claim.motor,
         place=found.place,
+        errors=errors,
     )
 
 
@@ -144,13 +113,11 @@ def goal_of(claim: Claim, gap: float = 0.0, part: float = 0.0, *, is_enough: boo
 def prove_extreme(
     layout: Layout,
     claim: Claim,
+    search: NumberSearch = DEFAULT,
     *,
-    gap: float = GAP,
     time_limit: float | None = None,
-    jobs: int | None = None,
     machine: WorstMachine | None = None,
-    paper: PaperRecord | None = None,
-) -> Extreme:
+) -> Verdict:
     """Prove the smallest or the largest value of a number over a workspace.
 
     A search whose bound is beyond the number's limit, with a value within it, goes on until the limit is decided.
@@ -158,50 +125,46 @@ def prove_extreme(
     Args:
         layout: the case as symbols of the pose.
         claim: the number.
-        gap: allowed distance of the bound from the best value known, as a part of it.
+        search: gap, threads and record.
         time_limit: seconds after which the search stops with the bound reached.
-        jobs: threads.
         machine: returns the machine that is worst at a pose, for a claim about every machine within a tolerance.
-        paper: records the search for a proof.
     """
     sign = claim.sense.sign
     if is_requested():
-        return extreme_of(claim, Minimum(reason=why_stopped()))
+        return verdict_of(claim, Minimum(reason=why_stopped()))
     nlp = extreme_program(layout, claim.expression, claim.sense)
     x: FloatArray | None
     if not varies(layout, [claim.expression])[0]:
         value = nlp.evaluate(nlp.start).F
-        if paper is not None:
-            paper.constant(claim, nlp, value)
+        if search.record is not None:
+            search.record.constant(claim, nlp, value)
         found, x = Minimum(-sign * value, -sign * value), np.array(nlp.start)
     else:
         try:
             with one_search(time_limit):
-                found, x = _search(nlp, claim, gap, jobs, paper)
+                found, x = _searched(nlp, claim, search)
         except UncoveredError as error:
-            return extreme_of(claim, Minimum(reason=str(error)))
+            return verdict_of(claim, Minimum(reason=str(error)))
     pose = None if x is None else _pose(nlp, x)
     if pose is None or machine is None:
-        return extreme_of(claim, found, pose)
+        return verdict_of(claim, found, pose)
     errors, value = machine(pose)
-    return extreme_of(claim, found._replace(value=-sign * value), pose, errors=errors)
+    return verdict_of(claim, found._replace(value=-sign * value), pose, errors=errors)
 
 
-def _search(
-    nlp: Nlp, claim: Claim, gap: float, jobs: int | None, paper: PaperRecord | None
-) -> tuple[Minimum, FloatArray | None]:
+def _searched(nlp: Nlp, claim: Claim, search: NumberSearch) -> tuple[Minimum, FloatArray | None]:
     """Return the bound of an expression, to the gap or as fine as its limit needs, and the point of its best value.
 
     Raises:
         UncoveredError: the expression holds an operation without a rule.
     """
     # A program of a claim has one function, and its search is that of certify with or without a record.
-    sign, writer = claim.sense.sign, None if paper is None else TreeRecord()
-    found = certify_program(nlp, gap=gap, jobs=jobs, recorder=writer)
+    sign, writer = claim.sense.sign, None if search.record is None else TreeRecord()
+    found = certify_program(nlp, gap=search.gap, jobs=search.jobs, recorder=writer)
     boxes, seconds = found.boxes, found.seconds
     while (finer := _finer_gap(nlp, claim, found)) is not None and not is_requested():
-        finer_writer = None if paper is None else TreeRecord()
-        more = certify_program(nlp, found.x, gap=finer, jobs=jobs, recorder=finer_writer)
+        finer_writer = None if search.record is None else TreeRecord()
+        more = certify_program(nlp, found.x, gap=finer, jobs=search.jobs, recorder=finer_writer)
         boxes, seconds = boxes + more.boxes, seconds + more.seconds
         if sign * more.bound <= sign * found.bound:
             found, writer = more, finer_writer
@@ -209,8 +172,8 @@ def _search(
             found = replace(more, bound=found.bound, bound_of_tree=found.bound_of_tree)
     if found.status is CertificateStatus.INFEASIBLE:
         return Minimum(boxes=boxes, seconds=seconds, reason="the robot has no pose there"), None
-    if paper is not None and writer is not None:
-        paper.program(claim, found, writer)
+    if search.record is not None and writer is not None:
+        search.record.program(claim, found, writer)
     # A search that ends early has a bound too, which may be as good as asked for.
     is_met = found.status is CertificateStatus.PROVED or found.gap <= found.allowed
     value = math.inf if math.isnan(found.incumbent) else -sign * found.incumbent

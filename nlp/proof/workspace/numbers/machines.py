@@ -16,7 +16,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
@@ -43,15 +42,14 @@ from ...statement.tolerance import (
     machine_layout,
     second_order_name,
 )
+from ..proof_record import ProofRecord
 from ..robot.pose_box import PoseNumbers, pose_coordinates
 from ..robot.posed_robot import NotJudgedError, Problem, family_of
+from ..verdict import Verdict
 from .bound_search import Minimum, smallest_values
 from .expressions import Expressions
-from .extremes import GAP, Extreme, extreme_of, goal_of, prove_extreme
+from .extremes import DEFAULT, NumberSearch, goal_of, prove_extreme, verdict_of
 from .second_order_change import second_order_change
-
-if TYPE_CHECKING:
-    from ..paper_record import PaperRecord
 
 #: Part of itself by which a bound of a change moves outwards: its own rounding.
 _OUTWARDS = 1 + 1e-12
@@ -74,6 +72,7 @@ class Machines:
     Attributes:
         case: the case.
         built: the robot with errors of its joint centres.
+        model: the robot without unknowns in closed form.
         family: the machines over the workspace.
         symbols: the machines as symbols of one pose and of errors.
 
@@ -82,7 +81,7 @@ class Machines:
     """
 
     def __init__(self, case: Case, closed: ClosedForm, design: Problem) -> None:
-        self.case, self._model, self._at = case, closed.model, pose_coordinates(design.box)
+        self.case, self.model, self._at = case, closed.model, pose_coordinates(design.box)
         tolerance = case.joint_centre_tolerance or 0.0
         try:
             bare = BuiltModel(closed.model, (), closed.reaches)
@@ -96,32 +95,27 @@ class Machines:
     @cached_property
     def _design(self) -> Layout:
         """The design as symbols of the pose."""
-        return design_layout(self.case, self._model, self._at)
+        return design_layout(self.case, self.model, self._at)
 
-    def extreme(
-        self, claim: Claim, *, gap: float = GAP, jobs: int | None = None, paper: PaperRecord | None = None
-    ) -> Extreme:
+    def extreme(self, claim: Claim, search: NumberSearch = DEFAULT) -> Verdict:
         """Prove the smallest or the largest value of a number over all machines and poses.
 
         Args:
             claim: the number, in the symbols of machines.
-            gap: allowed distance of the bound from the best value known, as a part of it.
-            jobs: threads.
-            paper: records the search for a proof.
+            search: gap, threads and record.
         """
         if is_requested():
-            return extreme_of(claim, Minimum(reason=why_stopped()))
+            return verdict_of(claim, Minimum(reason=why_stopped()))
         number, found = self.number(claim), None
         try:
             if not self.family.problem.dependent and is_smooth(number):
-                found = self._by_first_order(claim, number, gap, jobs, paper)
-            return found or next(
-                self._by_search([claim], gap, small=_SMALL if claim.is_coordinate else 0.0, paper=paper)
-            )
+                found = self._by_first_order(claim, number, search)
+            small = _SMALL if claim.is_coordinate else 0.0
+            return found or next(self._by_search([claim], search.gap, small=small, record=search.record))
         except UncoveredError as error:
-            return extreme_of(claim, Minimum(reason=str(error)))
+            return verdict_of(claim, Minimum(reason=str(error)))
 
-    def followed(self, claims: Sequence[Claim], *, gap: float) -> Iterator[Extreme]:
+    def followed(self, claims: Sequence[Claim], gap: float) -> Iterator[Verdict]:
         """Yield the extremes of those limits that have rules, by one search in which bounds within limits are enough.
 
         Args:
@@ -133,7 +127,7 @@ class Machines:
             with suppress(UncoveredError):  # an equation of loops
                 yield from self._by_search(covered, gap, is_enough=True)
 
-    def searched(self, claims: Sequence[Claim], gap: float, *, is_enough: bool = True) -> list[Extreme]:
+    def searched(self, claims: Sequence[Claim], gap: float, *, is_enough: bool = True) -> list[Verdict]:
         """Return the extremes of numbers that have rules, all by one search.
 
         Args:
@@ -155,9 +149,7 @@ class Machines:
         """Return a number in the coordinates of machines, times -1 where the largest value is meant."""
         return -claim.sense.sign * self.symbols.of(claim.expression, self.family.errors, self.family.problem.z)
 
-    def _by_first_order(
-        self, claim: Claim, number: SX, gap: float, jobs: int | None, paper: PaperRecord | None
-    ) -> Extreme | None:
+    def _by_first_order(self, claim: Claim, number: SX, search: NumberSearch) -> Verdict | None:
         """Return the extreme of a number and its change as an expression of the pose; None where it is not bounded.
 
         Raises:
@@ -175,11 +167,11 @@ class Machines:
             change = sum((ca.norm_2(ca.vertcat(gradient[3 * j : 3 * j + 3], size)) for j, size in sizes), SX(0))
             whole += sign * (family.tolerance * change * _OUTWARDS + rest)
             machine = partial(self._worst, values, sign)
-            if paper is not None:
-                paper.rests[second_order_name(claim.name), claim.sense.value] = rest
+            if search.record is not None:
+                search.record.rests[second_order_name(claim.name), claim.sense.value] = rest
         pose = design.table.variables_vector
-        own = replace(claim, expression=symbols.of(whole, SX.zeros(symbols.errors.numel()), pose))
-        return prove_extreme(design, own, gap=gap, jobs=jobs, machine=machine, paper=paper)
+        of_design = replace(claim, expression=symbols.of(whole, SX.zeros(symbols.errors.numel()), pose))
+        return replace(prove_extreme(design, of_design, search, machine=machine), claim=claim)
 
     def _worst(self, values: Expressions, sign: float, pose: PoseNumbers) -> tuple[JointErrors, float]:
         """Return the errors that are worst at a pose to first order, and the number with them."""
@@ -210,8 +202,8 @@ class Machines:
         *,
         is_enough: bool = False,
         small: float = 0.0,
-        paper: PaperRecord | None = None,
-    ) -> Iterator[Extreme]:
+        record: ProofRecord | None = None,
+    ) -> Iterator[Verdict]:
         """Yield the extremes of numbers by one search of boxes of poses for all machines.
 
         Args:
@@ -219,7 +211,7 @@ class Machines:
             gap: as a part of a number.
             is_enough: whether bounds within limits are enough whatever the gap is.
             small: length, in parts of the robot's, or angle, of which the gap is a part too: numbers may be 0 at home.
-            paper: records the search of one number for a proof.
+            record: record of the search of one number for a proof.
 
         Raises:
             UncoveredError: an expression holds an operation without a rule.
@@ -232,13 +224,13 @@ class Machines:
             for claim in claims
         ]
         goals = [goal_of(claim, gap * own, gap, is_enough=is_enough) for claim, own in zip(claims, least, strict=True)]
-        recorder = None if paper is None else TreeRecord()
+        recorder = None if record is None else TreeRecord()
         every = smallest_values(Expressions(self.family, ca.vertcat(*map(self.number, claims))), goals, recorder)
-        if paper is not None and recorder is not None and not every[0].reason:
+        if record is not None and recorder is not None and not every[0].reason:
             sign = -claims[0].sense.sign
-            paper.followed(claims[0], sign * every[0].bound, sign * every[0].value, recorder)
+            record.followed(claims[0], sign * every[0].bound, sign * every[0].value, recorder)
         for claim, found in zip(claims, every, strict=True):
             is_known = math.isfinite(found.value)
             pose = problem.box.pose(problem.pose_of(found.at)) if is_known else None
             errors = self.family.errors_of(found.at) if is_known and self.family.names else None
-            yield extreme_of(claim, found, pose, errors=errors)
+            yield verdict_of(claim, found, pose, errors=errors)

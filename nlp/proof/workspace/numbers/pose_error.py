@@ -28,13 +28,14 @@ from ....evidence.closed_loops import Loops
 from ...statement.claims import ERRORS
 from ...statement.machine import Legs
 from ..robot.pose_box import PoseNumbers, cayley_rotation
+from ..verdict import Verdict
 from .bound_search import Goal, Minimum, smallest_values
-from .extremes import Extreme, extreme_of
+from .extremes import verdict_of
 from .jacobian_numbers import WorstError
 from .searched import Subject
 
 if TYPE_CHECKING:
-    from ..paper_record import PaperRecord
+    from ..proof_record import ProofRecord
 
 #: Part of its size by which a computed bound is moved outwards: rounding.
 _ROUNDING = 1e-10
@@ -46,7 +47,7 @@ _GAP = 0.1
 _TOO_LARGE = "the errors are too large for a bound of their terms of second order"
 
 
-def pose_errors(subject: Subject, leg_error: float, *, paper: PaperRecord | None = None) -> Iterator[Extreme]:
+def pose_errors(subject: Subject, leg_error: float, record: ProofRecord | None = None) -> Iterator[Verdict]:
     """Yield the largest errors of the platform's position and rotation, for every machine within its tolerances.
 
     None is yielded without tolerances.
@@ -54,7 +55,7 @@ def pose_errors(subject: Subject, leg_error: float, *, paper: PaperRecord | None
     Args:
         subject: six straight legs.
         leg_error: largest error of a leg's length, length.
-        paper: records the searches for a proof.
+        record: record of the searches for a proof.
     """
     legs, shortest = subject.legs, subject.shortest
     eps = leg_error + 2 * legs.tolerance
@@ -65,11 +66,11 @@ def pose_errors(subject: Subject, leg_error: float, *, paper: PaperRecord | None
     for claim in ERRORS:
         number = WorstError(problem, is_rotation=claim.reading.dimension is Dimension.ANGLE)
         goal = Goal(_GAP * abs(float(number.values(problem.start[None])[0, 0])))
-        recorder = None if paper is None else paper.own(claim.name)
+        recorder = None if record is None else record.tree(claim.name)
         (found,) = smallest_values(number, [goal], recorder)
         searches.append((number, found))
-        if paper is not None:
-            paper.firsts[claim.name] = -found.bound
+        if record is not None:
+            record.firsts[claim.name] = -found.bound
     first = PoseErrors(*(-eps * found.bound for _, found in searches))
     reach = float(np.linalg.norm(legs.platform, axis=1).max())
     # The design's legs may be longer than those of every machine.
@@ -82,7 +83,7 @@ def pose_errors(subject: Subject, leg_error: float, *, paper: PaperRecord | None
         reached = float(np.nan_to_num(both, nan=-math.inf).max())
         reason = found.reason or ("" if math.isfinite(whole[k]) else _TOO_LARGE)
         shown = pose if math.isfinite(reached) else None
-        yield extreme_of(claim, found._replace(bound=-whole[k], value=-reached, reason=reason), shown)
+        yield verdict_of(claim, found._replace(bound=-whole[k], value=-reached, reason=reason), shown)
 
 
 class PoseErrors(NamedTuple):

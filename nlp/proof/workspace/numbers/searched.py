@@ -7,7 +7,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,17 +20,15 @@ from ...boxes.tree import TreeRecord
 from ...statement.claims import Claim, ClaimKind, searched_claims
 from ...statement.machine import JointErrors, Legs, has_straight_legs, joint_centres
 from ...statement.motors import motor_claims
+from ..proof_record import ProofRecord
 from ..robot.path_cover import PathCover
 from ..robot.posed_robot import NotJudgedError, Problem
-from ..verdict import EVERYWHERE
+from ..verdict import EVERYWHERE, Verdict
 from .bound_search import Minimum, smallest_values
 from .clearance import Clearance
-from .extremes import Extreme, extreme_of, goal_of
+from .extremes import NumberSearch, goal_of, verdict_of
 from .jacobian_numbers import SingularValues, change_of_rows
 from .motors import Motors
-
-if TYPE_CHECKING:
-    from ..paper_record import PaperRecord
 
 #: Singular values, and clearances in parts of the robot's length, of which gaps are parts where a limit is smaller.
 _NEAR_ZERO = {ClaimKind.SPECTRUM: 0.1, ClaimKind.CLEARANCE: 0.01}
@@ -109,42 +106,40 @@ class Subject:
         return SingularValues(problem, length, is_condition=is_condition, machines=self.machines, change=change)
 
 
-def searched_extremes(
-    subject: Subject, names: Sequence[str], *, gap: float, paper: PaperRecord | None = None
-) -> Iterator[Extreme]:
+def searched_extremes(subject: Subject, names: Sequence[str], search: NumberSearch) -> Iterator[Verdict]:
     """Yield the extremes of :func:`~.claims.searched_claims`.
 
     Args:
         subject: the robot.
         names: measures that are asked for, of which the others are left out.
-        gap: allowed distance of a bound from the best value known, as a part of it.
-        paper: records the searches for a proof.
+        search: gap and record.
     """
     for claim in searched_claims(subject.case, names):
-        yield _answer(subject, claim, gap, paper)
+        yield _answer(subject, claim, search)
 
 
-def _answer(subject: Subject, claim: Claim, gap: float, paper: PaperRecord | None) -> Extreme:
+def _answer(subject: Subject, claim: Claim, search: NumberSearch) -> Verdict:
     """Return the extreme of a number; the search of a limit ends as soon as it is decided."""
     if subject.model.rank < 6 and claim.limit is None and claim.kind is not ClaimKind.CLEARANCE:
-        return extreme_of(claim, Minimum(reason=EVERYWHERE))
+        return verdict_of(claim, Minimum(reason=EVERYWHERE))
     try:
         number, problem = subject.number(claim), subject.problem
         least = _NEAR_ZERO[claim.kind] * (problem.length if claim.kind is ClaimKind.CLEARANCE else 1.0)
+        gap, record = search.gap, search.record
         allowed = _asked_gap(subject, number, gap) if claim.limit is None else gap * max(abs(claim.limit), least)
-        recorder = None if paper is None or problem.dependent else paper.own(claim.name)
+        recorder = None if record is None or problem.dependent else record.tree(claim.name)
         (found,) = smallest_values(number, [goal_of(claim, allowed)], recorder)
     except (UncoveredError, NotJudgedError) as error:
-        return extreme_of(claim, Minimum(reason=str(error)))
+        return verdict_of(claim, Minimum(reason=str(error)))
     # A smallest singular value of at least 0, or an infinite condition number, says nothing.
     is_bound = math.isfinite(found.bound) and (claim.sense is Sense.MAX or found.bound > 0)
     if claim.limit is None and not is_bound and subject.case.joint_centre_tolerance:
         found = found._replace(reason=found.reason or _TOO_LARGE)
     if not math.isfinite(found.value):
-        return extreme_of(claim, found)
+        return verdict_of(claim, found)
     y = problem.pose_of(found.at)
     errors = subject.errors(number.worst(y), of_legs=claim.kind is ClaimKind.CLEARANCE)
-    return extreme_of(claim, found, problem.box.pose(y), errors=errors)
+    return verdict_of(claim, found, problem.box.pose(y), errors=errors)
 
 
 def motor_extremes(
@@ -152,8 +147,8 @@ def motor_extremes(
     *,
     with_all: bool = True,
     speeds: Mapping[str, float] | None = None,
-    paper: PaperRecord | None = None,
-) -> Iterator[Extreme]:
+    record: ProofRecord | None = None,
+) -> Iterator[Verdict]:
     """Yield the extremes of :func:`~.motors.motor_claims`, all or those with limits, for each actuator and load.
 
     Actuators are much alike: each takes its share of the time left, and the work after them has one too.
@@ -162,7 +157,7 @@ def motor_extremes(
         subject: the robot.
         with_all: whether numbers without limits are yielded too.
         speeds: proven bounds of the actuators' speeds, by name, which are then not searched; None where they are.
-        paper: records the searches for a proof.
+        record: record of the searches for a proof.
     """
     claims = [each for each in motor_claims(subject.case) if with_all or each.limit is not None]
     known = dict(speeds or {})
@@ -173,22 +168,22 @@ def motor_extremes(
     for left, group in zip(range(len(groups), 0, -1), groups, strict=True):
         actuator = group[0].motor.actuator if group[0].motor else ""
         with within(seconds_left() / (left + 1)):
-            found = list(_motor_answers(subject, group, known.get(actuator, math.inf), paper))
+            found = list(_motor_answers(subject, group, known.get(actuator, math.inf), record))
         if group[0].motor and group[0].motor.number is MotorNumber.SPEED:
             known[actuator] = found[0].bound
         yield from found
 
 
 def _motor_answers(
-    subject: Subject, claims: Sequence[Claim], speed: float, paper: PaperRecord | None
-) -> Iterator[Extreme]:
+    subject: Subject, claims: Sequence[Claim], speed: float, record: ProofRecord | None
+) -> Iterator[Verdict]:
     """Yield the extremes of numbers of an actuator, each to a part of the largest size of its kind at some poses.
 
     Args:
         subject: the robot.
         claims: the numbers; those of one load, or the speed.
         speed: proven bound of the actuator's speed; infinite where there is none.
-        paper: records the search for a proof.
+        record: record of the search for a proof.
     """
     try:
         if subject.machines is None:
@@ -210,17 +205,17 @@ def _motor_answers(
             z = z[:, : len(problem.start)]
             allowed = allowed + np.nan_to_num(values - number.bounds(z, z), posinf=0.0).max(axis=0)
         goals = [goal_of(claim, gap, is_enough=False) for claim, gap in zip(claims, allowed.tolist(), strict=True)]
-        recorder = None if paper is None else TreeRecord()
+        recorder = None if record is None else TreeRecord()
         every = _at_most_products(claims, smallest_values(number, goals, recorder), speed)
-        if paper is not None and recorder is not None:
+        if record is not None and recorder is not None:
             # One search is that of all.
-            paper.boxes |= dict.fromkeys((claim.name for claim in claims), recorder)
+            record.boxes |= dict.fromkeys((claim.name for claim in claims), recorder)
     except (UncoveredError, NotJudgedError) as error:
         every = [Minimum(reason=str(error))] * len(claims)
     for claim, found in zip(claims, every, strict=True):
         is_known = math.isfinite(found.value)
         pose = problem.box.pose(problem.pose_of(found.at)) if is_known else None
-        yield extreme_of(claim, found, pose)
+        yield verdict_of(claim, found, pose)
 
 
 def _at_most_products(claims: Sequence[Claim], every: Sequence[Minimum], speed: float) -> list[Minimum]:

@@ -20,7 +20,7 @@ from casadi import SX
 
 from .....models import FloatArray
 from .....models.arrays import first_largest
-from ...boxes.search import WHOLE, Boxes, Order, Rule, Search, Verdicts, some
+from ...boxes.search import WHOLE, Boxes, BoxResults, Order, Rule, Search, some
 from ...enclosure.forms import Encloser
 from ..ranks.loop_boxes import LoopBoxes, contracted_boxes, whole_workspace
 from ..robot.posed_robot import Problem
@@ -102,7 +102,7 @@ class _ChangeRule(Rule[FloatArray]):
         # An entry below the diagonal of a block on the diagonal stands for two of this block.
         self._times = np.where((rows != columns) & (rows // 3 == columns // 3), 2.0, 1.0)
 
-    def examine(self, boxes: Boxes[FloatArray]) -> Verdicts[FloatArray]:
+    def examine(self, boxes: Boxes[FloatArray]) -> BoxResults[FloatArray]:
         """Return bounds of boxes."""
         known = np.ones(len(boxes.split), dtype=bool)
         now, kept = contracted_boxes(self._problem, LoopBoxes(boxes.lower, boxes.upper, boxes.lower, known))
@@ -114,7 +114,7 @@ class _ChangeRule(Rule[FloatArray]):
         width = (self.whole.upper - self.whole.lower)[0]
         split = first_largest((now.upper - now.lower) / np.where(width > 0, width, np.inf))
         bound, middles = np.where(np.isfinite(found), found, np.inf), np.nan_to_num(self._changes(np.abs(forms.c)))
-        return Verdicts(Boxes(now.lower, now.upper, bound, split, middles), -math.inf, len(split))
+        return BoxResults(Boxes(now.lower, now.upper, bound, split, middles), -math.inf, len(split))
 
     def _changes(self, sizes: FloatArray) -> FloatArray:
         """Return the changes (B,) from sizes (B, R) of the entries: sums of the norms of all blocks."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,9 +15,9 @@ from ...statement.machine import JointErrors
 from ...statement.tolerance import Directions
 from ..robot.pose_box import PoseNumbers
 from ..robot.posed_robot import steepest
-from ..verdict import Outcome, slack_of
+from ..verdict import Outcome, Verdict, slack_of
 from .bound_search import Minimum
-from .extremes import Extreme, extreme_of
+from .extremes import verdict_of
 from .searched import Subject
 
 #: Smallest gap of a length, as a part of it, and part of the room that lengths may leave: that of rounding.
@@ -28,31 +28,29 @@ _GAPS = (1e-4, 1e-6)
 
 #: Proves the smallest or largest length of a leg, by its index, to a finer gap; with directions, the length less the
 #: part of its errors that is the same at every pose. None where it cannot.
-Refine = Callable[[int, Sense, float, Directions | None], Extreme | None]
+Refine = Callable[[int, Sense, float, Directions | None], Verdict | None]
 
 
-def with_strokes(subject: Subject, extremes: Sequence[Extreme], refine: Refine) -> list[Extreme]:
-    """Return extremes, and after them those of the case's limits on telescoping legs.
+def stroke_verdicts(subject: Subject, lengths: Iterable[Verdict], refine: Refine) -> Iterator[Verdict]:
+    """Yield the verdicts on the case's limits on telescoping legs.
 
     A stroke is the longest length less the shortest, at whichever poses: both are poses of the workspace. Where a limit
-    lies between its bound and the value reached, the two lengths are proved more finely, and stand in the place of
-    those given.
+    lies between its bound and the value reached, the two lengths are proved more finely, and yielded again before it.
 
     Args:
         subject: the robot.
-        extremes: among them the smallest and the largest length of each leg.
+        lengths: smallest and largest length of each leg.
         refine: proves a length more finely.
     """
-    found, added = list(extremes), list[Extreme]()
-    place = {(each.name, each.sense): k for k, each in enumerate(found)}
+    known = {(*each.claim.legs, each.sense): each for each in lengths}
     for claim in length_claims(subject.case):
-        name = f"leg_length limb {subject.case.model.legs[claim.legs[0]].name}"
-        own = [place[name, sense] for sense in (Sense.MIN, Sense.MAX)]
-        ends, extreme = _Combined(subject, claim, refine).refined([found[k] for k in own])
-        for k, each in zip(own, ends, strict=True):
-            found[k] = each
-        added.append(extreme)
-    return [*found, *added]
+        keys = [(*claim.legs, sense) for sense in (Sense.MIN, Sense.MAX)]
+        ends, verdict = _Combined(subject, claim, refine).refined([known[key] for key in keys])
+        for key, each in zip(keys, ends, strict=True):
+            if each is not known[key]:
+                known[key] = each
+                yield each
+        yield verdict
 
 
 class _Combined:
@@ -68,7 +66,7 @@ class _Combined:
         self._subject, self._claim, self._refine, self._legs = subject, claim, refine, subject.legs
         (self._leg,), self._factors, self._sign = claim.legs, np.array(claim.weights[::-1]), claim.sense.sign
 
-    def refined(self, ends: list[Extreme]) -> tuple[list[Extreme], Extreme]:
+    def refined(self, ends: list[Verdict]) -> tuple[list[Verdict], Verdict]:
         """Return the two lengths as fine as the limit needs, and the extreme of the number."""
         extreme = self.extreme(ends)
         while (gap := self.finer_gap(extreme, ends)) is not None:
@@ -83,13 +81,13 @@ class _Combined:
                 break
         return ends, self.of_one_machine(extreme, ends)
 
-    def lengths(self, gap: float, about: Directions | None) -> list[Extreme] | None:
+    def lengths(self, gap: float, about: Directions | None) -> list[Verdict] | None:
         """Return the shortest and the longest length, proved to a gap; None where one cannot."""
         found = [self._refine(self._leg, sense, gap, about) for sense in (Sense.MIN, Sense.MAX)]
         known = [each for each in found if each is not None]
         return known if len(known) == len(found) else None
 
-    def extreme(self, ends: Sequence[Extreme], bound: float | None = None) -> Extreme:
+    def extreme(self, ends: Sequence[Verdict], bound: float | None = None) -> Verdict:
         """Return the extreme from the shortest and the longest length, or from a bound, at the pose of one of them."""
         if bound is None:
             bound = float(self._factors @ [each.bound for each in ends])
@@ -98,9 +96,9 @@ class _Combined:
         reason = reason if math.isfinite(bound) else "the leg's lengths are not bounded"
         end = ends[self._claim.sense is Sense.MAX]
         found = Minimum(-self._sign * bound, -self._sign * reached, reason=reason, place=end.place)
-        return extreme_of(self._claim, found, end.pose, errors=errors)
+        return verdict_of(self._claim, found, end.pose, errors=errors)
 
-    def reached(self, ends: Sequence[Extreme]) -> tuple[float, JointErrors | None]:
+    def reached(self, ends: Sequence[Verdict]) -> tuple[float, JointErrors | None]:
         """Return the value from the two lengths of one machine, and its errors; of the design without a tolerance."""
         poses = [each.pose for each in ends if each.pose is not None]
         if not self._legs.tolerance or len(poses) < len(ends):
@@ -126,7 +124,7 @@ class _Combined:
         d /= np.linalg.norm(d, axis=1, keepdims=True)
         return d, np.array([n @ pose.rotation for n, pose in zip(d, poses, strict=True)])
 
-    def of_one_machine(self, extreme: Extreme, ends: Sequence[Extreme]) -> Extreme:
+    def of_one_machine(self, extreme: Verdict, ends: Sequence[Verdict]) -> Verdict:
         """Return an extreme that is open with a bound for machines whose errors are the same at both poses."""
         poses = [each.pose for each in ends if each.pose is not None]
         if not self._legs.tolerance or extreme.outcome is not Outcome.OPEN or len(poses) < len(ends):
@@ -143,7 +141,7 @@ class _Combined:
                 extreme = self.extreme(ends, bound)
         return extreme
 
-    def finer_gap(self, extreme: Extreme, ends: Sequence[Extreme]) -> float | None:
+    def finer_gap(self, extreme: Verdict, ends: Sequence[Verdict]) -> float | None:
         """Return the gap of squared lengths that decides the limit; None where it is decided, or cannot be."""
         if extreme.outcome is not Outcome.OPEN or not math.isfinite(extreme.bound):
             return None
@@ -155,8 +153,9 @@ class _Combined:
         return gap if gap >= _FINEST else None
 
 
-def _better(one: Extreme, finer: Extreme) -> Extreme:
+def _better(one: Verdict, finer: Verdict) -> Verdict:
     """Return a length that was proved more finely, with the boxes and seconds of both proofs."""
     sign = one.sense.sign
     best = finer if sign * finer.bound <= sign * one.bound else replace(finer, bound=one.bound)
-    return replace(best, boxes=one.boxes + finer.boxes, seconds=one.seconds + finer.seconds, outcome=one.outcome)
+    boxes, seconds = one.boxes + finer.boxes, one.seconds + finer.seconds
+    return replace(best, claim=one.claim, boxes=boxes, seconds=seconds, outcome=one.outcome)

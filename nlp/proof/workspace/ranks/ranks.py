@@ -4,27 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .....models import frozen_array
 from ....errors import UncoveredError
 from ....interruption import one_search
-from ...boxes.search import TOO_SMALL, Boxes, Effort, Order, Verdicts, joined, some
-from ...enclosure.engine import ENGINE
-from ...statement.claims import CONSTRAINTS, REGULAR
-from ..robot.pose_box import PoseBox
+from ...boxes.search import TOO_SMALL, Boxes, BoxResults, Effort, Order, joined, some
+from ...statement.claims import CONSTRAINTS, RANKS, REGULAR
 from ..robot.posed_model import RankMatrix
 from ..robot.posed_robot import Problem
-from ..verdict import Outcome, RankVerdict
+from ..verdict import Outcome, Verdict, not_judged
 from .loop_boxes import APART, Examined, Examiner, Followed, LoopRule, coordinates_to_split
 from .rank_rule import RankTest
 from .singular_pose import Singular, SingularSearch
 
 if TYPE_CHECKING:
     from ...boxes.tree import TreeRecord
-    from ..paper_record import PaperRecord
+    from ..proof_record import ProofRecord
 
 #: Number of boxes examined at once.
 _BLOCK = 1024
@@ -36,29 +33,25 @@ Look = Callable[[Examined, int], Singular | None]
 IsSingular = Callable[..., bool]
 
 
-class Ranks(NamedTuple):
-    """Verdicts on J, and on the constraint wrenches; None for a robot without them."""
-
-    regular: RankVerdict
-    constraints: RankVerdict | None
-
-
 def prove_ranks(
     problem: Problem,
     is_singular: IsSingular,
     *,
     rank: int = 6,
     progress: RankProgress | None = None,
-    paper: PaperRecord | None = None,
-) -> Ranks:
+    record: ProofRecord | None = None,
+) -> tuple[Verdict, ...]:
     """Prove that J and the constraint wrenches keep their ranks at every pose of a box, or find a pose.
 
     Args:
-        problem: the design, or all machines that are meant.
-        is_singular: shows single poses, in home's assembly; others refute nothing.
-        rank: of J at almost all dimensions and poses.
-        progress: called during them.
-        paper: records the searches for a proof.
+        problem: the design, or all robots within the tolerance.
+        is_singular: whether single poses are singular in the home assembly mode; others refute nothing.
+        rank: rank of J at almost all dimensions and poses.
+        progress: called during the searches.
+        record: record of the searches for a proof.
+
+    Returns:
+        The verdict on J, and that on the constraint wrenches of a robot that has them.
     """
     found = []
     try:
@@ -69,46 +62,44 @@ def prove_ranks(
             def is_shown(at: Singular, *, constraints: bool = name == CONSTRAINTS) -> bool:
                 return is_singular(at.y, at.errors, constraints=constraints)
 
-            recorder, search = None if paper is None else paper.own(name), SingularSearch(problem, matrix, is_shown)
+            recorder, search = None if record is None else record.tree(name), SingularSearch(problem, matrix, is_shown)
             at_start = search.everywhere() if name == REGULAR and rank < 6 else None
             if at_start is not None:
-                found.append(_refuted(not_judged(problem.box, at_start.reason), at_start))
+                found.append(_refuted(not_judged(name, at_start.reason), problem, at_start))
                 continue
-            verdict = prove_rank(problem, matrix, progress=progress, recorder=recorder, look=search.look)
+            verdict = prove_rank(problem, matrix, name, progress=progress, recorder=recorder, look=search.look)
             if name == REGULAR and verdict.outcome is Outcome.OPEN and not problem.dependent:
-                verdict = _refuted(verdict, search.from_random())
+                verdict = _refuted(verdict, problem, search.from_random())
             found.append(verdict)
     except UncoveredError as error:
-        return Ranks(not_judged(problem.box, str(error)), None)
-    return Ranks(found[0], found[1] if len(found) > 1 else None)
+        return (not_judged(REGULAR, str(error)),)
+    return tuple(found)
 
 
-def _refuted(verdict: RankVerdict, at: Singular | None) -> RankVerdict:
-    """Return a verdict that a singular pose refutes; the same without one."""
+def _refuted(verdict: Verdict, problem: Problem, at: Singular | None) -> Verdict:
+    """Return a verdict that a singular pose refutes; the same verdict without one."""
     if at is None:
         return verdict
-    return replace(verdict, outcome=Outcome.REFUTED, y=at.y, reason=at.reason, sides=at.sides, errors=at.errors)
-
-
-def not_judged(box: PoseBox, reason: str) -> RankVerdict:
-    """Return the verdict on a robot that no search covers."""
-    return RankVerdict(Outcome.OPEN, box, None, None, "none", 0, 1, 1.0, 0.0, reason)
+    pose = problem.box.pose(at.y)
+    return replace(verdict, outcome=Outcome.REFUTED, pose=pose, reason=at.reason, sides=at.sides, errors=at.errors)
 
 
 def prove_rank(
     problem: Problem,
     matrix: RankMatrix,
+    name: str = REGULAR,
     *,
     most_boxes: int | None = None,
     progress: RankProgress | None = None,
     recorder: TreeRecord | None = None,
     look: Look | None = None,
-) -> RankVerdict:
+) -> Verdict:
     """Prove that a matrix keeps its rank at every pose of a workspace, or find a pose at which it does not.
 
     Args:
         problem: the robot.
         matrix: one of its two matrices.
+        name: name of the claim.
         most_boxes: number of boxes after which it stops.
         progress: called about ten times a second.
         recorder: records the boxes for a proof.
@@ -136,17 +127,25 @@ def prove_rank(
         reason = effort.run(search, ending)
     left, y, share = [] if rule.singular else search.state.left, None, 0.0
     if left:
-        own, boxes = np.flatnonzero(rule.whole > 0), joined(left)
-        widths = (boxes.upper - boxes.lower)[:, own] / rule.whole[own]
+        varying, boxes = np.flatnonzero(rule.whole > 0), joined(left)
+        widths = (boxes.upper - boxes.lower)[:, varying] / rule.whole[varying]
         share = float(widths.prod(axis=1).sum())
         widest = int(np.argmax(widths.max(axis=1, initial=0.0)))
         centre = 0.5 * boxes.lower[widest] + 0.5 * boxes.upper[widest]
         y = problem.pose_of(np.where(np.isfinite(centre), centre, boxes.more.near[widest]))
     elif reason:
         y = problem.pose_of(problem.start)
-    outcome, at = (Outcome.PROVED, None) if y is None else (Outcome.OPEN, frozen_array(y, (6,)))
-    numbers = search.boxes, search.left, share, effort.seconds, reason
-    return _refuted(RankVerdict(outcome, problem.box, at, None, ENGINE, *numbers), rule.singular)
+    verdict = Verdict(
+        RANKS[name],
+        Outcome.PROVED if y is None else Outcome.OPEN,
+        pose=None if y is None else problem.box.pose(y),
+        reason=reason,
+        boxes=search.boxes,
+        open=search.left,
+        share=share,
+        seconds=effort.seconds,
+    )
+    return _refuted(verdict, problem, rule.singular)
 
 
 class RankRule(LoopRule):
@@ -167,7 +166,7 @@ class RankRule(LoopRule):
         self._more, self._columns = np.zeros((1, len(self._independent))), matrix.matrix.shape[1]
         self._look, self._examined = look, 0
 
-    def examine(self, boxes: Boxes[Followed]) -> Verdicts[Followed]:
+    def examine(self, boxes: Boxes[Followed]) -> BoxResults[Followed]:
         """Return the boxes over which the rank is not proved to be full."""
         found = self.examined(boxes)
         count = len(found.is_regular)
@@ -176,7 +175,7 @@ class RankRule(LoopRule):
             self.singular = self._look(found, self._examined)
         found = some(found, np.flatnonzero(~found.is_regular))
         split = coordinates_to_split(found.shares, self.widths(found.boxes))
-        return Verdicts(self.boxes_of(found, np.zeros(len(split)), split, found.shares), 0.0, count)
+        return BoxResults(self.boxes_of(found, np.zeros(len(split)), split, found.shares), 0.0, count)
 
     def divided(self, boxes: Boxes[Followed]) -> Boxes[Followed]:
         """Return the halves of boxes, and the quarters where a half would fail by its linear part alone."""

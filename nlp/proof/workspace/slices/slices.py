@@ -22,7 +22,7 @@ from ....case.case import Case
 from ....case.limits.legs import Actuator
 from ....case.workspace import TurnKind, Workspace
 from ....errors import CaseError, UncoveredError
-from ...boxes.search import Boxes, Order, Search, Verdicts, bisected, joined, some
+from ...boxes.search import Boxes, BoxResults, Order, Search, bisected, joined, some
 from ...statement.machine import workspace_of_case
 from ..ranks.loop_boxes import Examiner, Followed, LoopBoxes, LoopRule, loop_boxes_of, one_assembly
 from ..ranks.rank_rule import RankTest, is_polynomial
@@ -227,7 +227,7 @@ class _SliceRule(LoopRule):
         halves = bisected(boxes)
         return bisected(halves._replace(split=np.full(len(halves.split), self._places[1])))
 
-    def examine(self, boxes: Boxes[Followed]) -> Verdicts[Followed]:
+    def examine(self, boxes: Boxes[Followed]) -> BoxResults[Followed]:
         """Return the boxes that are not decided."""
         low, high = boxes.lower[:, self._places], boxes.upper[:, self._places]
         known, has_ranks, signs = (each.copy() for each in boxes.more.more)
@@ -254,7 +254,7 @@ class _SliceRule(LoopRule):
         )
         split = np.full(len(done), self._places[0])
         left = some(Boxes(inside.lower, inside.upper, boxes.bound, split, columns), ~done)
-        return Verdicts(left, -math.inf, len(done))
+        return BoxResults(left, -math.inf, len(done))
 
     def _with_ranks(self, boxes: LoopBoxes, is_regular: NDArray[np.bool_], signs: NDArray[np.int32]) -> LoopBoxes:
         """Return boxes with dependent coordinates where they are known; set whether ranks are proved, and signs."""

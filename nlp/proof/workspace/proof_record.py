@@ -24,15 +24,15 @@ _ROOM, _OUTWARDS = 0.25, 1e-6
 
 
 @dataclass(eq=False)
-class PaperRecord:
-    """Records of all searches about one machine.
+class ProofRecord:
+    """Records of the searches of one judgement.
 
     Attributes:
         programs: bounds of numbers by the rules of ``certify``, with their trees.
-        boxes: trees of other searches, by name.
-        firsts: bounds of the errors of the pose to first order, for legs that are one unit off, by name.
-        rests: bounds of terms of second order by which numbers of machines are bounded.
-        directions: fixed directions of a leg, by the name of lengths of one machine.
+        boxes: trees of other searches, by name of the claim.
+        firsts: bounds of the first-order pose error, for leg-length errors of one unit, by name.
+        rests: bounds of the terms of second order of numbers of all robots within a tolerance.
+        directions: fixed directions of a leg, by the name of the leg lengths of one robot at two poses.
     """
 
     programs: dict[Key, ProofClaim] = field(default_factory=dict)
@@ -41,8 +41,8 @@ class PaperRecord:
     rests: dict[Key, float] = field(default_factory=dict)
     directions: dict[str, Directions] = field(default_factory=dict)
 
-    def own(self, name: str) -> TreeRecord:
-        """Return the record of a search of its own."""
+    def tree(self, name: str) -> TreeRecord:
+        """Return the tree of the search of a claim."""
         return self.boxes.setdefault(name, TreeRecord())
 
     def constant(self, claim: Claim, nlp: Nlp, value: float) -> None:

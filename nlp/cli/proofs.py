@@ -12,12 +12,12 @@ if TYPE_CHECKING:
     from ..case.pose import Value
     from ..proof.checker.proof_file import Proof, Unproved
     from ..proof.checker.workspace.check import CheckedClaim, VerifiedWorkspace
-    from ..proof.workspace.judge import Judgement
-    from ..proof.workspace.paper_record import PaperRecord
+    from ..proof.workspace.judgement import Judgement
+    from ..proof.workspace.proof_record import ProofRecord
     from ..results.text import Line
 
 
-def paper_record(target: str | None, json_file: str | None) -> PaperRecord | None:
+def proof_record(target: str | None, json_file: str | None) -> ProofRecord | None:
     """Return an empty record of searches; None without a proof.
 
     Args:
@@ -28,19 +28,19 @@ def paper_record(target: str | None, json_file: str | None) -> PaperRecord | Non
         InputError: both are standard output.
     """
     from ..errors import InputError
-    from ..proof.workspace.paper_record import PaperRecord
+    from ..proof.workspace.proof_record import ProofRecord
 
     if target is None:
         return None
     if target == "-" and json_file == "-":
         raise InputError("standard output can take one of --json - and --proof - only")
-    return PaperRecord()
+    return ProofRecord()
 
 
-def paper_text(
+def proof_text(
     target: str | None,
     judged: Judgement,
-    record: PaperRecord | None,
+    record: ProofRecord | None,
     text: str,
     quantities: Sequence[str],
     leg_error: float,
@@ -56,11 +56,11 @@ def paper_text(
         leg_error: largest error of a leg's length.
     """
     from ..errors import one_line
-    from ..proof.workspace.proof_writer import paper_of
+    from ..proof.workspace.proof_writer import proof_of
 
     if target is None or record is None:
         return None
-    proof = paper_of(judged, record, text, quantities=quantities, leg_error=leg_error)
+    proof = proof_of(judged, record, text, quantities=quantities, leg_error=leg_error)
     if not proof.claims:
         # A file of an earlier run is left as it is: it must not be taken for the proof of this one.
         print_notice(f"--proof {one_line(target)}: not written, as no claim has a proof")
@@ -70,7 +70,7 @@ def paper_text(
     return proof.as_text()
 
 
-def verify_paper(proof: Proof, case: Case, leg_error: float) -> Iterator[Line]:
+def verified_lines(proof: Proof, case: Case, leg_error: float) -> Iterator[Line]:
     """Check the proof of a workspace, and return the lines that say what it proves.
 
     Raises:
@@ -92,7 +92,7 @@ def _checked_lines(proof: Proof, checked: VerifiedWorkspace, case: Case, leg_err
     from ..proof.checker.premises import exact
     from ..proof.statement.claims import ERRORS
     from ..results.text import Line
-    from ..results.workspaceposes import SHOWN
+    from ..results.verdictwording import SHOWN
 
     count = len(checked.claims) + len(proof.unproved)
     whose = f"the workspace of {case.name}"

@@ -1,0 +1,121 @@
+"""A robot along a tool path: boxes of the path's pieces, the box of all its poses, and the dependent coordinates."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from ....models import FloatArray, frozen_array
+from ....models.joints.closedform import ClosedForm
+from ...case.case import Case
+from ...case.pose import Free, Value, ends_of
+from ...case.workspace import LARGEST_TURN, TurnKind, Turns, Workspace
+from ...errors import CaseError, InputError
+from ...evidence.dependent import dependent_of, robot_size
+from ...path.arcs import PLANES
+from ...path.path import ProgrammedPath
+from .path_closing import unknowns_at
+from .robot.long_turns import turns_of_path
+from .robot.path_cover import PathCover
+from .robot.pose_box import PoseBox, pose_box
+from .robot.posed_robot import NotJudgedError, Problem, build_problem
+
+#: Part of the robot's size, or of the sizes of positions, by which the box of all poses is wider than a path that stays
+#: at one.
+_ROOM = 1e-9
+#: Parts of a robot's size, or angle, by which a coordinate moves that stands still but for rounding.
+_STILL = 1e-9
+
+
+def covered(path: ProgrammedPath, size: float) -> tuple[PathCover, PoseBox, Workspace]:
+    """Return the boxes of a path, the box of all its poses, and a workspace about it.
+
+    Args:
+        path: the path.
+        size: characteristic size of the robot, length.
+
+    Raises:
+        InputError: it has no motion, or its rotations are not covered.
+    """
+    if not len(path):
+        raise InputError(f"{path.source}: has no motion")
+    turns = turns_of_path(path)
+    arcs, axes = np.full((len(path), 6), np.nan), np.zeros((len(path), 3), dtype=np.intp)
+    k = path.arc_segments
+    arcs[k] = path.arcs
+    axes[k] = [PLANES[plane] for plane in path.planes.tolist()] if len(k) else np.zeros((0, 3), dtype=np.intp)
+    seconds = np.where(np.isfinite(path.durations), path.durations, np.inf)
+    cover = PathCover(path.knots[:, :3], arcs, axes, turns, seconds, path.frame)
+    lower, upper = cover.boxes(cover.pieces)
+    low, high = lower.min(axis=0), upper.max(axis=0)
+    if not (high > low).any():  # a path that stays at one pose
+        room = _ROOM * max(float(np.abs(path.knots[:, :3]).max()), size)
+        low[0], high[0] = low[0] - room, high[0] + room
+    box = PoseBox(
+        turns.kind,
+        frozen_array((0, 0, 1), (3,)),
+        frozen_array(low, low.shape),
+        frozen_array(high, high.shape),
+        math.inf,
+        turns.reference,
+    )
+    about = Turns(TurnKind.ANY_AXIS, (Free(-LARGEST_TURN, LARGEST_TURN),))
+    if turns.kind is TurnKind.ROLL_PITCH_YAW:
+        about = Turns(turns.kind, tuple(_values(2 * np.arctan(low[3:]), 2 * np.arctan(high[3:]))))
+    return cover, box, Workspace(_values(low[:3], high[:3]), about)
+
+
+def design_along(case: Case, closed: ClosedForm, box: PoseBox, cover: PathCover) -> Problem:
+    """Return the design along a path.
+
+    Raises:
+        NotJudgedError: it is not judged, or its loops are not closed at the first point.
+    """
+    first = cover.points(cover.pieces[:1], 0.0)[0]
+    near = partial(unknowns_at, case, closed, box.pose(first))
+    design = replace(build_problem(case, closed.model, box, first, near), cover=cover)
+    # An equation of a number that hardly changes counts as one that follows from others, but must hold.
+    if not np.array_equal(design.start[design.stated], first[[design.free[j] for j in design.stated]]):
+        raise NotJudgedError("its loops could not be closed at the first point of the path")
+    return design
+
+
+def with_dependent(case: Case, box: PoseBox, workspace: Workspace) -> tuple[PoseBox, Workspace]:
+    """Return the box of a path, and the workspace about it, with the coordinates that the robot cannot choose.
+
+    Raises:
+        NotJudgedError: the path moves one of these, or its rotations are not those of three angles.
+    """
+    if workspace.turns.kind is not TurnKind.ROLL_PITCH_YAW:
+        return box, workspace
+    try:
+        found = dependent_of(case, workspace)
+    except CaseError as error:
+        raise NotJudgedError(error.fault) from None
+    places = [each.index for each in found.dependent]
+    if not places:
+        return box, workspace
+    stated, angle = (*workspace.position, *workspace.turns.angles), _STILL
+    length = _STILL * robot_size(case, [sum(ends_of(each)) / 2 for each in workspace.position])
+    moved = [k for k in places if np.ptp(ends_of(stated[k])) > (length if k < 3 else angle)]
+    if moved:
+        names, chosen = (
+            " and ".join(found.names[k] for k in which) for which in (moved, [k for k in range(6) if k not in places])
+        )
+        raise NotJudgedError(f"the path moves {names}, which this robot cannot choose: of the pose it chooses {chosen}")
+    wide = pose_box(found)
+    lower, upper = box.lower.copy(), box.upper.copy()
+    lower[places], upper[places] = wide.lower[places], wide.upper[places]
+    lower, upper = frozen_array(lower, (6,)), frozen_array(upper, (6,))
+    # Ranges of rounding are no limits.
+    still = [sum(ends_of(each)) / 2 if k in places else each for k, each in enumerate(stated)]
+    found = replace(found, position=still[:3], turns=replace(found.turns, angles=tuple(still[3:])))
+    return replace(box, lower=lower, upper=upper, dependent=tuple(places)), found
+
+
+def _values(low: FloatArray, high: FloatArray) -> list[Value]:
+    """Return ranges, or fixed numbers where both ends are one."""
+    return [Free(a, b) if b > a else a for a, b in zip(low.tolist(), high.tolist(), strict=True)]

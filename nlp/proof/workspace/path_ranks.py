@@ -1,0 +1,137 @@
+"""Ranks of the matrices of a robot along a tool path: proved piece by piece, or refuted at a place."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from ....models import FloatArray
+from ...errors import UncoveredError
+from ...interruption import one_search
+from ..boxes.search import TOO_SMALL, Effort, Order, joined, some
+from ..statement.claims import RANKS, REGULAR
+from .path_faults import pose_at
+from .ranks.loop_boxes import APART, LoopBoxes, loop_boxes_of
+from .ranks.ranks import RankRule
+from .ranks.singular_pose import DeterminantSigns, SingularPose
+from .robot.path_cover import PathCover, Place, place_in
+from .robot.posed_model import RankMatrix
+from .robot.posed_robot import Problem
+from .verdict import EVERYWHERE, Outcome, Verdict, not_judged
+
+#: Singular value, in parts of the largest, that counts as 0 at a point of a path, steps in the search of it, and powers
+#: of two of a piece's width at which it begins.
+_SINGULAR, _STEPS, _FAR = 1e-9, 80, 16
+#: Parts of a way over which rows must have values.
+_PARTS = 64
+#: Parts of each segment at which a change of sign is looked for.
+_SAMPLES = (0.0, 0.25, 0.5, 0.75, 1.0)
+
+
+def rank_along(problem: Problem, matrix: RankMatrix, name: str, cover: PathCover) -> Verdict:
+    """Return the verdict on the rank of a matrix along a path."""
+    place = _sign_change(problem, matrix, cover)
+    if place is not None:
+        return Verdict(RANKS[name], Outcome.REFUTED, pose=pose_at(problem, cover, place), place=place)
+    effort = Effort()
+    try:
+        with one_search():
+            rule = RankRule(problem, matrix, None, lambda *_: None)
+            search = rule.search(Order.NEWEST)
+            # One piece that is too small leaves the claim open or refutes it, however many others there are.
+            reason = effort.run(search, lambda: TOO_SMALL if search.state.small else None)
+    except UncoveredError as error:
+        return replace(not_judged(name, str(error)), seconds=effort.seconds)
+    left = search.state.left
+    if not left:
+        reason = reason or ("" if rule.is_one_assembly() else APART)
+        outcome = Outcome.OPEN if reason else Outcome.PROVED
+        return Verdict(RANKS[name], outcome, reason=reason, boxes=search.boxes, seconds=effort.seconds)
+    boxes = joined(search.state.small or left)
+    pieces = boxes.more.along
+    first = np.lexsort(pieces.T[[1, 0]])[:1]
+    place, value = _most_singular(problem, matrix, cover, pieces[first[0]], loop_boxes_of(some(boxes, first)))
+    is_singular = value <= _SINGULAR
+    words = f"its smallest singular value is {value:.1e} of the largest there"
+    words = words if math.isfinite(value) else reason
+    outcome = Outcome.REFUTED if is_singular else Outcome.OPEN
+    return Verdict(
+        RANKS[name],
+        outcome,
+        pose=pose_at(problem, cover, place),
+        reason=words,
+        boxes=search.boxes,
+        open=search.left,
+        seconds=effort.seconds,
+        place=place,
+    )
+
+
+def rank_at_start(problem: Problem, matrix: RankMatrix, cover: PathCover) -> Verdict:
+    """Return the verdict on the rank of J of a structure that is singular everywhere, as at the first point."""
+    place = Place(int(cover.pieces[0, 0]), 0.0)
+    is_singular = SingularPose(problem, matrix).smallest(problem.start) <= _SINGULAR
+    outcome = Outcome.REFUTED if is_singular else Outcome.OPEN
+    pose = pose_at(problem, cover, place)
+    return Verdict(RANKS[REGULAR], outcome, pose=pose, reason=EVERYWHERE, place=place)
+
+
+def _sign_change(problem: Problem, matrix: RankMatrix, cover: PathCover) -> Place | None:
+    """Return the first place between whose neighbours the determinant is proved to have opposite signs.
+
+    The rows surely have values all the way between them.
+    """
+    if matrix.matrix.shape != (6, 6) or matrix.nullity or problem.dependent or problem.names:
+        return None
+    signs, free, every = DeterminantSigns(problem, matrix), list(problem.free), cover.pieces
+    for rows in cover.blocks():
+        pieces = every[rows]
+        points = [cover.points(pieces, part)[:, free] for part in _SAMPLES]
+        values = np.stack([np.sign(signs.computed(each)) for each in points], axis=1)
+        for k, j in np.argwhere(values[:, :-1] * values[:, 1:] < 0).tolist():
+            low, high = _SAMPLES[j], _SAMPLES[j + 1]
+            if signs.proved(points[j][k]) * signs.proved(points[j + 1][k]) >= 0:
+                continue
+            ends = np.linspace(low, high, _PARTS + 1)
+            ends = pieces[k, 1] + ends * (pieces[k, 2] - pieces[k, 1])
+            boxes = cover.boxes(np.stack([np.full(_PARTS, pieces[k, 0]), ends[:-1], ends[1:]], axis=1))
+            if not signs.has_values(*(each[:, free] for each in boxes)):
+                continue
+            for _ in range(_STEPS):
+                middle = 0.5 * (low + high)
+                sign = np.sign(signs.computed(cover.points(pieces[k : k + 1], middle)[:, free])[0])
+                low, high = (middle, high) if sign == values[k, j] else (low, middle)
+            return place_in(pieces[k], high)
+    return None
+
+
+def _most_singular(
+    problem: Problem, matrix: RankMatrix, cover: PathCover, piece: FloatArray, box: LoopBoxes
+) -> tuple[Place, float]:
+    """Return the place in a piece with its box, and near it, with the smallest singular value, and the value."""
+    newton, stated = SingularPose(problem, matrix), problem.stated
+    chosen = [problem.free[j] for j in stated]
+
+    def at(s: float) -> float:
+        z = box.near[0].copy()
+        z[stated] = cover.points(np.array([[piece[0], s, s]]), 0.0)[0, chosen]
+        if problem.dependent:
+            z = problem.loops.all_closed(z[:, None], list(problem.dependent))[:, 0]
+        return newton.smallest(z) if np.isfinite(z).all() else math.inf
+
+    # Where the value falls with the square of the distance, pieces are left far from the least one too.
+    wide, middle = piece[2] - piece[1], 0.5 * (piece[1] + piece[2])
+    away = wide * 2.0 ** np.arange(_FAR)
+    near = np.clip(np.concatenate([[middle], middle - away, middle + away]), 0.0, 1.0)
+    best = float(near[int(np.argmin([at(each) for each in near.tolist()]))])
+    wide += abs(best - middle)
+    low, high = max(best - wide, 0.0), min(best + wide, 1.0)
+    for _ in range(_STEPS):
+        s = np.linspace(low, high, 5)
+        values = [at(each) for each in s.tolist()]
+        k = int(np.argmin(values))
+        low, high = float(s[max(k - 1, 0)]), float(s[min(k + 1, 4)])
+    middle = 0.5 * (low + high)
+    return Place(int(piece[0]), middle), at(middle)

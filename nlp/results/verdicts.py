@@ -1,0 +1,186 @@
+"""Verdicts of a judgement as a result: on ranks and numbers, over a workspace or along a path."""
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from ...models import Dimension
+from ..case.task import Sense
+from ..proof.enclosure.engine import ENGINE
+from ..proof.statement.machine import has_straight_legs
+from ..proof.workspace.robot.pose_box import pose_box
+from ..proof.workspace.verdict import Outcome
+from ..system.jsonvalues import Absent, JsonObject, Vector3, vector
+from ..units import Units
+from .objective import unit_of_claim
+
+if TYPE_CHECKING:
+    from ..case.case import Case
+    from ..proof.statement.machine import JointErrors
+    from ..proof.workspace.judgement import Judgement
+    from ..proof.workspace.robot.pose_box import PoseNumbers
+    from ..proof.workspace.verdict import Verdict
+
+
+class WorkspacePose(JsonObject):
+    """A pose of the platform.
+
+    Attributes:
+        position: origin of the platform frame in the world frame.
+        axis: unit axis of the rotation; z without rotation.
+        angle: about it.
+    """
+
+    position: Vector3
+    axis: Vector3
+    angle: float
+
+
+class CentreData(JsonObject):
+    """Error of a joint centre.
+
+    Attributes:
+        joint: label of the joint, limb and place, or leg and plate.
+        error: in the world frame at home, or in that of the leg's plate, length.
+    """
+
+    joint: str
+    error: Vector3
+
+
+class MachineData(JsonObject):
+    """Errors of the joint centres of a machine.
+
+    Attributes:
+        base: of the base joints of six straight legs, in the world frame, length; absent for another robot.
+        platform: of their platform joints, in the platform frame, length; absent for another robot.
+        centres: of another robot; absent for six straight legs.
+    """
+
+    base: Absent[tuple[Vector3, ...]]
+    platform: Absent[tuple[Vector3, ...]]
+    centres: Absent[tuple[CentreData, ...]]
+
+
+class RegularData(JsonObject):
+    """Verdict on the claim that J has full rank at every pose.
+
+    Attributes:
+        outcome: ``proved``; ``refuted``, with a singular pose; ``open``, with the middle of the widest box that is
+            left.
+        pose: that pose; absent where the claim is proved.
+        between: two poses at which the determinant of the rows is proved to have opposite signs; absent where the
+            claim is not refuted so.
+        boxes: number of boxes examined.
+        open: number of boxes left.
+        share: part of the box of poses in boxes that are left.
+        seconds: wall time.
+        engine: ``c``, or ``none`` where no search was made.
+        reason: for stopping early, or how a singular pose was found that is not between two; absent without one.
+        machine: that is singular at the pose; absent where the claim is not refuted, or the exact machine is.
+    """
+
+    outcome: Outcome
+    pose: Absent[WorkspacePose]
+    between: Absent[tuple[WorkspacePose, ...]]
+    boxes: int
+    open: int
+    share: float
+    seconds: float
+    engine: str
+    reason: Absent[str]
+    machine: Absent[MachineData]
+
+
+class VerdictData(JsonObject):
+    """Verdict on a claim about every pose of a workspace or path: a rank, or the smallest or largest value of a number.
+
+    Attributes:
+        name: name of the claim.
+        unit: unit of the values; empty for a plain number, absent of a rank.
+        sense: smallest or largest value; absent of a rank.
+        bound: proven bound: no pose has a smaller, or larger, value; null where nothing is proved, and of a rank.
+        reached: smallest or largest known value; null without one, and of a rank.
+        key: dotted key, below ``limits``, of the limit in the case; absent without one.
+        limit: the limit; absent without one.
+        outcome: outcome of the limit or rank; of a number without a limit, whether the requested gap was reached.
+        pose: pose with the value, or of a singular or open rank; null without one.
+        boxes: number of examined boxes; absent in results of earlier versions along a path.
+        seconds: wall time; absent in results of earlier versions along a path.
+        reason: reason for an open outcome, or how a singular pose was computed; absent without one.
+        machine: joint-centre errors of the robot that has the value at the pose; absent for the exact robot.
+    """
+
+    name: str
+    unit: Absent[str]
+    sense: Absent[Sense]
+    bound: float | None
+    reached: float | None
+    key: Absent[str]
+    limit: Absent[float]
+    outcome: Outcome
+    pose: WorkspacePose | None
+    boxes: Absent[int]
+    seconds: Absent[float]
+    reason: Absent[str]
+    machine: Absent[MachineData]
+
+
+def pose_data(pose: "PoseNumbers", units: Units) -> WorkspacePose:
+    """Return a pose in a case's units."""
+    return WorkspacePose.of(pose, angle=units.shown(pose.angle, Dimension.ANGLE))
+
+
+def rank_data(found: "Verdict", judged: "Judgement") -> RegularData:
+    """Return the verdict on a rank over a workspace."""
+    case, sides = judged.case, None
+    if found.sides is not None:
+        box = pose_box(judged.workspace)
+        sides = tuple(pose_data(box.pose(y), case.units) for y in found.sides)
+    return RegularData.of(
+        found,
+        pose=None if found.pose is None else pose_data(found.pose, case.units),
+        between=sides,
+        engine=ENGINE if found.boxes else "none",
+        reason=found.reason or None,
+        machine=machine_data(found.errors, case),
+    )
+
+
+def machine_data(errors: "JointErrors | None", case: "Case") -> MachineData | None:
+    """Return the errors of a machine; None for the exact one. Lengths are in the case's unit already."""
+    if errors is None:
+        return None
+    each = tuple(map(vector, errors.vectors))
+    if has_straight_legs(case.model):
+        return MachineData(base=each[::2], platform=each[1::2], centres=None)
+    centres = tuple(CentreData(joint=name, error=error) for name, error in zip(errors.names, each, strict=True))
+    return MachineData(base=None, platform=None, centres=centres)
+
+
+def verdict_data(each: "Verdict", case: "Case") -> VerdictData:
+    """Return a verdict in a case's units."""
+    return VerdictData(**verdict_fields(each, case))
+
+
+def verdict_fields(each: "Verdict", case: "Case") -> dict[str, Any]:
+    """Return the fields of a verdict in a case's units, by name."""
+    units = case.units
+
+    def shown(value: float | None) -> float | None:
+        return units.shown(value, each.dimension) if value is not None and math.isfinite(value) else None
+
+    return {
+        "name": each.name,
+        "unit": None if each.is_rank else unit_of_claim(case, each.name, each.dimension),
+        "sense": None if each.is_rank else each.sense,
+        "bound": shown(each.bound),
+        "reached": shown(each.reached),
+        "key": each.key or None,
+        "limit": shown(each.limit),
+        "outcome": each.outcome,
+        "pose": None if each.pose is None else pose_data(each.pose, units),
+        "boxes": each.boxes,
+        "seconds": each.seconds,
+        "reason": each.reason or None,
+        "machine": machine_data(each.errors, case),
+    }
