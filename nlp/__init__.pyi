@@ -118,7 +118,6 @@ from .proof.workspace.scale import Scale as Scale
 from .proof.workspace.scale import largest_scale as largest_scale
 from .proof.workspace.verdict import Outcome as Outcome
 from .proof.workspace.verdict import Verdict as Verdict
-from .results.jsondata import json_data as json_data
 from .results.regression import CaseCheck as CaseCheck
 from .results.regression import check as check
 from .results.result import result_of as result_of
@@ -147,4 +146,5 @@ from .solver.tradeoff import TradeoffPoint as TradeoffPoint
 from .solver.tradeoff import tradeoff as tradeoff
 from .sweeps.columns import SweepColumns as SweepColumns
 from .sweeps.columns import sweep_result as sweep_result
+from .system.jsonvalues import json_data as json_data
 from .units import Units as Units

@@ -14,6 +14,7 @@ from builders import DOCS
 
 import screwsynth.models
 import screwsynth.nlp
+from screwsynth.nlp.system.jsonvalues import JsonObject
 
 PUBLIC = [(package, name) for package in (screwsynth.nlp, screwsynth.models) for name in package.__all__]
 
@@ -45,7 +46,7 @@ def _parts_of(value: type | FunctionType) -> list[str]:
         return list(inspect.signature(value).parameters)
     if dataclasses.is_dataclass(value):
         return [field.name for field in dataclasses.fields(value) if not field.name.startswith("_")]
-    return list(getattr(value, "_fields", ()))
+    return list(getattr(value, "fields" if issubclass(value, JsonObject) else "_fields", ()))
 
 
 def test_the_first_steps_of_the_documentation_print_what_they_show(tmp_path: Path) -> None:

@@ -1,13 +1,12 @@
 """Dimensions of a case that have one of a few values, as parts from a catalogue have, and cases with some of them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple, TypeAlias
+from typing import Annotated, NamedTuple, TypeAlias
 
 from ...models import Dimension
 from ..errors import CaseError
+from ..system.jsonvalues import Absent, Hidden, JsonObject, Known, Measure, Vector
 from .case import Case
 from .pose import Free, Value
 
@@ -31,6 +30,26 @@ class ListedNumber(NamedTuple):
     name: str
     dimension: Dimension
     values: tuple[float, ...]
+
+
+class ChosenNumber(JsonObject):
+    """A number whose value was chosen.
+
+    Attributes:
+        name: of the number.
+        value: that was chosen.
+        unit: of its numbers.
+        values: of which one was chosen; absent for a rounded number.
+        before: value before it was rounded; else absent.
+        dimension: of its numbers, in radians for angles.
+    """
+
+    name: str
+    value: Annotated[Known, Measure.NUMBER]
+    unit: str
+    values: Annotated[Absent[Vector], Measure.NUMBER]
+    before: Annotated[Absent[float], Measure.NUMBER]
+    dimension: Hidden[Dimension] = Dimension.NUMBER
 
 
 def listed_numbers(case: Case) -> tuple[ListedNumber, ...]:

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from ..case.case import Case
     from ..case.overrides import Settings
     from ..case.reader import CaseFile
-    from ..results.jsondata import JsonObject
     from ..results.text import Line, TextTable
+    from ..system.jsonvalues import JsonObject
 
 
 class WholeNumber:
@@ -386,7 +386,7 @@ def _write(target: str, make: Callable[[], JsonObject | str | Figure | None], *,
     elif content is not None:
         import json
 
-        from ..results.jsondata import json_data
+        from ..system.jsonvalues import json_data
 
         write_text(target, json.dumps(json_data(cast("JsonObject", content)), indent=2, allow_nan=False) + "\n")
 

@@ -13,7 +13,6 @@ from ...models import Model
 from ..case.case import Case
 from ..case.task import Sense
 from ..errors import CaseError, EvaluationError, InputError, ScrewsynthError, UncoveredError, check_seconds, listing
-from ..evidence.singularities import clause_of
 from ..interruption import Milestone, is_requested, one_call, reached, seconds_left, within
 from ..proof.enclosure.engine import kernel
 from ..proof.workspace.judge import judge_workspace
@@ -202,7 +201,7 @@ def _with_fits(entry: Entry) -> Entry:
         fits.append(fit)
         if mobility is not None:
             freedoms = mobility.freedoms
-            singularities += [clause_of(each.kind, each.limb, each.joints) for each in mobility.singularities]
+            singularities += [each.words for each in mobility.singularities]
     state = solution.state
     if state is not None and contender.model.generic is None and state.is_singular:
         singularities.append(f"the rank of J is {state.rank}: the platform can move with every actuator locked")

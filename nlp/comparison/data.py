@@ -23,11 +23,11 @@ from ..results.comparison import (
     ComparisonResult,
 )
 from ..results.evidence import certificate_data
-from ..results.jsondata import finite_or_none
 from ..results.objective import unit_of_objective
 from ..results.parts import SCHEMA, UnitsData
 from ..results.point import versions, violations
 from ..solver.status import Status
+from ..system.jsonvalues import finite_or_none
 from ..units import rate_unit
 from .compare import Comparison, part_of
 from .entry import Entry, TaskFit, driven_wrenches

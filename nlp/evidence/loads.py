@@ -5,55 +5,141 @@ orthogonal to what its actuators drive. Statics determines them where the wrench
 of all others; else limbs can load each other with wrenches that no load determines.
 """
 
-from __future__ import annotations
-
-import math
-from collections.abc import Mapping
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Annotated, NamedTuple
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ...models import FloatArray, rank_of_rows
+from ...models import Dimension, FloatArray, rank_of_rows
 from ...models.basis import is_apart
 from ...models.instance import length_of
-from ...models.statics import Statics, statics_of
-from ..case.forces import CaseForces, PosedForces, forces_at
+from ...models.statics import Statics, driven_joints, statics_of
+from ..case.forces import CaseForces, PosedForces, dimension_of_force, dimension_of_speed, forces_at
 from ..program.nlp import Nlp
+from ..system.jsonvalues import (
+    Absent,
+    Hidden,
+    JsonObject,
+    Matrix,
+    Measure,
+    Vector3,
+    Vector6,
+    finite_or_none,
+    matrix,
+    vector,
+)
 from .paths import velocities_at
-from .state import RobotState
+from .state import RobotState, evaluate
 
 #: Work rates of a limb's rows below this part of the largest are none of its actuators'.
 _DRIVES = 1e-9
 
 
-class LoadState(NamedTuple):
-    """What holds one load case.
+class ActuatorLoad(JsonObject):
+    """Force of an actuator under a load, or torque of one that turns; null at a singular pose.
 
     Attributes:
-        name: of the load case.
-        wrench: (6,) its fixed part, force, then moment about the world origin.
-        smallest, largest: (a,) forces of the actuators, torques of those that turn; not numbers at a singular pose.
-        constraints: (6,) wrench of each limb's constraints on the platform for the fixed part, force, then moment about
-            the world origin; None where statics does not determine it. Limbs without constraints are left out.
-        displacement: (6,) of the platform for the fixed part, turn, radians, then translation of its origin; empty
-            where the actuators' stiffness is not known.
-        deflection: upper bound of the translation, with loads of any direction; not a number where it is not known.
+        actuator: its name.
+        value: the force of the largest size, positive in the sense of the actuator's rate.
+        smallest: smallest force where the load is of any direction; the same value for others.
+        largest: largest force.
+        unit: of these numbers.
+        power: largest size of the force times the largest speed; absent without motions.
+    """
+
+    actuator: str
+    value: float | None
+    smallest: float | None
+    largest: float | None
+    unit: str
+    power: Absent[float]
+
+
+class ConstraintLoad(JsonObject):
+    """Wrench by which the constraints of a limb hold a load.
+
+    Attributes:
+        limb: its name.
+        wrench: on the platform, force, then moment about the world origin; null where statics does not determine it,
+            because limbs can load each other.
+    """
+
+    limb: str
+    wrench: Vector6 | None
+
+
+class PlatformDeflection(JsonObject):
+    """Displacement of the platform under a load, as its actuators give way.
+
+    Attributes:
+        translation: of its origin, without the part of any direction; null at a singular pose.
+        rotation: vector of the turn, in the unit of angles.
+        largest: upper bound of the size of the translation with loads of any direction.
+    """
+
+    translation: Vector3 | None
+    rotation: Annotated[Vector3 | None, Dimension.ANGLE]
+    largest: float | None
+
+
+class HeldLoad(JsonObject):
+    """A load and what holds it.
+
+    Attributes:
+        name: of the load.
+        pose: number of the pose, from 1 on; absent where there is one.
+        wrench: force, then moment about the world origin, without its part of any direction.
+        actuators: forces of the actuators.
+        constraints: wrenches of the limbs' constraints; absent for a robot without any.
+        deflection: of the platform; absent where the actuators' stiffness is not known.
     """
 
     name: str
-    wrench: FloatArray
-    smallest: FloatArray
-    largest: FloatArray
-    constraints: Mapping[str, FloatArray | None]
-    displacement: FloatArray
-    deflection: float
+    pose: Absent[int]
+    wrench: Vector6
+    actuators: tuple[ActuatorLoad, ...]
+    constraints: Absent[tuple[ConstraintLoad, ...]]
+    deflection: Absent[PlatformDeflection]
 
     @property
     def forces(self) -> FloatArray:
-        """Force (a,) of each actuator with the largest size."""
-        return np.where(np.abs(self.largest) >= np.abs(self.smallest), self.largest, self.smallest)
+        """Force (a,) of each actuator with the largest size; not numbers at a singular pose."""
+        return np.array([each.value for each in self.actuators], dtype=np.float64)
+
+
+class TopSpeed(JsonObject):
+    """Largest speed of an actuator in the platform's fastest motions; null at a singular pose.
+
+    Attributes:
+        actuator: its name.
+        pose: number of the pose, from 1 on; absent where there is one.
+        value: the speed.
+        unit: of the speed.
+        dimension: of the speed, in radians for an actuator that turns.
+    """
+
+    actuator: str
+    pose: Absent[int]
+    value: Annotated[float | None, Measure.NUMBER]
+    unit: str
+    dimension: Hidden[Dimension] = Dimension.NUMBER
+
+
+class ActuatorLoading(JsonObject):
+    """Forces and speeds of actuators at every pose.
+
+    Attributes:
+        loads: every load at every pose; absent without loads.
+        speeds: every actuator at every pose; absent without motions.
+        compliance: at the first pose, displacement of the platform, translation of its origin and turn in radians, by
+            force and moment about it; absent where the actuators' stiffness is not known, and at a singular pose.
+    """
+
+    loads: Absent[tuple[HeldLoad, ...]]
+    speeds: Absent[tuple[TopSpeed, ...]]
+    compliance: Absent[Matrix]
 
 
 class PoseLoads(NamedTuple):
@@ -61,14 +147,34 @@ class PoseLoads(NamedTuple):
 
     Attributes:
         loads: the load cases.
-        speeds: (a,) the largest speeds of the actuators; empty without a motion.
+        speeds: the largest speeds of the actuators; empty without a motion.
         compliance: (6, 6) displacement of the platform, turn and translation of its origin, by moment and force about
             it; empty where the actuators' stiffness is not known.
     """
 
-    loads: tuple[LoadState, ...]
-    speeds: FloatArray
+    loads: tuple[HeldLoad, ...]
+    speeds: tuple[TopSpeed, ...]
     compliance: FloatArray
+
+
+def loading_of(nlp: Nlp, x: FloatArray, state: RobotState) -> ActuatorLoading:
+    """Return forces and speeds of the actuators at every pose of a point, in the case's units.
+
+    Args:
+        nlp: the program.
+        x: (n,) the point.
+        state: the robot there, at the first pose.
+    """
+    poses = range(len(nlp.program.robots))
+    found, units = [loads_at(nlp, x, evaluate(nlp, x, k) if k else state, k) for k in poses], nlp.case.units
+    compliance = found[0].compliance
+    known = compliance.size and np.isfinite(compliance).all()
+    order = [3, 4, 5, 0, 1, 2]  # force before moment, and translation before turn
+    return ActuatorLoading(
+        loads=HeldLoad.of_each([load for each in found for load in each.loads], units) or None,
+        speeds=TopSpeed.of_each([speed for each in found for speed in each.speeds], units) or None,
+        compliance=matrix(compliance[np.ix_(order, order)]) if known else None,
+    )
 
 
 def loads_at(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> PoseLoads:
@@ -87,32 +193,85 @@ def loads_at(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> PoseL
     values = [float(each) for item in model.parameters for each in np.ravel(state.parameters[item.name])]
     found = forces_at(model, statics, R, loading, SX(length_of(model, values)))
     held = {} if state.is_singular else _constraints(nlp, statics)
-    loads = tuple(_load(case, state, found, held) for case in found.cases)
+    number = pose + 1 if len(nlp.program.robots) > 1 else None
+    speeds = _top_speeds(nlp, _numbers(found.speeds, state), number)
+    loads = tuple(_load(nlp, case, state, found, held, speeds, number) for case in found.cases)
     is_elastic = bool(found.stiffness.numel())
     compliance = _numbers(ca.vec(found.compliance), state).reshape(6, 6) if is_elastic else np.zeros((0, 0))
-    return PoseLoads(loads, _numbers(found.speeds, state), compliance)
+    return PoseLoads(loads, speeds, compliance)
 
 
 def largest_of(found: PoseLoads, measure: str) -> float:
     """Return the largest number of the actuators at a pose: ``actuator_force``, ``actuator_speed`` or ``..._power``."""
+    speeds = np.array([each.value for each in found.speeds], dtype=np.float64)
     if measure == "actuator_speed":
-        return float(found.speeds.max())
-    factor = found.speeds if measure == "actuator_power" else 1.0
+        return float(speeds.max())
+    factor = speeds if measure == "actuator_power" else 1.0
     return float((factor * np.abs([each.forces for each in found.loads])).max())
 
 
-def _load(case: CaseForces, state: RobotState, posed: PosedForces, held: Mapping[str, FloatArray | None]) -> LoadState:
+def _top_speeds(nlp: Nlp, speeds: FloatArray, pose: int | None) -> tuple[TopSpeed, ...]:
+    """Return the largest speeds (a,) of the actuators, none without a motion, at a pose by its number."""
+    return tuple(
+        TopSpeed(
+            actuator=joint.name,
+            pose=pose,
+            value=finite_or_none(speed),
+            unit=nlp.case.units.label(dimension_of_speed(joint)),
+            dimension=dimension_of_speed(joint),
+        )
+        for joint, speed in zip(driven_joints(nlp.program.model), speeds.tolist(), strict=False)
+    )
+
+
+def _load(
+    nlp: Nlp,
+    case: CaseForces,
+    state: RobotState,
+    posed: PosedForces,
+    held: "Mapping[str, FloatArray | None]",
+    speeds: Sequence[TopSpeed],
+    pose: int | None,
+) -> HeldLoad:
     """Return what holds one load case; ``held`` has the matrix from row forces to the wrench of each limb."""
     phi = _numbers(posed.statics.row_forces(case.wrench), state) if held else np.zeros(0)
-    is_elastic = bool(posed.stiffness.numel())
-    return LoadState(
-        case.case.name,
-        _about_world(np.array(ca.DM(case.wrench)).ravel(), state.position),
-        _numbers(case.smallest, state),
-        _numbers(case.largest, state),
-        {limb: None if matrix is None else _about_world(matrix @ phi, state.position) for limb, matrix in held.items()},
-        _numbers(posed.displacement(case), state) if is_elastic else np.zeros(0),
-        float(_numbers(posed.deflection(case), state)[0]) if is_elastic else math.nan,
+    ends = zip(_numbers(case.smallest, state).tolist(), _numbers(case.largest, state).tolist(), strict=True)
+    actuators = []
+    for k, (joint, (low, high)) in enumerate(zip(driven_joints(nlp.program.model), ends, strict=True)):
+        force = high if abs(high) >= abs(low) else low
+        speed = speeds[k].value if speeds else None
+        actuators.append(
+            ActuatorLoad(
+                actuator=joint.name,
+                value=finite_or_none(force),
+                smallest=finite_or_none(low),
+                largest=finite_or_none(high),
+                unit=nlp.case.units.label(dimension_of_force(joint)),
+                power=None if speed is None else finite_or_none(abs(force) * speed),
+            )
+        )
+    constraints = tuple(
+        ConstraintLoad(limb=limb, wrench=None if part is None else vector(_about_world(part @ phi, state.position)))
+        for limb, part in held.items()
+    )
+    return HeldLoad(
+        name=case.case.name,
+        pose=pose,
+        wrench=vector(_about_world(np.array(ca.DM(case.wrench)).ravel(), state.position)),
+        actuators=tuple(actuators),
+        constraints=constraints or None,
+        deflection=_deflection(case, posed, state) if posed.stiffness.numel() else None,
+    )
+
+
+def _deflection(case: CaseForces, posed: PosedForces, state: RobotState) -> PlatformDeflection:
+    """Return the platform's displacement under a load case."""
+    displacement = _numbers(posed.displacement(case), state)
+    known = bool(np.isfinite(displacement).all())
+    return PlatformDeflection(
+        translation=vector(displacement[3:]) if known else None,
+        rotation=vector(displacement[:3]) if known else None,
+        largest=finite_or_none(float(_numbers(posed.deflection(case), state)[0])),
     )
 
 
@@ -127,7 +286,7 @@ def _about_world(wrench: FloatArray, position: FloatArray) -> FloatArray:
     return np.concatenate([wrench[:3], wrench[3:] + np.cross(position, wrench[:3])])
 
 
-def _constraints(nlp: Nlp, statics: Statics) -> dict[str, FloatArray | None]:
+def _constraints(nlp: Nlp, statics: Statics) -> "dict[str, FloatArray | None]":
     """Return the matrix (6, m) from row forces to the wrench of each limb's constraints; None where not determined."""
     model = nlp.program.model
     rows, driven = (np.array(ca.DM(each), dtype=np.float64) for each in (statics.rows, statics.driven))

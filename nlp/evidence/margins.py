@@ -6,56 +6,71 @@ limits several legs or poses costs the sum of its costs at each of them. The der
 active limits have independent normals and positive multipliers, which :mod:`screwsynth.nlp.evidence.optimality` says.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal, NamedTuple
+from typing import Annotated, NamedTuple
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ...models import Dimension, FloatArray
-from ...models.values import dataclass
+from ...models import Dimension, FloatArray, frozen_array
+from ..case.case import Case
 from ..case.limits.constraint import BoundedConstraint, Constraint
-from ..program.nlp import Nlp
+from ..program.nlp import Bound, Nlp
 from ..program.pairs import pair_constraints, tightest_pairs, with_pairs_at
+from ..system.jsonvalues import Hidden, JsonObject, Known, Measure, Shown, Slope
+from ..units import rate_unit
 from .kkt import FEASIBLE, Linearisation, linearise, multipliers
 
+#: Beginning of the names of constraints on the rates of actuators.
+_RATE = "actuator_rate actuator "
 
-@dataclass(frozen=True)
-class Margin:
-    """A limit at one leg, joint or pose.
+
+class Margin(JsonObject):
+    """Margin of a point in a limit at one leg, joint or pose.
 
     Attributes:
-        name: the limit and where.
-        key: dotted key, below ``limits``, of the number in the case.
-        bound: which side of it.
-        value: the measured value there, radians for angles.
-        limit: the number in the case, radians for angles.
-        dimension: of both.
-        active: whether the point lies on it.
-        violated: whether the point lies outside of it by more than a feasible point may.
-        cost: derivative of the optimal F by the limit, per radian for angles; None where there is no optimum.
+        name: the limit, and where.
+        key: dotted key, below limits, of the number in the case.
+        bound: side of it.
+        value: measured there; null where it is not finite.
+        limit: number of the case.
+        margin: distance from the limit, positive inside.
+        unit: of value, limit and margin.
+        active: whether the point lies on the limit.
+        violated: whether the point lies outside of the limit by more than rounding error.
+        cost: derivative of the optimal F by the limit; null where the point is no optimum.
+        dimension: of value, limit and margin, which are in radians for angles.
     """
 
     name: str
     key: str
-    bound: Literal["min", "max", "equal"]
-    value: float
-    limit: float
-    dimension: Dimension
+    bound: Bound
+    value: Annotated[Known, Measure.NUMBER]
+    limit: Shown
+    margin: Annotated[Known, Measure.NUMBER]
+    unit: str
     active: bool
     violated: bool
-    cost: float | None
+    cost: Slope[float | None]
+    dimension: Hidden[Dimension] = Dimension.NUMBER
 
-    @property
-    def margin(self) -> float:
-        """Distance to the limit, positive inside."""
-        if self.bound == "equal":
-            return -abs(self.value - self.limit)
-        return self.limit - self.value if self.bound == "max" else self.value - self.limit
+
+def unit_of_side(case: Case, name: str, dimension: Dimension) -> str:
+    """Return the unit of a bound's or a limit's number; empty for a plain number.
+
+    Args:
+        case: the case.
+        name: of the variable or the constraint.
+        dimension: of the number; a limit on actuators' rates has one number for angles and lengths.
+    """
+    if not name.startswith(_RATE):
+        return case.units.label(dimension)
+    owners = [each for each in case.model.actuators if name.startswith(f"{_RATE}{each.name}")]
+    kind = max(owners, key=lambda each: len(each.name)).dimension if owners else Dimension.LENGTH
+    tasks = [task for task in case.tasks if f" task {task.name}" in name] or list(case.tasks[:1])
+    return rate_unit(frozen_array(tasks[0].twist, (6,)), case.units, kind)
 
 
 def measured_slack(nlp: Nlp, x: FloatArray, at: Linearisation, numbers: Sequence[float] | None = None) -> FloatArray:
@@ -116,20 +131,11 @@ def margins_of(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
         key = constraint.keys[1 if side.bound == "max" else 0]
         if not key:
             continue
-        limit = nlp.stated_limit(j)
-        rows.append(
-            Margin(
-                name=side.name,
-                key=key,
-                bound=side.bound,
-                value=measured[side.constraint],
-                limit=constraint.reading.from_value(limit),
-                dimension=constraint.reading.dimension,
-                active=j in active,
-                violated=bool(slack[j] < -FEASIBLE),
-                cost=float(gained[j] * constraint.reading.slope(limit)) if optimal else None,
-            )
-        )
+        at_side, limit = _LimitSide(side.bound, key, nlp.stated_limit(j)), nlp.stated_limit(j)
+        cost = float(gained[j] * constraint.reading.slope(limit)) if optimal else None
+        is_violated = bool(slack[j] < -FEASIBLE)
+        value = measured[side.constraint]
+        rows.append(_margin(nlp, constraint, at_side, value, active=j in active, violated=is_violated, cost=cost))
     known = set(nlp.pairs)
     other = [item for place in tightest_pairs(nlp, x) if place not in known for item in pair_constraints(nlp, place)]
     return [
@@ -148,28 +154,46 @@ def _without_cost(nlp: Nlp, x: FloatArray, limits: Sequence[BoundedConstraint], 
     function = ca.Function("constant", [nlp.program.x, nlp.program.p], [ca.densify(expressions)])
     measured = _measured(nlp, x, constraints, function(x, nlp.arguments).full().ravel())
     return [
-        Margin(
-            name=item.constraint.name,
-            key=key,
-            bound=bound,
-            value=value,
-            limit=item.constraint.reading.from_value(limit),
-            dimension=item.constraint.reading.dimension,
-            active=False,
-            violated=False,
-            cost=0.0 if optimal else None,
-        )
+        _margin(nlp, item.constraint, side, value, active=False, violated=False, cost=0.0 if optimal else None)
         for item, value in zip(limits, measured, strict=True)
-        for bound, key, limit in _sides(item)
+        for side in _sides(item)
     ]
 
 
 class _LimitSide(NamedTuple):
     """A side of a constraint with the key of its number, and its bound in the program's terms."""
 
-    bound: Literal["min", "max", "equal"]
+    bound: Bound
     key: str
     limit: float
+
+
+def _margin(
+    nlp: Nlp,
+    constraint: Constraint,
+    side: _LimitSide,
+    value: float,
+    *,
+    active: bool,
+    violated: bool,
+    cost: float | None,
+) -> Margin:
+    """Return the margin of a measured value in a side of a constraint."""
+    limit, dimension = constraint.reading.from_value(side.limit), constraint.reading.dimension
+    distance = value - limit if side.bound == "min" else limit - value
+    return Margin(
+        name=constraint.name,
+        key=side.key,
+        bound=side.bound,
+        value=value,
+        limit=limit,
+        margin=-abs(distance) if side.bound == "equal" else distance,
+        unit=unit_of_side(nlp.case, constraint.name, dimension),
+        active=active,
+        violated=violated,
+        cost=cost,
+        dimension=dimension,
+    )
 
 
 def _sides(item: BoundedConstraint) -> list[_LimitSide]:

@@ -5,30 +5,44 @@ rank C`` freedoms, and can make a twist where ``C`` does no work in it. The rate
 minimise the motion that the limb resists (:mod:`screwsynth.models.actuation`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Annotated
 
 import numpy as np
 
 from ...models import FloatArray, GenericRanks, LimbDrive, constraint_rows, limb_drive, rank_of_rows
 from ...models.values import dataclass
 from ..program.nlp import Nlp
+from ..system.jsonvalues import JsonObject, Key
 from .paths import numbers_at
-from .singularities import Singularity, SingularityKind, limb_singularities, platform_singularities
+from .singularities import (
+    Singularity,
+    SingularityKind,
+    limb_singularities,
+    platform_singularities,
+    singularity,
+)
 from .state import RobotState
 
 #: A twist is feasible where the constraints carry less than this part of F's size: the rates are then below 1e-6.
 _FEASIBLE = 1e-12
 
 
-class LimbPart(NamedTuple):
-    """The part of F that a limb has: of its actuators, and of its constraints, with which no actuator can move."""
+class LimbPart(JsonObject):
+    """The part of F that a limb has.
 
+    Attributes:
+        limb: its name.
+        F: sum of the squared work rates of its wrenches; of actuation and constraints.
+        actuation: part that its actuators can move with.
+        constraint: part that no actuator can move with: 0 in every limb for a motion that is possible.
+    """
+
+    limb: str
+    F: float
     actuation: float
-    constraint: float
+    constraint: Annotated[float, Key("constraints")]
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +55,7 @@ class Mobility:
         actuator_rates: rate of each actuator for the program's task: rad or length per unit of time; infinite where the
             actuator cannot drive the platform, and not a number where the motion does not determine it.
         constrained: part of F that the constraints carry, 0 to 1; 0 where the platform can make the motion.
-        parts: actuation and constraint in F, by limb.
+        parts: actuation and constraint in F of each limb.
         singularities: all that were found.
     """
 
@@ -49,7 +63,7 @@ class Mobility:
     constraint_rank: int
     actuator_rates: Mapping[str, float]
     constrained: float
-    parts: Mapping[str, LimbPart]
+    parts: tuple[LimbPart, ...]
     singularities: tuple[Singularity, ...]
 
 
@@ -73,18 +87,18 @@ def mobility_of(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> Mo
     constraint_rank = rank_of_rows(constraints, state.position, reach)
     drives = {limb: limb_drive(model, velocities, state.position, limb) for limb in model.limbs}
     rates = dict.fromkeys([each.name for each in model.actuators], float("inf"))
-    parts: dict[str, LimbPart] = {}
+    by_limb: dict[str, tuple[float, float]] = {}
     for limb, (rows, actuators, drive) in drives.items():
         resisted = numbers.rates[rows, 0]
         moved = drive.driven_part(resisted)
-        parts[limb] = LimbPart(float(moved @ moved), float(np.sum((resisted - moved) ** 2)))
+        by_limb[limb] = float(moved @ moved), float(np.sum((resisted - moved) ** 2))
         rates |= {
             model.actuators[k].name: float(rate) for k, rate in zip(actuators, drive.rates(resisted), strict=True)
         }
-    left = sum(part.constraint for part in parts.values())
+    left = sum(constraint for _, constraint in by_limb.values())
     is_feasible = left <= _FEASIBLE * state.size
     if is_feasible:  # what is left is rounding
-        parts = {limb: LimbPart(part.actuation, 0.0) for limb, part in parts.items()}
+        by_limb = {limb: (actuation, 0.0) for limb, (actuation, _) in by_limb.items()}
     found = limb_singularities(nlp, x, state, pose)
     if not found:
         found = _idle_limb(drives, model.generic)
@@ -93,13 +107,16 @@ def mobility_of(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> Mo
         generic = model.generic.constraints, model.generic.jacobian
         found += platform_singularities(state, constraints, (constraint_rank, state.rank), generic)
     if model.rank < 6:
-        found.append(Singularity(SingularityKind.ARCHITECTURE, gained=state.free_twists))
+        found.append(singularity(SingularityKind.ARCHITECTURE, gained=state.free_twists))
     return Mobility(
         freedoms=6 - constraint_rank,
         constraint_rank=constraint_rank,
         actuator_rates=MappingProxyType(rates),
         constrained=0.0 if is_feasible else left / state.F,
-        parts=MappingProxyType(parts),
+        parts=tuple(
+            LimbPart(limb=limb, F=actuation + constraint, actuation=actuation, constraint=constraint)
+            for limb, (actuation, constraint) in by_limb.items()
+        ),
         singularities=tuple(found),
     )
 
@@ -112,4 +129,4 @@ def _idle_limb(drives: Mapping[str, LimbDrive], generic: GenericRanks) -> list[S
     idle = {limb: each.drive.idle.shape[1] for limb, each in drives.items() if each.drive.idle.shape[1]}
     if sum(idle.values()) <= generic.idle:
         return []
-    return [Singularity(SingularityKind.SERIAL, next(iter(idle)) if len(idle) == 1 else None)]
+    return [singularity(SingularityKind.SERIAL, next(iter(idle)) if len(idle) == 1 else None)]

@@ -10,24 +10,23 @@ for a minimum) per unit by which the limit is **relaxed**, in F per the case's u
 negative on an inequality; on an equation it is the improvement per unit by which the equation's right-hand side grows.
 """
 
-from __future__ import annotations
-
 import enum
 import math
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Literal
+from typing import Annotated
 
 import numpy as np
 
 from ...models import Dimension, FloatArray, frozen_array
 from ...models.linalg import echelon_basis
-from ...models.values import dataclass
 from ..case.task import Sense
-from ..program.nlp import Nlp
+from ..program.nlp import Bound, Nlp
 from ..program.pairs import with_pairs_at
+from ..system.jsonvalues import Absent, Hidden, JsonObject, Key, Known, Row, Shown, Slope
 from ..units import Units
 from .kkt import FEASIBLE, STATIONARY, Linearisation, correct_point, lagrangian_hessian, linearise, multipliers
+from .margins import unit_of_side
 from .singularities import is_passive_singular
 
 #: Multiplier, in scaled terms, below which an active side is weakly active.
@@ -67,54 +66,52 @@ class PointKind(enum.Enum):
         return self in (PointKind.STRICT_MAXIMUM, PointKind.STRICT_MINIMUM, PointKind.NOT_ISOLATED, PointKind.UNDECIDED)
 
 
-@dataclass(frozen=True)
-class ActiveSide:
-    """An active side: a bound or a limit on which the point lies.
+class ActiveSide(JsonObject):
+    """A bound or limit that the point lies on.
 
     Attributes:
-        name: name of the variable or constraint.
-        bound: ``min``, ``max`` or ``equal``.
-        value: the limit, radians for angles.
-        multiplier: improvement of F per unit by which the limit is relaxed, in the same unit.
-        dimension: of the limit.
+        name: variable or constraint.
+        bound: side of it.
+        value: the limit.
+        unit: of the value; left out for a plain number.
+        multiplier: improvement of F per unit by which the limit is relaxed.
+        dimension: of the value, in radians for an angle.
     """
 
     name: str
-    bound: Literal["min", "max", "equal"]
-    value: float
-    multiplier: float
-    dimension: Dimension
+    bound: Bound
+    value: Shown
+    unit: Absent[str]
+    multiplier: Slope[float]
+    dimension: Hidden[Dimension] = Dimension.NUMBER
 
 
-@dataclass(frozen=True, eq=False)
-class Evidence:
-    """Evidence about a point.
+class Evidence(JsonObject):
+    """Evidence of optimality, from the program and the point alone.
 
     Attributes:
-        kind: the verdict.
-        stationarity: largest scaled derivative of the Lagrangian, with the multipliers that make it least.
-        feasibility: largest distance outside a side, in half ranges; 0 inside.
-        complementarity: largest product of a multiplier and the slack of its side, scaled.
-        active: active sides, with multipliers.
+        kind: of point.
+        stationarity: largest scaled derivative of the Lagrangian.
+        feasibility: largest distance outside a limit, in half ranges.
+        complementarity: largest product of a multiplier and its slack, scaled.
+        licq: whether the active normals are linearly independent.
+        active: bounds and limits that the point lies on.
+        eigenvalues: of the reduced Hessian, ascending: of the scaled Lagrangian's Hessian on the tangent space of the
+            strongly active sides. Positive means that F gets worse on leaving the point.
+        flat: rates of the variables along which F keeps its optimal value. In a result that of the variable that moves
+            most in its range is 1; else they are in the variables' own units, for a step of half a range of that one.
         violated: names of the variables and constraints of violated sides.
-        licq: whether the active normals are linearly independent, so that the multipliers are unique (the linear
-            independence constraint qualification).
-        eigenvalues: eigenvalues of the reduced Hessian, ascending: of the scaled Lagrangian's Hessian on the tangent
-            space of the strongly active sides. A positive one means that F gets worse away from the point, for a
-            maximum as for a minimum.
-        flat: directions along which F keeps its optimal value: change of each variable by name, in its unit, for a step
-            of half a range in the variable that changes most.
     """
 
     kind: PointKind
-    stationarity: float
-    feasibility: float
-    complementarity: float
-    active: tuple[ActiveSide, ...]
-    violated: tuple[str, ...]
+    stationarity: Known
+    feasibility: Known
+    complementarity: Known
     licq: bool
-    eigenvalues: FloatArray
-    flat: tuple[Mapping[str, float], ...]
+    active: tuple[ActiveSide, ...]
+    eigenvalues: Annotated[Row, Key("reduced_hessian_eigenvalues")]
+    flat: Annotated[tuple[Mapping[str, float], ...], Key("flat_directions")]
+    violated: Hidden[tuple[str, ...]] = ()
 
     def multipliers_in(self, units: Units) -> tuple[float, ...]:
         """Return the multipliers of the active sides, per unit of the case."""
@@ -133,8 +130,17 @@ def examine(nlp: Nlp, x: FloatArray) -> Evidence:
     active, feasibility = at.active(), at.violation
     violated = tuple(dict.fromkeys(at.sides[j].name for j in active if at.slack[j] < -FEASIBLE))
     if not math.isfinite(feasibility):
-        nothing = frozen_array((), (0,))
-        return Evidence(PointKind.UNDEFINED, math.inf, feasibility, math.inf, (), violated, True, nothing, ())
+        return Evidence(
+            kind=PointKind.UNDEFINED,
+            stationarity=math.inf,
+            feasibility=feasibility,
+            complementarity=math.inf,
+            licq=True,
+            active=(),
+            eigenvalues=frozen_array((), (0,)),
+            flat=(),
+            violated=violated,
+        )
     mu, stationarity = multipliers(at, active)
     normals = at.normals[list(active)]
     kind = PointKind.INFEASIBLE if feasibility > FEASIBLE else PointKind.NOT_STATIONARY
@@ -171,10 +177,17 @@ def _active_side(nlp: Nlp, at: Linearisation, j: int, mu: float) -> ActiveSide:
     multiplier = float(mu * at.per_unit[j] * nlp.objective_scale)
     if side.constraint is not None:
         reading = nlp.program.constraints[side.constraint].reading
-        value, slope = reading.from_value(limit), reading.slope(limit)
-        return ActiveSide(side.name, side.bound, value, multiplier * slope, reading.dimension)
-    dimension = nlp.program.variables[side.variable or 0].dimension
-    return ActiveSide(side.name, side.bound, limit, multiplier, dimension)
+        limit, multiplier, dimension = reading.from_value(limit), multiplier * reading.slope(limit), reading.dimension
+    else:
+        dimension = nlp.program.variables[side.variable or 0].dimension
+    return ActiveSide(
+        name=side.name,
+        bound=side.bound,
+        value=limit,
+        unit=unit_of_side(nlp.case, side.name, dimension) or None,
+        multiplier=multiplier,
+        dimension=dimension,
+    )
 
 
 def _second_order_test(nlp: Nlp, at: Linearisation, mu: FloatArray) -> tuple[PointKind, FloatArray, list[FloatArray]]:
@@ -241,7 +254,7 @@ def _reduced_eigenpairs(H: FloatArray, normals: FloatArray) -> tuple[FloatArray,
     return np.asarray(values, dtype=np.float64), np.asarray(Z @ vectors, dtype=np.float64)
 
 
-def _follow_flat_direction(nlp: Nlp, at: Linearisation, direction: FloatArray) -> FloatArray | None:
+def _follow_flat_direction(nlp: Nlp, at: Linearisation, direction: FloatArray) -> "FloatArray | None":
     """Return a direction in which F keeps its value over a finite step, near the given one; None when there is none.
 
     Newton's method corrects a step along the direction back onto the optimal set. Where the correction changes the
@@ -264,7 +277,7 @@ def _follow_flat_direction(nlp: Nlp, at: Linearisation, direction: FloatArray) -
     return None
 
 
-def _step_on_optimal_set(nlp: Nlp, at: Linearisation, direction: FloatArray) -> FloatArray | None:
+def _step_on_optimal_set(nlp: Nlp, at: Linearisation, direction: FloatArray) -> "FloatArray | None":
     """Return the step (n,), in scaled variables, to the corrected end of a short step along a direction.
 
     None stands for a step that leaves the box, changes F or returns to the point.

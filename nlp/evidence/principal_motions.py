@@ -13,40 +13,40 @@ Source: A. Wolf and M. Shoham, *Investigation of parallel manipulators using lin
 Mechanical Design 125 (2003), reference [4] of the paper.
 """
 
-from __future__ import annotations
-
-from dataclasses import dataclass
-
 import numpy as np
 
 from ...models import FloatArray, frozen_array
 from ...models.basis import settled_basis
+from ..system.jsonvalues import Inline, JsonObject
+from .screwvalues import ScrewMotion, motion_of
 
 #: Singular values that differ by less than this part of the largest are the same: rounding.
 _SAME = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
-class PrincipalMotion:
+class PrincipalMotion(JsonObject):
     """A motion at which F is stationary.
 
     Attributes:
-        twist: (6,) angular velocity, then velocity at the world origin, with ``|omega| = 1``, or ``|v| = 1`` for a
-            translation.
-        F: objective for this twist.
+        F: objective for it.
+        motion: of unit rotation, or a translation of unit speed.
     """
 
-    twist: FloatArray
     F: float
+    motion: Inline[ScrewMotion]
+
+    @property
+    def twist(self) -> FloatArray:
+        """Angular velocity, then velocity at the world origin (6,)."""
+        return frozen_array(self.motion.twist, (6,))
 
 
-@dataclass(frozen=True, eq=False)
-class TaskAnalysis:
-    """The principal motions of a robot at one point, each three by ascending F.
+class TaskAnalysis(JsonObject):
+    """Motions at which F is stationary, each three by ascending F.
 
     Attributes:
-        rotations: three stationary twists of unit rotation; the robot resists the first least of all such twists.
-        translations: three stationary pure translations of unit speed.
+        rotations: among twists of unit rotation.
+        translations: among translations of unit speed.
     """
 
     rotations: tuple[PrincipalMotion, ...]
@@ -69,7 +69,7 @@ def analyse_tasks(jacobian: FloatArray) -> TaskAnalysis:
     translations = [
         _principal_motion(jacobian, np.concatenate([np.zeros(3), axis])) for axis in _right_singular_vectors(N)
     ]
-    return TaskAnalysis(tuple(rotations), tuple(translations))
+    return TaskAnalysis(rotations=tuple(rotations), translations=tuple(translations))
 
 
 def _right_singular_vectors(matrix: FloatArray) -> FloatArray:
@@ -87,4 +87,4 @@ def _right_singular_vectors(matrix: FloatArray) -> FloatArray:
 def _principal_motion(jacobian: FloatArray, twist: FloatArray) -> PrincipalMotion:
     """Return a twist (6,) with F for a Jacobian (m, 6)."""
     rates = jacobian[:, 3:] @ twist[:3] + jacobian[:, :3] @ twist[3:]
-    return PrincipalMotion(frozen_array(twist, (6,)), float(rates @ rates))
+    return PrincipalMotion(F=float(rates @ rates), motion=motion_of(twist))

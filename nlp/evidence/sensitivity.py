@@ -8,8 +8,6 @@ derivative only if it is the same for all multipliers: if the variables can foll
 all active sides stay active. And there is none where the loops of the robot close at one value of the argument only.
 """
 
-from __future__ import annotations
-
 import enum
 from typing import TYPE_CHECKING
 
@@ -18,8 +16,8 @@ import numpy as np
 from casadi import SX
 
 from ...models import Dimension, FloatArray
-from ...models.values import dataclass
 from ..program.nlp import Nlp
+from ..system.jsonvalues import Absent, Hidden, JsonObject, Shown, Slope
 from .kkt import constraint_weights, linearise, multipliers
 
 if TYPE_CHECKING:
@@ -37,23 +35,24 @@ class Hindrance(enum.Enum):
     CORNER = "F has a corner there"
 
 
-@dataclass(frozen=True)
-class Sensitivity:
-    """Derivative of the optimal F with respect to a fixed number.
+class Sensitivity(JsonObject):
+    """Sensitivity of the optimal F to a fixed number.
 
     Attributes:
-        name: name of the number.
-        value: the number, radians for angles.
-        derivative: derivative of the optimal F, per radian for angles; None where there is none.
-        dimension: length, angle or plain number.
-        hindrance: why there is no derivative; None where there is one.
+        name: of the number.
+        value: of the number.
+        unit: of the value.
+        derivative: of the optimal F by the number; absent where there is none.
+        hindrance: why there is none, in words.
+        dimension: of the number, in radians for an angle.
     """
 
     name: str
-    value: float
-    derivative: float | None
-    dimension: Dimension
-    hindrance: Hindrance | None = None
+    value: Shown
+    unit: str
+    derivative: Slope[Absent[float]]
+    hindrance: Absent[Hindrance]
+    dimension: Hidden[Dimension] = Dimension.NUMBER
 
 
 def sensitivities(nlp: Nlp, x: FloatArray) -> list[Sensitivity]:
@@ -80,13 +79,20 @@ def sensitivities(nlp: Nlp, x: FloatArray) -> list[Sensitivity]:
     arguments, found = nlp.program.arguments, []
     for k in places:
         hindrance = Hindrance.NO_CHOICE if without_choice[k] else Hindrance.CORNER if cornered[k] else None
-        derivative = float(whole[k]) if hindrance is None else None
-        number = float(nlp.arguments[k])
-        found.append(Sensitivity(arguments[k].name, number, derivative, arguments[k].dimension, hindrance))
+        found.append(
+            Sensitivity(
+                name=arguments[k].name,
+                value=float(nlp.arguments[k]),
+                unit=nlp.case.units.label(arguments[k].dimension),
+                derivative=float(whole[k]) if hindrance is None else None,
+                hindrance=hindrance,
+                dimension=arguments[k].dimension,
+            )
+        )
     return found
 
 
-def _can_follow(by_variable: FloatArray, by_argument: FloatArray) -> NDArray[np.bool_]:
+def _can_follow(by_variable: FloatArray, by_argument: FloatArray) -> "NDArray[np.bool_]":
     """Return whether the variables can follow each argument, (k,), so that some functions keep their values.
 
     Args:

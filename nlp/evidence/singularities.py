@@ -16,20 +16,19 @@ motions ``dq_i`` of the joints before. The additional wrenches are those of the 
 nested loops the change is not known: joints and wrenches are not reported.
 """
 
-from __future__ import annotations
-
 import enum
 from collections.abc import Sequence
-from typing import Literal, NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
 from ...models import FloatArray, JointScrews, frozen_array
 from ...models.linalg import echelon_basis
-from ...models.values import dataclass
 from ..program.nlp import Nlp
 from ..program.program import RobotNumbers
+from ..system.jsonvalues import Absent, JsonObject
 from .paths import paths_at
+from .screwvalues import ScrewMotion, ScrewWrench, motion_of, wrench_of
 from .state import RobotState
 
 #: Screws of unit size whose singular values are below this part of the largest are dependent, as for the rank of J.
@@ -40,55 +39,74 @@ _NEGLIGIBLE = 1e-9
 _TAKES_PART = 1e-6
 
 
-#: Keys of kinds in results as JSON.
-SingularityKey: TypeAlias = Literal["passive", "serial", "constraint", "actuation", "architecture"]
-
-
 class SingularityKind(enum.Enum):
-    """Kind of a singularity; each value is a clause for people."""
+    """Kind of a singularity."""
 
-    PASSIVE = "passive joints are dependent: F jumps here, and the point is no optimum to build"
-    SERIAL = "joints are dependent: its actuator cannot drive the platform, which loses a freedom"
-    CONSTRAINT = "the constraints are dependent: the platform gains a freedom even with free actuators"
-    ACTUATION = "the platform can move with every actuator locked"
-    ARCHITECTURE = "the rank is below six at all dimensions and poses: the platform can always move"
+    PASSIVE = "passive"
+    SERIAL = "serial"
+    CONSTRAINT = "constraint"
+    ACTUATION = "actuation"
+    ARCHITECTURE = "architecture"
 
     @property
-    def key(self) -> SingularityKey:
-        """The kind's key in results as JSON."""
-        return _KEYS[self]
+    def clause(self) -> str:
+        """The kind as a clause for people."""
+        return _CLAUSES[self]
 
 
-_KEYS: dict[SingularityKind, SingularityKey] = {
-    SingularityKind.PASSIVE: "passive",
-    SingularityKind.SERIAL: "serial",
-    SingularityKind.CONSTRAINT: "constraint",
-    SingularityKind.ACTUATION: "actuation",
-    SingularityKind.ARCHITECTURE: "architecture",
+_CLAUSES = {
+    SingularityKind.PASSIVE: "passive joints are dependent: F jumps here, and the point is no optimum to build",
+    SingularityKind.SERIAL: "joints are dependent: its actuator cannot drive the platform, which loses a freedom",
+    SingularityKind.CONSTRAINT: "the constraints are dependent: the platform gains a freedom even with free actuators",
+    SingularityKind.ACTUATION: "the platform can move with every actuator locked",
+    SingularityKind.ARCHITECTURE: "the rank is below six at all dimensions and poses: the platform can always move",
 }
 
 
-@dataclass(frozen=True, eq=False)
-class Singularity:
+class Singularity(JsonObject):
     """A singularity.
 
     Attributes:
-        kind: the kind.
-        limb: name of the limb that it belongs to; None for one of the whole robot.
-        joints: labels of the limb's dependent joints; empty for nested loops.
-        gained: (k, 6) twists that the platform gains: angular velocity, then velocity at the world's origin. They span
-            the motions that no wrench resists; of a constraint singularity that leaves other motions to resist or not,
-            all that no constraint resists.
-        locking: (k, 6) wrenches that a limb resists with in addition: force, then moment about the world's origin; each
-            is of unit force, or a unit couple. The platform loses the motions in which they do work. Of more than one,
-            it depends on the way to the point which combinations are additional. None for nested loops.
+        kind: its kind.
+        limb: limb that it belongs to; absent for one of the whole robot.
+        joints: dependent joints of the limb, by label, none for nested loops; absent for one of the whole robot.
+        words: the same as a clause.
+        gained: basis of the motions that the platform gains; absent for one of a limb. Of a constraint singularity that
+            leaves other motions to resist or not, all that no constraint resists.
+        locking: wrenches that the limb resists with in addition, so that the platform loses the motions in which they
+            do work; absent for one of the whole robot. Of more than one, it depends on the way to the point which
+            combinations are additional.
     """
 
     kind: SingularityKind
-    limb: str | None = None
-    joints: tuple[str, ...] = ()
-    gained: FloatArray | None = None
-    locking: FloatArray | None = None
+    limb: Absent[str]
+    joints: Absent[tuple[str, ...]]
+    words: str
+    gained: Absent[tuple[ScrewMotion, ...]]
+    locking: Absent[tuple[ScrewWrench, ...]]
+
+
+def singularity(
+    kind: SingularityKind,
+    limb: str | None = None,
+    joints: tuple[str, ...] = (),
+    gained: "FloatArray | None" = None,
+    locking: Sequence[ScrewWrench] | None = None,
+) -> Singularity:
+    """Return a singularity: of a limb, or of the whole robot, with the twists (k, 6) that its platform gains."""
+    words = kind.clause
+    if limb is not None:
+        named = f" {', '.join(joints)}" if joints else ""
+        first, _, rest = words.partition(" are dependent")
+        words = f"limb {limb}: its {first}{named} are dependent{rest}"
+    return Singularity(
+        kind=kind,
+        limb=limb,
+        joints=None if limb is None else joints,
+        words=words,
+        gained=None if gained is None else tuple(motion_of(row) for row in gained),
+        locking=None if locking is None else tuple(locking),
+    )
 
 
 def limb_singularities(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> list[Singularity]:
@@ -148,11 +166,11 @@ def platform_singularities(
     if lost > 0:
         alone = len(state.free_twists) == lost
         gained = state.free_twists if alone else _null_twists(constraints, state.position)
-        found.append(Singularity(SingularityKind.CONSTRAINT, gained=gained))
+        found.append(singularity(SingularityKind.CONSTRAINT, gained=gained))
         if alone:
             return found
     if ranks[1] < generic[1]:
-        found.append(Singularity(SingularityKind.ACTUATION, gained=state.free_twists))
+        found.append(singularity(SingularityKind.ACTUATION, gained=state.free_twists))
     return found
 
 
@@ -208,7 +226,7 @@ def _singularity_of(motions: _Motions, own: FloatArray, centre: FloatArray) -> S
         if len(known) == len(columns) and (rank == generic or (rank > generic and kind is SingularityKind.SERIAL)):
             continue
         if each.is_nested:
-            return Singularity(kind, each.limb)
+            return singularity(kind, each.limb)
         before = [k for k in every if np.isfinite(screws[:, k]).all()]
         changes, kernel = _changes(screws, before, known, unit, reach, centre)
         cokernel = np.linalg.svd(unit)[0][:, rank:]
@@ -220,7 +238,7 @@ def _singularity_of(motions: _Motions, own: FloatArray, centre: FloatArray) -> S
         part = [known[k] for k in np.flatnonzero(taking_part > _TAKES_PART * taking_part.max(initial=0.0))]
         part += [k for k in columns if k not in known]
         joints = tuple(dict.fromkeys(each.joints[k] for k in sorted(part)))
-        return Singularity(kind, each.limb, joints, locking=_unit_wrenches(wrenches.T, centre, reach))
+        return singularity(kind, each.limb, joints, locking=_unit_wrenches(wrenches.T, centre, reach))
     return None
 
 
@@ -303,17 +321,16 @@ def _dual(wrenches: FloatArray, centre: FloatArray, reach: float) -> FloatArray:
     return _span_of(rows.T) if len(rows) else np.zeros((6, 0))
 
 
-def _unit_wrenches(duals: FloatArray, centre: FloatArray, reach: float) -> FloatArray:
-    """Return wrenches (k, 6) of unit force, or unit couples, from a basis (k, 6) as :func:`_dual` has it."""
+def _unit_wrenches(duals: FloatArray, centre: FloatArray, reach: float) -> list[ScrewWrench]:
+    """Return wrenches of unit force, or unit couples, from a basis (k, 6) as :func:`_dual` has it."""
     if not len(duals):
-        return np.zeros((0, 6))
+        return []
     rows = echelon_basis(duals)
     forces = rows[:, 3:]
     wrenches = np.hstack([forces, rows[:, :3] * reach + np.cross(centre, forces)])
     sizes = np.linalg.norm(forces, axis=1)
     couples = np.linalg.norm(wrenches[:, 3:], axis=1)
-    wrenches = wrenches / np.where(sizes > 0, sizes, couples)[:, None]
-    return frozen_array(wrenches, wrenches.shape)
+    return [wrench_of(row) for row in wrenches / np.where(sizes > 0, sizes, couples)[:, None]]
 
 
 def _null_twists(wrenches: FloatArray, centre: FloatArray) -> FloatArray:
@@ -333,16 +350,5 @@ def _are_alike(one: Singularity | None, other: Singularity) -> bool:
 
 def _together(one: Singularity, other: Singularity) -> Singularity:
     """Return one singularity for two paths of a limb."""
-    rows = [each.locking for each in (one, other) if each.locking is not None]
-    wrenches = np.vstack([np.zeros((0, 6)), *rows])
-    joints = tuple(dict.fromkeys([*one.joints, *other.joints]))
-    return Singularity(one.kind, one.limb, joints, locking=frozen_array(wrenches, wrenches.shape))
-
-
-def clause_of(kind: SingularityKind, limb: str | None, joints: Sequence[str]) -> str:
-    """Return a singularity as a clause for people."""
-    if limb is None:
-        return kind.value
-    named = f" {', '.join(joints)}" if joints else ""
-    first, _, rest = kind.value.partition(" are dependent")
-    return f"limb {limb}: its {first}{named} are dependent{rest}"
+    joints = tuple(dict.fromkeys([*(one.joints or ()), *(other.joints or ())]))
+    return singularity(one.kind, one.limb, joints, locking=(*(one.locking or ()), *(other.locking or ())))

@@ -1,13 +1,13 @@
 """The robot at one point, in numbers: pose, Jacobian, rates, F, rank and free twists."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from types import MappingProxyType
+from typing import Annotated
 
 import numpy as np
 
 from ...models import (
+    Dimension,
     Displacement,
     FloatArray,
     axis_angle_from_matrix,
@@ -24,6 +24,8 @@ from ..case.existence import fault_of_dimensions
 from ..errors import EvaluationError
 from ..program.nlp import Nlp
 from ..program.places import HeldRotation
+from ..system.jsonvalues import JsonObject, Key, Vector3, matrix, vector
+from ..system.strictjson import Size
 from .paths import numbers_at
 
 #: F below this part of its size without cancellation is zero: the rates are then below 1e-6 of their sizes.
@@ -82,21 +84,20 @@ class RobotState:
         return self.rank < 6
 
 
-@dataclass(frozen=True, eq=False)
-class StatedPose:
-    """A pose that a case states, before its displacements.
+class PlatformPose(JsonObject):
+    """A pose of the platform.
 
     Attributes:
-        position: (3,) ``p``, origin of the platform frame in the world frame, length.
-        rotation: (3, 3) ``R``, platform to world coordinates.
-        axis: unit axis of the rotation (3,).
-        angle: angle of the rotation, radians; with a sign about an axis that is held fixed.
+        position: of the platform's origin, in the world frame.
+        axis: unit axis of the rotation.
+        angle: of the rotation about the axis, with a sign about an axis that is held fixed.
+        rotation: rows of the rotation matrix.
     """
 
-    position: FloatArray
-    rotation: FloatArray
-    axis: FloatArray
-    angle: float
+    position: Vector3
+    axis: Vector3
+    angle: Annotated[float, Dimension.ANGLE]
+    rotation: Annotated[tuple[Vector3, ...], Size(3), Key("rotation_matrix")]
 
 
 def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
@@ -170,16 +171,18 @@ def loops_are_closed(nlp: Nlp, x: FloatArray) -> bool:
     return all(float(np.abs(each.loops).max(initial=0.0)) <= CLOSED for each in states)
 
 
-def stated_poses(nlp: Nlp, x: FloatArray) -> list[StatedPose]:
+def stated_poses(nlp: Nlp, x: FloatArray) -> list[PlatformPose]:
     """Return the poses that a case states, at a point (n,), before their displacements."""
-    found: dict[int, StatedPose] = {}
+    found: dict[int, PlatformPose] = {}
     for k, (stated, step) in enumerate(_pose_displacements(nlp.case)):
         if stated not in found:
             numbers = nlp.program.kernels.robot_states[k](x, nlp.arguments)
             rotation = step.rotation.T @ numbers.rotation
             position = step.rotation.T @ (numbers.position.ravel() - step.translation)
             axis, angle = _stated_axis_angle(nlp, x, stated, rotation)
-            found[stated] = StatedPose(frozen_array(position, (3,)), frozen_array(rotation, (3, 3)), axis, angle)
+            found[stated] = PlatformPose(
+                position=vector(position), axis=vector(axis), angle=angle, rotation=matrix(rotation)
+            )
     return list(found.values())
 
 

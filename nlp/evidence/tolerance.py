@@ -6,43 +6,51 @@ is parallel to the gradient of its joint. The platform has the same pose with th
 machine reaches that pose with other leg lengths.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ...models import FloatArray, frozen_array, objective
-from ...models.values import dataclass
+from ...models import FloatArray, objective
 from ..case.pose import OverPoses
 from ..program.epigraph import total_over_poses, worst_value
 from ..program.nlp import Nlp
+from ..system.jsonvalues import JsonObject, Key, Vector3, vector
 
 #: Poses whose F differs from the worst one by at most this part of it are all worst poses.
 _SAME_VALUE = 1e-7
 
 
-@dataclass(frozen=True, eq=False)
-class ToleranceLoss:
-    """The largest loss of F by a tolerance on every joint centre.
+class JointGradient(JsonObject):
+    """Derivatives of F by the error of a joint centre.
 
     Attributes:
-        tolerance: largest error of each joint centre, length.
-        loss: largest loss of F to first order, not negative.
-        loss_there: exact loss of F with the errors that are worst to first order.
-        joints: names of leg and plate of each joint.
-        gradients: (k, 3) derivatives of F with respect to each joint's error, base joints in the world frame and
-            platform joints in the platform frame.
+        limb: of the joint.
+        plate: base or platform.
+        gradient: in the plate's frame.
     """
 
-    tolerance: float
+    limb: str
+    plate: str
+    gradient: Vector3
+
+
+class ToleranceLoss(JsonObject):
+    """Loss of F by inexact joint centres.
+
+    Attributes:
+        tolerance: largest error of every joint centre.
+        loss: worst loss of F, to first order.
+        loss_there: loss of F with the errors that are worst to first order.
+        joints: derivatives of F by each joint's error.
+    """
+
+    tolerance: Annotated[float, Key("joint_centre")]
     loss: float
     loss_there: float
-    joints: tuple[tuple[str, str], ...]
-    gradients: FloatArray
+    joints: tuple[JointGradient, ...]
 
 
 class ToleranceEvaluation(NamedTuple):
@@ -130,6 +138,8 @@ def tolerance_loss(nlp: Nlp, x: FloatArray, tolerance: float) -> ToleranceLoss:
         tolerance=tolerance,
         loss=tolerance * float(sizes.sum()),
         loss_there=nlp.sign * (there - exact),
-        joints=robot.joints,
-        gradients=frozen_array(steepest, steepest.shape),
+        joints=tuple(
+            JointGradient(limb=limb, plate=plate, gradient=vector(gradient))
+            for (limb, plate), gradient in zip(robot.joints, steepest, strict=True)
+        ),
     )

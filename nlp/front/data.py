@@ -8,9 +8,9 @@ from ..program.places import Scalar
 from ..program.program import design_indices
 from ..results.evidence import certificate_data
 from ..results.explorations import FrontGoalData, FrontPointData, FrontResult
-from ..results.jsondata import finite_or_none
 from ..results.objective import unit_of_objective
 from ..results.point import head_data, stated_pose_notice, versions
+from ..system.jsonvalues import finite_or_none
 from .front import Front, FrontPoint
 
 

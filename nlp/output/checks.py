@@ -23,7 +23,7 @@ def checks_as_junit(checks: Sequence[CaseCheck]) -> str:
             failures += _add_test(suite, check.name, f"expected {row.quantity}", fault)
         for published in check.published:
             fault = "" if published.passed else f"newly changed: {published_words(published)}"
-            failures += _add_test(suite, check.name, f"published {published.published.quantity}", fault)
+            failures += _add_test(suite, check.name, f"published {published.quantity}", fault)
         suite.set("tests", str(len(check.expected) + len(check.published)))
         suite.set("failures", str(failures))
     ElementTree.indent(root)

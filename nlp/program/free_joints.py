@@ -5,18 +5,17 @@ bound that coincides with a constraint would share its multiplier. A joint witho
 the robot gives its unknown.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import casadi as ca
 import numpy as np
 
-from ...models import frozen_vector
+from ...models import Dimension, FloatArray, frozen_vector
 from ..case.limits.constraint import BoundedConstraint
 from ..case.pose import Free
+from ..system.jsonvalues import Hidden, JsonObject, Shown
 from .nlp import Nlp
 from .places import SymbolTable
 
@@ -32,30 +31,36 @@ class _Side(NamedTuple):
     name: str
 
 
-class FreeJoint(NamedTuple):
-    """A driven joint whose position the pose does not determine, at one pose.
+class FreeJoint(JsonObject):
+    """Position of a driven joint that the pose does not determine, at one pose: a variable of the program.
 
     Attributes:
-        variable: index of its position in ``x``.
-        joint: label, such as ``2:3``.
-        pose: index of the pose.
-        lower: smallest position, length or radians: of the limits, or where there is none, of the search.
+        name: of the variable.
+        joint: limb and place of the joint.
+        kind: ``angle`` or ``length``.
+        value: position from home.
+        lower: smallest position: of the limits on it, or where there is none, of the search.
         upper: likewise the largest.
-        limits: names of the constraints that are limits on this position alone.
-        is_limited: whether the lower and whether the upper end is a limit.
+        limits: names of the limits on it; empty where it has none.
+        lower_is_limit: whether the smallest position is a limit of the case.
+        upper_is_limit: whether the largest position is a limit of the case.
+        dimension: of the positions, in radians for an angle.
     """
 
-    variable: int
+    name: str
     joint: str
-    pose: int
-    lower: float
-    upper: float
+    kind: Literal["angle", "length"]
+    value: Shown
+    lower: Shown
+    upper: Shown
     limits: tuple[str, ...]
-    is_limited: tuple[bool, bool]
+    lower_is_limit: bool
+    upper_is_limit: bool
+    dimension: Hidden[Dimension] = Dimension.NUMBER
 
 
-def free_joints(nlp: Nlp) -> Iterator[FreeJoint]:
-    """Yield the driven joints whose positions are variables of a program, pose after pose."""
+def free_joints(nlp: Nlp, x: FloatArray) -> Iterator[FreeJoint]:
+    """Yield the driven joints whose positions at a point (n,) are variables of a program, pose after pose."""
     program = nlp.program
     if not program.model.free_joints:
         return
@@ -65,13 +70,23 @@ def free_joints(nlp: Nlp) -> Iterator[FreeJoint]:
     ]
     indices = [k for at_pose in program.places.joints for k in at_pose]
     found = _sides(bounded, [program.x, program.p], nlp.arguments.tolist(), indices)
-    for pose, at_pose in enumerate(program.places.joints):
+    for at_pose in program.places.joints:
         for k, joint in zip(at_pose, program.model.free_joints, strict=True):
             lower = [each.value for each in found[k] if not each.is_upper]
             upper = [each.value for each in found[k] if each.is_upper]
-            names = tuple(dict.fromkeys(each.name for each in found[k]))
-            ends = max(lower, default=float(nlp.lower[k])), min(upper, default=float(nlp.upper[k]))
-            yield FreeJoint(k, joint, pose, *ends, names, (bool(lower), bool(upper)))
+            dimension = program.variables[k].dimension
+            yield FreeJoint(
+                name=program.variables[k].name,
+                joint=joint,
+                kind="angle" if dimension is Dimension.ANGLE else "length",
+                value=float(x[k]),
+                lower=max(lower, default=float(nlp.lower[k])),
+                upper=min(upper, default=float(nlp.upper[k])),
+                limits=tuple(dict.fromkeys(each.name for each in found[k])),
+                lower_is_limit=bool(lower),
+                upper_is_limit=bool(upper),
+                dimension=dimension,
+            )
 
 
 def begun_at(nlp: Nlp, joints: Mapping[str, float]) -> Nlp:

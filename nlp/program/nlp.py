@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, Literal, NamedTuple, Self, TypeAlias
 
 import casadi as ca
 import numpy as np
@@ -33,6 +33,9 @@ _SMALLEST_CHANGE = 1e-8
 _POINTS = 9
 #: Rounding units by which an objective is inexact, beside its size: a few for each of its operations in a row.
 _ROUNDINGS = 16
+
+#: A side of a limit: from below, from above, or both at once.
+Bound: TypeAlias = Literal["min", "max", "equal"]
 
 
 class PairPlace(NamedTuple):
@@ -62,7 +65,7 @@ class Side:
     """
 
     name: str
-    bound: Literal["min", "max", "equal"]
+    bound: Bound
     variable: int | None = None
     constraint: int | None = None
 

@@ -6,8 +6,6 @@ unlike a sum of squares, relaxes few numbers and leaves the others unchanged, so
 contradict each other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -19,6 +17,7 @@ from ...models import Dimension, FloatArray, frozen_vector
 from ...models.values import dataclass
 from ..case.limits.constraint import Constraint, Reading
 from ..case.task import Sense
+from ..system.jsonvalues import Hidden, JsonObject, Shown
 from .nlp import Nlp, PairPlace
 from .pairs import violated_pairs, with_pairs
 from .places import Scalar
@@ -36,21 +35,22 @@ _BOUND_FACTOR = 2.0
 _LARGEST_RELAXATION = 1e3
 
 
-@dataclass(frozen=True)
-class RelaxedLimit:
-    """A limit whose number must change to make the case feasible.
+class RelaxedLimit(JsonObject):
+    """A number of an infeasible case that must be moved, with all the others of its list, for the case to be feasible.
 
     Attributes:
-        key: dotted key, below ``limits``, of the number.
-        limit: the number in the case, radians for angles.
-        needed: the nearest number with which the case is feasible, together with the other relaxed limits.
-        dimension: length, angle (radians) or plain number, of both.
+        key: dotted key, below limits, of the number.
+        limit: as it is.
+        needed: as it would have to be; where limits hold over a workspace or along a path, at least so far from it.
+        unit: of both.
+        dimension: of both, which are in radians for angles.
     """
 
     key: str
-    limit: float
-    needed: float
-    dimension: Dimension
+    limit: Shown
+    needed: Shown
+    unit: str
+    dimension: Hidden[Dimension] = Dimension.NUMBER
 
 
 @dataclass(frozen=True)
@@ -194,7 +194,9 @@ def relaxed_limits(nlp: Nlp, x: FloatArray) -> tuple[RelaxedLimit, ...]:
         side = next(each for each in sides if each.key == key)
         if t > RELAXED:
             needed = side.number + side.direction * side.unit * float(t)
-            relaxed.append(RelaxedLimit(key, side.number, needed, side.constraint.reading.dimension))
+            dimension = side.constraint.reading.dimension
+            unit = nlp.case.units.label(dimension)
+            relaxed.append(RelaxedLimit(key=key, limit=side.number, needed=needed, unit=unit, dimension=dimension))
     return tuple(relaxed)
 
 

@@ -9,8 +9,8 @@ from ..case.case import Case
 from ..case.task import Sense
 from ..proof.statement.claims import CONSTRAINTS, REGULAR
 from ..proof.workspace.verdict import Outcome
+from ..system.jsonvalues import Absent, Inline, JsonObject, Vector6, finite_or_none
 from ..units import Units
-from .jsondata import Absent, Inline, JsonObject, Vector6, finite_or_none
 from .parts import HeadData, VersionsData
 from .point import head_data, versions
 from .rounding import number

@@ -1,119 +1,13 @@
-"""Checks of cases as a result, and as lines and tables of text."""
+"""Checks of cases as lines and tables of text."""
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from .jsondata import JsonObject, Vector
-from .parts import SCHEMA, SchemaVersion
 from .regression import CaseCheck, PublishedCheck, decimals_of
 from .text import Line, TextTable, Tone, in_part
 from .wording import counted
 
 #: So many numbers that do not hold are shown in full in a short view.
 _FAULTS = 8
-
-
-class ExpectedData(JsonObject):
-    """A computed number beside the one that the case expects.
-
-    Attributes:
-        quantity: dotted path in the case's result.
-        expected: by the case.
-        computed: as the result has it; null where it has none.
-        tolerance: allowed difference.
-        passed: whether the expectation holds.
-    """
-
-    quantity: str
-    expected: float | bool | str
-    computed: object
-    tolerance: float
-    passed: bool
-
-
-class PublishedData(JsonObject):
-    """A published number beside the computed one.
-
-    Attributes:
-        quantity: dotted path in the case's result, or gain.
-        value: as printed.
-        source: place in the literature.
-        reproduced: whether the case says that the number is reproduced.
-        because: the reason, where it is not.
-        decimals: printed digits behind the point, where the value does not show them.
-        over: name of the case that a gain is over.
-        computed: the computed number; empty where there is none.
-        verdict: of the check.
-        rule: that decided, with its figures.
-        passed: whether the check confirms the case.
-    """
-
-    quantity: str
-    value: Vector
-    source: str
-    reproduced: bool
-    because: str
-    decimals: int | None
-    over: str | None
-    computed: Vector
-    verdict: str
-    rule: str
-    passed: bool
-
-
-class CaseCheckData(JsonObject):
-    """Checks of one case.
-
-    Attributes:
-        case: name of the case.
-        title: title of the case.
-        passed: whether everything holds.
-        seconds: wall time.
-        expected: numbers that the case expects.
-        published: numbers that the literature prints.
-    """
-
-    case: str
-    title: str
-    passed: bool
-    seconds: float
-    expected: tuple[ExpectedData, ...]
-    published: tuple[PublishedData, ...]
-
-
-class ChecksResult(JsonObject):
-    """Result of checking cases.
-
-    Attributes:
-        schema: version of the result's keys.
-        passed: whether everything holds.
-        cases: checks of each case.
-    """
-
-    schema: SchemaVersion
-    passed: bool
-    cases: tuple[CaseCheckData, ...]
-
-
-def checks_of(checks: Sequence[CaseCheck]) -> ChecksResult:
-    """Return the checks of several cases."""
-    return ChecksResult(
-        schema=SCHEMA,
-        passed=all(check.passed for check in checks),
-        cases=tuple(
-            CaseCheckData.of(
-                check,
-                case=check.name,
-                expected=tuple(ExpectedData.of(row) for row in check.expected),
-                published=tuple(_published_data(row) for row in check.published),
-            )
-            for check in checks
-        ),
-    )
-
-
-def _published_data(row: PublishedCheck) -> PublishedData:
-    """Return the check of a published number as data."""
-    return PublishedData.of(row.published, computed=row.computed, verdict=row.verdict, rule=row.rule, passed=row.passed)
 
 
 def checks_summary(checks: Sequence[CaseCheck]) -> Iterator[Line | TextTable]:
@@ -123,7 +17,7 @@ def checks_summary(checks: Sequence[CaseCheck]) -> Iterator[Line | TextTable]:
     published = [row for check in checks for row in check.published]
     held = sum(row.passed for check in checks for row in check.expected)
     count = f"{held} of {sum(len(check.expected) for check in checks)} expected numbers hold"
-    reproduced = sum(row.reproduced for row in published)
+    reproduced = sum(row.is_reproduced for row in published)
     words = f"; of {len(published)} published ones {reproduced} are reproduced" if published else ""
     yield Line(f"{counted(len(checks), 'case')}: {count}{words}")
     for k, fault in enumerate(faults):
@@ -134,7 +28,7 @@ def checks_summary(checks: Sequence[CaseCheck]) -> Iterator[Line | TextTable]:
 
 def _summary_row(check: CaseCheck) -> tuple[str | Line, ...]:
     """Return a case's row: its name, counts and seconds."""
-    reproduced = sum(row.reproduced for row in check.published)
+    reproduced = sum(row.is_reproduced for row in check.published)
     held = sum(row.passed for row in check.expected)
     published = f"{reproduced} reproduced, {len(check.published) - reproduced} not" if check.published else ""
     name = Line(check.name, tone=Tone.PLAIN if check.passed else Tone.NO_ANSWER)
@@ -156,9 +50,8 @@ def reproduction_table(checks: Iterable[CaseCheck]) -> TextTable:
     rows = []
     for check in checks:
         for row in check.published:
-            said = row.published
-            reason = said.because if not row.reproduced else row.rule.partition(":")[0]
-            rows.append((check.name, said.source, _quantity(row), _printed(row), _computed(row), row.verdict, reason))
+            reason = row.because if not row.is_reproduced else row.rule.partition(":")[0]
+            rows.append((check.name, row.source, _quantity(row), _printed(row), _computed(row), row.verdict, reason))
     return TextTable(("case", "where", "quantity", "printed", "computed", "verdict", "rule or reason"), tuple(rows))
 
 
@@ -166,12 +59,12 @@ def published_table(check: CaseCheck) -> TextTable:
     """Return the published numbers of one case beside the computed ones."""
     rows = [
         (
-            row.published.quantity,
-            ", ".join(f"{value:g}" for value in row.published.value),
+            row.quantity,
+            ", ".join(f"{value:g}" for value in row.value),
             ", ".join(f"{value:.7g}" for value in row.computed) or "none",
             row.verdict,
-            row.published.source,
-            row.published.because or row.rule,
+            row.source,
+            row.because or row.rule,
         )
         for row in check.published
     ]
@@ -185,25 +78,24 @@ def published_words(row: PublishedCheck) -> str:
 
 def _quantity(row: PublishedCheck) -> str:
     """Return the name of a published quantity."""
-    said = row.published
-    return said.quantity if said.over is None else f"gain over {said.over}, %"
+    return row.quantity if row.over is None else f"gain over {row.over}, %"
 
 
 def _printed(row: PublishedCheck) -> str:
     """Return a published number with the digits that were printed."""
-    return _tuple(f"{value:.{_decimals(row, value)}f}" for value in row.published.value)
+    return _tuple(f"{value:.{_decimals(row, value)}f}" for value in row.value)
 
 
 def _computed(row: PublishedCheck) -> str:
     """Return the computed number with two digits more than were printed."""
     if not row.computed:
         return "none"
-    shown = zip(row.computed, row.published.value, strict=True)
+    shown = zip(row.computed, row.value, strict=True)
     return _tuple(f"{value + 0.0:.{_decimals(row, said) + 2}f}" for value, said in shown)
 
 
 def _decimals(row: PublishedCheck, value: float) -> int:
-    return decimals_of(value) if row.published.decimals is None else row.published.decimals
+    return decimals_of(value) if row.decimals is None else row.decimals
 
 
 def _tuple(texts: Iterable[str]) -> str:

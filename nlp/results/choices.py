@@ -1,12 +1,11 @@
 """Values that were chosen: of listed numbers, and of rounded dimensions; what their search found, in words."""
 
-import math
 from typing import TYPE_CHECKING
 
 from ...models import Dimension
-from ..case.choices import chosen_settings, listed_numbers
+from ..case.choices import ChosenNumber, chosen_settings, listed_numbers
 from ..solver.status import Status
-from .jsondata import Absent, JsonObject, Vector
+from ..system.jsonvalues import JsonObject
 
 if TYPE_CHECKING:
     from ..solver.solution import Choice, Rounding, Solution
@@ -14,24 +13,6 @@ if TYPE_CHECKING:
 
 #: Part of itself by which a number may differ from its rounded one that was round before.
 _SAME = 1e-9
-
-
-class ChosenData(JsonObject):
-    """A number whose value was chosen.
-
-    Attributes:
-        name: of the number.
-        value: that was chosen.
-        unit: of its numbers.
-        values: of which one was chosen; absent for a rounded number.
-        before: value before it was rounded; else absent.
-    """
-
-    name: str
-    value: float | None
-    unit: str
-    values: Absent[Vector]
-    before: Absent[float]
 
 
 class ChoiceData(JsonObject):
@@ -45,7 +26,7 @@ class ChoiceData(JsonObject):
         statement: the same in words.
     """
 
-    numbers: tuple[ChosenData, ...]
+    numbers: tuple[ChosenNumber, ...]
     combinations: int
     solved: int
     complete: bool
@@ -68,7 +49,7 @@ class RoundingData(JsonObject):
     """
 
     step: float
-    numbers: tuple[ChosenData, ...]
+    numbers: tuple[ChosenNumber, ...]
     before: float
     loss: float | None
     relative_loss: float | None
@@ -85,13 +66,7 @@ def choice_data(solution: "Solution") -> ChoiceData | None:
         return None
     chosen = chosen_settings(case, solution.outcomes[0].own.nlp.case)
     numbers = tuple(
-        ChosenData(
-            name=each.name,
-            value=chosen[each.name],
-            unit=case.units.label(each.dimension),
-            values=tuple(case.units.shown(one, each.dimension) for one in each.values),
-            before=None,
-        )
+        ChosenNumber.of(each, case.units, value=chosen[each.name], unit=case.units.label(each.dimension), before=None)
         for each in listed_numbers(case)
     )
     return ChoiceData.of(
@@ -132,17 +107,7 @@ def rounding_data(solution: "Solution") -> RoundingData | None:
     case, rounding = solution.case, solution.rounding
     if rounding is None:
         return None
-    units, is_answer = case.units, solution.status.is_answer
-    numbers = tuple(
-        ChosenData(
-            name=each.name,
-            value=None if math.isnan(each.value) else units.shown(each.value, each.dimension),
-            unit=units.label(each.dimension),
-            values=None,
-            before=units.shown(each.before, each.dimension),
-        )
-        for each in rounding.numbers
-    )
+    is_answer = solution.status.is_answer
     decided = solution.decided_by
     sign = 1.0 if decided is None else decided.nlp.sign
     before = sign * rounding.before
@@ -150,7 +115,7 @@ def rounding_data(solution: "Solution") -> RoundingData | None:
     choice = rounding.choice
     return RoundingData(
         step=rounding.step,
-        numbers=numbers,
+        numbers=ChosenNumber.of_each(rounding.numbers, case.units),
         before=before,
         loss=loss,
         relative_loss=None if loss is None or not before else loss / abs(before),
@@ -173,7 +138,7 @@ def _rounding_statement(solution: "Solution", rounding: "Rounding") -> str:
         return f"{what}: {stopped or 'stopped before the end'}"
     if not status.is_answer:
         return f"{what}: no multiples within {rounding.farther + 1} steps were found that keep all limits"
-    if all(abs(each.value - each.before) <= _SAME * abs(each.value) for each in rounding.numbers):
+    if all(abs(each.value - (each.before or 0.0)) <= _SAME * abs(each.value) for each in rounding.numbers):
         return f"{what}: the numbers were round already"
     if rounding.choice is None:
         return f"{what}: each number has one of them near it within its bounds"

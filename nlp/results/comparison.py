@@ -8,9 +8,9 @@ from ..case.task import Sense
 from ..proof.workspace.verdict import Outcome
 from ..solver.status import Status
 from ..system.csvtext import csv_text
+from ..system.jsonvalues import Absent, JsonObject
 from ..system.strictjson import Size
 from .data import CertificateData
-from .jsondata import Absent, JsonObject
 from .parts import SchemaVersion, UnitsData, VersionsData
 from .rounding import number
 from .text import Line, TextTable, Tone

@@ -7,25 +7,18 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 from ..case.task import Method, Sense
-from ..evidence.optimality import PointKind
+from ..evidence.margins import Margin
+from ..evidence.optimality import Evidence, PointKind
+from ..evidence.sensitivity import Sensitivity
+from ..evidence.tolerance import ToleranceLoss
+from ..program.relaxation import RelaxedLimit
 from ..proof.certificate.certificate import CertificateStatus
 from ..solver.status import Status
+from ..system.jsonvalues import Absent, Inline, JsonObject, Vector
 from ..system.strictjson import Size
 from .choices import ChoiceData, RoundingData
-from .jsondata import Absent, Inline, JsonObject, Vector
 from .objective import ObjectiveData
-from .parts import (
-    Bound,
-    HeadData,
-    LimitData,
-    MarginData,
-    RelaxationData,
-    RobotData,
-    SensitivityData,
-    ToleranceData,
-    VersionsData,
-    ViolationData,
-)
+from .parts import HeadData, LimitData, RobotData, VersionsData, ViolationData
 
 if TYPE_CHECKING:
     from .path import PathProofData
@@ -42,49 +35,6 @@ class ReachedData(JsonObject):
 
     F: float | None
     violated: tuple[ViolationData, ...]
-
-
-class ActiveData(JsonObject):
-    """A bound or limit that the point lies on.
-
-    Attributes:
-        name: variable or constraint.
-        bound: side of it.
-        value: the limit.
-        unit: of the value; left out for a plain number.
-        multiplier: improvement of F per unit by which the limit is relaxed.
-    """
-
-    name: str
-    bound: Bound
-    value: float
-    unit: Absent[str]
-    multiplier: float
-
-
-class OptimalityData(JsonObject):
-    """Evidence of optimality, from the program and the point alone.
-
-    Attributes:
-        kind: of point.
-        stationarity: largest scaled derivative of the Lagrangian.
-        feasibility: largest distance outside a limit, in half ranges.
-        complementarity: largest product of a multiplier and its slack, scaled.
-        licq: whether the active normals are linearly independent.
-        active: bounds and limits that the point lies on.
-        reduced_hessian_eigenvalues: ascending; positive means that F gets worse on leaving the point.
-        flat_directions: rates of the variables along which F keeps its optimal value, that of the variable that moves
-            most in its range 1.
-    """
-
-    kind: PointKind
-    stationarity: float | None
-    feasibility: float | None
-    complementarity: float | None
-    licq: bool
-    active: tuple[ActiveData, ...]
-    reduced_hessian_eigenvalues: Vector
-    flat_directions: tuple[Mapping[str, float], ...]
 
 
 class OptimumData(JsonObject):
@@ -186,13 +136,13 @@ class SolveResult(JsonObject):
     F: float | None
     objective: Absent[ObjectiveData]
     reached: Absent[ReachedData]
-    relaxation: Absent[tuple[RelaxationData, ...]]
+    relaxation: Absent[tuple[RelaxedLimit, ...]]
     robot: Inline[RobotData | None]
-    optimality: OptimalityData | None
-    margins: tuple[MarginData, ...]
+    optimality: Evidence | None
+    margins: tuple[Margin, ...]
     limits: tuple[LimitData, ...]
-    sensitivity: Absent[tuple[SensitivityData, ...]]
-    tolerance: Absent[ToleranceData]
+    sensitivity: Absent[tuple[Sensitivity, ...]]
+    tolerance: Absent[ToleranceLoss]
     starts: StartsData
     certificate: CertificateData | None
     workspace: Absent["WorkspaceProofData"]
@@ -242,7 +192,7 @@ class CombinedPointData(JsonObject):
     """
 
     robot: Inline[RobotData | None]
-    margins: Absent[tuple[MarginData, ...]]
+    margins: Absent[tuple[Margin, ...]]
     limits: Absent[tuple[LimitData, ...]]
 
 
@@ -269,7 +219,7 @@ class CombinedData(JsonObject):
     tasks: tuple[OutcomeData, ...]
     violated: tuple[str, ...]
     notices: tuple[str, ...]
-    optimality: OptimalityData | None
+    optimality: Evidence | None
     starts: StartsData | None
     certificate: CertificateData | None
 
@@ -317,7 +267,7 @@ class CombinedResult(JsonObject):
         return None if self.combined.point is None else self.combined.point.robot
 
     @property
-    def margins(self) -> tuple[MarginData, ...]:
+    def margins(self) -> tuple[Margin, ...]:
         """Every limit at every leg, joint and pose of the combined point."""
         return () if self.combined.point is None else self.combined.point.margins or ()
 

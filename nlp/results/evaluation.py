@@ -3,14 +3,14 @@
 from collections.abc import Sequence
 
 from ...models import FloatArray
-from ..evidence.principal_motions import PrincipalMotion, analyse_tasks
+from ..evidence.margins import Margin
+from ..evidence.principal_motions import TaskAnalysis, analyse_tasks
 from ..evidence.state import RobotState
 from ..program.nlp import Nlp
+from ..system.jsonvalues import Absent, Inline, JsonObject, Vector, vector
 from .design import limits_data, margins_data
-from .jointdata import MotionData, motion_data
-from .jsondata import Absent, Inline, JsonObject, Vector, vector
 from .objective import ObjectiveData, objective_data
-from .parts import HeadData, LimitData, MarginData, RobotData, TaskData, VersionsData, ViolationData
+from .parts import HeadData, LimitData, RobotData, TaskData, VersionsData, ViolationData
 from .point import head_data, objective, robot_data, task_data, versions, violations
 
 
@@ -28,30 +28,6 @@ class EvaluatedTaskData(JsonObject):
     F: float
     rates: Vector
     task_is_free: bool
-
-
-class PrincipalMotionData(JsonObject):
-    """A motion at which F is stationary.
-
-    Attributes:
-        F: objective for it.
-        motion: of unit rotation, or a translation of unit speed.
-    """
-
-    F: float
-    motion: Inline[MotionData]
-
-
-class PrincipalMotionsData(JsonObject):
-    """Motions at which F is stationary, each three by ascending F.
-
-    Attributes:
-        rotations: among twists of unit rotation.
-        translations: among translations of unit speed.
-    """
-
-    rotations: tuple[PrincipalMotionData, ...]
-    translations: tuple[PrincipalMotionData, ...]
 
 
 class EvaluationResult(JsonObject):
@@ -76,9 +52,9 @@ class EvaluationResult(JsonObject):
     robot: Inline[RobotData]
     tasks: tuple[EvaluatedTaskData, ...]
     violated: tuple[ViolationData, ...]
-    margins: tuple[MarginData, ...]
+    margins: tuple[Margin, ...]
     limits: tuple[LimitData, ...]
-    principal_motions: PrincipalMotionsData
+    principal_motions: TaskAnalysis
     versions: VersionsData
 
 
@@ -91,7 +67,6 @@ def evaluation_of(nlps: Sequence[Nlp], x: FloatArray, states: Sequence[RobotStat
         states: the robot there with each task's rates, in order.
     """
     nlp, case = nlps[0], nlps[0].case
-    analysis = analyse_tasks(states[0].jacobian)
     margins = margins_data(nlp, x, optimal=False)
     return EvaluationResult(
         head=head_data(case),
@@ -111,14 +86,6 @@ def evaluation_of(nlps: Sequence[Nlp], x: FloatArray, states: Sequence[RobotStat
         violated=violations(nlp, x),
         margins=margins,
         limits=limits_data(margins),
-        principal_motions=PrincipalMotionsData(
-            rotations=tuple(_principal(each) for each in analysis.rotations),
-            translations=tuple(_principal(each) for each in analysis.translations),
-        ),
+        principal_motions=analyse_tasks(states[0].jacobian),
         versions=versions(),
     )
-
-
-def _principal(motion: PrincipalMotion) -> PrincipalMotionData:
-    """Return a motion at which F is stationary as data."""
-    return PrincipalMotionData(F=motion.F, motion=motion_data(motion.twist))

@@ -11,10 +11,9 @@ from ..case.task import Sense
 from ..evidence.optimality import Evidence
 from ..program.nlp import Nlp
 from ..proof.certificate.certificate import Certificate
+from ..system.jsonvalues import Absent, Inline, JsonObject
 from .choices import ChoiceData, choice_data
-from .data import ActiveData, CertificateData, OptimalityData
-from .design import unit_of_side
-from .jsondata import Absent, Inline, JsonObject, vector
+from .data import CertificateData
 from .objective import ObjectiveData, certified_objective
 from .parts import HeadData, VersionsData
 from .point import head_data, stated_pose_notice, versions
@@ -23,25 +22,11 @@ if TYPE_CHECKING:
     from ..solver.certified import Certified
 
 
-def optimality_data(nlp: Nlp, evidence: Evidence | None) -> OptimalityData | None:
+def optimality_of(nlp: Nlp, evidence: Evidence | None) -> Evidence | None:
     """Return the evidence about a point of a program in the case's units; None without any."""
     if evidence is None:
         return None
-    units = nlp.case.units
-    return OptimalityData.of(
-        evidence,
-        active=tuple(
-            ActiveData.of(
-                side,
-                value=units.shown(side.value, side.dimension),
-                unit=unit_of_side(nlp.case, side.name, side.dimension) or None,
-                multiplier=multiplier,
-            )
-            for side, multiplier in zip(evidence.active, evidence.multipliers_in(units), strict=True)
-        ),
-        reduced_hessian_eigenvalues=vector(evidence.eigenvalues),
-        flat_directions=tuple(_flat(nlp, direction) for direction in evidence.flat),
-    )
+    return Evidence.of(evidence, nlp.case.units, flat=tuple(_flat(nlp, direction) for direction in evidence.flat))
 
 
 def _flat(nlp: Nlp, direction: Mapping[str, float]) -> Mapping[str, float]:

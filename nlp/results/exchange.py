@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
-from .jsondata import Absent, JsonObject
+from ..system.jsonvalues import Absent, JsonObject
 from .verdicts import WorkspacePose, pose_data
 
 if TYPE_CHECKING:

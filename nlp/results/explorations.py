@@ -6,8 +6,8 @@ from typing import TypeAlias
 from ..case.task import Sense
 from ..evidence.optimality import PointKind
 from ..solver.status import Status
+from ..system.jsonvalues import Absent, Inline, JsonObject, Vector
 from .data import CertificateData
-from .jsondata import Absent, Inline, JsonObject, Vector
 from .parts import HeadData, VersionsData
 
 

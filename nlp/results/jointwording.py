@@ -13,11 +13,13 @@ from .rounding import NOISE, number, robot_size, settled
 from .text import Figure, Line, TextTable, Tone
 
 if TYPE_CHECKING:
-    from .jointdata import JointsData, MotionData, SingularityData, WrenchData
+    from ..evidence.screwvalues import ScrewMotion, ScrewWrench
+    from ..evidence.singularities import Singularity
+    from .jointdata import JointsData
     from .parts import RobotData
 
 
-def motion_words(motion: MotionData, units: Units, size: float = 0.0, part: float = NOISE) -> str:
+def motion_words(motion: ScrewMotion, units: Units, size: float = 0.0, part: float = NOISE) -> str:
     """Return a motion in words: its axis, point and pitch.
 
     Args:
@@ -32,14 +34,14 @@ def motion_words(motion: MotionData, units: Units, size: float = 0.0, part: floa
     return f"{screw_words(motion, units, reach, part)} through {triple(motion.point, reach)}"
 
 
-def screw_words(motion: MotionData, units: Units, size: float, part: float = NOISE) -> str:
+def screw_words(motion: ScrewMotion, units: Units, size: float, part: float = NOISE) -> str:
     """Return pitch and axis of a motion that is no translation; other arguments are those of :func:`motion_words`."""
     pitch = settled(0.0 if motion.pitch == "inf" else motion.pitch, size, part)
     words = f"screw of pitch {pitch:.5g} {units.length}" if pitch else "rotation"
     return f"{words} about {triple(motion.axis, 1.0)}"
 
 
-def reach_of(motion: MotionData, size: float) -> float:
+def reach_of(motion: ScrewMotion, size: float) -> float:
     """Return the length beside which a motion's point and pitch have rounding error: |v| / |omega| at least."""
     omega, v = math.hypot(*motion.twist[:3]), math.hypot(*motion.twist[3:])
     return max(size, v / omega if omega else 0.0)
@@ -50,7 +52,7 @@ def triple(values: Sequence[float], size: float) -> str:
     return f"({', '.join(number(value, size, digits=4) for value in values)})"
 
 
-def wrench_words(wrench: WrenchData, units: Units, size: float) -> str:
+def wrench_words(wrench: ScrewWrench, units: Units, size: float) -> str:
     """Return a wrench in words; the arguments are those of :func:`motion_words`."""
     if wrench.point is None or wrench.pitch == "inf":
         return f"couple about {triple(wrench.axis, 1.0)}"
@@ -144,14 +146,14 @@ def limb_part_table(case: Case, robot: RobotData) -> TextTable | None:
     total = sum(each.F for each in parts)
     rows = []
     for each in parts:
-        share = 100 * each.constraints / total if total > 0 else 0.0
-        cells = (number(each.F, total), number(each.actuation, total), number(each.constraints, total))
+        share = 100 * each.constraint / total if total > 0 else 0.0
+        cells = (number(each.F, total), number(each.actuation, total), number(each.constraint, total))
         rows.append((each.limb, *cells, Figure(f"{share:.3g}", share)))
     headers = ("limb", f"F\n{unit}", f"actuation\n{unit}", f"constraints\n{unit}", "constraints\n% of F")
     return TextTable(headers, tuple(rows), "actuation", "actuation and constraints by limb")
 
 
-def _singularity_lines(each: SingularityData, robot: RobotData, units: Units) -> Iterator[Line]:
+def _singularity_lines(each: Singularity, robot: RobotData, units: Units) -> Iterator[Line]:
     """Yield a singularity, then the motions gained, or the wrenches that lock motions."""
     yield Line(f"singular: {each.words}", tone=Tone.CAUTION)
     size = robot_size(robot)

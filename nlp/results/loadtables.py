@@ -11,7 +11,7 @@ from .rounding import number, robot_size
 from .text import TextTable
 
 if TYPE_CHECKING:
-    from .loaddata import ActuatorSpeedData, LoadData
+    from ..evidence.loads import HeldLoad, TopSpeed
     from .parts import RobotData
 
 
@@ -30,7 +30,7 @@ def loading_tables(case: Case, robot: RobotData) -> Iterator[TextTable]:
         yield TextTable((*_pose_header(data.speeds), "actuator", "speed", "unit"), tuple(rows), "speeds")
 
 
-def _force_table(case: Case, loads: Sequence[LoadData]) -> TextTable:
+def _force_table(case: Case, loads: Sequence[HeldLoad]) -> TextTable:
     """Return the force of every actuator under every load."""
     every = [row for load in loads for row in load.actuators]
     size = max((abs(row.value or 0.0) for row in every), default=0.0)
@@ -49,7 +49,7 @@ def _force_table(case: Case, loads: Sequence[LoadData]) -> TextTable:
     return TextTable(headers, tuple(rows), "forces")
 
 
-def _constraint_table(case: Case, loads: Sequence[LoadData], length: float) -> Iterator[TextTable]:
+def _constraint_table(case: Case, loads: Sequence[HeldLoad], length: float) -> Iterator[TextTable]:
     """Yield the wrenches by which the constraints of limbs hold the loads, where statics determines one of them.
 
     They are what is left of the load, which actuators may hold alone: their rounding is a part of it, of its moments
@@ -72,7 +72,7 @@ def _constraint_table(case: Case, loads: Sequence[LoadData], length: float) -> I
         yield TextTable(headers, tuple(rows), "constraints", "wrenches of the limbs' constraints on the platform")
 
 
-def _deflection_table(case: Case, loads: Sequence[LoadData], length: float) -> Iterator[TextTable]:
+def _deflection_table(case: Case, loads: Sequence[HeldLoad], length: float) -> Iterator[TextTable]:
     """Yield the platform's displacement under every load, where the actuators' stiffness is known.
 
     Its rounding is a part of it: of its turn also that of the translation by so much with the robot's ``length`` as an
@@ -102,9 +102,9 @@ def _text(value: float | None, size: float = 0.0, *, signed: bool = False) -> st
     return "none" if value is None else number(value, size, digits=6, signed=signed)
 
 
-def _pose(row: LoadData | ActuatorSpeedData) -> tuple[str, ...]:
+def _pose(row: HeldLoad | TopSpeed) -> tuple[str, ...]:
     return () if row.pose is None else (str(row.pose),)
 
 
-def _pose_header(rows: Sequence[LoadData | ActuatorSpeedData]) -> tuple[str, ...]:
+def _pose_header(rows: Sequence[HeldLoad | TopSpeed]) -> tuple[str, ...]:
     return ("pose",) if any(row.pose is not None for row in rows) else ()

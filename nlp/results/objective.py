@@ -11,8 +11,8 @@ from ..case.limits.objective import ObjectiveLimit
 from ..case.task import Sense
 from ..evidence.loads import PoseLoads, largest_of
 from ..proof.certificate.certificate import Certificate
+from ..system.jsonvalues import Absent, JsonObject, finite_or_none
 from ..units import objective_unit
-from .jsondata import Absent, JsonObject, finite_or_none
 
 if TYPE_CHECKING:
     from ..proof.workspace.judgement import Judgement

@@ -5,27 +5,27 @@ Numbers are in the case's units. Nothing is ever NaN or infinite, but an infinit
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Final, Literal, TypeAlias
+from typing import Final, Literal, TypeAlias
 
 from ..case.overrides import Settings
 from ..case.pose import OverPoses
 from ..case.task import Sense
-from ..system.strictjson import Size
-from .jointdata import FreeJointData, JointsData, MotionData
-from .jsondata import Absent, Inline, JsonObject, Vector, Vector3, Vector6
-from .loaddata import LoadingData
+from ..evidence.loads import ActuatorLoading
+from ..evidence.screwvalues import ScrewMotion
+from ..evidence.state import PlatformPose
+from ..program.free_joints import FreeJoint
+from ..program.nlp import Bound
+from ..system.jsonvalues import Absent, Inline, JsonObject, Known, Vector, Vector3, Vector6
+from .jointdata import JointsData
 
 #: Version of a result, the newest of :data:`screwsynth.models.fileversions.RESULT_FILES`.
 SchemaVersion: TypeAlias = Literal[1]
 SCHEMA: Final = 1
 
-#: A side of a limit: from below, from above, or both at once.
-Bound: TypeAlias = Literal["min", "max", "equal"]
 #: Values of a quantity by the limb or joint that has it.
 ByOwner: TypeAlias = Mapping[str, float]
 #: Numbers that replace those of a case file, by the names of ``--set``; an infinite one is a text.
 SettingsData: TypeAlias = Mapping[str, float | Vector | Literal["inf", "-inf"]]
-RotationMatrix: TypeAlias = Annotated[tuple[Vector3, ...], Size(3)]
 Jacobian: TypeAlias = tuple[Vector6, ...]
 
 
@@ -86,22 +86,6 @@ class VersionsData(JsonObject):
     python: str
 
 
-class PoseData(JsonObject):
-    """A pose of the platform.
-
-    Attributes:
-        position: of the platform's origin, in the world frame.
-        axis: unit axis of the rotation.
-        angle: of the rotation about the axis.
-        rotation_matrix: rows of the rotation matrix.
-    """
-
-    position: Vector3
-    axis: Vector3
-    angle: float
-    rotation_matrix: RotationMatrix
-
-
 class TaskData(JsonObject):
     """A task of the case.
 
@@ -114,7 +98,7 @@ class TaskData(JsonObject):
 
     name: str
     sense: Sense
-    motion: Inline[MotionData]
+    motion: Inline[ScrewMotion]
     stated_point: Absent[Vector3]
 
 
@@ -136,7 +120,7 @@ class PoseStateData(JsonObject):
     """
 
     F: float
-    pose: PoseData
+    pose: PlatformPose
     jacobian: Jacobian
     rates: Vector
     rank: int
@@ -155,7 +139,7 @@ class PosesData(JsonObject):
         poses: the robot at every pose.
     """
 
-    stated_poses: tuple[PoseData, ...]
+    stated_poses: tuple[PlatformPose, ...]
     over_poses: OverPoses
     poses: tuple[PoseStateData, ...]
 
@@ -190,7 +174,7 @@ class RobotData(JsonObject):
     """
 
     parameters: Mapping[str, float | Vector]
-    pose: PoseData
+    pose: PlatformPose
     task: Absent[TaskData]
     limbs: tuple[str, ...]
     members: tuple[str, ...]
@@ -199,15 +183,15 @@ class RobotData(JsonObject):
     rank: int
     singular: bool
     singular_values: Vector
-    free_motions: tuple[MotionData, ...]
+    free_motions: tuple[ScrewMotion, ...]
     task_is_free: Absent[bool]
     quantities: Mapping[str, ByOwner]
     limited_quantities: Absent[Mapping[str, ByOwner]]
     characteristic_length: Absent[float]
     length_dependence: Absent[float]
     joints: Absent[JointsData]
-    free_joints: Absent[tuple[FreeJointData, ...]]
-    loading: Inline[LoadingData | None]
+    free_joints: Absent[tuple[FreeJoint, ...]]
+    loading: Inline[ActuatorLoading | None]
     several: Inline[PosesData | None]
 
 
@@ -229,34 +213,6 @@ class ViolationData(JsonObject):
     unit: Absent[str]
 
 
-class MarginData(JsonObject):
-    """Margin of a point in a limit at one leg, joint or pose.
-
-    Attributes:
-        name: the limit, and where.
-        key: dotted key, below limits, of the number in the case.
-        bound: side of it.
-        value: measured there; null where it is not finite.
-        limit: number of the case.
-        margin: distance from the limit, positive inside.
-        unit: of value, limit and margin.
-        active: whether the point lies on the limit.
-        violated: whether the point lies outside of the limit by more than rounding error.
-        cost: derivative of the optimal F by the limit; null where the point is no optimum.
-    """
-
-    name: str
-    key: str
-    bound: Bound
-    value: float | None
-    limit: float
-    margin: float | None
-    unit: str
-    active: bool
-    violated: bool
-    cost: float | None
-
-
 class LimitData(JsonObject):
     """A limiting number of the case, over all legs, joints and poses.
 
@@ -276,72 +232,8 @@ class LimitData(JsonObject):
     limit: float
     unit: str
     nearest: str
-    value: float | None
-    margin: float | None
+    value: Known
+    margin: Known
     active: tuple[str, ...]
     violated: tuple[str, ...]
     cost: float | None
-
-
-class RelaxationData(JsonObject):
-    """A number of an infeasible case that must be moved, with all the others of its list, for the case to be feasible.
-
-    Attributes:
-        key: dotted key, below limits, of the number.
-        limit: as it is.
-        needed: as it would have to be; where limits hold over a workspace or along a path, at least so far from it.
-        unit: of both.
-    """
-
-    key: str
-    limit: float
-    needed: float
-    unit: str
-
-
-class SensitivityData(JsonObject):
-    """Sensitivity of the optimal F to a fixed number.
-
-    Attributes:
-        name: of the number.
-        value: of the number.
-        unit: of the value.
-        derivative: of the optimal F by the number; absent where there is none.
-        hindrance: why there is none, in words.
-    """
-
-    name: str
-    value: float
-    unit: str
-    derivative: Absent[float]
-    hindrance: Absent[str]
-
-
-class JointGradientData(JsonObject):
-    """Derivatives of F by the error of a joint centre.
-
-    Attributes:
-        limb: of the joint.
-        plate: base or platform.
-        gradient: in the plate's frame.
-    """
-
-    limb: str
-    plate: str
-    gradient: Vector3
-
-
-class ToleranceData(JsonObject):
-    """Loss of F by inexact joint centres.
-
-    Attributes:
-        joint_centre: largest error of every joint centre.
-        loss: worst loss of F, to first order.
-        loss_there: loss of F with the errors that are worst to first order.
-        joints: derivatives of F by each joint's error.
-    """
-
-    joint_centre: float
-    loss: float
-    loss_there: float
-    joints: tuple[JointGradientData, ...]

@@ -11,8 +11,8 @@ from ...models.statics import driven_joints
 from ..case.pathfile import PLACE
 from ..case.task import Sense
 from ..proof.statement.claims import ACTUATED
+from ..system.jsonvalues import Absent, Inline, JsonObject
 from .exchange import ExchangeData, exchange_fields
-from .jsondata import Absent, Inline, JsonObject
 from .parts import HeadData, SettingsData, VersionsData, settings_data
 from .pathtable import knot_motion
 from .point import head_data, versions

@@ -11,27 +11,26 @@ from types import MappingProxyType
 import casadi as ca
 import numpy as np
 
-from ...models import Dimension, FloatArray, Quantity
+from ...models import FloatArray, Quantity
 from .. import __version__
 from ..case.case import Case
 from ..case.loads import NO_LOADING
 from ..evidence.conventions import dependence_of
 from ..evidence.kkt import FEASIBLE, linearise
-from ..evidence.loads import loads_at
-from ..evidence.margins import measured_numbers, measured_slack
-from ..evidence.state import RobotState, StatedPose, evaluate, stated_poses
+from ..evidence.loads import loading_of, loads_at
+from ..evidence.margins import measured_numbers, measured_slack, unit_of_side
+from ..evidence.screwvalues import motion_of
+from ..evidence.state import PlatformPose, RobotState, evaluate, stated_poses
+from ..program.free_joints import FreeJoint, free_joints
 from ..program.nlp import Nlp
 from ..program.pairs import with_pairs_at
-from .design import unit_of_side
-from .jointdata import free_joints_data, joints_data, motion_data
-from .jsondata import Vector, matrix, vector
-from .loaddata import loading_data
+from ..system.jsonvalues import Vector, vector
+from .jointdata import joints_data
 from .objective import pose_objective
 from .parts import (
     SCHEMA,
     ByOwner,
     HeadData,
-    PoseData,
     PosesData,
     PoseStateData,
     RobotData,
@@ -95,15 +94,15 @@ def robot_data(nlp: Nlp, x: FloatArray, state: RobotState, task: int | None) -> 
         members=tuple(row.member for row in case.model.rows),
         rates=None if task is None else vector(state.rates),
         singular=state.is_singular,
-        free_motions=tuple(motion_data(twist) for twist in state.free_twists),
+        free_motions=tuple(motion_of(twist) for twist in state.free_twists),
         task_is_free=None if task is None else state.is_zero,
         quantities=_quantities(case, state),
         limited_quantities=limited[0] if limited else None,
         characteristic_length=case.characteristic_length if case.model.has_couples else None,
         length_dependence=None if dependence is None else dependence.length,
         joints=joints_data(nlp, x, state, dependence, with_task=task is not None),
-        free_joints=free_joints_data(nlp, x),
-        loading=loading_data(nlp, x, state) if case.loading != NO_LOADING else None,
+        free_joints=FreeJoint.of_each(free_joints(nlp, x), case.units) or None,
+        loading=loading_of(nlp, x, state) if case.loading != NO_LOADING else None,
         several=several,
     )
 
@@ -160,15 +159,11 @@ def _pose_state(nlp: Nlp, x: FloatArray, k: int, limited: Mapping[str, ByOwner] 
     )
 
 
-def pose_data(case: Case, pose: RobotState | StatedPose) -> PoseData:
+def pose_data(case: Case, pose: RobotState | PlatformPose) -> PlatformPose:
     """Return a pose in the case's units; without rotation its axis is z, unless the case holds another one."""
     is_held = any(each.rotation.axis is not None for each in case.poses)
-    return PoseData(
-        position=vector(pose.position),
-        axis=vector(pose.axis) if is_held or abs(pose.angle) > TURNED else (0.0, 0.0, 1.0),
-        angle=case.units.shown(pose.angle, Dimension.ANGLE),
-        rotation_matrix=matrix(pose.rotation),
-    )
+    unturned = {} if is_held or abs(pose.angle) > TURNED else {"axis": (0.0, 0.0, 1.0)}
+    return PlatformPose.of(pose, case.units, **unturned)
 
 
 def task_data(case: Case, task: int) -> TaskData:
@@ -176,7 +171,7 @@ def task_data(case: Case, task: int) -> TaskData:
     chosen = case.tasks[task]
     return TaskData.of(
         chosen,
-        motion=motion_data(chosen.twist),
+        motion=motion_of(chosen.twist),
         stated_point=None if chosen.point is None else vector(np.asarray(chosen.point, dtype=np.float64)),
     )
 

@@ -12,13 +12,10 @@ two rules, and no other:
 A number that a case marks reproduced and that is not, or the other way round, is *newly changed*, and fails the check.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Annotated, TypeAlias
 
 from ...models import component_names
 from ..case.case import Case
@@ -31,9 +28,9 @@ from ..interruption import Milestone, is_requested, reached
 from ..program.formulation import formulate_each
 from ..solver.multistart import solve_program
 from ..solver.solve import solve
+from ..system.jsonvalues import JsonObject, JsonValue, Key, Vector, json_data
 from .data import CaseResult
-from .jsondata import JsonValue, json_data
-from .parts import RobotData
+from .parts import SCHEMA, RobotData, SchemaVersion
 from .result import result_of
 
 #: A result as JSON's own types.
@@ -44,68 +41,96 @@ FLAT = 1e-5
 _STARTS = 8
 
 
-@dataclass(frozen=True)
-class ExpectedCheck:
-    """A computed number beside the one that the case expects."""
+class ExpectedCheck(JsonObject):
+    """A computed number beside the one that the case expects.
+
+    Attributes:
+        quantity: dotted path in the case's result.
+        expected: by the case.
+        computed: as the result has it; null where it has none.
+        tolerance: allowed difference.
+        passed: whether the expectation holds.
+    """
 
     quantity: str
     expected: float | bool | str
-    computed: JsonValue
+    computed: object
     tolerance: float
     passed: bool
 
 
-@dataclass(frozen=True)
-class PublishedCheck:
+class PublishedCheck(JsonObject):
     """A published number beside the computed one.
 
     Attributes:
-        published: the printed number, and how the case marks it.
-        computed: components of the computed number, empty when there is none.
-        reproduced: whether a rule finds it reproduced.
-        rule: the rule that decided, with its figures.
+        quantity: dotted path in the case's result, or gain.
+        value: as printed.
+        source: place in the literature.
+        reproduced: whether the case says that the number is reproduced.
+        because: the reason, where it is not.
+        decimals: printed digits behind the point, where the value does not show them.
+        over: name of the case that a gain is over.
+        computed: the computed number; empty where there is none.
+        verdict: of the check.
+        rule: that decided, with its figures.
+        passed: whether the check confirms the case.
     """
 
-    published: Published
-    computed: tuple[float, ...]
+    quantity: str
+    value: Vector
+    source: str
     reproduced: bool
+    because: str
+    decimals: int | None
+    over: str | None
+    computed: Vector
+    verdict: str
     rule: str
+    passed: bool
 
     @property
-    def passed(self) -> bool:
-        """Whether the number is reproduced where the case marks it so, and only there."""
-        return self.reproduced == self.published.reproduced
-
-    @property
-    def verdict(self) -> str:
-        """``reproduced``, ``not reproduced``, or ``newly changed``."""
-        if not self.passed:
-            return "newly changed"
-        return "reproduced" if self.reproduced else "not reproduced"
+    def is_reproduced(self) -> bool:
+        """Whether a rule finds the number reproduced."""
+        return self.passed == self.reproduced
 
 
-@dataclass(frozen=True)
-class CaseCheck:
-    """Checks of a case.
+class CaseCheck(JsonObject):
+    """Checks of one case.
 
     Attributes:
         name: name of the case.
-        title: its title.
-        expected: checks of its expected numbers.
-        published: checks of its published numbers.
-        seconds: wall time of the solve.
+        title: title of the case.
+        passed: whether everything holds.
+        seconds: wall time.
+        expected: numbers that the case expects.
+        published: numbers that the literature prints.
     """
 
-    name: str
+    name: Annotated[str, Key("case")]
     title: str
+    passed: bool
+    seconds: float
     expected: tuple[ExpectedCheck, ...]
     published: tuple[PublishedCheck, ...]
-    seconds: float
 
-    @property
-    def passed(self) -> bool:
-        """Whether everything holds."""
-        return all(row.passed for row in self.expected) and all(row.passed for row in self.published)
+
+class ChecksResult(JsonObject):
+    """Result of checking cases.
+
+    Attributes:
+        schema: version of the result's keys.
+        passed: whether everything holds.
+        cases: checks of each case.
+    """
+
+    schema: SchemaVersion
+    passed: bool
+    cases: tuple[CaseCheck, ...]
+
+
+def checks_of(checks: Sequence[CaseCheck]) -> ChecksResult:
+    """Return the checks of several cases."""
+    return ChecksResult(schema=SCHEMA, passed=all(check.passed for check in checks), cases=tuple(checks))
 
 
 def check(names: Sequence[str] | None = None) -> list[CaseCheck]:
@@ -145,12 +170,15 @@ def check_case(name: str, solved: dict[str, CaseResult] | None = None) -> CaseCh
     case = load_case(name)
     result = _result_for(name, solved, case)
     data = json_data(result)
+    expected = tuple(_check_expected(case, result, data))
+    published = tuple(_check_published(name, case, row, result, data, solved) for row in case.published)
     return CaseCheck(
         name=case.name,
         title=case.title,
-        expected=tuple(_check_expected(case, result, data)),
-        published=tuple(_check_published(name, case, row, result, data, solved) for row in case.published),
+        passed=all(row.passed for row in expected) and all(row.passed for row in published),
         seconds=time.perf_counter() - began,
+        expected=expected,
+        published=published,
     )
 
 
@@ -170,19 +198,25 @@ def _result_for(name: str, solved: dict[str, CaseResult], case: Case | None = No
 
 def _check_expected(case: Case, result: CaseResult, data: JsonData) -> list[ExpectedCheck]:
     """Return the expected numbers of a case beside the computed ones, its status first."""
-    expect = case.expect
-    rows = [ExpectedCheck("status", "an answer", result.status.value, 0.0, result.status.is_answer)]
+    expect, rows = case.expect, list[ExpectedCheck]()
+
+    def add(quantity: str, expected: float | bool | str, computed: object, tolerance: float, *, passed: bool) -> None:
+        rows.append(
+            ExpectedCheck(quantity=quantity, expected=expected, computed=computed, tolerance=tolerance, passed=passed)
+        )
+
+    add("status", "an answer", result.status.value, 0.0, passed=result.status.is_answer)
     if expect.F is not None:
         F = _number(data, "F")
         off = math.inf if F is None else abs(F - expect.F)
-        rows.append(ExpectedCheck("F", expect.F, F, expect.tolerance, off <= expect.tolerance * (abs(expect.F) or 1.0)))
+        add("F", expect.F, F, expect.tolerance, passed=off <= expect.tolerance * (abs(expect.F) or 1.0))
     if expect.singular is not None:
         singular = _lookup(data, "singular" if "F" in data else "combined.singular")
-        rows.append(ExpectedCheck("singular", expect.singular, singular, 0.0, singular == expect.singular))
+        add("singular", expect.singular, singular, 0.0, passed=singular == expect.singular)
     for row in expect.values:
         value = _lookup(data, row.quantity)
         near = isinstance(value, float | int) and abs(value - row.value) <= row.within
-        rows.append(ExpectedCheck(row.quantity, row.value, value, row.within, near))
+        add(row.quantity, row.value, value, row.within, passed=near)
     return rows
 
 
@@ -227,7 +261,7 @@ def _check_published(
         over, F = _number(json_data(_result_for(row.over, solved)), "F"), _number(data, "F")
         computed = (100 * (F - over) / over,) if F is not None and over else ()
     if not result.status.is_answer:
-        return PublishedCheck(row, (), False, f"the case has no answer: it is {result.status.value}")
+        return _published(row, (), f"the case has no answer: it is {result.status.value}", found=False)
     if len(computed) != len(row.value):
         source = case.source or name
         fault = f"is no number of this result with {len(row.value)} components"
@@ -235,11 +269,18 @@ def _check_published(
     halves = [0.5 * 10.0 ** -(decimals_of(value) if row.decimals is None else row.decimals) for value in row.value]
     off = max(abs(c - v) / h for c, v, h in zip(computed, row.value, halves, strict=True))
     if off <= 1 + 1e-9:
-        return PublishedCheck(row, computed, True, "digits")
+        return _published(row, computed, "digits", found=True)
     flat = _flat_difference(name, case, row, result)
     if flat is None:
-        return PublishedCheck(row, computed, False, "digits")
-    return PublishedCheck(row, computed, flat <= FLAT, f"flat: F is off its best by {flat:.1e}")
+        return _published(row, computed, "digits", found=False)
+    return _published(row, computed, f"flat: F is off its best by {flat:.1e}", found=flat <= FLAT)
+
+
+def _published(row: Published, computed: tuple[float, ...], rule: str, *, found: bool) -> PublishedCheck:
+    """Return the check of a published number, which a rule finds reproduced or not."""
+    passed = found == row.reproduced
+    verdict = "newly changed" if not passed else "reproduced" if found else "not reproduced"
+    return PublishedCheck.of(row, computed=computed, verdict=verdict, rule=rule, passed=passed)
 
 
 def decimals_of(value: float) -> int:

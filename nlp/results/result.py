@@ -8,10 +8,13 @@ from collections.abc import Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from ..evidence.sensitivity import Sensitivity, sensitivities
+from ..program.relaxation import RelaxedLimit
 from ..proof.certificate.certificate import Certificate
 from ..solver.multistart import ProgramSolution
 from ..solver.solution import Combination, Solution, TaskOutcome
 from ..solver.starts import Optimum, StartStatus
+from ..system.jsonvalues import finite_or_none, vector
 from .choices import ChoiceData, RoundingData, choice_data, rounding_data
 from .data import (
     CaseResult,
@@ -24,9 +27,8 @@ from .data import (
     SolveResult,
     StartsData,
 )
-from .design import limits_data, margins_data, relaxation_data, sensitivity_data, tolerance_data
-from .evidence import certificate_data, optimality_data
-from .jsondata import finite_or_none, vector
+from .design import limits_data, margins_data, tolerance_loss_of
+from .evidence import certificate_data, optimality_of
 from .objective import objective_data, over_workspace
 from .point import head_data, objective, robot_data, versions, violations
 
@@ -72,13 +74,13 @@ def task_result(
         F=objective(nlp, x, state) if solved else None,
         objective=objective_data(nlp.case, value if solved else None, certificate),
         reached=None if answer else ReachedData(F=finite_or_none(nlp.evaluate(x)[0]), violated=violations(nlp, x)),
-        relaxation=relaxation_data(nlp, solution.relaxation),
+        relaxation=RelaxedLimit.of_each(solution.relaxation, nlp.case.units) or None,
         robot=None if state is None else robot_data(nlp, x, state, task),
-        optimality=optimality_data(nlp, solution.evidence),
+        optimality=optimality_of(nlp, solution.evidence),
         margins=margins,
         limits=limits_data(margins),
-        sensitivity=sensitivity_data(nlp, x) if solved else None,
-        tolerance=tolerance_data(nlp, x) if solved else None,
+        sensitivity=Sensitivity.of_each(sensitivities(nlp, x), nlp.case.units) if solved else None,
+        tolerance=tolerance_loss_of(nlp, x) if solved else None,
         starts=starts_data(solution),
         certificate=certificate_data(certificate),
         workspace=None if workspace is None else _proof_data(workspace),
@@ -149,7 +151,7 @@ def combined_result(
             method_point=point if solution.all_solved else None,
             reached=None if solution.all_solved else point,
             tasks=tuple(_outcome(outcome, is_answer=solution.all_solved) for outcome in solution.outcomes),
-            optimality=None if combined is None else optimality_data(combined.nlp, combined.evidence),
+            optimality=None if combined is None else optimality_of(combined.nlp, combined.evidence),
             starts=None if combined is None else starts_data(combined),
             certificate=certificate_data(combined_certificate),
         ),

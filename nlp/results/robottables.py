@@ -33,9 +33,12 @@ from .rounding import (
 from .text import FEWEST_FOLDED, Figure, TextTable
 
 if TYPE_CHECKING:
-    from .data import ActiveData, CombinedData, SolveResult
-    from .jointdata import FreeJointData
-    from .parts import ByOwner, PoseData, PosesData, PoseStateData, RobotData, SensitivityData, TaskData
+    from ..evidence.optimality import ActiveSide
+    from ..evidence.sensitivity import Sensitivity
+    from ..evidence.state import PlatformPose
+    from ..program.free_joints import FreeJoint
+    from .data import CombinedData, SolveResult
+    from .parts import ByOwner, PosesData, PoseStateData, RobotData, TaskData
 
 #: So many fixed numbers are shown where others are free; those that F feels most, where that is known.
 _FIXED = 6
@@ -79,12 +82,12 @@ class _Reasons:
     """
 
     def __init__(
-        self, units: Units, size: float, F: float, active: Sequence[ActiveData], sensitivity: Sequence[SensitivityData]
+        self, units: Units, size: float, F: float, active: Sequence[ActiveSide], sensitivity: Sequence[Sensitivity]
     ) -> None:
         self._units, self._size, self._F = units, size, F
         # Variables' bounds come first among the active ones, so that a constraint of the same name hides none of them.
         self._active = {side.name: side for side in reversed(active)}
-        self._fixed: Mapping[str, SensitivityData] = {row.name: row for row in sensitivity}
+        self._fixed: Mapping[str, Sensitivity] = {row.name: row for row in sensitivity}
         self.any = bool(active or sensitivity)
 
     def row(
@@ -122,7 +125,7 @@ class _Reasons:
             cost = settled(side.multiplier, self._F / ((upper - lower) or 1.0))
             why = f"{side.bound}, {cost:.4g} {slope_unit(label)}"
         elif fixed is not None and fixed.derivative is None:
-            why = f"{held}: {fixed.hindrance}"
+            why = "" if fixed.hindrance is None else f"{held}: {fixed.hindrance.value}"
         elif fixed is not None and fixed.derivative is not None:
             natural = {Dimension.LENGTH: self._size, Dimension.ANGLE: self._units.shown(1.0, dimension)}
             size = max(abs(value), natural.get(dimension, 1.0))
@@ -147,8 +150,8 @@ def design_table(
     robot: RobotData,
     *,
     reached: bool = False,
-    active: Sequence[ActiveData] = (),
-    sensitivity: Sequence[SensitivityData] = (),
+    active: Sequence[ActiveSide] = (),
+    sensitivity: Sequence[Sensitivity] = (),
     F: float | None = None,
 ) -> TextTable:
     """Return every dimension and the pose: value, unit, the range it was free in, and the limit that holds it.
@@ -190,7 +193,7 @@ def design_table(
     return TextTable(headers, cells, "design", folded=folded, folded_words=words, named=named)
 
 
-def _pose_rows(case: Case, k: int, found: PoseData, reasons: _Reasons) -> list[_Row]:
+def _pose_rows(case: Case, k: int, found: PlatformPose, reasons: _Reasons) -> list[_Row]:
     """Return the rows of a stated pose: position, and rotation in the form in which the case states it."""
     prefix, pose = case.pose_prefixes[k], case.poses[k]
     largest = max(map(abs, found.position))
@@ -217,7 +220,7 @@ def _pose_rows(case: Case, k: int, found: PoseData, reasons: _Reasons) -> list[_
     return [*rows, _Row(last.place, cells, last.felt), last]
 
 
-def _free_joint_rows(case: Case, joints: Sequence[FreeJointData], reasons: _Reasons) -> list[_Row]:
+def _free_joint_rows(case: Case, joints: Sequence[FreeJoint], reasons: _Reasons) -> list[_Row]:
     """Return the rows of driven joints whose positions the pose does not determine."""
     rows = []
     for each in joints:

@@ -12,17 +12,17 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeAlias, Union, get_ar
 
 from ...models.fileversions import RESULT_FILES, VERSION_KEY
 from ..errors import InputError, listing
+from ..system.jsonvalues import JsonObject, JsonValue, Mark, kinds_of
 from ..system.reading import check_version, read_limited
 from ..system.strictjson import Size, WrongValueError, below, json_tree, value_of
 from .axisranges import AxisRangesResult
-from .checks import ChecksResult
 from .comparison import ComparisonResult
 from .data import CombinedResult, SolveResult
 from .evaluation import EvaluationResult
 from .evidence import CertifiedResult
 from .explorations import FrontResult, SweepResult
-from .jsondata import JsonObject, JsonValue, Mark, kinds_of
 from .path import PathResult
+from .regression import ChecksResult
 from .tradeoff import TradeoffResult
 from .workspace import WorkspaceResult
 
@@ -134,14 +134,14 @@ def _fields(kind: type[JsonObject], definitions: Schema) -> _Fields:
     """Return the fields of an object type, those of its inline parts among them."""
     fields, descriptions = _Fields({}, [], {}), _descriptions(kind)
     for name, annotation in kinds_of(kind).items():
-        mark = kind.marks[name]
+        key, mark, *_ = kind.fields[name]
         if mark is Mark.INLINE:
             _add_inline(fields, annotation, definitions)
             continue
         schema = _schema(annotation if mark is None else _type_without_none(annotation), definitions)
-        fields.properties[name] = {**schema, **({"description": descriptions[name]} if name in descriptions else {})}
+        fields.properties[key] = {**schema, **({"description": descriptions[name]} if name in descriptions else {})}
         if mark is None:
-            fields.required.append(name)
+            fields.required.append(key)
     return fields
 
 
@@ -206,7 +206,7 @@ def load_result(file: str | Path) -> Result:
         file: path of the file.
 
     Returns:
-        The typed value; :func:`~.jsondata.json_data` makes the same JSON of it again.
+        The typed value; :func:`~screwsynth.nlp.json_data` makes the same JSON of it again.
 
     Raises:
         InputError: the file cannot be read, holds no result, or one of a version that is not read.
@@ -262,13 +262,13 @@ def _keys(kind: type[JsonObject], *, required: bool) -> list[str]:
     """
     keys = []
     for name, annotation in kinds_of(kind).items():
-        mark = kind.marks[name]
+        key, mark, *_ = kind.fields[name]
         if mark is Mark.INLINE:
             part = _inline_kind(annotation)
             if not (required and part is not get_args(annotation)[0]):
                 keys += _keys(part, required=required)
         elif mark is None or not required:
-            keys.append(name)
+            keys.append(key)
     return keys
 
 
@@ -299,16 +299,16 @@ def _object_of_fields(kind: type[JsonObject], table: Mapping[str, object], key: 
     """Return an object from a table that may hold other keys too; the errors are those of :func:`_object`."""
     values: dict[str, object] = {}
     for name, annotation in kinds_of(kind).items():
-        mark = kind.marks[name]
+        name_in_json, mark, *_ = kind.fields[name]
         if mark is Mark.INLINE:
             part = _inline_kind(annotation)
             may_miss = part is not get_args(annotation)[0]
             missing = may_miss and table.keys().isdisjoint(_keys(part, required=False))
             values[name] = None if missing else _object_of_fields(part, table, key)
-        elif name in table:
-            values[name] = value_of(annotation, table[name], below(key, name), _object)
+        elif name_in_json in table:
+            values[name] = value_of(annotation, table[name_in_json], below(key, name_in_json), _object)
         elif mark is Mark.ABSENT:
             values[name] = None
         else:
-            raise WrongValueError(below(key, name), "is missing")
+            raise WrongValueError(below(key, name_in_json), "is missing")
     return kind(**values)

@@ -10,10 +10,11 @@ from ..case.case import Case
 from ..case.overrides import ENDS, Settings
 from ..case.pose import Free, Pose, RotationForm
 from ..errors import InputError
+from ..evidence.state import PlatformPose
+from ..system.jsonvalues import Vector
 from .data import CombinedResult, SolveResult
 from .evaluation import EvaluationResult
-from .jsondata import Vector
-from .parts import PoseData, RobotData, settings_from_data
+from .parts import RobotData, settings_from_data
 from .path import PathResult
 from .posewording import rotation_form, rotation_numbers
 from .schema import load_result
@@ -140,7 +141,7 @@ def place_of(result: Answer, case: Case) -> Settings:
     return {f"path.place.{name}": getattr(path.place, name) for name in case.path.free}
 
 
-def _pose_settings(prefix: str, pose: Pose, data: PoseData) -> Settings:
+def _pose_settings(prefix: str, pose: Pose, data: PlatformPose) -> Settings:
     """Return the numbers of a pose; those of a rotation only where it is free."""
     found: dict[str, float | list[float]] = {
         f"{prefix}p_{axis}": value for axis, value in zip("xyz", data.position, strict=True)

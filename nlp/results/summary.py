@@ -47,10 +47,11 @@ from .wording import (
 )
 
 if TYPE_CHECKING:
+    from ..evidence.margins import Margin
     from .data import CaseResult, SolveResult
     from .evaluation import EvaluationResult
     from .evidence import CertifiedResult
-    from .parts import MarginData, RobotData
+    from .parts import RobotData
 
 Summary: TypeAlias = Iterator[Line | TextTable]
 
@@ -298,6 +299,6 @@ def _tables(items: Iterator[object]) -> Iterator[TextTable]:
     return (item for item in items if isinstance(item, TextTable))
 
 
-def _margins(margins: Sequence[MarginData]) -> Iterator[TextTable]:
+def _margins(margins: Sequence[Margin]) -> Iterator[TextTable]:
     if margins:
         yield margin_table(margins)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from ..evidence.kkt import ACTIVE
@@ -17,11 +18,12 @@ if TYPE_CHECKING:
 
     from ..case.case import Case
     from ..case.settings import Search
+    from ..evidence.margins import Margin
+    from ..evidence.principal_motions import TaskAnalysis
     from ..program.nlp import Nlp
     from ..solver.multistart import ProgramSolution
     from .data import SolveResult
-    from .evaluation import PrincipalMotionsData
-    from .parts import LimitData, MarginData, RobotData, VersionsData
+    from .parts import LimitData, RobotData, VersionsData
     from .path import PathProofData
     from .workspace import WorkspaceProofData
 
@@ -36,7 +38,7 @@ _EIGENVECTOR = 1e-6
 MOST_OPTIMA = 12
 
 
-def principal_table(motions: PrincipalMotionsData, units: Units, size: float) -> TextTable:
+def principal_table(motions: TaskAnalysis, units: Units, size: float) -> TextTable:
     """Return the motions at which F is stationary: those of unit rotation, then translations of unit speed.
 
     Args:
@@ -91,14 +93,14 @@ def limit_table(limits: Sequence[LimitData], F: float = 0.0, title: str = "") ->
     )
 
 
-def _text(value: float | None, size: float) -> str:
+def _text(value: float, size: float) -> str:
     """Return a number's text, 0 where it is rounding error beside a size."""
-    return "none" if value is None else number(value, size, digits=6)
+    return number(value, size, digits=6) if math.isfinite(value) else "none"
 
 
-def _margin_text(margin: float | None, beside: float, word: str) -> str:
+def _margin_text(margin: float, beside: float, word: str) -> str:
     """Return a margin's text; at an active limit its error is that of the test for active limits."""
-    if margin is None:
+    if not math.isfinite(margin):
         return "none"
     return number(margin, beside, digits=6, part=_ON_LIMIT if word == "active" else NOISE)
 
@@ -134,7 +136,7 @@ def outcome_table(combined: CombinedData, tasks: Sequence[SolveResult] = ()) -> 
     return TextTable(headers, tuple(rows), "tasks", extra=1)
 
 
-def margin_table(margins: Sequence[MarginData]) -> TextTable:
+def margin_table(margins: Sequence[Margin]) -> TextTable:
     """Return every margin: violated and active ones first."""
     rows = []
     for row in sorted(margins, key=lambda each: (not each.violated, not each.active)):
@@ -206,7 +208,7 @@ def optimum_table(solution: ProgramSolution, robot: RobotData | None = None) -> 
 
 def origin_table(versions: VersionsData, search: Search | None = None, seconds: float = 0.0) -> TextTable:
     """Return versions, and of a search seed, starts and time: all that the numbers depend on."""
-    rows = [(name, str(getattr(versions, name))) for name in versions.marks]
+    rows = [(name, str(getattr(versions, name))) for name in versions.fields]
     if search is not None:
         rows += [("seed", str(search.seed)), ("starts", str(search.starts)), ("seconds", f"{seconds:.3g}")]
     return TextTable(("", ""), tuple(rows), "versions")

@@ -9,15 +9,16 @@ from ...models import component_names
 from ..case.case import Case
 from ..case.task import Sense
 from ..errors import CaseError
+from ..evidence.state import PlatformPose
 from ..interruption import is_requested
 from ..solver.solution import Solution
 from ..solver.status import Status
 from ..solver.tradeoff import Tradeoff, TradeoffPoint, tradeoff
 from ..system.csvtext import csv_text
+from ..system.jsonvalues import Absent, Inline, JsonObject, Vector, finite_or_none
 from ..units import slope_unit
 from .data import CaseResult, SolveResult
-from .jsondata import Absent, Inline, JsonObject, Vector, finite_or_none
-from .parts import HeadData, LimitData, PoseData, VersionsData
+from .parts import HeadData, LimitData, VersionsData
 from .point import head_data, stated_pose_notice, versions
 from .result import result_of
 from .rounding import number, ordered
@@ -49,7 +50,7 @@ class TradeoffPointData(JsonObject):
     tasks: tuple[float | None, ...]
     active: tuple[str, ...]
     parameters: Mapping[str, float | Vector] | None
-    pose: PoseData | None
+    pose: PlatformPose | None
 
 
 class TradeoffResult(JsonObject):

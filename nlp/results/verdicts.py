@@ -9,8 +9,8 @@ from ..proof.enclosure.engine import ENGINE
 from ..proof.statement.machine import has_straight_legs
 from ..proof.workspace.robot.pose_box import pose_box
 from ..proof.workspace.verdict import Outcome
+from ..system.jsonvalues import Absent, JsonObject, Vector3, vector
 from ..units import Units
-from .jsondata import Absent, JsonObject, Vector3, vector
 from .objective import unit_of_claim
 
 if TYPE_CHECKING:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -17,9 +18,11 @@ from .rounding import number, ordered, residual, robot_size, rounded_to, settled
 from .text import Line, Tone
 
 if TYPE_CHECKING:
+    from ..evidence.optimality import Evidence
+    from ..evidence.tolerance import ToleranceLoss
     from .choices import ChoiceData, RoundingData
-    from .data import CertificateData, CombinedData, CombinedResult, OptimalityData, SolveResult, StartsData
-    from .parts import LimitData, RobotData, TaskData, ToleranceData, ViolationData
+    from .data import CertificateData, CombinedData, CombinedResult, SolveResult, StartsData
+    from .parts import LimitData, RobotData, TaskData, ViolationData
 
 #: So many violated limits, and so many optima, are shown.
 _VIOLATIONS, _OPTIMA = 8, 5
@@ -173,15 +176,13 @@ def check_lines(result: SolveResult) -> Iterator[Line]:
     """Yield the evidence for the verdict: flat directions, stationarity, feasibility and curvature."""
     evidence = result.optimality
     if evidence is not None:
-        for direction in evidence.flat_directions:
+        for direction in evidence.flat:
             yield Line(", ".join(f"{name} {rate:+.4g}" for name, rate in direction.items()), label="flat along")
-        if evidence.stationarity is not None:
-            checks = (
-                f"stationarity {residual(evidence.stationarity)}, feasibility {residual(evidence.feasibility or 0.0)}"
-            )
-            curvature = evidence.reduced_hessian_eigenvalues
+        if math.isfinite(evidence.stationarity):
+            checks = f"stationarity {residual(evidence.stationarity)}, feasibility {residual(evidence.feasibility)}"
+            curvature = evidence.eigenvalues
             smallest = ", no free direction left"
-            if curvature:
+            if len(curvature):
                 smallest = f", smallest curvature {settled(min(curvature), 1.0, CURVED) or 0:.3g}"
             yield Line(checks + (smallest if result.reached is None else ""), label="evidence")
 
@@ -193,7 +194,7 @@ def fault_lines(result: SolveResult, case: Case) -> Iterator[Line]:
         yield Line(sentence)
 
 
-def verdict_line(evidence: OptimalityData) -> Line:
+def verdict_line(evidence: Evidence) -> Line:
     """Return the verdict about a point."""
     return Line(evidence.kind.value, label="verdict")
 
@@ -310,10 +311,10 @@ def singularity_lines(robot: RobotData, units: Units) -> Iterator[Line]:
         yield Line(f"  {motion_words(motion, units, robot_size(robot))}")
 
 
-def tolerance_line(lost: ToleranceData, F: float | None, units: Units) -> Line:
+def tolerance_line(lost: ToleranceLoss, F: float | None, units: Units) -> Line:
     """Return the loss of F by inexact joint centres."""
     part = f" ({100 * lost.loss / F:.2g} %)" if F else ""
-    text = f"{lost.joint_centre:g} {units.length} at every joint centre: F may be worse by {lost.loss:.4g}{part}"
+    text = f"{lost.tolerance:g} {units.length} at every joint centre: F may be worse by {lost.loss:.4g}{part}"
     return Line(text, label="tolerance")
 
 
@@ -345,7 +346,9 @@ def choice_lines(
     tone = Tone.PLAIN if is_answer else Tone.FAULT
     if choice is not None:
         chosen = ", ".join(
-            f"{each.name} = {each.value:.7g} {each.unit}".rstrip() for each in choice.numbers if each.value is not None
+            f"{each.name} = {each.value:.7g} {each.unit}".rstrip()
+            for each in choice.numbers
+            if math.isfinite(each.value)
         )
         yield Line(f"{chosen}: {choice.statement}" if is_answer else choice.statement, label="values", tone=tone)
     if rounding is not None:

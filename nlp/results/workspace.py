@@ -10,9 +10,9 @@ from ..case.motors import MotorNumber
 from ..case.task import Sense
 from ..proof.statement.claims import ACTUATED
 from ..proof.workspace.verdict import Outcome, Verdict
+from ..system.jsonvalues import Absent, Inline, JsonObject, Vector
 from ..units import Units
 from .exchange import ExchangeData, exchange_fields
-from .jsondata import Absent, Inline, JsonObject, Vector
 from .parts import HeadData, SettingsData, VersionsData, settings_data
 from .point import head_data, versions
 from .verdicts import RegularData, VerdictData, WorkspacePose, pose_data, rank_data, verdict_data

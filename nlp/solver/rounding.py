@@ -19,12 +19,12 @@ import numpy as np
 
 from ...models import Dimension
 from ..case.case import Case
-from ..case.choices import listed_numbers, within_ranges
+from ..case.choices import ChosenNumber, listed_numbers, within_ranges
 from ..case.pose import Free, Value
 from ..case.task import Method
 from ..errors import InputError
 from .choices import cost_of, solve_choices
-from .solution import RoundedNumber, Rounding, Solution
+from .solution import Rounding, Solution
 from .solve import solve
 from .status import Status
 
@@ -96,11 +96,13 @@ def round_design(
             break
     state = found.outcomes[0].state
     numbers = tuple(
-        RoundedNumber(
-            each.name,
-            each.dimension,
-            each.value,
-            math.nan if state is None else float(np.ravel(state.parameters[each.parameter])[each.component]),
+        ChosenNumber(
+            name=each.name,
+            value=math.nan if state is None else float(np.ravel(state.parameters[each.parameter])[each.component]),
+            unit=case.units.label(each.dimension),
+            values=None,
+            before=each.value,
+            dimension=each.dimension,
         )
         for each in places
     )

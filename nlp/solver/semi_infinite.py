@@ -280,7 +280,7 @@ def design_of(case: Case, nlp: Nlp, x: FloatArray) -> Case:
         return replace(case, parameters=parameters)
     pose = stated_poses(nlp, x)[0]
     rotation = Rotation(pose.axis, pose.angle, case.rotation.form)
-    return replace(case, parameters=parameters, position=tuple(pose.position.tolist()), rotation=rotation)
+    return replace(case, parameters=parameters, position=pose.position, rotation=rotation)
 
 
 def faults_of(judged: Judgement) -> Iterator[BindingPose | None]:

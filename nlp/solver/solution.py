@@ -6,12 +6,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ...models import Dimension, FloatArray
+from ...models import FloatArray
 from ...models.shown import Shown
 from ...models.values import dataclass
 from ...models.whole import Whole
 from ..case.case import Case
-from ..case.choices import Ranges
+from ..case.choices import ChosenNumber, Ranges
 from ..case.task import Method, Task
 from ..errors import EvaluationError
 from ..evidence.optimality import Evidence
@@ -169,15 +169,6 @@ class Choice:
     chosen: Ranges
 
 
-class RoundedNumber(NamedTuple):
-    """A dimension that was rounded: name, dimension, value before, and value after, NaN where there is no robot."""
-
-    name: str
-    dimension: Dimension
-    before: float
-    value: float
-
-
 @dataclass(frozen=True)
 class Rounding:
     """The rounding of a solution's dimensions.
@@ -187,7 +178,7 @@ class Rounding:
         before: objective before, the smaller the better.
         after: the same of the rounded design; infinite without an answer.
         farther: number of multiples on each side, beside the nearest ones, that were searched.
-        numbers: that were rounded.
+        numbers: that were rounded, with values that are NaN where there is no robot.
         choice: the search over the multiples; None where each number has only one.
     """
 
@@ -195,7 +186,7 @@ class Rounding:
     before: float
     after: float
     farther: int
-    numbers: tuple[RoundedNumber, ...]
+    numbers: tuple[ChosenNumber, ...]
     choice: Choice | None
 
 

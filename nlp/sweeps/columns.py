@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from ...models import FloatArray, frozen_array
 from ..case.case import Case
 from ..results.explorations import Column, SweepResult
-from ..results.jsondata import finite_or_none, vector
 from ..results.objective import unit_of_objective
 from ..results.point import head_data, stated_pose_notice, versions
+from ..system.jsonvalues import finite_or_none, vector
 from .journal import Row, row_kinds
 from .sweep import Sweep
 

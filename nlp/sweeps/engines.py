@@ -27,11 +27,11 @@ from ..evidence.optimality import Evidence, PointKind, examine
 from ..interruption import within
 from ..program.program import design_indices
 from ..proof.enclosure.engine import kernel
-from ..results.jsondata import finite_or_none
 from ..solver.certified import Certified, certify
 from ..solver.solution import Solution
 from ..solver.solve import solve
 from ..solver.status import Status
+from ..system.jsonvalues import finite_or_none
 from .journal import REFUSED, Row, with_evidence
 from .places import Block, NotPlacedError, Places, existing_cases, place
 from .points import CaseSource, PointBlock, Points

@@ -18,7 +18,7 @@ import numpy as np
 from ..errors import InputError
 from ..evidence.optimality import Evidence
 from ..interruption import WRITING
-from ..results.jsondata import finite_or_none
+from ..system.jsonvalues import finite_or_none
 from ..system.locks import hold
 from ..system.strictjson import json_tree, value_of
 from ..units import Units

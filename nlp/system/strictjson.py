@@ -41,6 +41,16 @@ class Size(NamedTuple):
     entries: int
 
 
+class Made(NamedTuple):
+    """Mark of an annotation of which a field has another value than JSON.
+
+    Attributes:
+        of: returns the field's value from that of the annotation.
+    """
+
+    of: Callable[[Any], object]
+
+
 class WrongValueError(ValueError):
     """A value that its type does not allow.
 
@@ -158,10 +168,7 @@ def _compound(kind: object, value: object, key: str, read: ObjectReader | None) 
     origin, arguments = get_origin(kind), get_args(kind)
     if origin is Annotated:
         found = value_of(arguments[0], value, key, read)
-        for mark in arguments[1:]:
-            if isinstance(mark, Size) and isinstance(found, tuple) and len(found) != mark.entries:
-                raise WrongValueError(key, f"must have {mark.entries} entries, got {len(found)}")
-        return found
+        return _marked(arguments[1:], found, key)
     if origin is Literal:
         if not any(type(value) is type(each) and value == each for each in arguments):
             raise WrongValueError(key, f"must be one of {listing(map(repr, arguments))}")
@@ -177,6 +184,16 @@ def _compound(kind: object, value: object, key: str, read: ObjectReader | None) 
     return MappingProxyType(
         {name: value_of(arguments[1], each, below(key, name), read) for name, each in value.items()}
     )
+
+
+def _marked(marks: tuple[object, ...], found: object, key: str) -> object:
+    """Return a value as the marks of its annotation have it; the errors are those of :func:`value_of`."""
+    for mark in marks:
+        if isinstance(mark, Size) and isinstance(found, tuple) and len(found) != mark.entries:
+            raise WrongValueError(key, f"must have {mark.entries} entries, got {len(found)}")
+        if isinstance(mark, Made):
+            found = mark.of(found)
+    return found
 
 
 def _one_of(kinds: tuple[object, ...], value: object, key: str, read: ObjectReader | None) -> object:

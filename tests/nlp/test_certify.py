@@ -35,10 +35,10 @@ from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.statement import standard_form as statement
 from screwsynth.nlp.proof.statement.standard_form import Kind, StandardForm, is_in_home_mode, standard_form
 from screwsynth.nlp.results.evidence import certificate_data
-from screwsynth.nlp.results.jsondata import json_data
 from screwsynth.nlp.solver import certified
 from screwsynth.nlp.solver.certified import proof_of
 from screwsynth.nlp.solver.multistart import ProgramSolution, solve_program
+from screwsynth.nlp.system.jsonvalues import json_data
 
 AXIS_Z = "paper-4.1-helical-axis-z"
 

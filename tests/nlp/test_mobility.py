@@ -19,6 +19,7 @@ from screwsynth.nlp.case.workspace import Workspace
 from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.evidence.margins import margins_of
 from screwsynth.nlp.evidence.mobility import Mobility, mobility_of
+from screwsynth.nlp.evidence.screwvalues import ScrewMotion, ScrewWrench, wrench_of
 from screwsynth.nlp.evidence.singularities import Singularity, SingularityKind, _null_twists, is_passive_singular
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.verdict import Outcome
@@ -84,9 +85,10 @@ def force_along(point: object, direction: object) -> np.ndarray:
     return np.concatenate([unit, np.cross(point, unit)])
 
 
-def assert_same_span(found: np.ndarray | None, expected: object) -> None:
+def assert_same_span(screws: Sequence[ScrewMotion | ScrewWrench] | None, expected: object) -> None:
     """Both are bases of one space."""
-    assert found is not None
+    assert screws is not None
+    found = np.array([each.twist if isinstance(each, ScrewMotion) else each.wrench for each in screws])
     rows = np.atleast_2d(expected)
     assert len(found) == len(rows)
     np.testing.assert_allclose(found @ np.linalg.pinv(rows) @ rows, found, rtol=0, atol=1e-9)
@@ -107,7 +109,7 @@ def test_stretched_planar_limbs_lock_the_line_of_their_links_and_meet_in_the_cen
     assert_same_span(platform.gained, [0, 0, 1, 0, 0, 0])
     # An actuator that does not drive the platform has no rate, and its limb resists by constraints alone.
     assert set(mobility.actuator_rates.values()) == {float("inf")}
-    assert {part.actuation for part in mobility.parts.values()} == {0.0}
+    assert {part.actuation for part in mobility.parts} == {0.0}
 
 
 def test_what_rounding_leaves_of_constraints_is_nothing_in_any_unit() -> None:
@@ -195,7 +197,7 @@ def test_a_leg_along_the_first_axis_of_its_universal_joint_resists_across_too(is
         # The second axis of a straight leg may have any angle about it, as the leg may turn about itself: all forces
         # through the ball joint but the leg's own.
         assert len(each.locking) == 2
-        assert_same_span(np.vstack([each.locking, leg]), [across, leg, force_along([0.6, 0, 1], [1, 0, 0])])
+        assert_same_span([*each.locking, wrench_of(leg)], [across, leg, force_along([0.6, 0, 1], [1, 0, 0])])
 
 
 def test_a_passive_singularity_is_refused_as_an_optimum() -> None:

@@ -23,7 +23,7 @@ from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.evidence.closing import closed_start
-from screwsynth.nlp.evidence.loads import LoadState, loads_at
+from screwsynth.nlp.evidence.loads import HeldLoad, loads_at
 from screwsynth.nlp.evidence.state import evaluate
 from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.proof.statement.machine import Legs
@@ -171,12 +171,12 @@ def test_no_pose_of_six_legs_has_a_larger_number_than_its_bound(seed: int) -> No
         assert sign * (value - each.reached) <= 0.0101 * size
 
 
-def held_at(case: Case, position: list[float], rotation: Rotation) -> tuple[LoadState, Array]:
+def held_at(case: Case, position: list[float], rotation: Rotation) -> tuple[HeldLoad, Array]:
     """Forces under the only load at a pose, and speeds."""
     nlp = formulate(replace(case, position=position, rotation=rotation, workspace=None))
     x = closed_start(nlp)
     (one,), speeds, _ = loads_at(nlp, x, evaluate(nlp, x))
-    return one, speeds
+    return one, np.array([each.value for each in speeds])
 
 
 @pytest.mark.parametrize("name", soaked(["6-pus", "delta", "tricept"], ["6-pus"]))
@@ -190,7 +190,8 @@ def test_numbers_of_robots_with_passive_joints_are_those_that_a_pose_shows(name:
     def at(position: list[float], rotation: Rotation) -> dict[tuple[str, int, str, Sense], float]:
         one, speeds = held_at(case, position, rotation)
         numbers = dict[tuple[str, int, str, Sense], float]()
-        for k, (low, high, speed) in enumerate(zip(one.smallest, one.largest, speeds, strict=True)):
+        ends = [np.array([each.smallest, each.largest], dtype=np.float64).tolist() for each in one.actuators]
+        for k, ((low, high), speed) in enumerate(zip(ends, speeds, strict=True)):
             numbers["force", k, "push", Sense.MIN], numbers["force", k, "push", Sense.MAX] = low, high
             numbers["speed", k, "", Sense.MAX], numbers["power", k, "push", Sense.MAX] = speed, max(0.0, high) * speed
             numbers["braking", k, "push", Sense.MAX] = max(0.0, -low) * speed

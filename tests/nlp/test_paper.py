@@ -174,7 +174,7 @@ def test_all_cases_are_checked() -> None:
 
 def test_every_printed_number_of_section_4_has_a_row(checks: dict[str, CaseCheck]) -> None:
     rows = {
-        (row.published.source.split()[1].rstrip(","), row.published.quantity, row.published.value)
+        (row.source.split()[1].rstrip(","), row.quantity, row.value)
         for check in checks.values()
         for row in check.published
     }
@@ -192,9 +192,9 @@ paper-4.1-helical task.twist; paper-4.2 tasks.0.task.twist; paper-4.2 tasks.1.ta
 def test_what_is_reproduced_and_what_is_not(checks: dict[str, CaseCheck]) -> None:
     for text, reproduced in ((REPRODUCED, True), (NOT_REPRODUCED, False)):
         for case, quantity in map(str.split, text.split(";")):
-            (row,) = [row for row in checks[case].published if row.published.quantity == quantity]
-            assert row.reproduced is reproduced, (case, quantity)
-            assert reproduced or row.published.because
+            (row,) = [row for row in checks[case].published if row.quantity == quantity]
+            assert row.is_reproduced is reproduced, (case, quantity)
+            assert reproduced or row.because
 
 
 def test_the_documented_table_is_what_the_check_prints(checks: dict[str, CaseCheck]) -> None:

@@ -1,6 +1,7 @@
 """Results as typed values and JSON, their schema, and the versions of all files."""
 
 import json
+import math
 import re
 import subprocess
 import sys
@@ -9,31 +10,43 @@ from collections.abc import Callable, Iterator, Mapping
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+import numpy as np
 import pytest
 from builders import DOCS, EACH_CASE, FEW_CASES, Run, edited, output_of, refusal_of, saved, soaked, starter_text
 from jsonschema import Draft202012Validator
 
 import screwsynth.cases
 import screwsynth.models
-from screwsynth.models import fileversions, robot
+from screwsynth.models import Dimension, fileversions, robot
 from screwsynth.models.fileversions import FileVersions
 from screwsynth.models.joints import RobotError
 from screwsynth.models.joints.home.mechanisms import mechanism_of
-from screwsynth.nlp import InputError, Solution, Status, json_data, load_case, load_result, result_of, solve
+from screwsynth.nlp import InputError, Solution, Status, Units, json_data, load_case, load_result, result_of, solve
 from screwsynth.nlp.cli.usage import EARLIER
 from screwsynth.nlp.output.checks import markdown
 from screwsynth.nlp.output.report.markup import html_table, paragraphs
 from screwsynth.nlp.output.report.report import report_of
 from screwsynth.nlp.output.report.webpage import page_of
 from screwsynth.nlp.results import data, parts
-from screwsynth.nlp.results.jsondata import Absent, Inline, JsonObject
 from screwsynth.nlp.results.regression import check_case
-from screwsynth.nlp.results.schema import RESULTS, result_from_json, result_schema
+from screwsynth.nlp.results.schema import RESULTS, _object, result_from_json, result_schema
 from screwsynth.nlp.results.summary import case_summary
 from screwsynth.nlp.results.text import Line, TextTable, Tone
 from screwsynth.nlp.solver import multistart, starts
+from screwsynth.nlp.system.jsonvalues import (
+    Absent,
+    Hidden,
+    Inline,
+    JsonObject,
+    Key,
+    Known,
+    Measure,
+    Row,
+    Slope,
+)
+from screwsynth.nlp.system.strictjson import WrongValueError
 
 Json = dict[str, Any]
 
@@ -267,6 +280,61 @@ def test_values_are_frozen_and_whole() -> None:
     assert list(found) == ["a", "b", "null", "status", "numbers", "named"]
     assert found == {"a": 1, "b": 2.0, "null": None, "status": "optimal", "numbers": [[1.0, 2.0]], "named": {"x": 3.0}}
     assert json_data(outer(absent="here", none=None))["absent"] == "here"
+
+
+class Reading(JsonObject):
+    """A value with numbers in units, one that may be none, an array, another key, and a field for computations."""
+
+    name: Annotated[str, Key("label")]
+    value: Annotated[Known, Measure.NUMBER]
+    cost: Slope[float | None]
+    turn: Annotated[tuple[float, ...] | None, Dimension.ANGLE]
+    row: Row
+    note: Absent[str]
+    dimension: Hidden[Dimension] = Dimension.NUMBER
+
+
+class Readings(JsonObject):
+    """Several such values."""
+
+    rows: tuple[Reading, ...]
+    last: Reading
+
+
+def reading(value: float) -> Reading:
+    row = np.array([1.0, 2.0])
+    turn, dimension = (0.0, math.pi), Dimension.ANGLE
+    return Reading(name="a", value=value, cost=2.0, turn=turn, row=row, note="", dimension=dimension)
+
+
+def test_one_conversion_has_every_number_in_the_units_of_the_case() -> None:
+    inner = reading(math.pi / 6)
+    (found, none), last = Readings.of(Readings(rows=(inner, reading(math.nan)), last=inner), Units()).rows, inner
+    assert (found.value, found.turn, found.note) == (30.0, (0.0, 180.0), None)
+    assert found.cost == pytest.approx(2.0 * math.pi / 180)
+    assert math.isnan(none.value)
+    assert inner.value == math.pi / 6 == last.value, "the value itself stays as it is"
+    # Degrees stay degrees where the number is converted again, and radians where the case has them.
+    assert (found.dimension, Reading.of(found, Units(), turn=None).value) == (Dimension.NUMBER, 30.0)
+    assert Reading.of(inner, Units(angle="rad")).value == math.pi / 6
+    (again,) = Reading.of_each([inner])
+    assert (again.value, again.dimension) == (inner.value, Dimension.ANGLE)
+
+
+def test_numbers_that_are_none_and_arrays_are_read_again() -> None:
+    for value, written in ((math.nan, None), (math.inf, None), (0.5, 0.5)):
+        data = json.loads(json.dumps(json_data(reading(value)), allow_nan=False))
+        assert data == {"label": "a", "value": written, "cost": 2.0, "turn": [0, math.pi], "row": [1, 2], "note": ""}
+        found = _object(Reading, data, "")
+        assert isinstance(found, Reading)
+        assert json_data(found) == data
+        assert (found.name, found.dimension) == ("a", Dimension.NUMBER)
+        assert math.isnan(found.value) or found.value == value
+        assert found.row.tolist() == [1.0, 2.0]
+    with pytest.raises(WrongValueError, match="label: is missing"):
+        _object(Reading, {}, "")
+    with pytest.raises(WrongValueError, match="dimension: no such key; allowed: label, value"):
+        _object(Reading, {"dimension": "angle"}, "")
 
 
 def test_words_need_neither_terminal_nor_page() -> None:

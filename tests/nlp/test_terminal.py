@@ -38,6 +38,7 @@ from screwsynth.nlp.case.limits.legs import LegLength
 from screwsynth.nlp.case.pose import RotationForm
 from screwsynth.nlp.case.robots import model_options
 from screwsynth.nlp.evidence.kkt import close_equations
+from screwsynth.nlp.evidence.screwvalues import motion_of
 from screwsynth.nlp.evidence.state import evaluate
 from screwsynth.nlp.output.report.report import report_of
 from screwsynth.nlp.output.report.webpage import page_of
@@ -49,7 +50,6 @@ from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.results.data import SolveResult
 from screwsynth.nlp.results.evaluation import EvaluationResult, evaluation_of
 from screwsynth.nlp.results.evidence import certificate_data
-from screwsynth.nlp.results.point import motion_data
 from screwsynth.nlp.results.posewording import evaluate_command, pose_words, rotation_form, rotation_numbers
 from screwsynth.nlp.results.result import result_of
 from screwsynth.nlp.results.robotwording import model_words
@@ -487,8 +487,8 @@ def test_motions_have_no_noise_in_any_unit(scale: float) -> None:
     axis, point = np.array([0.0, 1.0, 0.0]), scale * np.array([0.25, 0.0, 0.5])
     noise = scale * 1e-13 * np.array([1.0, -1.0, 1.0])
     twist = np.concatenate([axis, np.cross(point, axis) + noise])
-    assert motion_words(motion_data(twist), case.units).startswith("rotation about (0, 1, 0) through (")
-    assert f"({0.25 * scale:.4g}, 0, {0.5 * scale:.4g})" in motion_words(motion_data(twist), case.units)
+    assert motion_words(motion_of(twist), case.units).startswith("rotation about (0, 1, 0) through (")
+    assert f"({0.25 * scale:.4g}, 0, {0.5 * scale:.4g})" in motion_words(motion_of(twist), case.units)
 
 
 def test_rates_angles_and_lengths_by_pose_and_leg_with_the_worst_pose_marked() -> None:

@@ -12,7 +12,7 @@ from ....models import Dimension, FloatArray, JointKind, Model, frozen_array
 from ....models.statics import driven_joints
 from ...case.forces import dimension_of_force
 from ...case.loads import LoadCase
-from ...evidence.loads import LoadState, loads_at
+from ...evidence.loads import HeldLoad, loads_at
 from ...evidence.state import RobotState
 from ...program.nlp import Nlp
 from .posture import Posture
@@ -126,9 +126,9 @@ def _norm(vector: FloatArray) -> float:
     return float(np.linalg.norm(vector))
 
 
-def _any_words(held: LoadState) -> str:
+def _any_words(held: HeldLoad) -> str:
     """Return what forces of actuators are where a load has any direction."""
-    return "" if np.array_equal(held.smallest, held.largest) else ", actuators at their largest"
+    return ", actuators at their largest" if any(each.smallest != each.largest for each in held.actuators) else ""
 
 
 class _Part(NamedTuple):

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 from ...case.case import Case
 from ...case.choices import listed_numbers
 from ...case.pose import sizes_of_turn
-from ...evidence.optimality import CURVED
+from ...evidence.optimality import CURVED, Evidence
 from ...results.checks import published_table
-from ...results.data import CertificateData, CombinedData, CombinedResult, OptimalityData, SolveResult
+from ...results.data import CertificateData, CombinedData, CombinedResult, SolveResult
 from ...results.jointwording import limb_part_table
 from ...results.objective import objective_words
 from ...results.pathwording import along_table, path_proof_lines
@@ -63,15 +63,13 @@ def _evidence_of(case: Case, result: SolveResult) -> Iterator[Markup]:
         return
     size = 0.0 if result.robot is None else size_of_F(result.robot)
     yield _active_table(result, optimality, size, is_answer=result.status.is_answer)
-    if optimality.reduced_hessian_eigenvalues and result.reached is None:
-        values = optimality.reduced_hessian_eigenvalues
+    if len(optimality.eigenvalues) and result.reached is None:
+        values = optimality.eigenvalues
         listed = ", ".join(number(value, 1.0, digits=4, part=CURVED) for value in values)
         yield tag("p", f"Curvatures along the directions that are left, in scaled variables: {listed}.")
 
 
-def _active_table(
-    result: SolveResult | CombinedData, optimality: OptimalityData, size: float, *, is_answer: bool
-) -> Markup:
+def _active_table(result: SolveResult | CombinedData, optimality: Evidence, size: float, *, is_answer: bool) -> Markup:
     if not optimality.active:
         return tag("p", "No bound or limit is active.")
     table = active_table(result, size, is_answer=is_answer)

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from ...case.case import Case
 from ...errors import EvaluationError
 from ...proof.workspace.slices.slices import Slice
-from ...results.jsondata import json_data
 from ...results.posewording import pose_words
 from ...results.rounding import number
 from ...results.text import TextTable
@@ -17,6 +16,7 @@ from ...results.verdictwording import machine_lines
 from ...results.workspace import WorkspaceResult
 from ...results.workspaceposes import refuted_claims, worst_claim
 from ...results.workspacewording import verdict_words, workspace_summary
+from ...system.jsonvalues import json_data
 from ..pictures.figures import picture
 from ..pictures.workspaces import Kind, drawing_at, slice_images, slices_legend, slices_notes
 from .markup import (

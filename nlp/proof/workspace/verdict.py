@@ -19,7 +19,7 @@ from .robot.pose_box import PoseNumbers
 #: Part of a limit by which a value may be beyond it and still count as on it: rounding.
 _ON_LIMIT = 1e-9
 #: Reason for a structure that is singular at every pose.
-EVERYWHERE = SingularityKind.ARCHITECTURE.value
+EVERYWHERE = SingularityKind.ARCHITECTURE.clause
 
 
 class Outcome(enum.Enum):
