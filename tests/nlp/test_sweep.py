@@ -205,7 +205,8 @@ def test_joints_are_no_design() -> None:
         (("--over", "x1=1:2:9999", "--over", "x2=1:2:9999"), "and at most 10,000,000 are allowed"),
         (("--over", "x1=1,2", "--over", "x1=3,4"), "x1 is given twice"),
         (("--over", "EMPTY"), "has 0 points"),
-        (("--over", "SHORT"), "point 2 has 1 values, and must have 2"),
+        (("--over", "SHORT"), "row 3: must have 2 cells, got 1"),
+        (("--over", "WORDS"), 'row 4, column x2 = "1,1": must be a number; write 1.1'),
         (("--over", "x1=1,2", "--over", "EMPTY"), "a file of points stands alone, without ranges or lists beside it"),
         ((), "--over: is missing: NAME=FIRST:LAST:COUNT, a number to vary"),
         (("--over", "x1=1,2", "--engine", "fast"), "--engine fast: must be compiled or ipopt"),
@@ -216,6 +217,7 @@ def test_joints_are_no_design() -> None:
 def test_bad_input_is_one_sentence(arguments: tuple[str, ...], words: str, tmp_path: Path, cli: Run) -> None:
     files = {"EMPTY": saved(tmp_path / "empty.csv", "x1,x2\n")}
     files["SHORT"] = saved(tmp_path / "short.csv", "x1,x2\n10,11\n12\n")
+    files["WORDS"] = saved(tmp_path / "words.csv", "x1;x2\n10;11\n\n12;1,1\n")
     out = tmp_path / "out.csv"
     given = [str(files.get(word, word)) for word in arguments]
     refusal_of(cli("sweep", CASE, *given, "--out", str(out)), words)
