@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from . import contents, options
+from . import designs, options
 from .commandline import Argument, print_notice
 from .progress import counting_line
 
@@ -37,7 +37,7 @@ def compare(
     from pathlib import Path
 
     from ..comparison.compare import compare as compare_robots
-    from ..comparison.data import comparison_result
+    from ..comparison.data import comparison_designs, comparison_result
     from ..comparison.robots import read_robots
     from ..interruption import Milestone, answer_after, is_requested, why_stopped
 
@@ -69,12 +69,5 @@ def compare(
         print_notice(f"{why_stopped()}: {begun}")
     is_proved = not certified or all(each.certified is not None and each.certified.is_proved for each in found.ranked)
     result = comparison_result(found)
-    files.deliver(
-        lambda: contents.comparison_summary(result),
-        whole=whole,
-        done=bool(found.ranked) and is_proved and not is_stopped,
-        json=lambda: result,
-        csv=lambda: contents.comparison_csv(result),
-        html=lambda: contents.comparison_page(found, result),
-        plot=lambda: contents.comparison_figure(found),
-    )
+    done = bool(found.ranked) and is_proved and not is_stopped
+    designs.deliver(files, comparison_designs(found, result), lambda: result, whole=whole, done=done)

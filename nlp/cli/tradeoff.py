@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from . import contents, options
+from . import designs, options
 from .commandline import print_notice
 from .progress import counting_line
 
@@ -38,7 +38,7 @@ def tradeoff(
     from ..case.reader import read_case
     from ..errors import InputError
     from ..interruption import Milestone, answer_after, is_requested, why_stopped
-    from ..results.tradeoff import tradeoff_csv, tradeoff_result, tradeoff_summary
+    from ..results.tradeoff import tradeoff_designs, tradeoff_result
     from ..solver.status import Status
     from ..solver.tradeoff import tradeoff as solve_along
     from ..sweeps.points import grid
@@ -64,15 +64,13 @@ def tradeoff(
         )
     if is_requested() and not found.unsolved:
         print_notice(f"{why_stopped()}: every value is solved, but not all from the optima beside it")
-    loaded, result = found.points[0].solution.case, tradeoff_result(found)
+    result = tradeoff_result(found)
     statuses = [point.status for point in result.points]
     is_done = all(status.is_answer or status is Status.INFEASIBLE for status in statuses)
-    files.deliver(
-        lambda: tradeoff_summary(loaded, result),
+    designs.deliver(
+        files,
+        tradeoff_designs(result, found.points[0].solution.case, found),
+        lambda: result,
         whole=whole,
         done=is_done and any(status.is_answer for status in statuses),
-        json=lambda: result,
-        csv=lambda: tradeoff_csv(result),
-        html=lambda: contents.tradeoff_page(found, result),
-        plot=lambda: contents.tradeoff_figure(loaded, result),
     )

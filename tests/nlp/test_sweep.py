@@ -6,7 +6,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,13 +20,15 @@ from screwsynth.nlp import InputError, examine, formulate, load_case, load_resul
 from screwsynth.nlp import sweep as run_in_python
 from screwsynth.nlp.case.reader import read_case
 from screwsynth.nlp.evidence.many import Numbers, _scales, judge_many
-from screwsynth.nlp.output.pictures.sweeps import sweep_figure, sweep_legend
-from screwsynth.nlp.output.sweeptable import TablePoint, table_points, write_table
+from screwsynth.nlp.output.pictures.designs import designs_figure, legend_of
+from screwsynth.nlp.output.sweeptable import table_rows, write_table
+from screwsynth.nlp.results.designs import Designs
 from screwsynth.nlp.results.explorations import SweepResult
 from screwsynth.nlp.sweeps import workers
+from screwsynth.nlp.sweeps.columns import sweep_designs
 from screwsynth.nlp.sweeps.engines import EngineKind, Job
 from screwsynth.nlp.sweeps.journal import Journal, Row, line_of, row_of
-from screwsynth.nlp.sweeps.points import CaseSource, Points, grid
+from screwsynth.nlp.sweeps.points import CaseSource, Points, grid, points_of_csv
 from screwsynth.nlp.sweeps.sweep import Sweep, run_sweep
 from screwsynth.nlp.sweeps.workers import PointBlock, answer_in_processes
 
@@ -125,7 +127,9 @@ def test_points_of_a_file_and_parquet(tmp_path: Path, cli: Run) -> None:
     assert "task[0].axis" in found["note"][3]
     assert found["F"][3] is None
     assert said.startswith("4 of 5 points have an answer")
-    assert [each.active for each in table_points(str(out))] == found["active"]
+    source = CaseSource.from_file(read_case(CASE))
+    one = Sweep.of(source, points_of_csv(points.read_text(), str(points)), starts=2)
+    assert ["; ".join(row.active) for row in table_rows(str(out), one)] == found["active"]
 
 
 def test_a_sweep_in_python_is_that_of_the_command(tmp_path: Path, cli: Run) -> None:
@@ -293,30 +297,34 @@ def test_a_row_group_is_in_memory_at_once(sweep: Callable[..., Sweep], tmp_path:
     assert file.read(columns=["x1"]).to_pydict()["x1"] == one.points.values[:, 0].tolist()
 
 
+def designs_on(points: Points, F: Sequence[float], active: Iterable[tuple[str, ...]]) -> Designs[Row]:
+    """The table of a sweep with made-up answers."""
+    source = CaseSource.from_file(read_case("hexapod-machining"))
+    values = [None if math.isnan(value) else value for value in F]
+    rows = [Row(k, "optimal", value, active=each) for k, (value, each) in enumerate(zip(values, active, strict=True))]
+    return sweep_designs(Sweep.of(source, points), rows)
+
+
 def test_axes_of_a_sweep_have_units() -> None:
-    case = load_case("hexapod-machining")
-    points = grid(["limits.leg_length.max=32,34", "task.pitch=0.1,0.2"])
-    found = [TablePoint(1.0, "")] * len(points)
-    labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in sweep_figure(case, points, found).axes]
+    found = designs_on(grid(["limits.leg_length.max=32,34", "task.pitch=0.1,0.2"]), [1.0] * 4, [()] * 4)
+    labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in designs_figure(found).axes]
     assert labels[0] == ("limits.leg_length.max, in", "task.pitch, in/rad")
-    points = grid(["x3=1,2", "x1=30,31"])
-    labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in sweep_figure(case, points, found).axes]
+    found = designs_on(grid(["x3=1,2", "x1=30,31"]), [1.0] * 4, [()] * 4)
+    labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in designs_figure(found).axes]
     assert labels[0] == ("x3, deg", "x1, in")
 
 
 def test_regions_of_a_sweep_have_numbers_that_a_legend_explains() -> None:
-    case = load_case("hexapod-machining")
     points = grid(["x1=26:32:13", "x2=10:13:7"])
     x1, x2 = (each.ravel() for each in np.meshgrid(*points.axes, indexing="ij"))
     # Three regions: a half, a quarter, and a quarter without an answer.
-    words = ["leg_length limb 1- max; leg_length limb 1+ max; x3 min" if a < 29 else "x3 min" for a in x1]
-    F = np.where((x1 >= 29) & (x2 > 11.5), math.nan, x1 + x2)
-    found = [TablePoint(float(value), word) for value, word in zip(F, words, strict=True)]
-    figure = sweep_figure(case, points, found)
+    sides = [("leg_length limb 1- max", "leg_length limb 1+ max", "x3 min") if a < 29 else ("x3 min",) for a in x1]
+    found = designs_on(points, np.where((x1 >= 29) & (x2 > 11.5), math.nan, x1 + x2).tolist(), sides)
+    figure = designs_figure(found)
     FigureCanvasAgg(figure).draw()
     axes = figure.axes[0]
     numbers = {text.get_text(): text.get_position() for text in axes.texts if text.get_gid() == "number"}
-    lines = {line.partition(": ")[0]: line.partition(": ")[2] for line in sweep_legend(found)}
+    lines = {line.partition(": ")[0]: line.partition(": ")[2] for line in legend_of(found)}
     assert lines.pop("Lines").endswith("Empty: no answer.")
     limits = {"1": "also leg_length max (limb 1-, limb 1+)", "2": "no other limit is active"}
     assert lines == {"Active at every number": "x3 min", **limits}
@@ -327,7 +335,7 @@ def test_regions_of_a_sweep_have_numbers_that_a_legend_explains() -> None:
         assert 5 <= len(axis) <= 9
         assert set(axis) <= set(values)
     drawn = figure.get_supxlabel()
-    assert all(line in drawn for line in sweep_legend(found))
+    assert all(line in drawn for line in legend_of(found))
     # The legend stands below the axes, and within the picture.
     (legend,) = [text for text in figure.texts if text.get_text() == drawn]
     box = legend.get_window_extent()
@@ -337,10 +345,8 @@ def test_regions_of_a_sweep_have_numbers_that_a_legend_explains() -> None:
 
 
 def test_numbers_above_a_curve_do_not_cover_each_other() -> None:
-    case = load_case("hexapod-machining")
-    points = grid(["x1=26:32:25"])
-    found = [TablePoint(float(k), "x2 min" if k % 8 < 2 else "x3 min" if k % 8 < 4 else "") for k in range(25)]
-    figure = sweep_figure(case, points, found)
+    sides = [("x2 min",) if k % 8 < 2 else ("x3 min",) if k % 8 < 4 else () for k in range(25)]
+    figure = designs_figure(designs_on(grid(["x1=26:32:25"]), list(map(float, range(25))), sides))
     FigureCanvasAgg(figure).draw()
     boxes = [text.get_bbox_patch().get_window_extent() for text in figure.axes[0].texts]
     assert len(boxes) == 10  # one for each run of equal limits

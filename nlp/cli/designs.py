@@ -1,0 +1,50 @@
+"""Outputs of the commands that make tables of designs: ``sweep``, ``tradeoff``, ``pareto`` and ``compare``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NoReturn
+
+from . import contents
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from ..results.designs import Designs, Row
+    from ..results.jsondata import JsonObject
+    from ..results.text import Line, TextTable
+    from .options import Outputs
+
+
+def deliver(
+    files: Outputs,
+    found: Designs[Row],
+    result: Callable[[], JsonObject],
+    *,
+    whole: bool,
+    done: bool,
+    shown: Callable[[], Iterable[Line | TextTable]] | None = None,
+) -> NoReturn:
+    """Write a table of designs into the files that are asked for, show it, and exit.
+
+    Args:
+        files: the files.
+        found: the table.
+        result: returns the result for JSON.
+        whole: whether everything is shown, and not the answer alone.
+        done: whether the exit status is 0, and not 1.
+        shown: returns the lines for the terminal; the table with the lines around it where it is left out.
+
+    Raises:
+        InputError: a file cannot be written.
+        SystemExit: at the end, with the exit status.
+    """
+    files.deliver(
+        shown or (lambda: contents.designs_summary(found)),
+        whole=whole,
+        done=done,
+        json=result,
+        csv=lambda: contents.designs_csv(found),
+        markdown=lambda: contents.designs_markdown(found),
+        html=lambda: contents.designs_page(found),
+        plot=lambda: contents.designs_figure(found),
+    )
