@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, NoReturn
 
 from . import contents
+from .commandline import print_notice
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Iterator
 
     from ..results.designs import Designs, Row
     from ..results.jsondata import JsonObject
@@ -48,3 +50,40 @@ def deliver(
         html=lambda: contents.designs_page(found),
         plot=lambda: contents.designs_figure(found),
     )
+
+
+@contextmanager
+def resumed(journal: str | None) -> Iterator[None]:
+    """Take searches of a block from a journal of an earlier run, and keep those that are new in it.
+
+    The journal is removed where the block delivers a result that no stop has cut short.
+
+    Args:
+        journal: its file; None without one.
+
+    Raises:
+        InputError: the file cannot be written, is something else, or is held by another process.
+    """
+    if journal is None:
+        yield
+        return
+    from pathlib import Path
+
+    from ..interruption import is_requested, say_on_leaving
+    from ..solver.kept import SearchJournal, kept_in
+
+    searches = SearchJournal(Path(journal))
+    if len(searches):
+        print_notice(f"{searches.count} already")
+    say_on_leaving(lambda: searches.words)
+    try:
+        with kept_in(searches):
+            yield
+    except SystemExit:
+        if is_requested():
+            print_notice(searches.words)
+        else:
+            searches.remove()
+        raise
+    finally:
+        searches.close()

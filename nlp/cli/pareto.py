@@ -23,8 +23,10 @@ def pareto(
     jobs: options.Jobs = None,
     _time: options.Time = None,
     certify: options.Certify = False,
+    resume: options.ResumeFile = None,
     csv_file: Annotated[str | None, options.table("the front")] = None,
     json_file: options.JsonFile = None,
+    markdown: options.MarkdownFile = None,
     html: options.PageFile = None,
     plot: options.CurveFile = None,
     whole: options.ShowAll = False,
@@ -36,28 +38,31 @@ def pareto(
     from ..front.goals import read_goals
     from ..interruption import Milestone, answer_after, is_requested, why_stopped
 
-    files = options.Outputs(json=json_file, csv=csv_file, html=html, plot=plot)
+    files = options.Outputs(resume=resume, json=json_file, csv=csv_file, markdown=markdown, html=html, plot=plot)
     read = options.read_machine(case, settings, of).file
     read_goals(goals, read.case)  # before the files are looked at
     files.check(read.inputs)
     answer_after(Milestone.POINT)
-    try:
-        with counting_line() as show:
-            found = find_front(
-                read.case,
-                goals,
-                points=points,
-                starts=starts,
-                seed=seed,
-                jobs=jobs,
-                certified=certify,
-                progress=lambda done, total: show(f"{done} of {total} points"),
-            )
-    except UncoveredError as error:
-        raise InputError(f"--certify: {error}") from None
-    is_stopped = is_requested()
-    if is_stopped:
-        print_notice(f"{why_stopped()}: {len(found.points)} of {points} points are found")
-    is_proved = all(each.certificate is None or each.certificate.status.value == "proved" for each in found.points)
-    result = front_result(found)
-    designs.deliver(files, front_designs(found, result), lambda: result, whole=whole, done=is_proved and not is_stopped)
+    with designs.resumed(resume):
+        try:
+            with counting_line() as show:
+                found = find_front(
+                    read.case,
+                    goals,
+                    points=points,
+                    starts=starts,
+                    seed=seed,
+                    jobs=jobs,
+                    certified=certify,
+                    progress=lambda done, total: show(f"{done} of {total} points"),
+                )
+        except UncoveredError as error:
+            raise InputError(f"--certify: {error}") from None
+        is_stopped = is_requested()
+        if is_stopped:
+            print_notice(f"{why_stopped()}: {len(found.points)} of {points} points are found")
+        is_proved = all(each.certificate is None or each.certificate.status.value == "proved" for each in found.points)
+        result = front_result(found)
+        designs.deliver(
+            files, front_designs(found, result), lambda: result, whole=whole, done=is_proved and not is_stopped
+        )

@@ -28,15 +28,18 @@ def tradeoff(
     seed: options.Seed = None,
     jobs: options.Jobs = None,
     _time: options.Time = None,
+    certify: options.Certify = False,
+    resume: options.ResumeFile = None,
     json_file: options.JsonFile = None,
     csv_file: Annotated[str | None, options.table("the curve")] = None,
+    markdown: options.MarkdownFile = None,
     plot: options.CurveFile = None,
     html: options.PageFile = None,
     whole: options.ShowAll = False,
 ) -> None:
     """Solve along one limit or number, and show F against it."""
     from ..case.reader import read_case
-    from ..errors import InputError
+    from ..errors import InputError, UncoveredError
     from ..interruption import Milestone, answer_after, is_requested, why_stopped
     from ..results.tradeoff import tradeoff_designs, tradeoff_result
     from ..solver.status import Status
@@ -48,29 +51,35 @@ def tradeoff(
     name, values = points.names[0], points.values[:, 0].tolist()
     if not 2 <= len(values) <= _MOST:
         raise InputError(f"--over {over}: must have from 2 to {_MOST} values")
-    files = options.Outputs(json=json_file, csv=csv_file, html=html, plot=plot)
+    files = options.Outputs(resume=resume, json=json_file, csv=csv_file, markdown=markdown, html=html, plot=plot)
     fixed = options.read_machine(case, settings, of).settings
     read = {value: read_case(case, {**fixed, name: value}) for value in values}
     files.check(read[values[0]].inputs)
-    with counting_line() as write:
-        found = solve_along(
-            lambda value: read[value].case,
-            values,
-            name=name,
-            starts=starts,
-            seed=seed,
-            jobs=jobs,
-            progress=lambda done, total: write(f"{done} of {total} values solved"),
+    with designs.resumed(resume):
+        try:
+            with counting_line() as write:
+                found = solve_along(
+                    lambda value: read[value].case,
+                    values,
+                    name=name,
+                    starts=starts,
+                    seed=seed,
+                    jobs=jobs,
+                    certified=certify,
+                    progress=lambda done, total: write(f"{done} of {total} values solved"),
+                )
+        except UncoveredError as error:
+            raise InputError(f"--certify: {error}") from None
+        if is_requested() and not found.unsolved:
+            print_notice(f"{why_stopped()}: every value is solved, but not all from the optima beside it")
+        result = tradeoff_result(found)
+        is_proved = all(point.certified is None or point.certified.is_proved for point in found.points)
+        statuses = [point.status for point in result.points]
+        is_done = all(status.is_answer or status is Status.INFEASIBLE for status in statuses)
+        designs.deliver(
+            files,
+            tradeoff_designs(result, found.points[0].solution.case, found),
+            lambda: result,
+            whole=whole,
+            done=is_done and is_proved and any(status.is_answer for status in statuses),
         )
-    if is_requested() and not found.unsolved:
-        print_notice(f"{why_stopped()}: every value is solved, but not all from the optima beside it")
-    result = tradeoff_result(found)
-    statuses = [point.status for point in result.points]
-    is_done = all(status.is_answer or status is Status.INFEASIBLE for status in statuses)
-    designs.deliver(
-        files,
-        tradeoff_designs(result, found.points[0].solution.case, found),
-        lambda: result,
-        whole=whole,
-        done=is_done and any(status.is_answer for status in statuses),
-    )

@@ -99,15 +99,20 @@ def table_rows(target: str, sweep: Sweep, *, drawn: bool = False) -> list[Row]:
     Args:
         target: the file.
         sweep: the sweep.
-        drawn: whether F and the active sides alone are needed. Rows then share the texts of these sides: a million rows
-            have a few dozen of them.
+        drawn: whether the rows are for a picture and a line alone, and need no design and no evidence.
+
+    Rows share their texts: a million rows have a few dozen sets of active sides.
     """
     found: list[Row] = []
-    shared: dict[tuple[str, ...], tuple[str, ...]] = {}
+    shared: dict[object, Any] = {}
+
+    def one(value: Any) -> Any:  # noqa: ANN401 - a text, or several
+        return shared.setdefault(value, value)
+
     for cells in _cells(target):
         row = row_of_cells(sweep, cells)
-        active = shared.setdefault(row.active, row.active)
-        found.append(Row(row.point, row.status, row.F, active=active) if drawn else row._replace(active=active))
+        texts = {name: one(getattr(row, name)) for name in ("active", "certificate", "note")}
+        found.append(Row(row.point, one(row.status), row.F, **texts) if drawn else row._replace(**texts))
     return found
 
 

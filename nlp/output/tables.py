@@ -44,7 +44,8 @@ def _cell(cell: str | Line) -> str:
 
 def designs_markdown(found: Designs[Row]) -> str:
     """Return a table of designs in Markdown, with its lines above and below it."""
-    return "\n".join([*(f"{_words(line)}\n" for line in found.before), markdown(designs_table(found))])
+    lines = [f"{line.label}: {line.words}" if line.label else line.words for line in found.before]
+    return "\n".join([*(f"{markdown_text(line)}\n" for line in lines), markdown(designs_table(found))])
 
 
 def markdown(table: TextTable) -> str:

@@ -25,7 +25,8 @@ from ..results.rounding import number
 from ..results.tables import sizes_of_variables
 from ..results.text import Line
 from ..results.tradeoff import unit_of_number
-from .journal import Row, row_kinds
+from ..system.journal import fields_of
+from .journal import Row
 from .points import Points
 from .sweep import Sweep
 
@@ -100,7 +101,7 @@ def columns_of(sweep: Sweep, rows: Sequence[Row]) -> SweepColumns:
     return SweepColumns(
         numbers=MappingProxyType({name: frozen_array(each, (len(points),)) for name, each in values}),
         design=MappingProxyType(design),
-        **{name: column(name, kind) for name, kind in row_kinds() if name not in ("point", "x")},
+        **{name: column(name, kind) for name, kind in fields_of(Row) if name not in ("point", "x")},
     )
 
 
@@ -180,7 +181,7 @@ def sweep_columns(sweep: Sweep, case: Case | None = None) -> Iterator[Column[Row
     )
     for k, name in enumerate(sweep.variables):
         yield _variable(k, name, sizes.get(name, 0.0))
-    for name, kind in row_kinds():
+    for name, kind in fields_of(Row):
         if name in _LAST and (sweep.certified or name not in _PROOF):
             yield _column_of(name, kind)
 
@@ -215,7 +216,7 @@ def _unit_of(nlp: Nlp, name: str) -> str:
 
 #: Fields of a row that its last columns have, and those of its proof.
 _PROOF = ("certificate", "bound", "gap")
-_LAST = {name for name, _ in row_kinds()} - {"point", "status", "F", "x"}
+_LAST = {name for name, _ in fields_of(Row)} - {"point", "status", "F", "x"}
 #: Texts of fields that a page shows; ``None`` in the place of a number that is missing.
 _SHOWN: Mapping[str, Callable[[Row], str]] = {
     "active": lambda row: ", ".join(row.active) or row.note,
@@ -245,7 +246,7 @@ def row_of_cells(sweep: Sweep, cells: Sequence[Any]) -> Row:
     """Return the row of the cells of its table as they are read from a file; None for an empty one."""
     count, (point, *_, status, F) = len(sweep.variables), cells[: 3 + len(sweep.points.names)]
     x = cells[3 + len(sweep.points.names) :][:count]
-    last = [(name, kind) for name, kind in row_kinds() if name in _LAST]
+    last = [(name, kind) for name, kind in fields_of(Row) if name in _LAST]
     found = zip(last, cells[3 + len(sweep.points.names) + count :], strict=False)
     values = {name: _value(kind, cell) for (name, kind), cell in found if sweep.certified or name not in _PROOF}
     return Row(int(point), status, _value(float | None, F), () if None in x else tuple(map(float, x)), **values)

@@ -147,7 +147,7 @@ def run_sweep(
             if is_interrupted():
                 raise KeyboardInterrupt
             return
-        journal.append(rows)
+        journal.add(rows)
         done += len(rows)
         if progress is not None:
             progress(before, done, len(missing), time.perf_counter() - began)

@@ -27,10 +27,11 @@ from screwsynth.nlp.results.explorations import SweepResult
 from screwsynth.nlp.sweeps import workers
 from screwsynth.nlp.sweeps.columns import sweep_designs
 from screwsynth.nlp.sweeps.engines import EngineKind, Job
-from screwsynth.nlp.sweeps.journal import Journal, Row, line_of, row_of
+from screwsynth.nlp.sweeps.journal import Journal, Row
 from screwsynth.nlp.sweeps.points import CaseSource, Points, grid, points_of_csv
 from screwsynth.nlp.sweeps.sweep import Sweep, run_sweep
 from screwsynth.nlp.sweeps.workers import PointBlock, answer_in_processes
+from screwsynth.nlp.system.journal import line_of, row_of
 
 CASE = "paper-4.1-helical"
 #: Case files that say the same number in two ways are the same to this part.
@@ -162,7 +163,7 @@ def test_rows_with_certificates_are_taken_up(tmp_path: Path) -> None:
 
     with pytest.raises(KeyboardInterrupt):
         run_in_python(case, values, out=file, starts=2, jobs=1, certified=True, time_limit=20, progress=stop)
-    kept = [row_of(line) for line in file.with_name("sweep.csv.journal").read_text().splitlines()[1:]]
+    kept = [row_of(Row, line) for line in file.with_name("sweep.csv.journal").read_text().splitlines()[1:]]
     assert [row.point for row in kept] == [0]
     found = run_in_python(case, values, out=file, starts=2, jobs=1, certified=True, time_limit=20)
     # The first row, its time too, is that of the first run.
@@ -244,8 +245,8 @@ def test_other_outputs_are_refused(tmp_path: Path, cli: Run) -> None:
 def test_a_journal_cut_off_anywhere_keeps_whole_rows(tmp_path: Path) -> None:
     path, rows = tmp_path / "journal", [Row(k, "optimal", k / 3, x=(k / 7,), active=("ä max",)) for k in (2, 0, 3, 1)]
     whole = Journal(path, "abc", 4)
-    whole.append(rows[:2])
-    whole.append([*rows, rows[0]])
+    whole.add(rows[:2])
+    whole.add([*rows, rows[0]])
     with pytest.raises(InputError, match="another run of this sweep is writing it"):
         Journal(path, "abc", 4)
     assert list(whole.rows()) == sorted(rows)
@@ -257,7 +258,7 @@ def test_a_journal_cut_off_anywhere_keeps_whole_rows(tmp_path: Path) -> None:
         journal = Journal(path, "abc", 4)
         kept = 4 - len(journal.missing)
         assert kept == content[head:length].count(b"\n") if length >= head else kept == 0
-        journal.append(rows)
+        journal.add(rows)
         assert (len(journal.missing), list(journal.rows())) == (0, sorted(rows))
         journal.close()
         assert path.read_bytes() == content
@@ -358,10 +359,11 @@ KILLED = """
 import os, signal, sys
 from screwsynth.nlp.cli.main import main
 from screwsynth.nlp.sweeps import sweep
-from screwsynth.nlp.sweeps.journal import Journal, line_of
+from screwsynth.nlp.sweeps.journal import Journal
+from screwsynth.nlp.system.journal import line_of
 
 sweep._BLOCK = 128
-append, left = Journal.append, [int(sys.argv.pop(1))]
+append, left = Journal.add, [int(sys.argv.pop(1))]
 def append_or_die(journal, rows):
     left[0] -= 1
     rows = list(rows)
@@ -370,7 +372,7 @@ def append_or_die(journal, rows):
         journal._file.write(line_of(rows[1]).encode()[:20])
         journal._file.flush()
         os.kill(os.getpid(), signal.SIGKILL)
-Journal.append = append_or_die
+Journal.add = append_or_die
 main()
 """
 
