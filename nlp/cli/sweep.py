@@ -194,7 +194,7 @@ def _deliver(found: Sweep, table: Path, out: str | None, files: options.Outputs)
     from ..output.sweeptable import table_rows
     from ..sweeps.columns import columns_of, sweep_designs, sweep_result
 
-    rows = table_rows(str(table), found, drawn=not any(files[name] for name in ("json", "csv", "markdown", "html")))
+    rows = table_rows(str(table), found, shown=not any(files[name] for name in ("json", "csv", "markdown", "html")))
     table_of_designs = sweep_designs(found, rows)
 
     def shown() -> Iterator[Line]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import tempfile
+from array import array
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from importlib.util import find_spec
@@ -19,7 +20,7 @@ from ..case.case import Case
 from ..errors import InputError, check_seconds
 from ..interruption import one_call, within
 from ..results.designs import Column
-from ..sweeps.columns import SweepColumns, columns_of, row_of_cells, sweep_columns
+from ..sweeps.columns import SweepColumns, columns_of, row_reader, sweep_columns
 from ..sweeps.engines import EngineKind
 from ..sweeps.journal import Row
 from ..sweeps.points import CaseSource, Points, grid_of
@@ -93,27 +94,40 @@ def write_table(target: str, sweep: Sweep, rows: Iterable[Row]) -> None:
             _write_parquet(path, sweep, columns, cells)
 
 
-def table_rows(target: str, sweep: Sweep, *, drawn: bool = False) -> list[Row]:
+#: Fields of a row that a picture and a line about a sweep need.
+_SHOWN = ("status", "F", "active", "note", "certificate")
+
+
+class _ShownRows(Sequence[Row]):
+    """Rows without design and evidence, in a few bytes each: a picture may have millions."""
+
+    def __init__(self, rows: Iterable[Row]) -> None:
+        self._F, self._others = array("d"), list[Row]()
+        shared: dict[Row, Row] = {}
+        for row in rows:
+            self._F.append(math.nan if row.F is None else row.F)
+            other = row._replace(F=None)
+            self._others.append(shared.setdefault(other, other))
+
+    def __len__(self) -> int:
+        return len(self._F)
+
+    def __getitem__(self, k: int) -> Row:  # type: ignore[override]  # no slices
+        F = self._F[k]
+        return self._others[k]._replace(point=k, F=None if math.isnan(F) else F)
+
+
+def table_rows(target: str, sweep: Sweep, *, shown: bool = False) -> Sequence[Row]:
     """Return the rows of the whole table of a sweep, in the order of its points.
 
     Args:
         target: the file.
         sweep: the sweep.
-        drawn: whether the rows are for a picture and a line alone, and need no design and no evidence.
-
-    Rows share their texts: a million rows have a few dozen sets of active sides.
+        shown: whether the rows are for a picture and a line alone, and need no design and no evidence.
     """
-    found: list[Row] = []
-    shared: dict[object, Any] = {}
-
-    def one(value: Any) -> Any:  # noqa: ANN401 - a text, or several
-        return shared.setdefault(value, value)
-
-    for cells in _cells(target):
-        row = row_of_cells(sweep, cells)
-        texts = {name: one(getattr(row, name)) for name in ("active", "certificate", "note")}
-        found.append(Row(row.point, one(row.status), row.F, **texts) if drawn else row._replace(**texts))
-    return found
+    read = row_reader(sweep, _SHOWN if shown else None)
+    rows = map(read, _cells(target))
+    return _ShownRows(rows) if shown else list(rows)
 
 
 def _cells(target: str) -> Iterator[Sequence[Any]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from types import MappingProxyType
 from typing import Any
 
@@ -179,8 +180,10 @@ def sweep_columns(sweep: Sweep, case: Case | None = None) -> Iterator[Column[Row
         if nlp is None
         else dict(zip((each.name for each in nlp.program.variables), sizes_of_variables(nlp), strict=True))
     )
+    kinds = {} if nlp is None else {each.name: each.dimension for each in nlp.program.variables}
     for k, name in enumerate(sweep.variables):
-        yield _variable(k, name, sizes.get(name, 0.0))
+        unit = "" if case is None or name not in kinds else case.units.label(kinds[name])
+        yield _variable(k, name, sizes.get(name, 0.0), unit)
     for name, kind in fields_of(Row):
         if name in _LAST and (sweep.certified or name not in _PROOF):
             yield _column_of(name, kind)
@@ -198,12 +201,13 @@ def _varied(sweep: Sweep, j: int, name: str, unit: str) -> Column[Row]:
     )
 
 
-def _variable(k: int, name: str, size: float) -> Column[Row]:
+def _variable(k: int, name: str, size: float, unit: str) -> Column[Row]:
     return Column(
         name,
         lambda row: row.x[k] if k < len(row.x) else None,
         ColumnKind.VARIABLE,
         label=name,
+        unit=unit,
         text=lambda row: number(row.x[k], size) if k < len(row.x) else "",
     )
 
@@ -242,24 +246,43 @@ def _column_of(name: str, kind: object) -> Column[Row]:
     return Column(name, cell, meaning, holds, name, text=shown) if shown else Column(name, cell, meaning, holds)
 
 
-def row_of_cells(sweep: Sweep, cells: Sequence[Any]) -> Row:
-    """Return the row of the cells of its table as they are read from a file; None for an empty one."""
-    count, (point, *_, status, F) = len(sweep.variables), cells[: 3 + len(sweep.points.names)]
-    x = cells[3 + len(sweep.points.names) :][:count]
-    last = [(name, kind) for name, kind in fields_of(Row) if name in _LAST]
-    found = zip(last, cells[3 + len(sweep.points.names) + count :], strict=False)
-    values = {name: _value(kind, cell) for (name, kind), cell in found if sweep.certified or name not in _PROOF}
-    return Row(int(point), status, _value(float | None, F), () if None in x else tuple(map(float, x)), **values)
+def row_reader(sweep: Sweep, names: Sequence[str] | None = None) -> Callable[[Sequence[Any]], Row]:
+    """Return the function that makes a row of the cells of its table as they are read from a file; None for empty ones.
 
+    Equal texts become one object: a million rows have a few dozen sets of active sides.
 
-def _value(kind: object, cell: Any) -> Any:  # noqa: ANN401 - a field of a row
-    """Return the value of a cell as a field of a row has it."""
-    if kind in (tuple[str, ...], tuple[float, ...]):
-        parts = cell.split(SEPARATOR) if cell else ()
-        return tuple(parts) if kind == tuple[str, ...] else tuple(map(float, parts))
-    if kind is str:
-        return cell or ""
-    return None if cell is None else int(cell) if kind is int else float(cell)
+    Args:
+        sweep: the sweep.
+        names: fields of a row that are needed; all where they are left out. The others have their defaults.
+    """
+    first = 1 + len(sweep.points.names)
+    design = slice(first + 2, first + 2 + len(sweep.variables))
+    last = [name for name, _ in fields_of(Row) if name in _LAST and (sweep.certified or name not in _PROOF)]
+    places = {"point": 0, "status": first, "F": first + 1} | {name: design.stop + k for k, name in enumerate(last)}
+    readers: dict[object, Callable[[Any], Any]] = {
+        tuple[str, ...]: cache(lambda cell: tuple(cell.split(SEPARATOR)) if cell else ()),
+        tuple[float, ...]: lambda cell: tuple(map(float, cell.split(SEPARATOR))) if cell else (),
+        str: cache(lambda cell: cell or ""),
+        int: int,
+        float: float,
+        float | None: lambda cell: None if cell is None else float(cell),
+    }
+    wanted = [
+        (k, places[name], readers[kind])
+        for k, (name, kind) in enumerate(fields_of(Row))
+        if name in places and (names is None or name in names)
+    ]
+    empty = [0, "", None, *Row._field_defaults.values()]
+
+    def read(cells: Sequence[Any]) -> Row:
+        values = list(empty)
+        for k, place, reader in wanted:
+            values[k] = reader(cells[place])
+        x = cells[design] if names is None else ()
+        values[3] = () if None in x else tuple(map(float, x))
+        return Row._make(values)
+
+    return read
 
 
 def stated_pose_note(case: Case, notes: Iterable[str]) -> str | None:

@@ -56,8 +56,10 @@ def designs_page(found: Designs[Row]) -> str:
 def _sections(found: Designs[Row]) -> Iterator[tuple[str, str, Markup]]:
     """Yield the sections of a page about designs of one robot: anchor, heading and content of each."""
     page, designs = found.page, found.drawn()
-    bends = bend_lines(designs, page.bends) if page.bends else Markup("")
-    beside = tag("div", tag("div", _picture(found), class_="wide"), bends, class_="beside")
+    aside = bend_lines(designs, page.bends) if page.bends else Markup("")
+    if page.is_answer and (legend := legend_of(found)):
+        aside = tag("ul", *(tag("li", line) for line in legend), class_="plain")
+    beside = tag("div", tag("div", _picture(found), class_="wide"), aside, class_="beside")
     yield (*page.picture, join_markup([paragraphs(page.rules), beside, paragraphs(page.cautions)]))
     yield "designs", page.designs, design_figures(designs)
     yield (*page.table, designs_rows(found))
@@ -74,8 +76,7 @@ def _picture(found: Designs[Row]) -> Markup:
         picture = picture_of(".svg", designs_figure, found, is_on_page=True)
     except EvaluationError as error:
         return paragraphs([f"{error}."])
-    legend = [tag("li", line) for line in legend_of(found)]
-    return join_markup([picture_figure(picture, page.below), tag("ul", *legend, class_="plain") if legend else None])
+    return picture_figure(picture, page.below)
 
 
 def _list_sections(found: Designs[Row]) -> Iterator[tuple[str, str, Markup]]:
