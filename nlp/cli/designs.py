@@ -70,7 +70,8 @@ def resumed(journal: str | None) -> Iterator[None]:
     from pathlib import Path
 
     from ..interruption import is_requested, say_on_leaving
-    from ..solver.kept import SearchJournal, kept_in
+    from ..solver.kept import kept_in
+    from ..solver.searchjournal import SearchJournal
 
     searches = SearchJournal(Path(journal))
     if len(searches):

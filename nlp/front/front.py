@@ -27,8 +27,8 @@ from ..errors import EvaluationError, InputError
 from ..interruption import Milestone, is_requested, one_call, reached, seconds_left, why_stopped, within
 from ..proof.certificate.certificate import Certificate
 from ..proof.enclosure.engine import kernel
-from ..solver.kept import kept_certificate
 from ..solver.multistart import ProgramSolution, solve_program
+from ..solver.searchjournal import kept_certificate
 from ..solver.status import Status
 from .boxes import GoalBox, Region
 from .goals import Goal, GoalProgram, loosest_numbers, program_of, read_goals

@@ -28,9 +28,9 @@ from ..proof.statement.standard_form import is_in_home_mode, standard_form
 from .certified_choices import prove_choices
 from .choices import solve_choices
 from .compromise import solution_of_one_task
-from .kept import kept_certificate
 from .multistart import ProgramSolution, solve_program
 from .pose_constraints import with_margin
+from .searchjournal import kept_certificate
 from .solution import Answer, Solution, interrupted
 from .solve import solve, solve_programs
 from .status import Status

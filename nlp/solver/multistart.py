@@ -40,7 +40,7 @@ from ..program.sampling import starting_points
 from .by_blocks import from_best_blocks, searched_starts
 from .interface import LocalSearch, Solver, SolverResult, StopReason
 from .ipopt import ipopt
-from .kept import kept_search
+from .kept import journal_in_force
 from .screened import search_each
 from .starts import Optimum, Start, StartStatus, distinct_optima
 from .status import Phase, PhaseProgress, Status, no_phase
@@ -131,7 +131,8 @@ def solve_program(
     def solve() -> ProgramSolution:
         return _solved(nlp, search, first, jobs, progress, solver, phase)
 
-    found: ProgramSolution = kept_search(nlp, search, first, solve, ProgramSolution)
+    journal = journal_in_force()
+    found: ProgramSolution = solve() if journal is None else journal.search(nlp, search, first, solve, ProgramSolution)
     return found
 
 

@@ -10,7 +10,7 @@ from builders import TWO_GOALS, Run, output_of, refusal_of, rows_of, saved, unbr
 
 import screwsynth.nlp as sn
 from screwsynth.nlp.solver import multistart
-from screwsynth.nlp.solver.kept import KeptCertificate, KeptSearch, SearchJournal
+from screwsynth.nlp.solver.searchjournal import KeptCertificate, KeptSearch, SearchJournal
 
 #: The first task of the case alone: F is that of legs of one length and of one horizontal distance of their ends.
 UP = TWO_GOALS.replace('    { name = "side", sense = "max", axis = [1, 0, 0], pitch = inf },\n', "")
