@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from screwsynth.nlp.case.reader import read_case
-from screwsynth.nlp.output.sweeptable import table_points, write_table
+from screwsynth.nlp.output.sweeptable import table_rows, write_table
 from screwsynth.nlp.sweeps.journal import Row
 from screwsynth.nlp.sweeps.points import CaseSource, grid
 from screwsynth.nlp.sweeps.sweep import Sweep
@@ -61,7 +61,7 @@ def memory(folder: str) -> None:
     active, multipliers = ("p_x min", "p_y min", "p_z max"), (1 / 3, 2 / 7, 5 / 3)
     with sweep.journal_of(out) as journal:
         for first in range(0, count, 512):
-            journal.append(
+            journal.add(
                 Row(
                     k,
                     "optimal",
@@ -82,7 +82,7 @@ def memory(folder: str) -> None:
         write_table(out, sweep, journal.rows())
         written = time.perf_counter() - with_rows
         journal.remove()
-    table_points(out)
+    table_rows(out, sweep, shown=True)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     times = f"journal of {size / 1e6:.0f} MB in {appended:.0f} s, table in {written:.0f} s"
     print(f"{count:,} rows: {times}, {peak:.0f} MB of memory")

@@ -2,20 +2,27 @@
 
 The first row names the columns. Numbers are fixed, and in the units of the case. A fault is told with the file, the row
 as a spreadsheet counts it, and the column. Files of paths have the columns of poses too, and are read by the same
-functions.
+functions, and so are the points of a sweep.
 """
 
 from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from array import array
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
+from ...models import FloatArray
 from ...models.values import dataclass
 from ..errors import CaseError, InputError, listing, nearest
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 #: Largest size of a file, bytes, and the largest number of its rows: what is larger is no trajectory of a case.
 _MOST_BYTES, _MOST_ROWS = 4_000_000, 1_000
@@ -231,7 +238,7 @@ def csv_rows(text: str, file: str) -> Iterator[tuple[int, list[str]]]:
         raise InputError(f"{file}: is not CSV: {error}") from None
 
 
-def number_in(text: str, row: int, column: str, file: str) -> float:
+def _number_in(text: str, row: int, column: str, file: str) -> float:
     """Return the number of a cell.
 
     Raises:
@@ -244,6 +251,78 @@ def number_in(text: str, row: int, column: str, file: str) -> float:
 
         fault = f"must be a number{hint_of(text)}" if text else "is empty; it must be a number"
         raise CaseError(f"row {row}, column {column}", fault, text or None, file) from None
+
+
+class NumberTable(NamedTuple):
+    """Numbers of a file.
+
+    Attributes:
+        source: name of the file.
+        rows: (n,) numbers of the rows, as a spreadsheet counts.
+        columns: (n,) numbers of each column, by its name.
+    """
+
+    source: str
+    rows: NDArray[np.int32]
+    columns: Mapping[str, FloatArray]
+
+    def block(self, names: str) -> FloatArray:
+        """Return columns (n, k) by their names, which spaces separate."""
+        return np.stack([self.columns[name] for name in names.split()], axis=1)
+
+    def refuse(self, is_wrong: NDArray[np.bool_], name: str, fault: str) -> None:
+        """Refuse the first row at which something is wrong.
+
+        Args:
+            is_wrong: (n,) whether it is, at each row.
+            name: of the columns, for messages.
+            fault: the fault, in words.
+
+        Raises:
+            CaseError: there is such a row.
+        """
+        if is_wrong.any():
+            at = int(np.argmax(is_wrong))
+            value = float(self.columns[name][at]) if name in self.columns else None
+            raise CaseError(f"row {self.rows[at]}, column{'s' * (value is None)} {name}", fault, value, self.source)
+
+
+def number_table(
+    records: Iterable[tuple[int, list[str]]], header: list[str], file: str, left_out: Sequence[Mapping[int, str]] = ()
+) -> NumberTable:
+    """Return the numbers of a file.
+
+    Args:
+        records: rows below the one that names the columns, with their numbers.
+        header: names of the columns.
+        file: name of the file, for messages.
+        left_out: cells in the place of those of columns that a row may leave empty together, by place.
+
+    Raises:
+        CaseError: a row has not a cell for each column, or a cell is no number.
+        InputError: the file is no table at all.
+    """
+    rows, numbers = array("i"), array("d")
+    for row, cells in records:
+        _check_count(cells, header, row, file)
+        for others in left_out:
+            if not any(cells[place] for place in others):
+                for place, cell in others.items():
+                    cells[place] = cell
+        try:
+            numbers.extend([float(cell) for cell in cells])
+        except ValueError:
+            for cell, name in zip(cells, header, strict=True):
+                _number_in(cell, row, name, file)  # of which one raises
+        rows.append(row)
+    columns = np.array(numbers).reshape(-1, len(header)).T
+    return NumberTable(file, np.array(rows, dtype=np.int32), dict(zip(header, columns, strict=True)))
+
+
+def _check_count(cells: Sequence[str], header: Sequence[str], row: int, file: str) -> None:
+    """Refuse a row that has not a cell for each column, by a CaseError."""
+    if len(cells) != len(header):
+        raise CaseError(f"row {row}", f"must have {len(header)} cells, got {len(cells)}", source=file)
 
 
 def _text_of(path: Path, file: str, name: str, most: int) -> str:
@@ -299,12 +378,11 @@ def _table_of(
     Raises:
         CaseError: a cell is no number, or missing.
     """
-    if len(record) != len(header):
-        raise CaseError(f"row {number}", f"must have {len(header)} cells, got {len(record)}", source=file)
+    _check_count(record, header, number, file)
     cells = dict(zip(header, record, strict=True))
 
     def value(column: str) -> float | str:
-        return cells[column] if column in kind.words else number_in(cells[column], number, column, file)
+        return cells[column] if column in kind.words else _number_in(cells[column], number, column, file)
 
     table: dict[str, Any] = {}
     for key, names in columns.items():

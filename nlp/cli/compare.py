@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from . import contents, options
+from . import designs, options
 from .commandline import Argument, print_notice
 from .progress import counting_line
 
@@ -27,8 +27,10 @@ def compare(
     starts: options.Starts = None,
     seed: options.Seed = None,
     jobs: options.Jobs = None,
+    resume: options.ResumeFile = None,
     json_file: options.JsonFile = None,
     csv_file: Annotated[str | None, options.table("a row for each robot")] = None,
+    markdown: options.MarkdownFile = None,
     html: options.PageFile = None,
     plot: Annotated[str | None, options.plot("Draw the designs in one scale")] = None,
     whole: options.ShowAll = False,
@@ -37,11 +39,11 @@ def compare(
     from pathlib import Path
 
     from ..comparison.compare import compare as compare_robots
-    from ..comparison.data import comparison_result
+    from ..comparison.data import comparison_designs, comparison_result
     from ..comparison.robots import read_robots
     from ..interruption import Milestone, answer_after, is_requested, why_stopped
 
-    files = options.Outputs(json=json_file, csv=csv_file, html=html, plot=plot)
+    files = options.Outputs(resume=resume, json=json_file, csv=csv_file, markdown=markdown, html=html, plot=plot)
     read = options.read_machine(case, settings, of).file
     inputs = dict(read.inputs)
     for each in read_robots(robots, read.case):
@@ -49,32 +51,28 @@ def compare(
             inputs[Path(each.file)] = "a robot file"
     files.check(inputs)
     answer_after(Milestone.ROBOT)
-    with counting_line() as show:
-        found = compare_robots(
-            read.case,
-            robots,
-            size=size,
-            scale=not no_scale,
-            part=part,
-            certified=certified,
-            time_limit=time,
-            starts=starts,
-            seed=seed,
-            jobs=jobs,
-            progress=lambda label, done, total: show(f"{done} of {total} robots done: {label}"),
+    with designs.resumed(resume):
+        with counting_line() as show:
+            found = compare_robots(
+                read.case,
+                robots,
+                size=size,
+                scale=not no_scale,
+                part=part,
+                certified=certified,
+                time_limit=time,
+                starts=starts,
+                seed=seed,
+                jobs=jobs,
+                progress=lambda label, done, total: show(f"{done} of {total} robots done: {label}"),
+            )
+        is_stopped = is_requested()
+        if is_stopped:
+            begun = f"{len(found.entries)} of {len(robots)} robots are begun, the last one not to its end"
+            print_notice(f"{why_stopped()}: {begun}")
+        is_proved = not certified or all(
+            each.certified is not None and each.certified.is_proved for each in found.ranked
         )
-    is_stopped = is_requested()
-    if is_stopped:
-        begun = f"{len(found.entries)} of {len(robots)} robots are begun, the last one not to its end"
-        print_notice(f"{why_stopped()}: {begun}")
-    is_proved = not certified or all(each.certified is not None and each.certified.is_proved for each in found.ranked)
-    result = comparison_result(found)
-    files.deliver(
-        lambda: contents.comparison_summary(result),
-        whole=whole,
-        done=bool(found.ranked) and is_proved and not is_stopped,
-        json=lambda: result,
-        csv=lambda: contents.comparison_csv(result),
-        html=lambda: contents.comparison_page(found, result),
-        plot=lambda: contents.comparison_figure(found),
-    )
+        result = comparison_result(found)
+        done = bool(found.ranked) and is_proved and not is_stopped
+        designs.deliver(files, comparison_designs(found, result), lambda: result, whole=whole, done=done)

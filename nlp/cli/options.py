@@ -190,6 +190,10 @@ CsvTable = Annotated[str | None, text("--table", "NAME", "Write this table only,
 PlotFile = Annotated[str | None, plot("Draw the robot")]
 CurveFile = Annotated[str | None, plot("Draw the curve")]
 PageFile = Annotated[str | None, page("")]
+MarkdownFile = Annotated[str | None, file("--markdown", "Write the table in Markdown; - is stdout")]
+ResumeFile = Annotated[
+    str | None, file("--resume", "Journal of what is solved: the same command goes on from it after a stop")
+]
 ShowAll = Annotated[bool, flag("--all", "Show every row and every table, not the answer alone")]
 Folder = Annotated[str, text("--out", "DIR", "Folder to write into")]
 Force = Annotated[bool, flag("--force", "Write over files that screwsynth did not write")]
@@ -286,8 +290,8 @@ def read_robot(file: str) -> Model:
         raise (InputError(f"{file}: {error.fault}") if error.key == "robot.file" else error) from None
 
 
-#: Options of files for which ``-`` is a name: pictures, and the table of a sweep.
-_PICTURES, _TABLE = ("plot", "plot_pose"), "out"
+#: Options of files for which ``-`` is a name: pictures; the table of a sweep, and journals.
+_PICTURES, _NAMED = ("plot", "plot_pose"), ("out", "resume")
 
 
 class Outputs:
@@ -295,8 +299,8 @@ class Outputs:
 
     Args:
         targets: file by the option that names it, such as ``json``, or ``plot_pose`` for ``--plot-pose``; None for one
-            that is not asked for. All but pictures and the table of a sweep are standard output for ``-``, one of them
-            at most.
+            that is not asked for. All but pictures, journals and the table of a sweep are standard output for ``-``,
+            one of them at most.
 
     Raises:
         InputError: several are standard output, a picture's ending is none, or Matplotlib is not installed.
@@ -305,7 +309,7 @@ class Outputs:
     def __init__(self, **targets: str | None) -> None:
         self._targets = targets
         pictures = [target for name in _PICTURES if (target := targets.get(name)) is not None]
-        texts = {name: target for name, target in targets.items() if name not in (*_PICTURES, _TABLE)}
+        texts = {name: target for name, target in targets.items() if name not in (*_PICTURES, *_NAMED)}
         #: Whether a file is standard output.
         self.is_piped = "-" in texts.values()
         if list(texts.values()).count("-") > 1:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from . import contents, options
+from . import designs, options
 from .commandline import print_notice
 from .progress import counting_line
 
@@ -23,48 +23,46 @@ def pareto(
     jobs: options.Jobs = None,
     _time: options.Time = None,
     certify: options.Certify = False,
+    resume: options.ResumeFile = None,
     csv_file: Annotated[str | None, options.table("the front")] = None,
     json_file: options.JsonFile = None,
+    markdown: options.MarkdownFile = None,
     html: options.PageFile = None,
     plot: options.CurveFile = None,
     whole: options.ShowAll = False,
 ) -> None:
     """Find the front of two or more goals of a case."""
     from ..errors import InputError, UncoveredError
+    from ..front.data import front_designs, front_result
     from ..front.front import pareto as find_front
     from ..front.goals import read_goals
     from ..interruption import Milestone, answer_after, is_requested, why_stopped
-    from ..results.text import Line
 
-    files = options.Outputs(json=json_file, csv=csv_file, html=html, plot=plot)
+    files = options.Outputs(resume=resume, json=json_file, csv=csv_file, markdown=markdown, html=html, plot=plot)
     read = options.read_machine(case, settings, of).file
     read_goals(goals, read.case)  # before the files are looked at
     files.check(read.inputs)
     answer_after(Milestone.POINT)
-    try:
-        with counting_line() as show:
-            found = find_front(
-                read.case,
-                goals,
-                points=points,
-                starts=starts,
-                seed=seed,
-                jobs=jobs,
-                certified=certify,
-                progress=lambda done, total: show(f"{done} of {total} points"),
-            )
-    except UncoveredError as error:
-        raise InputError(f"--certify: {error}") from None
-    is_stopped = is_requested()
-    if is_stopped:
-        print_notice(f"{why_stopped()}: {len(found.points)} of {points} points are found")
-    is_proved = all(each.certificate is None or each.certificate.status.value == "proved" for each in found.points)
-    files.deliver(
-        lambda: [*map(Line, contents.front_words(found)), contents.front_table(found)],
-        whole=whole,
-        done=is_proved and not is_stopped,
-        json=lambda: contents.front_result(found),
-        csv=lambda: contents.front_csv(found),
-        html=lambda: contents.front_page(found),
-        plot=lambda: contents.front_figure(found),
-    )
+    with designs.resumed(resume):
+        try:
+            with counting_line() as show:
+                found = find_front(
+                    read.case,
+                    goals,
+                    points=points,
+                    starts=starts,
+                    seed=seed,
+                    jobs=jobs,
+                    certified=certify,
+                    progress=lambda done, total: show(f"{done} of {total} points"),
+                )
+        except UncoveredError as error:
+            raise InputError(f"--certify: {error}") from None
+        is_stopped = is_requested()
+        if is_stopped:
+            print_notice(f"{why_stopped()}: {len(found.points)} of {points} points are found")
+        is_proved = all(each.certificate is None or each.certificate.status.value == "proved" for each in found.points)
+        result = front_result(found)
+        designs.deliver(
+            files, front_designs(found, result), lambda: result, whole=whole, done=is_proved and not is_stopped
+        )

@@ -4,20 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, NoReturn
 
-from . import contents, options
+from . import designs, options
 from .commandline import print_notice
 from .progress import counting_line
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
+    from ..results.text import Line
+    from ..sweeps.engines import EngineKind
     from ..sweeps.points import Points
     from ..sweeps.sweep import Sweep
 
 
 def sweep(
     case: options.CaseName,
-    out: Annotated[str, options.file("--out", "The table: a .parquet or .csv file; a stopped run is resumed")],
     over: Annotated[
         list[str],
         options.several(
@@ -26,6 +30,9 @@ def sweep(
             "A number to vary, or NAME=V1,V2,..., or one CSV file of points, names in its first row",
         ),
     ],
+    out: Annotated[
+        str | None, options.file("--out", "The table: a .parquet or .csv file; a stopped run is resumed")
+    ] = None,
     settings: options.SettingTexts = None,
     of: options.ResultFile = None,
     starts: Annotated[int | None, options.starts("Starting points at each point; 8 if left out")] = None,
@@ -39,27 +46,31 @@ def sweep(
     ] = None,
     certified: options.Certify = False,
     _time: Annotated[float | None, options.time("no limit if left out", "goes on when it is called again")] = None,
+    resume: options.ResumeFile = None,
     json_file: options.JsonFile = None,
+    csv_file: Annotated[str | None, options.table("the table")] = None,
+    markdown: options.MarkdownFile = None,
     html: options.PageFile = None,
     plot: Annotated[str | None, options.plot("Draw F over one or two numbers")] = None,
 ) -> None:
     """Solve at thousands of values of fixed numbers."""
-    from ..interruption import say_on_leaving
     from ..output.files import read_text
-    from ..output.sweeptable import check_table, is_written, write_table
+    from ..output.sweeptable import check_table
+    from ..sweeps.columns import check_drawn
     from ..sweeps.engines import EngineKind
     from ..sweeps.points import CaseSource, grid, points_of_csv
-    from ..sweeps.sweep import Sweep, run_sweep
+    from ..sweeps.sweep import Sweep
 
     kind = EngineKind.of(engine)
     points = _points_file(over)
     chosen = grid(over) if points is None else points_of_csv(read_text(points), points)
-    files = options.Outputs(out=out, json=json_file, html=html, plot=plot)
+    files = options.Outputs(
+        out=out, resume=resume, json=json_file, csv=csv_file, markdown=markdown, html=html, plot=plot
+    )
     if plot is not None:
-        from ..output.pictures.sweeps import check_axes
-
-        check_axes(chosen)
-    check_table(out)
+        check_drawn(chosen)
+    if out is not None:
+        check_table(out)
     read = options.read_machine(case, settings, of).file
     inputs = dict(read.inputs)
     if points is not None:
@@ -69,30 +80,80 @@ def sweep(
     files.check(inputs)
     with _named_points(chosen, points):
         found = Sweep.of(CaseSource.from_file(read), chosen, starts, seed, certified=certified)
-    if is_written(out, found):
-        print_notice(f"{out}: holds all {len(chosen):,} points already")
-    else:
-        with found.journal_of(out) as journal:
-            before = len(chosen) - len(journal.missing)
-            if before:
-                print_notice(f"{before:,} of {len(chosen):,} points are in {journal.path} already")
-            say_on_leaving(lambda: journal.words)
-            with counting_line() as show:
-                run_sweep(
-                    found,
-                    journal,
-                    engine=kind,
-                    jobs=jobs,
-                    dask=dask,
-                    progress=lambda *counts: show(_progress_words(*counts)),
-                    notice=print_notice,
-                )
-            if len(journal.missing):
-                print_notice(f"the time is over: {journal.words}")
-                raise SystemExit(1)
-            write_table(out, found, journal.rows())
-            journal.remove()
-    _deliver(found, out, files)
+    with _table_file(out) as table:
+        _run(found, table, resume, is_kept=out is not None, engine=kind, jobs=jobs, dask=dask)
+        _deliver(found, table, out, files)
+
+
+@contextmanager
+def _table_file(out: str | None) -> Iterator[Path]:
+    """Give the file of the table, which is removed after the block where no name is given for it."""
+    from pathlib import Path
+    from tempfile import TemporaryDirectory
+
+    if out is not None:
+        yield Path(out)
+        return
+    with TemporaryDirectory(prefix="screwsynth.") as folder:
+        yield Path(folder) / "sweep.csv"
+
+
+def _run(
+    found: Sweep,
+    table: Path,
+    resume: str | None,
+    *,
+    is_kept: bool,
+    engine: EngineKind | None,
+    jobs: int | None,
+    dask: str | None,
+) -> None:
+    """Solve the points that neither the table nor the journal has, and write the table.
+
+    Args:
+        found: the sweep.
+        table: file of the table.
+        resume: file of the journal; beside the table where it is left out.
+        is_kept: whether the table and the journal beside it stay.
+        engine: as for :func:`.run_sweep`.
+        jobs: likewise.
+        dask: likewise.
+
+    Raises:
+        InputError: a file belongs to another sweep, or cannot be written.
+        SystemExit: the time is over before all points are solved.
+    """
+    from ..interruption import say_on_leaving
+    from ..output.sweeptable import is_written, write_table
+    from ..sweeps.sweep import run_sweep
+
+    if is_written(str(table), found):
+        print_notice(f"{table}: holds all {len(found.points):,} points already")
+        return
+    with found.journal_of(str(table), resume) as journal:
+        before = len(found.points) - len(journal.missing)
+        if before:
+            print_notice(f"{before:,} of {len(found.points):,} points are in {journal.path} already")
+
+        def words() -> str:
+            return journal.words if is_kept or resume else "without --out or --resume no point is kept"
+
+        say_on_leaving(words)
+        with counting_line() as show:
+            run_sweep(
+                found,
+                journal,
+                engine=engine,
+                jobs=jobs,
+                dask=dask,
+                progress=lambda *counts: show(_progress_words(*counts)),
+                notice=print_notice,
+            )
+        if len(journal.missing):
+            print_notice(f"the time is over: {words()}")
+            raise SystemExit(1)
+        write_table(str(table), found, journal.rows())
+        journal.remove()
 
 
 @contextmanager
@@ -128,39 +189,27 @@ def _points_file(over: list[str]) -> str | None:
     return file
 
 
-def _deliver(found: Sweep, out: str, files: options.Outputs) -> NoReturn:
-    """Write a sweep as JSON, as a page and as a picture, print a line about its table, and exit."""
-    import math
-    from functools import cache
+def _deliver(found: Sweep, table: Path, out: str | None, files: options.Outputs) -> NoReturn:
+    """Write the outputs of a sweep, print a line about its table, and exit."""
+    from ..output.sweeptable import table_rows
+    from ..sweeps.columns import columns_of, sweep_designs, sweep_result
 
-    from ..output.sweeptable import table_points, table_rows
-    from ..results.text import Line
-    from ..sweeps.columns import columns_of, stated_pose_note, sweep_result
-
-    case = found.source.case_at(found.points.settings(0))
-    rows = cache(lambda: table_rows(out, found))
-    columns = cache(lambda: columns_of(found, rows()))
-    points = table_points(out)
-    answered = [row for row in points if not math.isnan(row.F)]
+    rows = table_rows(str(table), found, shown=not any(files[name] for name in ("json", "csv", "markdown", "html")))
+    table_of_designs = sweep_designs(found, rows)
 
     def shown() -> Iterator[Line]:
-        values = [row.F for row in answered]
-        regions = len({row.active for row in answered})
-        ends = f", F from {min(values):.7g} to {max(values):.7g}, {regions} sets of active limits" if values else ""
-        if found.certified:
-            ends += f", {sum(row.certificate == 'proved' for row in rows()):,} are proved"
-        yield Line(f"{len(values):,} of {len(found.points):,} points have an answer{ends}: {out}")
-        notice = stated_pose_note(case, [row.note for row in rows()]) if case.limits_over else None
-        if notice is not None:
-            yield Line(f"note: {notice}")
+        line, *others = table_of_designs.before
+        yield line if out is None else replace(line, text=f"{line.text}: {out}")
+        yield from others
+        yield from table_of_designs.after
 
-    files.deliver(
-        shown,
+    designs.deliver(
+        files,
+        table_of_designs,
+        lambda: sweep_result(table_of_designs.case, columns_of(found, rows)),
         whole=True,
-        done=bool(answered),
-        json=lambda: sweep_result(case, columns()),
-        html=lambda: contents.sweep_page(case, found.points, columns()),
-        plot=lambda: contents.sweep_figure(case, found.points, points),
+        done=any(row.F is not None for row in rows),
+        shown=shown,
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from . import contents, options
+from . import designs, options
 from .commandline import print_notice
 from .progress import counting_line
 
@@ -28,17 +28,20 @@ def tradeoff(
     seed: options.Seed = None,
     jobs: options.Jobs = None,
     _time: options.Time = None,
+    certify: options.Certify = False,
+    resume: options.ResumeFile = None,
     json_file: options.JsonFile = None,
     csv_file: Annotated[str | None, options.table("the curve")] = None,
+    markdown: options.MarkdownFile = None,
     plot: options.CurveFile = None,
     html: options.PageFile = None,
     whole: options.ShowAll = False,
 ) -> None:
     """Solve along one limit or number, and show F against it."""
     from ..case.reader import read_case
-    from ..errors import InputError
+    from ..errors import InputError, UncoveredError
     from ..interruption import Milestone, answer_after, is_requested, why_stopped
-    from ..results.tradeoff import tradeoff_csv, tradeoff_result, tradeoff_summary
+    from ..results.tradeoff import tradeoff_designs, tradeoff_result
     from ..solver.status import Status
     from ..solver.tradeoff import tradeoff as solve_along
     from ..sweeps.points import grid
@@ -48,31 +51,35 @@ def tradeoff(
     name, values = points.names[0], points.values[:, 0].tolist()
     if not 2 <= len(values) <= _MOST:
         raise InputError(f"--over {over}: must have from 2 to {_MOST} values")
-    files = options.Outputs(json=json_file, csv=csv_file, html=html, plot=plot)
+    files = options.Outputs(resume=resume, json=json_file, csv=csv_file, markdown=markdown, html=html, plot=plot)
     fixed = options.read_machine(case, settings, of).settings
     read = {value: read_case(case, {**fixed, name: value}) for value in values}
     files.check(read[values[0]].inputs)
-    with counting_line() as write:
-        found = solve_along(
-            lambda value: read[value].case,
-            values,
-            name=name,
-            starts=starts,
-            seed=seed,
-            jobs=jobs,
-            progress=lambda done, total: write(f"{done} of {total} values solved"),
+    with designs.resumed(resume):
+        try:
+            with counting_line() as write:
+                found = solve_along(
+                    lambda value: read[value].case,
+                    values,
+                    name=name,
+                    starts=starts,
+                    seed=seed,
+                    jobs=jobs,
+                    certified=certify,
+                    progress=lambda done, total: write(f"{done} of {total} values solved"),
+                )
+        except UncoveredError as error:
+            raise InputError(f"--certify: {error}") from None
+        if is_requested() and not found.unsolved:
+            print_notice(f"{why_stopped()}: every value is solved, but not all from the optima beside it")
+        result = tradeoff_result(found)
+        is_proved = all(point.certified is None or point.certified.is_proved for point in found.points)
+        statuses = [point.status for point in result.points]
+        is_done = all(status.is_answer or status is Status.INFEASIBLE for status in statuses)
+        designs.deliver(
+            files,
+            tradeoff_designs(result, found.points[0].solution.case, found),
+            lambda: result,
+            whole=whole,
+            done=is_done and is_proved and any(status.is_answer for status in statuses),
         )
-    if is_requested() and not found.unsolved:
-        print_notice(f"{why_stopped()}: every value is solved, but not all from the optima beside it")
-    loaded, result = found.points[0].solution.case, tradeoff_result(found)
-    statuses = [point.status for point in result.points]
-    is_done = all(status.is_answer or status is Status.INFEASIBLE for status in statuses)
-    files.deliver(
-        lambda: tradeoff_summary(loaded, result),
-        whole=whole,
-        done=is_done and any(status.is_answer for status in statuses),
-        json=lambda: result,
-        csv=lambda: tradeoff_csv(result),
-        html=lambda: contents.tradeoff_page(found, result),
-        plot=lambda: contents.tradeoff_figure(loaded, result),
-    )

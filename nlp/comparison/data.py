@@ -1,4 +1,4 @@
-"""A comparison as a result, with sentences about its rules, and about limits and freedoms that a robot lacks."""
+"""A comparison as a result and as a table of designs, with sentences about its rules and about what a robot lacks."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from ..case.case import Case
 from ..case.pose import Free
 from ..errors import CaseError, listing
 from ..program.program import design_names
+from ..proof.workspace.verdict import Outcome
 from ..results.comparison import (
     ComparedDimensionData,
     ComparedLimitData,
@@ -21,11 +22,16 @@ from ..results.comparison import (
     ComparedStrokeData,
     ComparedTaskData,
     ComparisonResult,
+    comparison_columns,
+    comparison_lines,
 )
+from ..results.designs import DesignDetails, Designs, DrawnDesign, Join, PageWords, free_numbers
 from ..results.evidence import certificate_data
 from ..results.objective import unit_of_objective
 from ..results.parts import SCHEMA, UnitsData
 from ..results.point import versions, violations
+from ..results.text import Line, TextTable, Tone
+from ..solver.solution import Solution
 from ..solver.status import Status
 from ..system.jsonvalues import finite_or_none
 from ..units import rate_unit
@@ -202,6 +208,78 @@ def comparison_result(found: Comparison) -> ComparisonResult:
         sentences=tuple(comparison_sentences(found)),
         versions=versions(),
     )
+
+
+def comparison_designs(found: Comparison, result: ComparisonResult) -> Designs[ComparedRobotData]:
+    """Return a comparison as a table of designs.
+
+    Args:
+        found: the comparison.
+        result: the same as a result.
+    """
+    case, ranked = found.case, [each for each in result.robots if each.part == "ranked"]
+    words = f"{len(ranked)} of {len(result.robots)} robots can be compared"
+    if others := sum(each.part == "limits not kept" for each in result.robots):
+        words += f", {others} {'does' if others == 1 else 'do'} not keep every limit"
+    if ranked and ranked[0].value is not None:
+        unit = ranked[0].tasks[0].unit if len(ranked[0].tasks) == 1 else ""
+        best = f"{ranked[0].name} has the best value, {f'{ranked[0].value:.7g} {unit}'.rstrip()}"
+        if ranked[0].workspace is Outcome.REFUTED:
+            best += ", and is refuted over the workspace"
+        words = f"{best}; {words}"
+    return Designs(
+        "comparison",
+        case,
+        "robots, the best first",
+        tuple(comparison_columns(result)),
+        result.robots,
+        Join.LIST,
+        PageWords(
+            f"{case.name}, robots {', '.join(each.name for each in result.robots)}",
+            f"{words}.",
+            ("drawings", "Designs"),
+            ("robots", "Robots in one table"),
+            rules=result.sentences,
+            below="Each robot at its design, all from one side, in one scale and with one scale of the colours.",
+            is_answer=bool(ranked),
+        ),
+        before=[Line(case.title or case.name, tone=Tone.TITLE)],
+        after=tuple(comparison_lines(result)),
+        drawn=lambda: [
+            _drawn(case, each, each.solution) for each in found.entries if each.solution and each.has_answer
+        ],
+        details=tuple(_details(each) for each in result.robots),
+    )
+
+
+def _details(robot: ComparedRobotData) -> DesignDetails:
+    """Return what a page says of a robot: its description, what it lacks, and its dimensions with their ranges."""
+    rows = tuple(
+        (
+            each.name,
+            f"{each.value:.6g}",
+            each.unit,
+            "fixed" if each.range is None else f"{each.range[0]:.5g} to {each.range[1]:.5g}",
+        )
+        for each in robot.dimensions
+    )
+    table = TextTable(("dimension", "value", "unit", "range"), rows) if rows else None
+    return DesignDetails(robot.name, (f"{robot.description}.", *robot.sentences), table)
+
+
+def _drawn(case: Case, entry: Entry, solution: Solution) -> DrawnDesign:
+    """Return the design of a robot with an answer, with its F and its size."""
+    name, unit = ("F", unit_of_objective(case)) if len(entry.tasks) == 1 else ("value", "")
+    words = "no common value" if entry.value is None else f"{name} = {entry.value:.5g} {unit}".rstrip()
+    if entry.final_size is not None:
+        words += f", size {entry.final_size:.4g} {case.units.length}"
+    if entry.can_move is False:
+        words += ", cannot make the motion"
+    elif not entry.keeps_limits:
+        words += ", does not keep every limit"
+    outcome, nlp = solution.outcomes[0], solution.outcomes[0].own.nlp
+    numbers, active = free_numbers(nlp, outcome.x), _active(entry)
+    return DrawnDesign(entry.contender.label, words, numbers, active, nlp, outcome.x, outcome.state)
 
 
 def _robot(case: Case, entry: Entry) -> ComparedRobotData:

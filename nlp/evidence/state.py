@@ -229,3 +229,11 @@ def _rank_and_free_twists(jacobian: FloatArray, centre: FloatArray) -> tuple[int
     free[:, 3:] *= arm
     parts = np.where(free[:, :3].any(axis=1, keepdims=True), free[:, :3], free[:, 3:])
     return rank, free / np.abs(parts).max(axis=1, keepdims=True, initial=0.0), values
+
+
+def state_or_none(nlp: Nlp, x: FloatArray) -> RobotState | None:
+    """Return the robot at a point (n,), or None where its equations have no value."""
+    try:
+        return evaluate(nlp, x)
+    except EvaluationError:
+        return None

@@ -25,10 +25,10 @@ from ..case.case import Case
 from ..case.settings import Search
 from ..errors import EvaluationError, InputError
 from ..interruption import Milestone, is_requested, one_call, reached, seconds_left, why_stopped, within
-from ..proof.certificate.branch_and_bound import certify_program
 from ..proof.certificate.certificate import Certificate
 from ..proof.enclosure.engine import kernel
 from ..solver.multistart import ProgramSolution, solve_program
+from ..solver.searchjournal import kept_certificate
 from ..solver.status import Status
 from .boxes import GoalBox, Region
 from .goals import Goal, GoalProgram, loosest_numbers, program_of, read_goals
@@ -330,4 +330,4 @@ def _undominated(points: list[FrontPoint], goals: tuple[Goal, ...], size: FloatA
 def _certificate(point: FrontPoint, jobs: int | None, left: int) -> Certificate:
     """Return the proven bound of a point's optimised goal, in an equal part of the time that so many points share."""
     with within(seconds_left() / left):
-        return certify_program(point.solution.nlp, point.solution.x, claimed=point.solution.F, jobs=jobs)
+        return kept_certificate(point.solution.nlp, point.solution.x, claimed=point.solution.F, jobs=jobs)

@@ -8,8 +8,7 @@ from xml.etree import ElementTree
 from ..errors import one_line
 from ..results.checks import published_words, reproduction_table
 from ..results.regression import CaseCheck
-from ..results.text import Line, TextTable
-from ..system.markdown import markdown_text
+from .tables import markdown
 
 
 def checks_as_junit(checks: Sequence[CaseCheck]) -> str:
@@ -41,23 +40,3 @@ def _add_test(suite: ElementTree.Element, case: str, name: str, fault: str) -> i
 def checks_as_markdown(checks: Sequence[CaseCheck]) -> str:
     """Return the published numbers as a Markdown table: printed, computed, verdict and reason."""
     return markdown(reproduction_table(checks))
-
-
-def markdown(table: TextTable) -> str:
-    """Return a table in Markdown; the words of a case are escaped in its cells."""
-    rows = ([_words(cell) for cell in row] for row in table.rows)
-    lines = [
-        _row([header.replace("\n", ", ") for header in table.headers]),
-        f"|{'---|' * len(table.headers)}",
-        *map(_row, rows),
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def _words(cell: str | Line) -> str:
-    return cell.words if isinstance(cell, Line) else cell
-
-
-def _row(cells: Sequence[str]) -> str:
-    """Return a row of a Markdown table."""
-    return "| " + " | ".join(markdown_text(text) for text in cells) + " |"

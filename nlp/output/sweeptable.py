@@ -5,13 +5,13 @@ from __future__ import annotations
 import csv
 import math
 import tempfile
+from array import array
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from importlib.util import find_spec
 from itertools import islice
 from pathlib import Path, PurePath
-from sys import intern
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +19,8 @@ from ...models import FloatArray
 from ..case.case import Case
 from ..errors import InputError, check_seconds
 from ..interruption import one_call, within
-from ..sweeps.columns import SweepColumns, columns_of
+from ..results.designs import Column
+from ..sweeps.columns import SweepColumns, columns_of, row_reader, sweep_columns
 from ..sweeps.engines import EngineKind
 from ..sweeps.journal import Row
 from ..sweeps.points import CaseSource, Points, grid_of
@@ -33,16 +34,6 @@ _PARQUET, _CSV = ".parquet", ".csv"
 _GROUP = 20_000
 #: Key of the sweep's fingerprint in a Parquet file, and name of its column in a CSV file.
 _KEY = "screwsynth_sweep"
-_SEPARATOR = "; "
-_TEXTS = ("status", "active", "multipliers", "verdict", "engine", "note", "certificate")
-_WHOLE = ("index", "starts", "converged")
-
-
-class TablePoint(NamedTuple):
-    """What a picture shows of a row: objective, NaN where there is no answer, and the active sides as one text."""
-
-    F: float
-    active: str
 
 
 def check_table(target: str) -> None:
@@ -91,122 +82,77 @@ def write_table(target: str, sweep: Sweep, rows: Iterable[Row]) -> None:
     Raises:
         InputError: the file cannot be written.
     """
-    columns = column_names(sweep)
-    cells = (_cells(sweep, row) for row in rows)
+    columns = list(sweep_columns(sweep))
+    cells = ([column.cell(row) for column in columns] for row in rows)
     with write_whole(target) as path:
         if PurePath(target).suffix.lower() == _CSV:
             with path.open("w", encoding="utf-8", newline="") as file:
                 writer = csv.writer(file, lineterminator="\n")
-                writer.writerow(csv_row([*columns, _KEY]))
+                writer.writerow(csv_row([*(column.name for column in columns), _KEY]))
                 writer.writerows(csv_row([*row, sweep.fingerprint]) for row in cells)
         else:
             _write_parquet(path, sweep, columns, cells)
 
 
-def table_points(target: str) -> list[TablePoint]:
-    """Return what a picture shows of the rows of a table, in the order of the points.
+#: Fields of a row that a picture and a line about a sweep need.
+_SHOWN = ("status", "F", "active", "note", "certificate")
 
-    Rows with the same active sides share one text: a million rows have a few dozen of them.
+
+class _ShownRows(Sequence[Row]):
+    """Rows without design and evidence, in a few bytes each: a picture may have millions."""
+
+    def __init__(self, rows: Iterable[Row]) -> None:
+        self._F, self._others = array("d"), list[Row]()
+        shared: dict[Row, Row] = {}
+        for row in rows:
+            self._F.append(math.nan if row.F is None else row.F)
+            other = row._replace(F=None)
+            self._others.append(shared.setdefault(other, other))
+
+    def __len__(self) -> int:
+        return len(self._F)
+
+    def __getitem__(self, k: int) -> Row:  # type: ignore[override]  # no slices
+        F = self._F[k]
+        return self._others[k]._replace(point=k, F=None if math.isnan(F) else F)
+
+
+def table_rows(target: str, sweep: Sweep, *, shown: bool = False) -> Sequence[Row]:
+    """Return the rows of the whole table of a sweep, in the order of its points.
+
+    Args:
+        target: the file.
+        sweep: the sweep.
+        shown: whether the rows are for a picture and a line alone, and need no design and no evidence.
     """
+    read = row_reader(sweep, _SHOWN if shown else None)
+    rows = map(read, _cells(target))
+    return _ShownRows(rows) if shown else list(rows)
+
+
+def _cells(target: str) -> Iterator[Sequence[Any]]:
+    """Yield the cells of each row of a table by their place; None for an empty one."""
     if PurePath(target).suffix.lower() == _CSV:
         with Path(target).open(encoding="utf-8", newline="") as file:
-            return [
-                TablePoint(float(row["F"] or "nan"), intern(text_of_cell(row["active"])))
-                for row in csv.DictReader(file)
-            ]
+            # A number that changes and a free number may have one name.
+            for cells in islice(csv.reader(file), 1, None):
+                yield [text_of_cell(cell) or None for cell in cells]
+        return
     import pyarrow.parquet as pq  # noqa: PLC0415 - only tables in this format need it
 
-    found: list[TablePoint] = []
-    with pq.ParquetFile(target) as file:
-        for batch in file.iter_batches(_GROUP, columns=["F", "active"]):
-            F, active = (column.to_pylist() for column in batch.columns)
-            found += [
-                TablePoint(float("nan") if value is None else value, intern(each))
-                for value, each in zip(F, active, strict=True)
-            ]
-    return found
-
-
-def column_names(sweep: Sweep) -> list[str]:
-    """Return the columns of a sweep's table: the numbers that change, the answer, its evidence."""
-    middle = ["status", "F", *sweep.variables, "active", "multipliers", "verdict", "stationarity", "feasibility"]
-    last = ["curvature", "starts", "converged", "engine", "seconds", "note"]
-    proof = [] if not sweep.certified else ["certificate", "bound", "gap"]
-    return ["index", *sweep.points.names, *middle, *last, *proof]
-
-
-def _cells(sweep: Sweep, row: Row) -> list[Any]:
-    """Return the cells of a row; None for those that are empty."""
-    x = [*row.x[: len(sweep.variables)], *[None] * (len(sweep.variables) - len(row.x))]
-    sides = [_SEPARATOR.join(row.active), _SEPARATOR.join(map(repr, row.multipliers))]
-    evidence = [row.verdict, row.stationarity, row.feasibility, row.curvature]
-    run = [row.starts, row.converged, row.engine, row.seconds, row.note]
-    proof = [] if not sweep.certified else [row.certificate, row.bound, row.gap]
-    return [row.point, *sweep.points.values[row.point].tolist(), row.status, row.F, *x, *sides, *evidence, *run, *proof]
-
-
-def table_rows(target: str, sweep: Sweep) -> list[Row]:
-    """Return the rows of the whole table of a sweep, in the order of its points."""
-    if PurePath(target).suffix.lower() == _CSV:
-        with Path(target).open(encoding="utf-8", newline="") as file:
-            # Columns by their place: a number that changes and a free number may have one name.
-            return [_row(sweep, [cell or None for cell in cells]) for cells in islice(csv.reader(file), 1, None)]
-    import pyarrow.parquet as pq  # noqa: PLC0415 - only tables in this format need it
-
-    found: list[Row] = []
     with pq.ParquetFile(target) as file:
         for batch in file.iter_batches(_GROUP):
-            columns = [column.to_pylist() for column in batch.columns]
-            found += [_row(sweep, cells) for cells in zip(*columns, strict=True)]
-    return found
+            yield from zip(*(column.to_pylist() for column in batch.columns), strict=True)
 
 
-def _row(sweep: Sweep, cells: Sequence[Any]) -> Row:
-    """Return the row of cells that :func:`_cells` made, as they are read from a file; None for an empty one."""
-    first = 1 + len(sweep.points.names)
-    status, F, *rest = cells[first:]
-    x, (active, multipliers, verdict, *evidence), run = (
-        rest[: len(sweep.variables)],
-        rest[len(sweep.variables) : len(sweep.variables) + 6],
-        rest[len(sweep.variables) + 6 :],
-    )
-    starts, converged, engine, seconds, note = run[:5]
-    certificate, bound, gap = run[5:8] if sweep.certified else (None, None, None)
-    return Row(
-        int(cells[0]),
-        status,
-        _number(F),
-        x=() if None in x else tuple(map(float, x)),
-        active=tuple((active or "").split(_SEPARATOR)) if active else (),
-        multipliers=tuple(float(each) for each in multipliers.split(_SEPARATOR)) if multipliers else (),
-        verdict=verdict or "",
-        stationarity=_number(evidence[0]),
-        feasibility=_number(evidence[1]),
-        curvature=_number(evidence[2]),
-        starts=int(starts),
-        converged=int(converged),
-        engine=engine or "",
-        seconds=float(seconds),
-        note=note or "",
-        certificate=certificate or "",
-        bound=_number(bound),
-        gap=_number(gap),
-    )
-
-
-def _number(cell: Any) -> float | None:  # noqa: ANN401 - a text or a number
-    return None if cell is None else float(cell)
-
-
-def _write_parquet(path: Path, sweep: Sweep, columns: list[str], cells: Iterator[list[Any]]) -> None:
+def _write_parquet(path: Path, sweep: Sweep, columns: Sequence[Column[Row]], cells: Iterator[list[Any]]) -> None:
     """Write cells as a Parquet file, a group of rows at a time."""
     import pyarrow as pa  # noqa: PLC0415 - only tables in this format need it
     import pyarrow.parquet as pq  # noqa: PLC0415
 
-    def kind(name: str) -> Any:  # noqa: ANN401 - pyarrow has no types
-        return pa.string() if name in _TEXTS else pa.int64() if name in _WHOLE else pa.float64()
-
-    schema = pa.schema([(name, kind(name)) for name in columns], metadata={_KEY: sweep.fingerprint})
+    kinds = {str: pa.string(), int: pa.int64(), float: pa.float64()}
+    fields = [(column.name, kinds[column.holds]) for column in columns]
+    schema = pa.schema(fields, metadata={_KEY: sweep.fingerprint})
     with pq.ParquetWriter(path, schema) as writer:
         while group := list(islice(cells, _GROUP)):
             by_column = zip(schema, zip(*group, strict=True), strict=True)

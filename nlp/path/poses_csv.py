@@ -6,14 +6,10 @@ case.
 
 from __future__ import annotations
 
-from array import array
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, NamedTuple
-
 import numpy as np
 
 from ...models import Dimension, FloatArray
-from ..case.csvrows import POSE_ROWS, check_header, csv_rows, number_in
+from ..case.csvrows import POSE_ROWS, NumberTable, check_header, csv_rows, number_table
 from ..case.pose import LARGEST
 from ..errors import CaseError, InputError
 from ..units import Units
@@ -22,49 +18,12 @@ from .orientation import ORDERS, order_named, roll_pitch_yaw
 from .path import Kind, ProgrammedPath
 from .standing import duration_at, still_way, turns_between, without_rests
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
 #: Columns of poses, and of the time.
 _ROWS = POSE_ROWS._replace(others={**POSE_ROWS.others, "t": ("t",), "feed": ("feed",)})
 #: Cells of a rotation that a row leaves out; 0 for all others.
 _LEFT_OUT = {"qw": "1", "axis_z": "1"}
 #: Largest distance of a quaternion's size from 1, as in a case file.
 _ROUNDING = 1e-6
-
-
-class _Table(NamedTuple):
-    """Numbers of a file.
-
-    Attributes:
-        source: name of the file.
-        rows: (n,) numbers of the rows, as a spreadsheet counts.
-        columns: (n,) numbers of each column, by its name.
-    """
-
-    source: str
-    rows: NDArray[np.int32]
-    columns: Mapping[str, FloatArray]
-
-    def block(self, names: str) -> FloatArray:
-        """Return columns (n, k) by their names, which spaces separate."""
-        return np.stack([self.columns[name] for name in names.split()], axis=1)
-
-    def refuse(self, is_wrong: NDArray[np.bool_], name: str, fault: str) -> None:
-        """Refuse the first row at which something is wrong.
-
-        Args:
-            is_wrong: (n,) whether it is, at each row.
-            name: of the columns, for messages.
-            fault: the fault, in words.
-
-        Raises:
-            CaseError: there is such a row.
-        """
-        if is_wrong.any():
-            at = int(np.argmax(is_wrong))
-            value = float(self.columns[name][at]) if name in self.columns else None
-            raise CaseError(f"row {self.rows[at]}, column{'s' * (value is None)} {name}", fault, value, self.source)
 
 
 def read_poses(text: str, source: str, units: Units, options: PathOptions) -> ProgrammedPath:
@@ -104,56 +63,28 @@ def read_poses(text: str, source: str, units: Units, options: PathOptions) -> Pr
     return without_rests(path, are_timed="t" in table.columns)
 
 
-def _check_columns(top: int, header: list[str], source: str) -> list[list[int]]:
-    """Return the places of the columns of a rotation that a row may leave empty together.
-
-    Args:
-        top: number of the row that names the columns.
-        header: their names.
-        source: name of the file.
+def _read_table(text: str, source: str) -> NumberTable:
+    """Return the numbers of a file.
 
     Raises:
-        InputError: there are none, or not those of a path.
+        InputError: it is no table, has columns that are not those of a path, or a cell is no number.
     """
+    records = csv_rows(text, source)
+    top, header = next(records, (0, []))
     if not header:
         raise InputError(f"{source}: has no rows below a row that names the columns")
     found = check_header(header, _ROWS, lambda fault: CaseError(f"row {top}", fault, source=source))
     if {"t", "feed"} <= found.keys():
         raise CaseError(f"row {top}", "column 'feed' cannot stand beside 't'; state the time in one way", source=source)
-    return [[header.index(name) for name in names] for key, names in found.items() if key in POSE_ROWS.others]
-
-
-def _read_table(text: str, source: str) -> _Table:
-    """Return the numbers of a file.
-
-    Raises:
-        InputError: it is no table, or a cell is no number.
-    """
-    records = csv_rows(text, source)
-    top, header = next(records, (0, []))
-    optional = _check_columns(top, header, source)
-    rows, numbers = array("i"), array("d")
-    for row, cells in records:
-        if len(cells) != len(header):
-            raise CaseError(f"row {row}", f"must have {len(header)} cells, got {len(cells)}", source=source)
-        for places in optional:
-            if not any(cells[place] for place in places):
-                for place in places:
-                    cells[place] = _LEFT_OUT.get(header[place], "0")
-        try:
-            numbers.extend([float(cell) for cell in cells])
-        except ValueError:
-            for cell, name in zip(cells, header, strict=True):
-                number_in(cell, row, name, source)  # of which one raises
-        rows.append(row)
-    columns = np.array(numbers).reshape(-1, len(header)).T
-    table = _Table(source, np.array(rows, dtype=np.int32), dict(zip(header, columns, strict=True)))
+    turns = [names for key, names in found.items() if key in POSE_ROWS.others]
+    left_out = [{header.index(name): _LEFT_OUT.get(name, "0") for name in names} for names in turns]
+    table = number_table(records, header, source, left_out)
     for name, column in table.columns.items():
         table.refuse(~(np.abs(column) <= LARGEST), name, f"must be finite, of a size of at most {LARGEST:g}")
     return table
 
 
-def _angles(table: _Table, units: Units) -> FloatArray:
+def _angles(table: NumberTable, units: Units) -> FloatArray:
     """Return roll, pitch and yaw (n, 3) of the rows."""
     columns, zeros = table.columns, np.zeros(len(table.rows))
     unit = units.to_internal(1, Dimension.ANGLE)
@@ -171,7 +102,7 @@ def _angles(table: _Table, units: Units) -> FloatArray:
     return roll_pitch_yaw(np.hstack([np.cos(half), np.sin(half) * axes / sizes[:, None]]))
 
 
-def _durations(table: _Table, knots: FloatArray, between: Between, units: Units) -> FloatArray:
+def _durations(table: NumberTable, knots: FloatArray, between: Between, units: Units) -> FloatArray:
     """Return the times (n - 1,) from each row to the next, in seconds; NaN where none is stated."""
     durations = np.full(len(knots) - 1, np.nan)
     if "t" in table.columns:

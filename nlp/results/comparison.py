@@ -1,19 +1,20 @@
-"""Robots compared on one case as data, and in words: lines, a table of text, and rows for a CSV file."""
+"""Robots compared on one case as data, as columns of a table of designs, and in words."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
 from typing import Annotated, Literal
 
 from ..case.task import Sense
 from ..proof.workspace.verdict import Outcome
 from ..solver.status import Status
-from ..system.csvtext import csv_text
 from ..system.jsonvalues import Absent, JsonObject
 from ..system.strictjson import Size
 from .data import CertificateData
+from .designs import SEPARATOR, Cell, Column, ColumnKind, certificate_columns
 from .parts import SchemaVersion, UnitsData, VersionsData
 from .rounding import number
-from .text import Line, TextTable, Tone
+from .text import Line, Tone
 
 
 class ComparedRateData(JsonObject):
@@ -180,15 +181,12 @@ class ComparisonResult(JsonObject):
     seconds: float
 
 
-_SEPARATOR = "; "
 #: Digits of F, and of other numbers, in the table.
 _DIGITS, _FEW = 7, 4
 
 
-def comparison_summary(result: ComparisonResult) -> Iterator[Line | TextTable]:
-    """Yield a comparison: the table, words and dimensions robot by robot, then the rules."""
-    yield Line(result.title or result.case, tone=Tone.TITLE)
-    yield comparison_table(result)
+def comparison_lines(result: ComparisonResult) -> Iterator[Line]:
+    """Yield the lines below the table: words and dimensions robot by robot, then the rules."""
     for robot in result.robots:
         for sentence in robot.sentences:
             yield Line(sentence, label=robot.name, tone=Tone.CAUTION)
@@ -199,35 +197,94 @@ def comparison_summary(result: ComparisonResult) -> Iterator[Line | TextTable]:
         yield Line(sentence, part="rules")
 
 
-def comparison_table(result: ComparisonResult) -> TextTable:
-    """Return a row for each robot, the best first; robots that are not ranked come last."""
-    robots = result.robots
+def comparison_columns(result: ComparisonResult) -> Iterator[Column[ComparedRobotData]]:
+    """Yield the columns: robot and rank, F, rates and sizes, limits, workspace, strokes, and the certificate."""
+    robots, proofs = result.robots, ColumnKind.PROOF
     tasks = next((each.tasks for each in robots if each.tasks), ())
-    several = len(tasks) > 1
-    unit = result.units.length
-    headers = ["robot", "rank", "freedoms", "value" if several else _headed("F", tasks[0].unit if tasks else "")]
-    headers += [_headed(f"F of {each.name}", each.unit) for each in tasks] if several else []
-    headers += ["constraints\n% of F", "largest rate", _headed("size", unit)]
-    with_limits, with_proof = result.limits > 0, any(each.certificate or each.certificate_fault for each in robots)
-    with_workspace = any(each.workspace is not None for each in robots)
-    with_strokes = any(each.strokes for each in robots)
-    headers += ["limits kept"] if with_limits else []
-    headers += ["workspace"] if with_workspace else []
-    headers += ["stroke"] if with_strokes else []
-    headers += ["certificate"] if with_proof else []
-    rows = []
-    for rank, robot in enumerate(robots, start=1):
-        row = [robot.name, str(rank) if robot.part == "ranked" else robot.part]
-        row += ["" if robot.freedoms is None else str(robot.freedoms), _text(robot.value, _DIGITS)]
-        if several:
-            row += [_text(each.F, _DIGITS) for each in robot.tasks] or [""] * len(tasks)
-        row += [_constraints(robot), _largest_rate(robot), _text(robot.final_size, _FEW)]
-        row += [f"{robot.limits_kept} of {result.limits}"] if with_limits else []
-        row += ["" if robot.workspace is None else robot.workspace.value] if with_workspace else []
-        row += [_strokes(robot)] if with_strokes else []
-        row += [_proof(robot)] if with_proof else []
-        rows.append(tuple(row))
-    return TextTable(tuple(headers), tuple(rows), "comparison")
+    several, unit = len(tasks) > 1, result.units.length
+    ranks = {robot.name: str(k) if robot.part == "ranked" else robot.part for k, robot in enumerate(robots, start=1)}
+    yield Column("robot", lambda robot: robot.name, holds=str, label="robot", text=lambda robot: robot.name)
+    yield Column("model", lambda robot: robot.model, holds=str)
+    yield Column("part", lambda robot: robot.part, holds=str, label="rank", text=lambda robot: ranks[robot.name])
+    yield Column(
+        "freedoms",
+        lambda robot: robot.freedoms,
+        holds=int,
+        label="freedoms",
+        text=lambda robot: "" if robot.freedoms is None else str(robot.freedoms),
+    )
+    yield Column("status", lambda robot: None if robot.status is None else robot.status.value, holds=str)
+    yield Column(
+        "value",
+        lambda robot: robot.value,
+        ColumnKind.OBJECTIVE,
+        label="value" if several else "F",
+        unit=tasks[0].unit if len(tasks) == 1 else "",
+        text=lambda robot: _text(robot.value, _DIGITS),
+    )
+    for k, task in enumerate(tasks):
+        yield from _task_columns(k, task, is_shown=several)
+    yield Column("", _constraints, label="constraints", unit="% of F", text=_constraints)
+    yield Column("", _largest_rate, label="largest rate", text=_largest_rate)
+    yield Column("factor", lambda robot: robot.factor)
+    yield Column("size", lambda robot: robot.size)
+    yield Column(
+        "final_size",
+        lambda robot: robot.final_size,
+        label="size",
+        unit=unit,
+        text=lambda robot: _text(robot.final_size, _FEW),
+    )
+    yield _joined("dimensions", lambda robot: (f"{each.name}={each.value!r}" for each in robot.dimensions))
+    yield _joined("active", lambda robot: robot.active)
+    yield Column(
+        "limits_kept",
+        lambda robot: robot.limits_kept,
+        holds=int,
+        label="limits kept" if result.limits > 0 else "",
+        text=lambda robot: f"{robot.limits_kept} of {result.limits}",
+    )
+    yield _joined("limits_left_out", lambda robot: (each.key for each in robot.limits_left_out))
+    yield _joined("singularities", lambda robot: robot.singularities)
+    yield Column(
+        "workspace",
+        _workspace,
+        proofs,
+        str,
+        label="workspace" if any(each.workspace is not None for each in robots) else "",
+        text=_workspace,
+    )
+    strokes = _joined("strokes", lambda robot: (f"{name}={each.stroke!r}" for name, each in robot.strokes.items()))
+    yield replace(strokes, label="stroke" if any(each.strokes for each in robots) else "", text=_strokes)
+    status, *bounds = certificate_columns(_certificate)
+    is_proved = any(each.certificate or each.certificate_fault for each in robots)
+    yield replace(status, label="certificate" if is_proved else "", text=_proof)
+    yield from bounds
+    yield Column("sentences", lambda robot: " ".join(robot.sentences), holds=str)
+    yield Column("seconds", lambda robot: robot.seconds)
+
+
+def _task_columns(k: int, task: ComparedTaskData, *, is_shown: bool) -> Iterator[Column[ComparedRobotData]]:
+    """Yield the columns of a task; in tables F alone is shown, where there are several."""
+
+    def of(cell: Callable[[ComparedTaskData], Cell]) -> Callable[[ComparedRobotData], Cell]:
+        return lambda robot: cell(robot.tasks[k]) if robot.tasks else None
+
+    yield Column(
+        f"F of {task.name}",
+        of(lambda each: each.F),
+        label=f"F of {task.name}" if is_shown else "",
+        unit=task.unit,
+        text=lambda robot: _text(robot.tasks[k].F, _DIGITS) if robot.tasks else "",
+    )
+    yield Column(f"can move {task.name}", of(lambda each: each.can_move))
+    yield Column(f"constraint part of {task.name}", of(lambda each: each.constraint))
+    yield Column(f"rates for {task.name}", of(_rates), holds=str)
+
+
+def _joined(name: str, texts: Callable[[ComparedRobotData], Iterable[str]]) -> Column[ComparedRobotData]:
+    """Return a column of several texts in a cell."""
+    return Column(name, lambda robot: SEPARATOR.join(texts(robot)), holds=str)
 
 
 def dimension_words(robot: ComparedRobotData) -> str:
@@ -239,38 +296,6 @@ def dimension_words(robot: ComparedRobotData) -> str:
         mark = next((word for end, word in zip(ends, ("least", "most"), strict=False) if _is_at(each.value, end)), "")
         parts.append(f"{each.name} = {each.value:.5g} {each.unit}".rstrip() + (f" ({mark})" if mark else ""))
     return ", ".join(parts)
-
-
-def comparison_csv(result: ComparisonResult) -> str:
-    """Return a comparison as CSV, one row for each robot; what has no value is an empty cell."""
-    tasks = next((each.tasks for each in result.robots if each.tasks), ())
-    head = ["robot", "model", "part", "freedoms", "status", "value"]
-    for each in tasks:
-        head += [f"F of {each.name}", f"can move {each.name}", f"constraint part of {each.name}"]
-        head += [f"rates for {each.name}"]
-    head += ["factor", "size", "final_size", "dimensions", "active", "limits_kept", "limits_left_out"]
-    head += ["singularities", "workspace", "strokes", "certificate", "proven_bound", "gap", "sentences", "seconds"]
-    rows = []
-    for robot in result.robots:
-        proof = robot.certificate
-        row: list[object] = [robot.name, robot.model, robot.part, robot.freedoms]
-        row += [None if robot.status is None else robot.status.value, robot.value]
-        for task in robot.tasks or [None] * len(tasks):
-            row += [None] * 4 if task is None else _task_cells(task)
-        row += [robot.factor, robot.size, robot.final_size]
-        row += [_SEPARATOR.join(f"{each.name}={each.value!r}" for each in robot.dimensions)]
-        row += [_SEPARATOR.join(robot.active), robot.limits_kept]
-        row += [_SEPARATOR.join(each.key for each in robot.limits_left_out), _SEPARATOR.join(robot.singularities)]
-        row += ["" if robot.workspace is None else robot.workspace.value]
-        row += [_SEPARATOR.join(f"{name}={each.stroke!r}" for name, each in robot.strokes.items())]
-        row += [None] * 3 if proof is None else [proof.status.value, proof.bound, proof.gap]
-        row += [" ".join(robot.sentences), robot.seconds]
-        rows.append(row)
-    return csv_text(head, rows)
-
-
-def _headed(name: str, unit: str) -> str:
-    return f"{name}\n{unit}" if unit else name
 
 
 def _is_at(value: float, end: float) -> bool:
@@ -314,6 +339,13 @@ def _proof(robot: ComparedRobotData) -> str:
     return proof.status.value if gap is None else f"{proof.status.value}, gap {gap:.1e}"
 
 
-def _task_cells(task: ComparedTaskData) -> list[object]:
-    rates = (f"{each.actuator}={'' if each.rate is None else repr(each.rate)} {each.unit}" for each in task.rates)
-    return [task.F, task.can_move, task.constraint, _SEPARATOR.join(rates)]
+def _certificate(robot: ComparedRobotData) -> CertificateData | None:
+    return robot.certificate
+
+
+def _workspace(robot: ComparedRobotData) -> str:
+    return "" if robot.workspace is None else robot.workspace.value
+
+
+def _rates(task: ComparedTaskData) -> str:
+    return SEPARATOR.join(f"{x.actuator}={'' if x.rate is None else repr(x.rate)} {x.unit}" for x in task.rates)

@@ -81,7 +81,7 @@ class FrontResult(JsonObject):
 
 
 #: A number for each point; null where there is none.
-Column: TypeAlias = tuple[float | None, ...]
+Numbers: TypeAlias = tuple[float | None, ...]
 
 
 class SweepResult(JsonObject):
@@ -118,20 +118,20 @@ class SweepResult(JsonObject):
     unit: str
     numbers: Mapping[str, Vector]
     statuses: tuple[str, ...]
-    F: Column
-    design: Mapping[str, Column]
+    F: Numbers
+    design: Mapping[str, Numbers]
     actives: tuple[tuple[str, ...], ...]
     multipliers: tuple[Vector, ...]
     verdicts: tuple[str, ...]
-    stationarity: Column
-    feasibility: Column
-    curvature: Column
+    stationarity: Numbers
+    feasibility: Numbers
+    curvature: Numbers
     starts: tuple[int, ...]
     converged: tuple[int, ...]
     engines: tuple[str, ...]
-    times: Column
+    times: Numbers
     notes: tuple[str, ...]
     certificates: Absent[tuple[str, ...]]
-    bounds: Absent[Column]
-    gaps: Absent[Column]
+    bounds: Absent[Numbers]
+    gaps: Absent[Numbers]
     versions: VersionsData

@@ -1,4 +1,4 @@
-"""Trade-off curves as a result, over the active limits of a solution, and in words: lines, tables, and rows of CSV."""
+"""Trade-off curves as a result, over the active limits of a solution, and as a table of designs."""
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -14,15 +14,16 @@ from ..interruption import is_requested
 from ..solver.solution import Solution
 from ..solver.status import Status
 from ..solver.tradeoff import Tradeoff, TradeoffPoint, tradeoff
-from ..system.csvtext import csv_text
 from ..system.jsonvalues import Absent, Inline, JsonObject, Vector, finite_or_none
 from ..units import slope_unit
-from .data import CaseResult, SolveResult
+from .data import CaseResult, CertificateData, SolveResult
+from .designs import Column, ColumnKind, Designs, DrawnDesign, Join, PageWords, certificate_columns, free_numbers
+from .evidence import certificate_data
 from .parts import HeadData, LimitData, VersionsData
 from .point import head_data, stated_pose_notice, versions
 from .result import result_of
 from .rounding import number, ordered
-from .text import Line, TextTable, Tone
+from .text import Line, Tone
 from .wording import title_line
 
 #: Stands before the dotted key of a limit.
@@ -41,6 +42,7 @@ class TradeoffPointData(JsonObject):
         active: bounds and limits that the point lies on.
         parameters: dimensions by name; null without an answer.
         pose: of the platform, the first that the case states; null without an answer.
+        certificate: the proven bound; absent where none was asked for.
     """
 
     value: float
@@ -51,6 +53,7 @@ class TradeoffPointData(JsonObject):
     active: tuple[str, ...]
     parameters: Mapping[str, float | Vector] | None
     pose: PlatformPose | None
+    certificate: Absent[CertificateData]
 
 
 class TradeoffResult(JsonObject):
@@ -134,6 +137,7 @@ def _point(name: str, point: TradeoffPoint, result: CaseResult) -> TradeoffPoint
         active=_active(point.solution, result) if is_answer else (),
         parameters=None if robot is None else robot.parameters,
         pose=None if robot is None else robot.pose,
+        certificate=None if point.certified is None else certificate_data(point.certified.certificate),
     )
 
 
@@ -148,6 +152,7 @@ def _unsolved(value: float, tasks: int) -> TradeoffPointData:
         active=(),
         parameters=None,
         pose=None,
+        certificate=None,
     )
 
 
@@ -239,17 +244,124 @@ def _is_allowed(case_at: Callable[[float], Case], value: float) -> bool:
     return True
 
 
-def tradeoff_summary(case: Case, result: TradeoffResult) -> Iterator[Line | TextTable]:
-    """Yield a trade-off: what is varied, then a row for each value."""
-    yield title_line(case)
-    yield Line(over_words(result), label="over")
-    if result.notice is not None:
-        yield Line(result.notice, label="note", tone=Tone.CAUTION)
-    yield tradeoff_table(result)
-    if throughout_words(result):
-        yield Line(throughout_words(result), label="active throughout")
-    for line in tradeoff_words(result):
-        yield Line(line, tone=Tone.CAUTION)
+def tradeoff_designs(result: TradeoffResult, case: Case, found: Tradeoff | None = None) -> Designs[TradeoffPointData]:
+    """Return a trade-off as a table of designs.
+
+    Args:
+        result: the trade-off.
+        case: the case at one of the values.
+        found: the same with its solutions, for drawings of the designs; None without them.
+    """
+    throughout, cautions, over = _active_throughout(result), _faults(result), over_words(result)
+    solved = sum(point.status.is_answer for point in result.points)
+    before = [title_line(case), Line(over, label="over")]
+    before += [] if result.notice is None else [Line(result.notice, label="note", tone=Tone.CAUTION)]
+    after = [Line(_listed(throughout), label="active throughout")] if throughout else []
+    return Designs(
+        "trade-off",
+        case,
+        over,
+        tuple(_columns(result, throughout)),
+        result.points,
+        Join.CURVE,
+        PageWords(
+            f"{case.name}, robot {case.model.name}: {over}",
+            f"{solved} of {len(result.points)} values have an answer",
+            ("curve", "F against the number"),
+            ("values", "Every value"),
+            rules=("Each point is a solve of its own, with everything that is free chosen anew.",),
+            cautions=tuple(f"{line}." for line in cautions),
+            designs="The design at each value",
+            bends="Where the curve bends",
+            is_answer=solved > 0,
+        ),
+        before=before,
+        after=[*after, *(Line(line, tone=Tone.CAUTION) for line in cautions)],
+        drawn=lambda: () if found is None else _drawn(result, found),
+        missing=cautions,
+        throughout=_listed(throughout),
+    )
+
+
+def _columns(result: TradeoffResult, throughout: Sequence[str]) -> Iterator[Column[TradeoffPointData]]:
+    """Yield the columns: the number, F with that of each of several tasks, its slope, what is active, the design."""
+    objective, names = ColumnKind.OBJECTIVE, result.tasks
+    yield Column(
+        result.over,
+        lambda point: point.value,
+        ColumnKind.VARIED,
+        label=result.over,
+        unit=result.unit,
+        text=lambda point: f"{point.value:.7g}",
+    )
+    if len(names) == 1:
+        yield Column("F", lambda point: point.F, objective, label="F", text=_text_of_F, series=names[0])
+    else:
+        yield Column("F", lambda point: point.F, label="combined F", text=_text_of_F)
+        yield from (_column_of_task(k, name) for k, name in enumerate(names))
+    yield Column(
+        "slope",
+        lambda point: point.slope,
+        ColumnKind.EVIDENCE,
+        label="slope",
+        unit=slope_unit(result.unit),
+        text=lambda point: "" if point.slope is None else _signed(point.slope),
+    )
+    if any(point.certificate is not None for point in result.points):
+        yield from certificate_columns(lambda point: point.certificate)
+    yield Column(
+        "status", lambda point: point.status.value, holds=str, label="status", text=lambda point: point.status.value
+    )
+    yield Column(
+        "active",
+        lambda point: " ".join(point.active),
+        ColumnKind.ACTIVE,
+        holds=str,
+        label="also active" if throughout else "active",
+        text=lambda point: _listed(name for name in point.active if name not in throughout),
+    )
+    answer = next((point for point in result.points if point.parameters is not None), None)
+    for name in () if answer is None else _design(answer):
+        yield _column_of_number(name)
+
+
+def _column_of_task(k: int, name: str) -> Column[TradeoffPointData]:
+    """Return the column of F of one of several tasks."""
+    return Column(
+        f"F {name}",
+        lambda point: point.tasks[k],
+        ColumnKind.OBJECTIVE,
+        label=f"F of {name}",
+        text=lambda point: _number_text(point.tasks[k]),
+        series=name,
+    )
+
+
+def _column_of_number(name: str) -> Column[TradeoffPointData]:
+    """Return the column of a number of the design."""
+    return Column(name, lambda point: _design(point).get(name), ColumnKind.VARIABLE)
+
+
+def _drawn(result: TradeoffResult, found: Tradeoff) -> list[DrawnDesign]:
+    """Return the designs at values that have an answer."""
+    designs = []
+    for row, point in zip(result.points, found.points, strict=False):
+        if row.status.is_answer:
+            outcome = point.solution.outcomes[0]
+            F = "" if row.F is None else f"F = {row.F:.6g}"
+            of_each = (f"F of {name} = {each:.6g}" for name, each in zip(result.tasks, row.tasks, strict=True) if each)
+            designs.append(
+                DrawnDesign(
+                    f"{result.over} = {row.value:.5g} {result.unit}".rstrip(),
+                    F or ", ".join(of_each),
+                    free_numbers(outcome.own.nlp, outcome.x),
+                    tuple(each.removeprefix(_LIMITS) for each in row.active),
+                    outcome.own.nlp,
+                    outcome.x,
+                    outcome.state,
+                )
+            )
+    return designs
 
 
 def over_words(result: TradeoffResult) -> str:
@@ -257,34 +369,6 @@ def over_words(result: TradeoffResult) -> str:
     first, last = result.points[0].value, result.points[-1].value
     count = len(result.points)
     return f"{result.over} from {first:g} to {last:g} {result.unit}".rstrip() + f", {count} value{'s'[: count != 1]}"
-
-
-def tradeoff_table(result: TradeoffResult) -> TextTable:
-    """Return a row for each value: F, its slope and what is active there only; with several tasks F of each."""
-    several = len(result.tasks) > 1
-    header = f"{result.over}\n{result.unit}" if result.unit else result.over
-    per = f"slope\n{slope_unit(result.unit)}"
-    names = tuple(f"F of {name}" for name in result.tasks) if several else ()
-    throughout = _active_throughout(result)
-    last = "also active" if throughout else "active"
-    headers = (header, "F" if not several else "combined F", *names, per, "status", last)
-    rows = tuple(
-        (
-            f"{point.value:.7g}",
-            _number_text(point.F),
-            *(_number_text(F) for F in (point.tasks if several else ())),
-            "" if point.slope is None else _signed(point.slope),
-            point.status.value,
-            _listed(name for name in point.active if name not in throughout),
-        )
-        for point in result.points
-    )
-    return TextTable(headers, rows, extra=1, is_curve=True)
-
-
-def throughout_words(result: TradeoffResult) -> str:
-    """Return the bounds and limits that are active at every value with an answer; an empty text for none."""
-    return _listed(_active_throughout(result))
 
 
 def _active_throughout(result: TradeoffResult) -> list[str]:
@@ -296,8 +380,8 @@ def _listed(names: Iterable[str]) -> str:
     return ", ".join(name.removeprefix("limits.") for name in names)
 
 
-def tradeoff_words(result: TradeoffResult) -> list[str]:
-    """Return sentences about values without an answer."""
+def _faults(result: TradeoffResult) -> list[str]:
+    """Return a clause about the values of each status that is no answer."""
     missing = [point for point in result.points if not point.status.is_answer]
     return [_status_words(result, status) for status in dict.fromkeys(point.status for point in missing)]
 
@@ -310,19 +394,8 @@ def _status_words(result: TradeoffResult, status: Status) -> str:
     return f"{status.value} at {', '.join(f'{value:.5g}' for value in own)} {result.unit}".rstrip()
 
 
-def tradeoff_csv(result: TradeoffResult) -> str:
-    """Return a trade-off as CSV, one row for each value; what has no value is an empty cell."""
-    answer = next((point for point in result.points if point.parameters is not None), None)
-    names = [] if answer is None else list(_design(answer))
-    several = len(result.tasks) > 1
-    own = [f"F {name}" for name in result.tasks] if several else []
-    head, rows = [result.over, "F", *own, "slope", "status", "active", *names], []
-    for point in result.points:
-        design = _design(point)
-        cells: list[object] = [point.F, *(point.tasks if several else ()), point.slope]
-        others = [design.get(name) for name in names]
-        rows.append([point.value, *cells, point.status.value, " ".join(point.active), *others])
-    return csv_text(head, rows)
+def _text_of_F(point: TradeoffPointData) -> str:  # noqa: N802 - the objective's name
+    return _number_text(point.F)
 
 
 def _number_text(value: float | None) -> str:

@@ -19,7 +19,7 @@ from ..interruption import is_requested, one_call, reason_of, seconds_left, with
 from ..program.formulation import formulate_each
 from ..proof.boxes.engine import search_tape
 from ..proof.boxes.tree import TreeRecord
-from ..proof.certificate.branch_and_bound import GAP, CertifyProgress, certify_program
+from ..proof.certificate.branch_and_bound import GAP, CertifyProgress
 from ..proof.certificate.certificate import Certificate, CertificateStatus
 from ..proof.checker.premises import check_minimum, fingerprint, has_both_senses, has_modes, program_of
 from ..proof.checker.proof_file import OPTIMUM, Proof, ProofClaim, Statement
@@ -30,6 +30,7 @@ from .choices import solve_choices
 from .compromise import solution_of_one_task
 from .multistart import ProgramSolution, solve_program
 from .pose_constraints import with_margin
+from .searchjournal import kept_certificate
 from .solution import Answer, Solution, interrupted
 from .solve import solve, solve_programs
 from .status import Status
@@ -229,7 +230,7 @@ def _certify(
         """Certify a program with an equal part of the time left, which so many programs share."""
         x, claimed = _incumbent(own)
         in_home_mode = with_mode and (x is None or is_in_home_mode(own.nlp, x) is True)
-        certificate = certify_program(
+        certificate = kept_certificate(
             replace(own.nlp, in_home_mode=True) if in_home_mode else own.nlp,
             x,
             claimed=claimed,
@@ -332,7 +333,7 @@ def _certify_from_poses(
     """
     own = solution.outcomes[0].own
     x, claimed = (own.x, own.F) if own.status.is_answer else (None, None)
-    certificate = certify_program(
+    certificate = kept_certificate(
         with_margin(own.nlp, 0.0),
         x,
         claimed=claimed,

@@ -30,13 +30,14 @@ from ..case.task import Method, Sense, Task
 from ..evidence.kkt import FEASIBLE, close_equations, correct_point, linearise
 from ..evidence.margins import measured_slack
 from ..evidence.optimality import PointKind, examine
+from ..evidence.state import state_or_none
 from ..program.epigraph import formulate_worst, level_of_tasks
 from ..program.formulation import formulate_weighted, proximity_program, scaled_weights, with_proximity_term
 from ..program.nlp import Nlp
 from ..program.pairs import with_pairs_at
 from ..program.places import FreeRotation
 from ..program.program import Program
-from .multistart import ProgramSolution, state_or_none
+from .multistart import ProgramSolution
 from .solution import Combination, Solution, TaskOutcome
 from .starts import StartStatus, same_value
 from .status import Status

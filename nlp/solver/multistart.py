@@ -23,7 +23,7 @@ from ..evidence.closing import close_near, closed_start, closed_starts
 from ..evidence.kkt import FEASIBLE, close_equations, linearise
 from ..evidence.margins import measured_violation
 from ..evidence.optimality import Evidence, PointKind, examine
-from ..evidence.state import RobotState, evaluate, loops_are_closed
+from ..evidence.state import RobotState, loops_are_closed, state_or_none
 from ..interruption import Milestone, is_requested, reached
 from ..program.blocks import Blocks
 from ..program.epigraph import with_exact_level, with_wider_level
@@ -40,6 +40,7 @@ from ..program.sampling import starting_points
 from .by_blocks import from_best_blocks, searched_starts
 from .interface import LocalSearch, Solver, SolverResult, StopReason
 from .ipopt import ipopt
+from .kept import journal_in_force
 from .screened import search_each
 from .starts import Optimum, Start, StartStatus, distinct_optima
 from .status import Phase, PhaseProgress, Status, no_phase
@@ -126,6 +127,25 @@ def solve_program(
     Raises:
         InputError: the objective is to be compiled, and there is no C compiler or it fails.
     """
+
+    def solve() -> ProgramSolution:
+        return _solved(nlp, search, first, jobs, progress, solver, phase)
+
+    journal = journal_in_force()
+    found: ProgramSolution = solve() if journal is None else journal.search(nlp, search, first, solve, ProgramSolution)
+    return found
+
+
+def _solved(
+    nlp: Nlp,
+    search: Search,
+    first: Sequence[FloatArray],
+    jobs: int | None,
+    progress: Progress | None,
+    solver: Solver,
+    phase: PhaseProgress,
+) -> ProgramSolution:
+    """Solve a program; arguments as for :func:`solve_program`."""
     began = time.perf_counter()
     solution = _search(nlp, search, first, jobs, progress, solver, phase)
     nlp = solution.nlp
@@ -307,14 +327,6 @@ def _status(nlp: Nlp, x: FloatArray, evidence: Evidence, converged: bool, better
     if evidence.kind is PointKind.LIMB_SINGULAR:
         return Status.LIMB_SINGULAR
     return Status.SADDLE if evidence.kind is PointKind.SADDLE else Status.NOT_CONVERGED
-
-
-def state_or_none(nlp: Nlp, x: FloatArray) -> RobotState | None:
-    """Return the robot at a point, or None where its equations have no value."""
-    try:
-        return evaluate(nlp, x)
-    except EvaluationError:
-        return None
 
 
 def closed_point(nlp: Nlp, search: Search) -> FloatArray:

@@ -16,8 +16,10 @@ from ...models import FloatArray
 from ..case.case import Case
 from ..case.settings import Search
 from ..errors import InputError
-from ..interruption import Milestone, is_requested, reached, why_stopped
+from ..interruption import Milestone, is_requested, reached, seconds_left, why_stopped, within
 from ..program.formulation import formulate_each
+from ..proof.enclosure.engine import kernel
+from .certified import Certified, certify
 from .compromise import solution_of_one_task
 from .multistart import ProgramSolution, solve_program
 from .solution import Solution
@@ -34,10 +36,12 @@ class TradeoffPoint:
     Attributes:
         value: of the number, in the case's unit.
         solution: of the case with this value; its status says whether it is an answer.
+        certified: certificates of an answer; None where none were asked for.
     """
 
     value: float
     solution: Solution
+    certified: Certified | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +70,7 @@ def tradeoff(
     seed: int | None = None,
     jobs: int | None = None,
     first: Sequence[FloatArray] = (),
+    certified: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Tradeoff:
     """Solve a case again for each value of one of its numbers.
@@ -79,13 +84,17 @@ def tradeoff(
         seed: seed instead of the case's.
         jobs: number of threads; the result does not depend on it.
         first: points (n,) to start from at every value.
+        certified: whether the optimum at each value is proved too, in an equal part of the time left.
         progress: called after each solve of the first pass with the numbers of solves done and of all.
 
     Raises:
         CaseError: a value is not allowed; nothing has been solved by then.
-        InputError: there is no value.
+        InputError: there is no value, or the C kernel was not built, which a proof needs.
+        UncoveredError: an optimum is to be proved, and an expression has an operation without a rule.
     """
     began = time.perf_counter()
+    if certified:
+        kernel()  # before any solve where it is missing
     if not values:
         raise InputError("a trade-off needs at least one value")
     cases = [case_at(value) for value in values]
@@ -108,7 +117,19 @@ def tradeoff(
         solutions[k] = better
     solved, unsolved = values[: len(solutions)], values[len(solutions) :]
     points = tuple(TradeoffPoint(float(value), found) for value, found in zip(solved, solutions, strict=True))
+    if certified:
+        points = tuple(_certified(point, len(points) - k, jobs) for k, point in enumerate(points))
     return Tradeoff(name, points, time.perf_counter() - began, tuple(map(float, unsolved)))
+
+
+def _certified(point: TradeoffPoint, left: int, jobs: int | None) -> TradeoffPoint:
+    """Return an answer with its certificates, in an equal part of the time that so many values share."""
+    if not point.solution.status.is_answer:
+        return point
+    with within(seconds_left() / left):
+        found = certify(point.solution, jobs=jobs)
+    # The search of the whole box may find a better design.
+    return replace(point, solution=found.solution, certified=found)
 
 
 def _whole(solve: Callable[[], Solution]) -> Solution | None:

@@ -1,9 +1,10 @@
-"""The rows of a sweep as typed columns, and as a result."""
+"""The rows of a sweep as a table of designs, as typed columns, and as a result."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from types import MappingProxyType
 from typing import Any
 
@@ -12,11 +13,22 @@ from numpy.typing import NDArray
 
 from ...models import FloatArray, frozen_array
 from ..case.case import Case
-from ..results.explorations import Column, SweepResult
+from ..errors import InputError
+from ..program.formulation import formulate_each
+from ..program.nlp import Nlp
+from ..results.design import limits_data, margins_data
+from ..results.designs import SEPARATOR, Cell, Column, ColumnKind, Designs, Join, PageWords
+from ..results.explorations import Numbers, SweepResult
 from ..results.objective import unit_of_objective
 from ..results.point import head_data, stated_pose_notice, versions
+from ..results.rounding import number
+from ..results.tables import sizes_of_variables
+from ..results.text import Line
+from ..results.tradeoff import unit_of_number
+from ..system.journal import fields_of
 from ..system.jsonvalues import finite_or_none, vector
-from .journal import Row, row_kinds
+from .journal import Row
+from .points import Points
 from .sweep import Sweep
 
 
@@ -90,8 +102,187 @@ def columns_of(sweep: Sweep, rows: Sequence[Row]) -> SweepColumns:
     return SweepColumns(
         numbers=MappingProxyType({name: frozen_array(each, (len(points),)) for name, each in values}),
         design=MappingProxyType(design),
-        **{name: column(name, kind) for name, kind in row_kinds() if name not in ("point", "x")},
+        **{name: column(name, kind) for name, kind in fields_of(Row) if name not in ("point", "x")},
     )
+
+
+def sweep_designs(sweep: Sweep, rows: Sequence[Row]) -> Designs[Row]:
+    """Return rows of a sweep as a table of designs."""
+    case = sweep.case
+    values = [row.F for row in rows if row.F is not None]
+    words = f"{len(values):,} of {len(rows):,} points have an answer"
+    proved = sum(row.certificate == "proved" for row in rows)
+    notice = stated_pose_note(case, (row.note for row in rows)) if case.limits_over else None
+    line = words
+    if values:
+        regions = len({row.active for row in rows if row.F is not None})
+        line += f", F from {min(values):.7g} to {max(values):.7g}, {regions} sets of active limits"
+    return Designs(
+        "sweep",
+        case,
+        "points",
+        tuple(sweep_columns(sweep, case)),
+        rows,
+        Join.GRID if is_drawn(sweep.points) else Join.CLOUD,
+        PageWords(
+            f"{case.name}, robot {case.model.name}, over {', '.join(sweep.points.names)}",
+            f"{words}, {proved:,} of them with a proof." if any(row.certificate for row in rows) else f"{words}.",
+            ("curve", "F over the points"),
+            ("values", "Every point"),
+            rules=() if notice is None else (f"Note: {notice}.",),
+            below="F at each point. Numbers: the limits that are active in a region.",
+            is_answer=bool(values),
+        ),
+        before=[Line(line + f", {proved:,} are proved" if sweep.certified else line)],
+        after=() if notice is None else [Line(f"note: {notice}")],
+    )
+
+
+def is_drawn(points: Points) -> bool:
+    """Return whether points are a grid over one or two numbers, over which F is drawn."""
+    return 1 <= sum(len(axis) > 1 for axis in points.axes) <= 2
+
+
+def check_drawn(points: Points) -> None:
+    """Refuse a picture of a sweep that is no grid over one or two numbers.
+
+    Raises:
+        InputError: it is none.
+    """
+    if not is_drawn(points):
+        count = sum(len(axis) > 1 for axis in points.axes)
+        fault = f"{count} numbers change on a grid" if points.axes else "the points are rows of a file"
+        raise InputError(f"--plot: draws F over one or two numbers of --over, and {fault}")
+
+
+def sweep_columns(sweep: Sweep, case: Case | None = None) -> Iterator[Column[Row]]:
+    """Yield the columns of a sweep's table: the numbers that change, the answer, its evidence.
+
+    Args:
+        sweep: the sweep.
+        case: the case at one of its points, for labels and units; None for a table without them.
+    """
+    nlp = None if case is None else formulate_each(case)[0]
+    yield Column("index", lambda row: row.point, holds=int, label="point", text=lambda row: str(row.point))
+    for j, name in enumerate(sweep.points.names):
+        yield _varied(sweep, j, name, "" if nlp is None else _unit_of(nlp, name))
+    yield Column("status", lambda row: row.status, holds=str, label="status", text=lambda row: row.status)
+    yield Column(
+        "F",
+        lambda row: row.F,
+        ColumnKind.OBJECTIVE,
+        label="F",
+        unit="" if case is None else unit_of_objective(case),
+        text=lambda row: "" if row.F is None else number(row.F),
+    )
+    sizes = (
+        {}
+        if nlp is None
+        else dict(zip((each.name for each in nlp.program.variables), sizes_of_variables(nlp), strict=True))
+    )
+    kinds = {} if nlp is None else {each.name: each.dimension for each in nlp.program.variables}
+    for k, name in enumerate(sweep.variables):
+        unit = "" if case is None or name not in kinds else case.units.label(kinds[name])
+        yield _variable(k, name, sizes.get(name, 0.0), unit)
+    for name, kind in fields_of(Row):
+        if name in _LAST and (sweep.certified or name not in _PROOF):
+            yield _column_of(name, kind)
+
+
+def _varied(sweep: Sweep, j: int, name: str, unit: str) -> Column[Row]:
+    values = sweep.points.values
+    return Column(
+        name,
+        lambda row: float(values[row.point, j]),
+        ColumnKind.VARIED,
+        label=name,
+        unit=unit,
+        text=lambda row: number(float(values[row.point, j])),
+    )
+
+
+def _variable(k: int, name: str, size: float, unit: str) -> Column[Row]:
+    return Column(
+        name,
+        lambda row: row.x[k] if k < len(row.x) else None,
+        ColumnKind.VARIABLE,
+        label=name,
+        unit=unit,
+        text=lambda row: number(row.x[k], size) if k < len(row.x) else "",
+    )
+
+
+def _unit_of(nlp: Nlp, name: str) -> str:
+    """Return the unit of a number of the case of a program by its name."""
+    limits = limits_data(margins_data(nlp, nlp.start, optimal=False)) if name.startswith("limits.") else ()
+    return unit_of_number(name, nlp.case, limits)
+
+
+#: Fields of a row that its last columns have, and those of its proof.
+_PROOF = ("certificate", "bound", "gap")
+_LAST = {name for name, _ in fields_of(Row)} - {"point", "status", "F", "x"}
+#: Texts of fields that a page shows; ``None`` in the place of a number that is missing.
+_SHOWN: Mapping[str, Callable[[Row], str]] = {
+    "active": lambda row: ", ".join(row.active) or row.note,
+    "certificate": lambda row: row.certificate,
+    "gap": lambda row: "" if row.gap is None else number(row.gap),
+}
+_KINDS = {"active": ColumnKind.ACTIVE} | dict.fromkeys(_PROOF, ColumnKind.PROOF)
+_TEXTS = (tuple[str, ...], tuple[float, ...], str)
+
+
+def _column_of(name: str, kind: object) -> Column[Row]:
+    """Return the column of a field of a row with its type; several values share a cell."""
+
+    def cell(row: Row) -> Cell:
+        value = getattr(row, name)
+        if isinstance(value, tuple):
+            return SEPARATOR.join(each if isinstance(each, str) else repr(each) for each in value)
+        return value  # type: ignore[no-any-return]
+
+    holds = str if kind in _TEXTS else int if kind is int else float
+    shown = _SHOWN.get(name)
+    meaning = _KINDS.get(name, ColumnKind.EVIDENCE)
+    return Column(name, cell, meaning, holds, name, text=shown) if shown else Column(name, cell, meaning, holds)
+
+
+def row_reader(sweep: Sweep, names: Sequence[str] | None = None) -> Callable[[Sequence[Any]], Row]:
+    """Return the function that makes a row of the cells of its table as they are read from a file; None for empty ones.
+
+    Equal texts become one object: a million rows have a few dozen sets of active sides.
+
+    Args:
+        sweep: the sweep.
+        names: fields of a row that are needed; all where they are left out. The others have their defaults.
+    """
+    first = 1 + len(sweep.points.names)
+    design = slice(first + 2, first + 2 + len(sweep.variables))
+    last = [name for name, _ in fields_of(Row) if name in _LAST and (sweep.certified or name not in _PROOF)]
+    places = {"point": 0, "status": first, "F": first + 1} | {name: design.stop + k for k, name in enumerate(last)}
+    readers: dict[object, Callable[[Any], Any]] = {
+        tuple[str, ...]: cache(lambda cell: tuple(cell.split(SEPARATOR)) if cell else ()),
+        tuple[float, ...]: lambda cell: tuple(map(float, cell.split(SEPARATOR))) if cell else (),
+        str: cache(lambda cell: cell or ""),
+        int: int,
+        float: float,
+        float | None: lambda cell: None if cell is None else float(cell),
+    }
+    wanted = [
+        (k, places[name], readers[kind])
+        for k, (name, kind) in enumerate(fields_of(Row))
+        if name in places and (names is None or name in names)
+    ]
+    empty = [0, "", None, *Row._field_defaults.values()]
+
+    def read(cells: Sequence[Any]) -> Row:
+        values = list(empty)
+        for k, place, reader in wanted:
+            values[k] = reader(cells[place])
+        x = cells[design] if names is None else ()
+        values[3] = () if None in x else tuple(map(float, x))
+        return Row._make(values)
+
+    return read
 
 
 def stated_pose_note(case: Case, notes: Iterable[str]) -> str | None:
@@ -120,25 +311,25 @@ def sweep_result(case: Case, found: SweepColumns) -> SweepResult:
         unit=unit_of_objective(case),
         numbers=MappingProxyType({name: vector(values) for name, values in found.numbers.items()}),
         statuses=found.status,
-        F=_column(found.F),
-        design=MappingProxyType({name: _column(values) for name, values in found.design.items()}),
+        F=_numbers(found.F),
+        design=MappingProxyType({name: _numbers(values) for name, values in found.design.items()}),
         actives=found.active,
         verdicts=found.verdict,
-        stationarity=_column(found.stationarity),
-        feasibility=_column(found.feasibility),
-        curvature=_column(found.curvature),
+        stationarity=_numbers(found.stationarity),
+        feasibility=_numbers(found.feasibility),
+        curvature=_numbers(found.curvature),
         starts=tuple(found.starts.tolist()),
         converged=tuple(found.converged.tolist()),
         engines=found.engine,
-        times=_column(found.seconds),
+        times=_numbers(found.seconds),
         notes=found.note,
         certificates=found.certificate if is_proved else None,
-        bounds=_column(found.bound) if is_proved else None,
-        gaps=_column(found.gap) if is_proved else None,
+        bounds=_numbers(found.bound) if is_proved else None,
+        gaps=_numbers(found.gap) if is_proved else None,
         versions=versions(),
     )
 
 
-def _column(values: FloatArray) -> Column:
+def _numbers(values: FloatArray) -> Numbers:
     """Return numbers (N,) with None for those that are not finite."""
     return tuple(finite_or_none(value) for value in values.tolist())

@@ -6,13 +6,14 @@ import math
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
 
 from ...models import FloatArray, frozen_array
 from ..case.case import Case
-from ..case.csvrows import csv_rows
+from ..case.csvrows import csv_rows, number_table
 from ..case.overrides import Settings
 from ..case.reader import CaseFile, case_from_tables
 from ..errors import InputError
@@ -102,20 +103,18 @@ def points_of_csv(text: str, source: str) -> Points:
     Raises:
         InputError: the file has no points, a row has another length, or something is no finite number.
     """
-    names, *rows = [cells for _, cells in csv_rows(text, source)] or [[]]
+    records = csv_rows(text, source)
+    _, names = next(records, (0, []))
     if not names:
         raise InputError(f"{source}: is empty: the first row must have the names of the numbers")
     _check_names(names, source)
-    if not rows:
-        raise InputError(f"{source}: has 0 points: a row of values must follow the names")
-    if len(rows) > MOST_POINTS:
-        raise InputError(f"{source}: has {len(rows):,} points, and at most {MOST_POINTS:,} are allowed")
-    values = np.empty((len(rows), len(names)))
-    for k, row in enumerate(rows):
-        if len(row) != len(names):
-            raise InputError(f"{source}: point {k + 1} has {len(row)} values, and must have {len(names)}")
-        for j, part in enumerate(row):
-            values[k, j] = _number(part, f"{source}: point {k + 1}, {names[j]}")
+    table = number_table(islice(records, MOST_POINTS + 1), names, source)
+    if not 1 <= len(table.rows) <= MOST_POINTS:
+        few = "has 0 points: a row of values must follow the names"
+        raise InputError(f"{source}: {f'has more than {MOST_POINTS:,} points' if len(table.rows) else few}")
+    for name, column in table.columns.items():
+        table.refuse(~np.isfinite(column), name, "must be finite")
+    values = np.stack(list(table.columns.values()), axis=1)
     return Points(tuple(names), frozen_array(values, values.shape))
 
 

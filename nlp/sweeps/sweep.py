@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
+from ..case.case import Case
 from ..interruption import is_interrupted, is_requested, one_call, seconds_left
 from ..program.formulation import formulate
 from ..program.program import design_indices
@@ -81,13 +82,18 @@ class Sweep:
         hashed.update(np.ascontiguousarray(self.points.values).tobytes())
         return hashed.hexdigest()[:32]
 
-    def journal_of(self, out: str) -> Journal:
-        """Return the journal beside a table's file.
+    @property
+    def case(self) -> Case:
+        """The case at the first point."""
+        return self.source.case_at(self.points.settings(0))
+
+    def journal_of(self, out: str, file: str | None = None) -> Journal:
+        """Return the journal beside a table's file, or in a file of its own.
 
         Raises:
             InputError: it belongs to another sweep, is held by another process, or cannot be written.
         """
-        return Journal(Path(f"{out}{ENDING}"), self.fingerprint, len(self.points))
+        return Journal(Path(file or f"{out}{ENDING}"), self.fingerprint, len(self.points))
 
 
 @one_call
@@ -141,7 +147,7 @@ def run_sweep(
             if is_interrupted():
                 raise KeyboardInterrupt
             return
-        journal.append(rows)
+        journal.add(rows)
         done += len(rows)
         if progress is not None:
             progress(before, done, len(missing), time.perf_counter() - began)

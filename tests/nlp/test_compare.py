@@ -11,9 +11,10 @@ from jsonschema import Draft202012Validator
 
 import screwsynth.nlp as sn
 from screwsynth.models import Displacement
-from screwsynth.nlp.comparison.data import comparison_sentences
+from screwsynth.nlp.comparison.data import comparison_designs, comparison_sentences
 from screwsynth.nlp.comparison.robots import placed, read_robots
-from screwsynth.nlp.output.pictures.comparisons import comparison_drawings, comparison_figure, comparison_pictures
+from screwsynth.nlp.output.pictures.drawing import drawing_of
+from screwsynth.nlp.output.pictures.robots import robot_pictures, robots_figure
 from screwsynth.nlp.results.schema import result_schema
 
 # The twist is about an axis far from the origin, so that a frame that is moved wrongly shows.
@@ -90,7 +91,8 @@ def test_a_robot_in_the_place_of_another(path: str, tmp_path: Path, cli: Run) ->
 
 def test_pictures_have_units_sizes_and_one_scale(path: str) -> None:
     found = sn.compare(sn.load_case(path), ["6-sps", "case"], part=0, starts=1)
-    figure = comparison_figure(found)
+    designs = comparison_designs(found, sn.comparison_result(found))
+    figure = robots_figure(designs)
     words = [text.get_text() for text in figure.texts]
     for entry in found.entries:
         assert f"F = {entry.value:.5g} (mm/rad)², size {entry.final_size:.4g} mm" in words
@@ -104,14 +106,15 @@ def test_pictures_have_units_sizes_and_one_scale(path: str) -> None:
         ends = axes.transData.transform([[0, 0], [shown, 0]])
         assert ends[1, 0] - ends[0, 0] == pytest.approx(long, rel=1e-9)
     # The fastest limb of all has the colour at an end of the scale, and the legend says what is drawn.
-    rates = np.abs(np.concatenate([[row.rate for row in each.rows] for _, each in comparison_drawings(found)]))
+    drawings = [drawing_of(each.nlp, each.x, each.state) for each in designs.drawn()]
+    rates = np.abs(np.concatenate([[row.rate for row in each.rows] for each in drawings]))
     (scale,) = [axes for axes in figure.axes if axes.get_xlabel() == "rate of each limb, mm/rad"]
     assert scale.get_xlim() == pytest.approx((-rates.max(), rates.max()))
     legend = {text.get_text() for each in figure.legends for text in each.get_texts()}
     assert any(text.startswith("task: tilt (screw of pitch 3 mm") for text in legend)
     assert {"spherical (S)", "filled: actuated"} <= legend
     # On a page each robot has a picture of its own, and the legend one.
-    assert len(comparison_pictures(found)) == 3
+    assert len(robot_pictures(designs)) == 3
 
 
 def test_dimensions_ranges_and_certificates() -> None:

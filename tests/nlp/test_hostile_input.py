@@ -10,6 +10,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -38,7 +39,8 @@ from screwsynth.nlp.embedding.manifest import read_manifest
 from screwsynth.nlp.proof.checker.proof_file import Premises, Proof, ProofClaim, Unproved, read_proof
 from screwsynth.nlp.solver.certified import proof_of
 from screwsynth.nlp.starter.text import starter_case
-from screwsynth.nlp.sweeps.journal import Row, line_of, row_of
+from screwsynth.nlp.sweeps.journal import Row
+from screwsynth.nlp.system.journal import line_of, row_of
 from screwsynth.nlp.system.strictjson import WrongValueError, json_tree, object_of, value_of
 
 #: What is put into files byte by byte.
@@ -190,7 +192,10 @@ def readers_in(folder: Path, cli: Run) -> dict[str, tuple[bytes, Callable[[bytes
         "proof": (proof, lambda content: read_proof(content.decode(), "file")),
         "workspace": (paper.as_text().encode(), lambda content: read_proof(content.decode(), "file")),
         "result": (result.read_bytes(), read_file),
-        "row": (line_of(Row(0, "optimal", 1.5, (1.0,), ("p_z max",), (0.1,), "strict", 1e-9)).encode(), row_of),
+        "row": (
+            line_of(Row(0, "optimal", 1.5, (1.0,), ("p_z max",), (0.1,), "strict", 1e-9)).encode(),
+            partial(row_of, Row),
+        ),
         "manifest": (json.dumps(MANIFEST).encode(), read_folder),
     }
 

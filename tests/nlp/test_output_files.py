@@ -14,9 +14,12 @@ import pytest
 from builders import Run, edited, output_of, refusal_of, saved, saved_with_robot
 
 from screwsynth.nlp import InputError, generate_c, load_case
+from screwsynth.nlp.case.reader import read_case
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.output.files import MANIFEST, check_folder, check_origin, write_folder
-from screwsynth.nlp.output.sweeptable import table_points
+from screwsynth.nlp.output.sweeptable import table_rows
+from screwsynth.nlp.sweeps.points import CaseSource, grid
+from screwsynth.nlp.sweeps.sweep import Sweep
 from screwsynth.nlp.system.csvtext import csv_row, csv_text, text_of_cell
 from screwsynth.nlp.system.locks import held_folder
 from screwsynth.nlp.system.markdown import markdown_text
@@ -330,9 +333,10 @@ def test_a_sweep_of_numbers_is_read_again(tmp_path: Path, cli: Run) -> None:
     single = CASE[: CASE.rindex("[[task]]")]
     path, out = saved_with_robot(tmp_path, ROBOT, single), tmp_path / "out.csv"
     assert cli("sweep", path, "--over", "rp=0.5:0.6:2", "--starts", "2", "--jobs", "1", "--out", str(out))[0] == 0
-    points = table_points(str(out))
-    assert len(points) == 2
-    assert all(each.F > 0 and not each.active.startswith("'") for each in points)
+    source, points = CaseSource.from_file(read_case(path)), grid(["rp=0.5:0.6:2"])
+    rows = table_rows(str(out), Sweep.of(source, points, starts=2))
+    assert len(rows) == 2
+    assert all(row.F > 0 and not row.active[0].startswith("'") for row in rows)
 
 
 @pytest.mark.parametrize(

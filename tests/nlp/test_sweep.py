@@ -6,7 +6,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,15 +20,18 @@ from screwsynth.nlp import InputError, examine, formulate, load_case, load_resul
 from screwsynth.nlp import sweep as run_in_python
 from screwsynth.nlp.case.reader import read_case
 from screwsynth.nlp.evidence.many import Numbers, _scales, judge_many
-from screwsynth.nlp.output.pictures.sweeps import sweep_figure, sweep_legend
-from screwsynth.nlp.output.sweeptable import TablePoint, table_points, write_table
+from screwsynth.nlp.output.pictures.designs import designs_figure, legend_of
+from screwsynth.nlp.output.sweeptable import table_rows, write_table
+from screwsynth.nlp.results.designs import Designs
 from screwsynth.nlp.results.explorations import SweepResult
 from screwsynth.nlp.sweeps import workers
+from screwsynth.nlp.sweeps.columns import sweep_designs
 from screwsynth.nlp.sweeps.engines import EngineKind, Job
-from screwsynth.nlp.sweeps.journal import Journal, Row, line_of, row_of
-from screwsynth.nlp.sweeps.points import CaseSource, Points, grid
+from screwsynth.nlp.sweeps.journal import Journal, Row
+from screwsynth.nlp.sweeps.points import CaseSource, Points, grid, points_of_csv
 from screwsynth.nlp.sweeps.sweep import Sweep, run_sweep
 from screwsynth.nlp.sweeps.workers import PointBlock, answer_in_processes
+from screwsynth.nlp.system.journal import line_of, row_of
 
 CASE = "paper-4.1-helical"
 #: Case files that say the same number in two ways are the same to this part.
@@ -125,7 +128,9 @@ def test_points_of_a_file_and_parquet(tmp_path: Path, cli: Run) -> None:
     assert "task[0].axis" in found["note"][3]
     assert found["F"][3] is None
     assert said.startswith("4 of 5 points have an answer")
-    assert [each.active for each in table_points(str(out))] == found["active"]
+    source = CaseSource.from_file(read_case(CASE))
+    one = Sweep.of(source, points_of_csv(points.read_text(), str(points)), starts=2)
+    assert ["; ".join(row.active) for row in table_rows(str(out), one)] == found["active"]
 
 
 def test_a_sweep_in_python_is_that_of_the_command(tmp_path: Path, cli: Run) -> None:
@@ -158,7 +163,7 @@ def test_rows_with_certificates_are_taken_up(tmp_path: Path) -> None:
 
     with pytest.raises(KeyboardInterrupt):
         run_in_python(case, values, out=file, starts=2, jobs=1, certified=True, time_limit=20, progress=stop)
-    kept = [row_of(line) for line in file.with_name("sweep.csv.journal").read_text().splitlines()[1:]]
+    kept = [row_of(Row, line) for line in file.with_name("sweep.csv.journal").read_text().splitlines()[1:]]
     assert [row.point for row in kept] == [0]
     found = run_in_python(case, values, out=file, starts=2, jobs=1, certified=True, time_limit=20)
     # The first row, its time too, is that of the first run.
@@ -205,7 +210,8 @@ def test_joints_are_no_design() -> None:
         (("--over", "x1=1:2:9999", "--over", "x2=1:2:9999"), "and at most 10,000,000 are allowed"),
         (("--over", "x1=1,2", "--over", "x1=3,4"), "x1 is given twice"),
         (("--over", "EMPTY"), "has 0 points"),
-        (("--over", "SHORT"), "point 2 has 1 values, and must have 2"),
+        (("--over", "SHORT"), "row 3: must have 2 cells, got 1"),
+        (("--over", "WORDS"), 'row 4, column x2 = "1,1": must be a number; write 1.1'),
         (("--over", "x1=1,2", "--over", "EMPTY"), "a file of points stands alone, without ranges or lists beside it"),
         ((), "--over: is missing: NAME=FIRST:LAST:COUNT, a number to vary"),
         (("--over", "x1=1,2", "--engine", "fast"), "--engine fast: must be compiled or ipopt"),
@@ -216,6 +222,7 @@ def test_joints_are_no_design() -> None:
 def test_bad_input_is_one_sentence(arguments: tuple[str, ...], words: str, tmp_path: Path, cli: Run) -> None:
     files = {"EMPTY": saved(tmp_path / "empty.csv", "x1,x2\n")}
     files["SHORT"] = saved(tmp_path / "short.csv", "x1,x2\n10,11\n12\n")
+    files["WORDS"] = saved(tmp_path / "words.csv", "x1;x2\n10;11\n\n12;1,1\n")
     out = tmp_path / "out.csv"
     given = [str(files.get(word, word)) for word in arguments]
     refusal_of(cli("sweep", CASE, *given, "--out", str(out)), words)
@@ -238,8 +245,8 @@ def test_other_outputs_are_refused(tmp_path: Path, cli: Run) -> None:
 def test_a_journal_cut_off_anywhere_keeps_whole_rows(tmp_path: Path) -> None:
     path, rows = tmp_path / "journal", [Row(k, "optimal", k / 3, x=(k / 7,), active=("ä max",)) for k in (2, 0, 3, 1)]
     whole = Journal(path, "abc", 4)
-    whole.append(rows[:2])
-    whole.append([*rows, rows[0]])
+    whole.add(rows[:2])
+    whole.add([*rows, rows[0]])
     with pytest.raises(InputError, match="another run of this sweep is writing it"):
         Journal(path, "abc", 4)
     assert list(whole.rows()) == sorted(rows)
@@ -251,7 +258,7 @@ def test_a_journal_cut_off_anywhere_keeps_whole_rows(tmp_path: Path) -> None:
         journal = Journal(path, "abc", 4)
         kept = 4 - len(journal.missing)
         assert kept == content[head:length].count(b"\n") if length >= head else kept == 0
-        journal.append(rows)
+        journal.add(rows)
         assert (len(journal.missing), list(journal.rows())) == (0, sorted(rows))
         journal.close()
         assert path.read_bytes() == content
@@ -291,30 +298,34 @@ def test_a_row_group_is_in_memory_at_once(sweep: Callable[..., Sweep], tmp_path:
     assert file.read(columns=["x1"]).to_pydict()["x1"] == one.points.values[:, 0].tolist()
 
 
+def designs_on(points: Points, F: Sequence[float], active: Iterable[tuple[str, ...]]) -> Designs[Row]:
+    """The table of a sweep with made-up answers."""
+    source = CaseSource.from_file(read_case("hexapod-machining"))
+    values = [None if math.isnan(value) else value for value in F]
+    rows = [Row(k, "optimal", value, active=each) for k, (value, each) in enumerate(zip(values, active, strict=True))]
+    return sweep_designs(Sweep.of(source, points), rows)
+
+
 def test_axes_of_a_sweep_have_units() -> None:
-    case = load_case("hexapod-machining")
-    points = grid(["limits.leg_length.max=32,34", "task.pitch=0.1,0.2"])
-    found = [TablePoint(1.0, "")] * len(points)
-    labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in sweep_figure(case, points, found).axes]
+    found = designs_on(grid(["limits.leg_length.max=32,34", "task.pitch=0.1,0.2"]), [1.0] * 4, [()] * 4)
+    labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in designs_figure(found).axes]
     assert labels[0] == ("limits.leg_length.max, in", "task.pitch, in/rad")
-    points = grid(["x3=1,2", "x1=30,31"])
-    labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in sweep_figure(case, points, found).axes]
+    found = designs_on(grid(["x3=1,2", "x1=30,31"]), [1.0] * 4, [()] * 4)
+    labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in designs_figure(found).axes]
     assert labels[0] == ("x3, deg", "x1, in")
 
 
 def test_regions_of_a_sweep_have_numbers_that_a_legend_explains() -> None:
-    case = load_case("hexapod-machining")
     points = grid(["x1=26:32:13", "x2=10:13:7"])
     x1, x2 = (each.ravel() for each in np.meshgrid(*points.axes, indexing="ij"))
     # Three regions: a half, a quarter, and a quarter without an answer.
-    words = ["leg_length limb 1- max; leg_length limb 1+ max; x3 min" if a < 29 else "x3 min" for a in x1]
-    F = np.where((x1 >= 29) & (x2 > 11.5), math.nan, x1 + x2)
-    found = [TablePoint(float(value), word) for value, word in zip(F, words, strict=True)]
-    figure = sweep_figure(case, points, found)
+    sides = [("leg_length limb 1- max", "leg_length limb 1+ max", "x3 min") if a < 29 else ("x3 min",) for a in x1]
+    found = designs_on(points, np.where((x1 >= 29) & (x2 > 11.5), math.nan, x1 + x2).tolist(), sides)
+    figure = designs_figure(found)
     FigureCanvasAgg(figure).draw()
     axes = figure.axes[0]
     numbers = {text.get_text(): text.get_position() for text in axes.texts if text.get_gid() == "number"}
-    lines = {line.partition(": ")[0]: line.partition(": ")[2] for line in sweep_legend(found)}
+    lines = {line.partition(": ")[0]: line.partition(": ")[2] for line in legend_of(found)}
     assert lines.pop("Lines").endswith("Empty: no answer.")
     limits = {"1": "also leg_length max (limb 1-, limb 1+)", "2": "no other limit is active"}
     assert lines == {"Active at every number": "x3 min", **limits}
@@ -325,7 +336,7 @@ def test_regions_of_a_sweep_have_numbers_that_a_legend_explains() -> None:
         assert 5 <= len(axis) <= 9
         assert set(axis) <= set(values)
     drawn = figure.get_supxlabel()
-    assert all(line in drawn for line in sweep_legend(found))
+    assert all(line in drawn for line in legend_of(found))
     # The legend stands below the axes, and within the picture.
     (legend,) = [text for text in figure.texts if text.get_text() == drawn]
     box = legend.get_window_extent()
@@ -335,10 +346,8 @@ def test_regions_of_a_sweep_have_numbers_that_a_legend_explains() -> None:
 
 
 def test_numbers_above_a_curve_do_not_cover_each_other() -> None:
-    case = load_case("hexapod-machining")
-    points = grid(["x1=26:32:25"])
-    found = [TablePoint(float(k), "x2 min" if k % 8 < 2 else "x3 min" if k % 8 < 4 else "") for k in range(25)]
-    figure = sweep_figure(case, points, found)
+    sides = [("x2 min",) if k % 8 < 2 else ("x3 min",) if k % 8 < 4 else () for k in range(25)]
+    figure = designs_figure(designs_on(grid(["x1=26:32:25"]), list(map(float, range(25))), sides))
     FigureCanvasAgg(figure).draw()
     boxes = [text.get_bbox_patch().get_window_extent() for text in figure.axes[0].texts]
     assert len(boxes) == 10  # one for each run of equal limits
@@ -350,10 +359,11 @@ KILLED = """
 import os, signal, sys
 from screwsynth.nlp.cli.main import main
 from screwsynth.nlp.sweeps import sweep
-from screwsynth.nlp.sweeps.journal import Journal, line_of
+from screwsynth.nlp.sweeps.journal import Journal
+from screwsynth.nlp.system.journal import line_of
 
 sweep._BLOCK = 128
-append, left = Journal.append, [int(sys.argv.pop(1))]
+append, left = Journal.add, [int(sys.argv.pop(1))]
 def append_or_die(journal, rows):
     left[0] -= 1
     rows = list(rows)
@@ -362,7 +372,7 @@ def append_or_die(journal, rows):
         journal._file.write(line_of(rows[1]).encode()[:20])
         journal._file.flush()
         os.kill(os.getpid(), signal.SIGKILL)
-Journal.append = append_or_die
+Journal.add = append_or_die
 main()
 """
 

@@ -29,7 +29,7 @@ from screwsynth.nlp.evidence.assembly import assembly_at, unknowns_from_home
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.workingmode import Posture
 from screwsynth.nlp.front.goals import program_of, read_goals
-from screwsynth.nlp.output.report.sweep import sweep_page
+from screwsynth.nlp.output.report.designs import designs_page
 from screwsynth.nlp.path.reader import read_path
 from screwsynth.nlp.program.formulation import formulate_each
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
@@ -42,7 +42,7 @@ from screwsynth.nlp.results.summary import case_summary, evaluation_summary
 from screwsynth.nlp.results.text import Line, TextTable
 from screwsynth.nlp.results.workspace import WorkspaceResult, workspace_of
 from screwsynth.nlp.results.workspacewording import workspace_summary
-from screwsynth.nlp.sweeps.columns import columns_of
+from screwsynth.nlp.sweeps.columns import sweep_designs
 from screwsynth.nlp.sweeps.journal import Row
 from screwsynth.nlp.sweeps.points import CaseSource, Points
 from screwsynth.nlp.sweeps.sweep import Sweep
@@ -292,9 +292,8 @@ def test_rounding_has_no_digits_and_decides_on_no_order_or_optimum() -> None:
     assert np.array_equal(best.x, first.x)
     points = Points(("x4",), np.array([[5.0]]))
     sweep = Sweep.of(CaseSource.from_file(read_case("paper-4.1-helical")), points)
-    found = columns_of(sweep, [Row(0, "optimal", 1.0, x=tuple(1.234e-17 for _ in sweep.variables))])
-    page = sweep_page(sweep.source.case_at(points.settings(0)), points, found)
-    assert "1.234e-17" not in page
+    row = Row(0, "optimal", 1.0, x=tuple(1.234e-17 for _ in sweep.variables))
+    assert "1.234e-17" not in designs_page(sweep_designs(sweep, [row]))
 
 
 def with_other_task(model: Model, unit: str) -> Case:

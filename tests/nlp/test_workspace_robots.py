@@ -34,10 +34,9 @@ from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.evidence import state
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.mobility import mobility_of
-from screwsynth.nlp.front.data import front_result
+from screwsynth.nlp.front.data import front_designs, front_result
 from screwsynth.nlp.front.front import pareto
 from screwsynth.nlp.interruption import within
-from screwsynth.nlp.output.fronttable import front_words
 from screwsynth.nlp.proof.checker.proof_file import ProofError
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.checker.workspace.closed_loops import start_of
@@ -271,7 +270,7 @@ def test_a_front_and_a_compiled_sweep_say_that_limits_hold_at_the_stated_pose(cl
     path = case_file(tmp_path, tables | {"limits": OVER | {"footprint": {"base": 28}}})
     front = pareto(load_case(str(path)), ["max F", "min limits.footprint.base"], points=2, starts=1)
     assert front_result(front).notice == NOTICE
-    assert NOTICE in front_words(front)
+    assert NOTICE in [line.text for line in front_designs(front, front_result(front)).before]
     table, data = tmp_path / "sweep.csv", tmp_path / "sweep.json"
     options = ("--over", "task.pitch=0.1,0.2", "--starts", "1", "--engine", "compiled", "--out", str(table))
     code, out, err = cli("sweep", str(path), *options, "--json", str(data))

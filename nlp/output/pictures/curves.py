@@ -1,9 +1,10 @@
-"""Pictures of trade-off curves and of fronts: F over a number of the case, and one goal over another."""
+"""Pictures of curves and clouds of designs: F over a number of the case, and one goal over another."""
 
 from __future__ import annotations
 
 import math
 import textwrap
+from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
@@ -11,12 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ....models import FloatArray
-from ...case.case import Case
-from ...front.data import goal_units, goal_values
-from ...front.front import Front
+from ...results.designs import Column, ColumnKind, Designs, Row
 from ...results.objective import objective_label
-from ...results.tradeoff import TradeoffResult, tradeoff_words
-from ..fronttable import goal_names
 from .canvas import INK, RED, draw_edges
 
 
@@ -41,30 +38,34 @@ _SIZE = (7.2, 4.6)
 _LOOKS = (("#08519c", "o"), ("#b34700", "s"), ("#3f86c4", "^"), ("#e08a3c", "D"))
 
 
-def tradeoff_figure(case: Case, result: TradeoffResult) -> Figure:
+def numbers_of(column: Column[Row], rows: Sequence[Row]) -> FloatArray:
+    """Return the numbers (n,) of a column, NaN where there is none."""
+    return np.array([math.nan if (cell := column.cell(row)) is None else float(cell) for row in rows])
+
+
+def lines_figure(found: Designs[Row]) -> Figure:
     """Return F over the number as a Matplotlib figure; the line of each task carries ``F`` and its name as ``gid``."""
     figure = Figure(figsize=_SIZE, facecolor="white", layout="constrained")
     axes = figure.add_subplot()
-    values = [point.value for point in result.points]
-    several = len(result.tasks) > 1
-    for k, name in enumerate(result.tasks):
+    (over,), columns = found.of_kind(ColumnKind.VARIED), found.of_kind(ColumnKind.OBJECTIVE)
+    values, several = numbers_of(over, found.rows), len(columns) > 1
+    for k, column in enumerate(columns):
         colour, mark = _LOOKS[k % len(_LOOKS)]
-        F = [math.nan if point.tasks[k] is None else point.tasks[k] for point in result.points]
+        F, name = numbers_of(column, found.rows), column.series
         label = name if several else None
-        axes.plot(values, F, color=colour, marker=mark, markersize=4.5, linewidth=1.4, label=label, gid=f"F {name}")  # type: ignore[arg-type]
-    missing = [point.value for point in result.points if not point.status.is_answer]
-    for value in missing:
+        axes.plot(values, F, color=colour, marker=mark, markersize=4.5, linewidth=1.4, label=label, gid=f"F {name}")
+    known = np.any([np.isfinite(numbers_of(column, found.rows)) for column in columns], axis=0)
+    for value in values[~known]:
         axes.axvline(value, color=RED, linewidth=0.8, linestyle=":", gid="no answer")
-    axes.set_xlabel(f"{result.over}, {result.unit}" if result.unit else result.over, color=INK, parse_math=False)
-    axes.set_ylabel(objective_label(case), color=INK, parse_math=False)
-    draw_frame(axes, case.title or case.name)
+    axes.set_xlabel(over.axis, color=INK, parse_math=False)
+    axes.set_ylabel(objective_label(found.case), color=INK, parse_math=False)
+    draw_frame(axes, found.title)
     axes.margins(x=0.03)
     if several:
         for text in axes.legend(frameon=False, fontsize=9).get_texts():
             text.set_parse_math(False)
-    words = tradeoff_words(result)
-    if words:
-        note = "\n".join(textwrap.wrap(f"Dotted: {'; '.join(words)}.", 95, max_lines=3, placeholder=" …"))
+    if found.missing:
+        note = "\n".join(textwrap.wrap(f"Dotted: {'; '.join(found.missing)}.", 95, max_lines=3, placeholder=" …"))
         figure.supxlabel(note, fontsize=8.5, color=RED, x=0.01, ha="left", parse_math=False)
     return figure
 
@@ -74,27 +75,24 @@ _FRONT_SIZE = (6.4, 5.0)
 _PANEL, _ACROSS = (4.6, 3.7), 3
 
 
-def front_figure(front: Front) -> Figure:
+def goals_figure(found: Designs[Row]) -> Figure:
     """Return one goal over the other as a Matplotlib figure; a gap of the front has no line.
 
     More than two goals have a panel for each pair of them; of three, the third is the colour.
     """
-    labels = [
-        f"{name}, {unit}" if unit else name for name, unit in zip(goal_names(front), goal_units(front), strict=True)
-    ]
-    values = np.array([goal_values(front, point) for point in front.points])
-    title = front.case.title or front.case.name
-    if len(front.goals) > 2:
-        return _pairs(labels, values, title)
+    goals = found.of_kind(ColumnKind.OBJECTIVE)
+    labels, values = [goal.axis for goal in goals], np.stack([numbers_of(goal, found.rows) for goal in goals], axis=1)
+    if len(goals) > 2:
+        return _pairs(labels, values, found.title)
     figure = Figure(figsize=_FRONT_SIZE, facecolor="white", layout="constrained")
     axes = figure.add_subplot()
     first = 0
-    for last in (*front.gaps, len(values) - 1):
+    for last in (*found.gaps, len(values) - 1):
         axes.plot(*values[first : last + 1].T, color="#08519c", marker="o", markersize=4.5, linewidth=1.4, gid="front")
         first = last + 1
     axes.set_xlabel(labels[0], color=INK, parse_math=False)
     axes.set_ylabel(labels[1], color=INK, parse_math=False)
-    draw_frame(axes, title)
+    draw_frame(axes, found.title)
     return figure
 
 

@@ -1,4 +1,4 @@
-"""Small pictures of several designs of one robot, without words: one view and one scale, so that they compare."""
+"""Pictures of tables of designs, by how their rows belong together; and small ones of single designs, without words."""
 
 from __future__ import annotations
 
@@ -8,13 +8,44 @@ from dataclasses import replace
 import numpy as np
 from matplotlib.figure import Figure
 
+from ...errors import EvaluationError
+from ...results.designs import ColumnKind, Designs, Join, Row
+from .curves import goals_figure, lines_figure
 from .drawing import Drawing
 from .figures import picture_of
 from .painting import Panel
+from .regions import regions_figure, regions_legend
+from .robots import robots_figure
 from .view import View, clearest_view
 
 #: Width and height of a picture, inches.
 _SIZE = (2.9, 2.6)
+
+
+def designs_figure(found: Designs[Row], *, is_on_page: bool = False) -> Figure:
+    """Return the picture of a table of designs as a Matplotlib figure.
+
+    Args:
+        found: the table.
+        is_on_page: whether the sentences of :func:`legend_of` stand beside the picture, and not in it.
+
+    Raises:
+        EvaluationError: nothing can be drawn.
+    """
+    if found.join is Join.LIST:
+        return robots_figure(found)
+    if found.join is Join.GRID:
+        return regions_figure(found, () if is_on_page else legend_of(found))
+    if not found.of_kind(ColumnKind.VARIED):
+        return goals_figure(found)
+    if found.join is Join.CLOUD:
+        raise EvaluationError("A picture needs a grid over one or two numbers")
+    return lines_figure(found)
+
+
+def legend_of(found: Designs[Row]) -> list[str]:
+    """Return the sentences about the numbers in a picture; none where it has no numbers."""
+    return regions_legend(found) if found.join is Join.GRID else []
 
 
 def design_pictures(drawings: Sequence[Drawing]) -> list[bytes]:

@@ -1,54 +1,107 @@
-"""Designs along a curve or a front as HTML: a small picture of each, its numbers, and what becomes active there."""
+"""A table of designs as a page of HTML: picture, changes of active limits, drawings of designs, the table."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 
 import numpy as np
 
-from ....models import FloatArray
-from ...program.nlp import Nlp
-from ...program.program import design_indices
-from ...results.rounding import number
-from ..pictures.designs import design_pictures
-from ..pictures.drawing import Drawing
-from .markup import Markup, image_source, join_markup, paragraphs, tag
+from ...errors import EvaluationError
+from ...results.designs import ColumnKind, Designs, DrawnDesign, Join, Row, designs_table
+from ..pictures.designs import design_pictures, designs_figure, legend_of
+from ..pictures.drawing import Drawing, drawing_of
+from ..pictures.figures import picture_of
+from ..pictures.robots import robot_pictures
+from .curves import curve_figures
+from .markup import (
+    Markup,
+    answer_box,
+    contents_and_body,
+    html_table,
+    image_source,
+    join_markup,
+    paragraphs,
+    picture_figure,
+    tag,
+    whole_page,
+)
 
-#: So many designs are drawn at most.
-_MOST = 12
+#: So many designs are drawn at most; so many rows of a table are on a page: a browser is slow with many more.
+_MOST, _ROWS = 12, 500
 _WORDS = (
     "The robot at each design, from one direction and at one scale. Its limbs have the colours of their rates: blue "
     "for shortening, orange for lengthening."
 )
 
 
-class Design(NamedTuple):
-    """A design of a curve.
+def designs_page(found: Designs[Row]) -> str:
+    """Return a whole page about a table of designs, which opens without a network.
 
-    Attributes:
-        name: the value or the goals that it belongs to.
-        words: its result.
-        numbers: of the design, each with its name and unit.
-        active: bounds and limits that it lies on.
-        drawing: the robot there; None where it cannot be drawn.
+    Its script only says which tables scroll: all words, charts, pictures and tables stand there without it.
     """
+    page = found.page
+    sections = list(_list_sections(found) if found.join is Join.LIST else _sections(found))
+    contents, body = contents_and_body(sections)
+    return whole_page(
+        f"{found.title} - {found.word}",
+        page.subtitle,
+        answer_box([page.answer], is_answer=page.is_answer),
+        body,
+        heading=found.title,
+        contents=contents,
+    )
 
-    name: str
-    words: str
-    numbers: tuple[str, ...]
-    active: tuple[str, ...]
-    drawing: Drawing | None
+
+def _sections(found: Designs[Row]) -> Iterator[tuple[str, str, Markup]]:
+    """Yield the sections of a page about designs of one robot: anchor, heading and content of each."""
+    page, designs = found.page, found.drawn()
+    aside = bend_lines(designs, page.bends) if page.bends else Markup("")
+    if page.is_answer and (legend := legend_of(found)):
+        aside = tag("ul", *(tag("li", line) for line in legend), class_="plain")
+    beside = tag("div", tag("div", _picture(found), class_="wide"), aside, class_="beside")
+    yield (*page.picture, join_markup([paragraphs(page.rules), beside, paragraphs(page.cautions)]))
+    yield "designs", page.designs, design_figures(designs)
+    yield (*page.table, designs_rows(found))
 
 
-def free_numbers(nlp: Nlp, x: FloatArray) -> tuple[str, ...]:
-    """Return the dimensions and poses of a program that are free, each with its name, value and unit."""
-    units, variables = nlp.case.units, nlp.program.variables
-    found = []
-    for k in design_indices(nlp.program):
-        shown = number(units.shown(float(x[k]), variables[k].dimension), digits=5)
-        found.append(f"{variables[k].name} = {shown} {units.label(variables[k].dimension)}".rstrip())
-    return tuple(found)
+def _picture(found: Designs[Row]) -> Markup:
+    """Return the picture of a page, or a sentence where there is none."""
+    page = found.page
+    if found.join is Join.CURVE and found.of_kind(ColumnKind.VARIED):
+        return curve_figures(found)
+    if not page.is_answer:
+        return Markup("")
+    try:
+        picture = picture_of(".svg", designs_figure, found, is_on_page=True)
+    except EvaluationError as error:
+        return paragraphs([f"{error}."])
+    return picture_figure(picture, page.below)
+
+
+def _list_sections(found: Designs[Row]) -> Iterator[tuple[str, str, Markup]]:
+    """Yield the sections of a page about several robots: anchor, heading and content of each."""
+    page = found.page
+    yield (*page.table, join_markup([paragraphs(page.rules), designs_rows(found)]))
+    with suppress(EvaluationError):  # where no robot has an answer
+        *robots, legend = map(image_source, robot_pictures(found))
+        alt = "A robot at its design; the table has its numbers."
+        images = [tag("img", src=source, alt=alt) for source in robots]
+        shown = [tag("div", *images, class_="designs"), tag("img", src=legend, alt="Colours are rates of the limbs.")]
+        yield (*page.picture, tag("figure", *shown, tag("figcaption", page.below)))
+    details = []
+    for each in found.details:
+        details += [tag("h3", each.name), paragraphs(each.sentences)]
+        details += [] if each.table is None else [html_table(each.table, f"dimensions of {each.name}")]
+    yield "details", "Each robot", join_markup(details)
+
+
+def designs_rows(found: Designs[Row]) -> Markup:
+    """Return the table, and below it what is active in all of its rows."""
+    few = "" if len(found.rows) <= _ROWS else f"The first {_ROWS} of {len(found.rows):,} rows; CSV and JSON have all."
+    below = tag("p", f"Active throughout: {found.throughout}.") if found.throughout else None
+    rows = html_table(designs_table(found, _ROWS), found.caption, id="swept" if found.join is Join.GRID else None)
+    return join_markup([tag("p", few) if few else None, rows, below])
 
 
 def bends(active: Sequence[frozenset[str]]) -> list[int]:
@@ -74,7 +127,7 @@ def changed_words(before: Sequence[str], after: Sequence[str]) -> str:
     return "; ".join(parts)
 
 
-def bend_lines(designs: Sequence[Design], heading: str) -> Markup:
+def bend_lines(designs: Sequence[DrawnDesign], heading: str) -> Markup:
     """Return, below a heading, a sentence for each two neighbours between which other limits become active."""
     found = bends([frozenset(each.active) for each in designs])
     lines = [
@@ -87,10 +140,10 @@ def bend_lines(designs: Sequence[Design], heading: str) -> Markup:
     return tag("div", tag("h3", heading), tag("ul", *(tag("li", line) for line in lines), id="bends"))
 
 
-def design_figures(designs: Sequence[Design]) -> Markup:
+def design_figures(designs: Sequence[DrawnDesign]) -> Markup:
     """Return a figure of each chosen design that can be drawn, side by side as the width allows."""
     chosen = chosen_designs([frozenset(each.active) for each in designs])
-    shown = [(designs[k], drawing) for k in chosen if (drawing := designs[k].drawing) is not None]
+    shown = [(designs[k], drawing) for k in chosen if (drawing := _drawing(designs[k])) is not None]
     if not shown:
         return Markup("")
     pictures = design_pictures([drawing for _, drawing in shown])
@@ -104,3 +157,11 @@ def design_figures(designs: Sequence[Design]) -> Markup:
     ]
     few = [] if len(shown) == len(designs) else [f"{len(shown)} of {len(designs)} designs are drawn."]
     return join_markup([paragraphs([_WORDS, *few]), tag("div", *figures, class_="designs")])
+
+
+def _drawing(design: DrawnDesign) -> Drawing | None:
+    """Return the robot at a design; None where it cannot be drawn."""
+    try:
+        return drawing_of(design.nlp, design.x, design.state, design.task)
+    except EvaluationError:
+        return None

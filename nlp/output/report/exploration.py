@@ -13,11 +13,13 @@ from ...results.objective import objective_label, unit_of_objective
 from ...results.parts import LimitData, RobotData
 from ...results.rounding import number, settled, task_F
 from ...results.tables import MOST_OPTIMA, optimum_table
+from ...results.tradeoff import tradeoff_designs
 from ...results.wording import counted
 from ...solver.multistart import ProgramSolution
 from ...solver.starts import StartStatus
 from .charts import Curve, Spot, count_chart, line_chart
-from .curves import tradeoff_figures, tradeoff_rows
+from .curves import curve_figures
+from .designs import designs_rows
 from .markup import Markup, html_table, join_markup, paragraphs, script_frame, tag
 from .report import Part, Report
 from .slices import Slice, has_loops
@@ -94,8 +96,8 @@ def surroundings(report: Report) -> Markup:
         return Markup("")
     if report.curves:
         here = {f"limits.{row.key}": row.limit for row in _limits(report)}
-        parts += [tag("p", _ENCLOSED), tradeoff_figures(report.case, report.curves, here)]
-        parts += [tradeoff_rows(each) for each in report.curves]
+        curves = [tradeoff_designs(each, report.case) for each in report.curves]
+        parts += [tag("p", _ENCLOSED), curve_figures(*curves, here=here), *map(designs_rows, curves)]
     parts += _slices(report)
     if with_maps:
         parts.append(tag("h3", "Two variables at once"))

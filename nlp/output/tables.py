@@ -1,12 +1,14 @@
-"""Tables as comma-separated values, with every digit of their numbers."""
+"""Tables as comma-separated values, with every digit of their numbers, and in Markdown."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from ..errors import InputError, listing
+from ..results.designs import Designs, Row, designs_table
 from ..results.text import Figure, Line, TextTable
 from ..system.csvtext import csv_text
+from ..system.markdown import markdown_text
 
 
 def tables_as_csv(items: Iterable[Line | TextTable], name: str | None = None) -> str:
@@ -38,3 +40,29 @@ def _cell(cell: str | Line) -> str:
     if isinstance(cell, Figure):
         return repr(float(cell.value))
     return cell.words if isinstance(cell, Line) else cell
+
+
+def designs_markdown(found: Designs[Row]) -> str:
+    """Return a table of designs in Markdown, with its lines above and below it."""
+    lines = [f"{line.label}: {line.words}" if line.label else line.words for line in found.before]
+    return "\n".join([*(f"{markdown_text(line)}\n" for line in lines), markdown(designs_table(found))])
+
+
+def markdown(table: TextTable) -> str:
+    """Return a table in Markdown; the words of a case are escaped in its cells."""
+    rows = ([_words(cell) for cell in row] for row in table.rows)
+    lines = [
+        _markdown_row([header.replace("\n", ", ") for header in table.headers]),
+        f"|{'---|' * len(table.headers)}",
+        *map(_markdown_row, rows),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _words(cell: str | Line) -> str:
+    return cell.words if isinstance(cell, Line) else cell
+
+
+def _markdown_row(cells: Sequence[str]) -> str:
+    """Return a row of a Markdown table."""
+    return "| " + " | ".join(markdown_text(text) for text in cells) + " |"

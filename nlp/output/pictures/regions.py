@@ -1,4 +1,4 @@
-"""F* of a sweep over one or two numbers, with the regions of equal active limits outlined and numbered."""
+"""F over one or two numbers of a grid, with the regions of equal active limits outlined and numbered."""
 
 from __future__ import annotations
 
@@ -14,16 +14,10 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ....models import FloatArray
-from ...case.case import Case
-from ...errors import InputError
-from ...program.formulation import formulate_each
-from ...results.design import limits_data, margins_data
+from ...results.designs import ColumnKind, Designs, Row
 from ...results.objective import objective_label
-from ...results.parts import LimitData
-from ...results.tradeoff import unit_of_number
-from ...sweeps.points import Points
-from ..sweeptable import TablePoint
 from .canvas import INK, MUTED, draw_edges
+from .curves import numbers_of
 from .fonts import legible
 
 #: Width and height of the picture without its legend, and height of a line of the legend, inches; most letters of a
@@ -39,22 +33,11 @@ _ROWS = (0.95, 0.88)
 _ROOM, _APART = (0.045, 0.06), 0.115
 
 
-def check_axes(points: Points) -> None:
-    """Refuse a picture of a sweep that is no grid over one or two numbers.
-
-    Raises:
-        InputError: it is none.
-    """
-    changing = [axis for axis in points.axes if len(axis) > 1]
-    if not 1 <= len(changing) <= 2:
-        fault = f"{len(changing)} numbers change on a grid" if points.axes else "the points are rows of a file"
-        raise InputError(f"--plot: draws F over one or two numbers of --over, and {fault}")
-
-
-def sweep_legend(found: Sequence[TablePoint]) -> list[str]:
+def regions_legend(found: Designs[Row]) -> list[str]:
     """Return what the lines in a picture are, and the active limits of each of its numbers, a sentence each."""
-    has_gaps = not all(np.isfinite(each.F) for each in found)
-    names = [name for name, _ in _counted(found)]
+    F, active = _answers(found)
+    has_gaps = not np.isfinite(F).all()
+    names = [name for name, _ in _counted(F, active)]
     lines = ["Lines: the active limits change. Empty: no answer." if has_gaps else "Lines: the active limits change."]
     sets = [name.split("; ") if name else [] for name in names[:_NUMBERED]]
     everywhere = [side for side in sets[0] if all(side in each for each in sets)] if len(names) > 1 else []
@@ -68,43 +51,53 @@ def sweep_legend(found: Sequence[TablePoint]) -> list[str]:
     return lines
 
 
-def _counted(found: Sequence[TablePoint]) -> list[tuple[str, int]]:
+def _answers(found: Designs[Row]) -> tuple[FloatArray, list[str]]:
+    """Return F (n,), NaN without an answer, and the active sides of each row as one text."""
+    ((objective,), (active,)) = (found.of_kind(kind) for kind in (ColumnKind.OBJECTIVE, ColumnKind.ACTIVE))
+    return numbers_of(objective, found.rows), [str(active.cell(row) or "") for row in found.rows]
+
+
+def _counted(F: FloatArray, active: Sequence[str]) -> list[tuple[str, int]]:
     """Return the sets of active limits with the number of their points, those of most points first."""
-    return Counter(sorted(each.active for each in found if np.isfinite(each.F))).most_common()
+    return Counter(sorted(each for value, each in zip(F, active, strict=True) if np.isfinite(value))).most_common()
 
 
-def sweep_figure(
-    case: Case, points: Points, found: Sequence[TablePoint], *, legend: Sequence[str] | None = None
-) -> Figure:
-    """Return F over one or two numbers as a Matplotlib figure.
+def regions_figure(found: Designs[Row], legend: Sequence[str]) -> Figure:
+    """Return F over one or two numbers as a Matplotlib figure, with sentences below it.
 
     Args:
-        case: the case, for the title and the unit of F.
-        points: a grid over one or two numbers.
-        found: objective and active sides at each point.
-        legend: sentences below the picture; those of :func:`sweep_legend` when left out.
+        found: a table of designs on a grid.
+        legend: the sentences, such as those of :func:`regions_legend`.
     """
-    changing = [(name, axis) for name, axis in zip(points.names, points.axes, strict=True) if len(axis) > 1]
+    axis_of = {
+        column: np.array(list(dict.fromkeys(numbers_of(column, found.rows))))
+        for column in found.of_kind(ColumnKind.VARIED)
+    }
+    changing = [(column.axis, axis) for column, axis in axis_of.items() if len(axis) > 1]
     shape = tuple(len(axis) for _, axis in changing)
-    F = np.array([each.F for each in found]).reshape(shape)
-    names = [name for name, _ in _counted(found)]
-    sets = np.array([names.index(each.active) if np.isfinite(each.F) else -1 for each in found]).reshape(shape)
+    values, active = _answers(found)
+    names = [name for name, _ in _counted(values, active)]
+    F = values.reshape(shape)
+    sets = np.array(
+        [names.index(each) if np.isfinite(value) else -1 for value, each in zip(values, active, strict=True)]
+    )
+    sets = sets.reshape(shape)
     lines = [
         line
-        for text in (sweep_legend(found) if legend is None else legend)
+        for text in legend
         for line in textwrap.wrap(text, _WIDE, max_lines=_LINES, placeholder=" …", subsequent_indent="    ")
     ]
     size = (_SIZE[0], _SIZE[1] + _LINE * len(lines))
     figure = Figure(figsize=size, facecolor="white", layout="constrained")
-    axes = figure.add_subplot()
+    axes, label = figure.add_subplot(), objective_label(found.case)
     if len(changing) == 1:
-        _draw_curve(axes, changing[0][1], F, sets, objective_label(case))
+        _draw_curve(axes, changing[0][1], F, sets, label)
     else:
-        _draw_map(figure, axes, [axis for _, axis in changing], F, sets, objective_label(case))
-        axes.set_ylabel(_label(case, changing[1][0]), color=INK, parse_math=False)
-    axes.set_xlabel(_label(case, changing[0][0]), color=INK, parse_math=False)
+        _draw_map(figure, axes, [axis for _, axis in changing], F, sets, label)
+        axes.set_ylabel(legible(changing[1][0]), color=INK, parse_math=False)
+    axes.set_xlabel(legible(changing[0][0]), color=INK, parse_math=False)
     draw_edges(axes)
-    title = "\n".join(textwrap.wrap(case.title or case.name, 70, max_lines=2, placeholder=" …"))
+    title = "\n".join(textwrap.wrap(found.title, 70, max_lines=2, placeholder=" …"))
     axes.set_title(title, loc="left", fontsize=11, fontweight="bold", color=INK, parse_math=False)
     if lines:
         figure.supxlabel(legible("\n".join(lines)), fontsize=8.5, color=INK, x=0.01, ha="left", parse_math=False)
@@ -118,16 +111,6 @@ def _grouped(sides: Sequence[str]) -> str:
         key, *parts, end = side.split(" ")
         groups.setdefault(f"{key} {end}", []).extend([" ".join(parts)] if parts else [])
     return ", ".join(f"{key} ({', '.join(parts)})" if parts else key for key, parts in groups.items())
-
-
-def _label(case: Case, name: str) -> str:
-    """Return the name of a case's number with its unit, for an axis."""
-    limits: Sequence[LimitData] = ()
-    if name.startswith("limits."):
-        nlp = formulate_each(case)[0]
-        limits = limits_data(margins_data(nlp, nlp.start, optimal=False))
-    unit = unit_of_number(name, case, limits)
-    return legible(f"{name}, {unit}" if unit else name)
 
 
 def _draw_curve(axes: Axes, x: FloatArray, F: FloatArray, sets: NDArray[np.intp], label: str) -> None:

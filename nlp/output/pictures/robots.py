@@ -1,9 +1,10 @@
-"""Compared robots at their designs side by side, in one scale and from one view."""
+"""Robots at their designs side by side, in one scale and from one view."""
 
 from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -14,10 +15,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ....models import Dimension
-from ...comparison.compare import Comparison
-from ...comparison.entry import Entry
 from ...errors import EvaluationError
-from ...results.objective import unit_of_objective
+from ...results.designs import Designs, DrawnDesign, Row
 from .canvas import INK, MUTED
 from .drawing import Drawing, drawing_of
 from .figures import add_colour_bar, add_legend, picture_of
@@ -35,24 +34,10 @@ _LEAST, _TITLE, _FOOT = 6.6, 0.4, 1.65
 _BAR = 0.4
 
 
-def comparison_drawings(found: Comparison) -> list[tuple[Entry, Drawing]]:
-    """Return the drawing of each robot with an answer."""
-    drawings = []
-    for entry in found.entries:
-        if entry.solution is None or not entry.has_answer:
-            continue
-        outcome = entry.solution.outcomes[0]
-        try:
-            drawings.append((entry, drawing_of(outcome.own.nlp, outcome.x, outcome.state)))
-        except EvaluationError:  # a design that exists for the program, but whose drawing has no finite points
-            continue
-    return drawings
-
-
 class _Pair(NamedTuple):
-    """A robot of a comparison, and its drawing without words."""
+    """A design of a table, and its drawing without words."""
 
-    entry: Entry
+    design: DrawnDesign
     drawing: Drawing
 
 
@@ -64,8 +49,8 @@ class _Scale(NamedTuple):
     half: float
 
 
-def comparison_figure(found: Comparison) -> Figure:
-    """Return the robots of a comparison at their designs, all in one scale, with a bar that states it.
+def robots_figure(found: Designs[Row]) -> Figure:
+    """Return robots at their designs, all in one scale, with a bar that states it.
 
     Raises:
         EvaluationError: no robot has an answer that exists.
@@ -76,16 +61,15 @@ def comparison_figure(found: Comparison) -> Figure:
     figure = _empty(width, height)
     scale = _scale_of(pairs)
     for k, pair in enumerate(pairs):
-        _draw_panel(figure, k % across * _WIDTH, height - _TITLE - k // across * _ROW, found, pair, scale)
-    case = found.case
-    title = "".join(textwrap.wrap(legible(case.title or case.name), int(width / 0.11), max_lines=1, placeholder=" …"))
+        _draw_panel(figure, k % across * _WIDTH, height - _TITLE - k // across * _ROW, pair, scale)
+    title = "".join(textwrap.wrap(legible(found.title), int(width / 0.11), max_lines=1, placeholder=" …"))
     figure.text(0.15 / width, 1 - 0.15 / height, title, fontsize=12, color=INK, va="top", parse_math=False)
     _draw_length(figure, _FOOT - 0.28, found, scale)
     _draw_legend(figure, pairs, scale)
     return figure
 
 
-def comparison_pictures(found: Comparison) -> list[bytes]:
+def robot_pictures(found: Designs[Row]) -> list[bytes]:
     """Return an SVG picture of each robot, with the bar of the scale, and at last one of their common legend.
 
     Raises:
@@ -96,7 +80,7 @@ def comparison_pictures(found: Comparison) -> list[bytes]:
 
     def panel(pair: _Pair) -> Figure:
         figure = _empty(_WIDTH, _ROW + 0.3)
-        _draw_panel(figure, 0.0, _ROW + 0.3, found, pair, scale)
+        _draw_panel(figure, 0.0, _ROW + 0.3, pair, scale)
         _draw_length(figure, 0.15, found, scale)
         return figure
 
@@ -108,13 +92,18 @@ def comparison_pictures(found: Comparison) -> list[bytes]:
     return [*(picture_of(".svg", panel, pair) for pair in pairs), picture_of(".svg", legend)]
 
 
-def _pairs(found: Comparison) -> list[_Pair]:
-    """Return the robots that have a design to draw.
+def _pairs(found: Designs[Row]) -> list[_Pair]:
+    """Return the designs that can be drawn: some exist for the program, but their drawing has no finite points.
 
     Raises:
         EvaluationError: there is none.
     """
-    pairs = [_Pair(entry, _plain(drawing)) for entry, drawing in comparison_drawings(found)]
+    pairs = []
+    for each in found.drawn():
+        with suppress(EvaluationError):
+            drawing = drawing_of(each.nlp, each.x, each.state, each.task)
+            # Start, free motions and forces have scales of one robot.
+            pairs.append(_Pair(each, replace(drawing, reference=None, free=(), forces=None)))
     if not pairs:
         raise EvaluationError(f"{found.case.source or found.case.name}: no robot has a design to draw")
     return pairs
@@ -138,7 +127,7 @@ def _scale_of(pairs: Sequence[_Pair]) -> _Scale:
     return _Scale(view, max(map(largest_rate, drawings)) or 1.0, half)
 
 
-def _draw_panel(figure: Figure, left: float, top: float, found: Comparison, pair: _Pair, scale: _Scale) -> None:
+def _draw_panel(figure: Figure, left: float, top: float, pair: _Pair, scale: _Scale) -> None:
     """Draw a robot below its name; the place of the upper left corner is in inches."""
     width, height = figure.get_size_inches()
     axes = figure.add_axes((left / width, (top - _ROW) / height, _WIDTH / width, _HEIGHT / height))
@@ -146,7 +135,7 @@ def _draw_panel(figure: Figure, left: float, top: float, found: Comparison, pair
     for get, put in ((axes.get_xlim, axes.set_xlim), (axes.get_ylim, axes.set_ylim)):
         middle = float(np.mean(get()))
         put(middle - scale.half, middle + scale.half)
-    _write_heading(figure, (left + 0.15) / width, (top - 0.12) / height, found, pair.entry)
+    _write_heading(figure, (left + 0.15) / width, (top - 0.12) / height, pair.design)
 
 
 def _draw_legend(figure: Figure, pairs: Sequence[_Pair], scale: _Scale, left: float = 0.48) -> None:
@@ -168,28 +157,15 @@ def _draw_legend(figure: Figure, pairs: Sequence[_Pair], scale: _Scale, left: fl
     add_legend(figure, 0.15 / width, 0.1 / height, [(handle, text) for text, handle in symbols.items()], columns)
 
 
-def _plain(drawing: Drawing) -> Drawing:
-    """Return a drawing without its start, free motions and forces, whose scales are those of one robot."""
-    return replace(drawing, reference=None, free=(), forces=None)
-
-
-def _write_heading(figure: Figure, left: float, top: float, found: Comparison, entry: Entry) -> None:
+def _write_heading(figure: Figure, left: float, top: float, design: DrawnDesign) -> None:
     """Write the name of a robot, its F and its size above its panel."""
-    value, units = entry.value, found.case.units
-    name, unit = ("F", unit_of_objective(found.case)) if len(entry.tasks) == 1 else ("value", "")
-    words = "no common value" if value is None else f"{name} = {value:.5g} {unit}".rstrip()
-    if entry.final_size is not None:
-        words += f", size {entry.final_size:.4g} {units.length}"
-    if entry.can_move is False:
-        words += ", cannot make the motion"
-    elif not entry.keeps_limits:
-        words += ", does not keep every limit"
-    heading = f"{legible(entry.contender.label)}"
+    heading = legible(design.name)
     figure.text(left, top, heading, fontsize=12, color=INK, fontweight="bold", va="top", parse_math=False)
-    figure.text(left, top - 0.24 / figure.get_figheight(), words, fontsize=9.5, color=MUTED, va="top", parse_math=False)
+    lower = top - 0.24 / figure.get_figheight()
+    figure.text(left, lower, design.words, fontsize=9.5, color=MUTED, va="top", parse_math=False)
 
 
-def _draw_length(figure: Figure, bottom: float, found: Comparison, scale: _Scale) -> None:
+def _draw_length(figure: Figure, bottom: float, found: Designs[Row], scale: _Scale) -> None:
     """Draw a bar whose length is a round number of the case's unit, for all panels; its place is in inches."""
     longest = 2 * scale.half * _BAR
     power = 10.0 ** np.floor(np.log10(longest))

@@ -1,0 +1,229 @@
+"""Tables of designs, which sweeps, trade-offs, fronts and comparisons fill, and which every output reads."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Iterator, Sequence
+from typing import Generic, NamedTuple, TypeAlias, TypeVar
+
+from ...models import FloatArray
+from ...models.values import dataclass
+from ..case.case import Case
+from ..evidence.state import RobotState
+from ..program.nlp import Nlp
+from ..program.program import design_indices
+from ..system.csvtext import csv_text
+from .data import CertificateData
+from .rounding import number
+from .text import Line, TextTable
+
+#: Between several values in a cell of CSV.
+SEPARATOR = "; "
+Row = TypeVar("Row")
+Cell: TypeAlias = "float | str | bool | None"
+
+
+class ColumnKind(enum.Enum):
+    """Meaning of the cells of a column."""
+
+    VARIED = "number that is varied"
+    OBJECTIVE = "objective or goal"
+    VARIABLE = "free number of the design"
+    ACTIVE = "active bounds and limits"
+    EVIDENCE = "evidence of the search"
+    PROOF = "proven bound"
+    OTHER = "name, status or note"
+
+
+class Join(enum.Enum):
+    """Relation of the rows, which a picture shows."""
+
+    CURVE = "neighbours along one number, or along a front of two goals"
+    GRID = "points of a grid over one or more numbers"
+    CLOUD = "points without an order"
+    LIST = "robots side by side"
+
+
+@dataclass(frozen=True)
+class Column(Generic[Row]):
+    """A column of a table of designs.
+
+    Attributes:
+        name: name in CSV; empty for a column of tables of text alone.
+        cell: returns the exact value of a row.
+        kind: meaning of the cells.
+        holds: type of the cells: ``float``, ``int`` or ``str``.
+        label: name in tables of text, pages and pictures; empty for a column of CSV alone.
+        unit: of the numbers; empty for a plain number.
+        text: returns the text of a row in tables.
+        series: name of the line in pictures, where it is not the label.
+    """
+
+    name: str
+    cell: Callable[[Row], Cell]
+    kind: ColumnKind = ColumnKind.OTHER
+    holds: type[float | str] = float
+    label: str = ""
+    unit: str = ""
+    text: Callable[[Row], str] = lambda _row: ""
+    series: str = ""
+
+    @property
+    def axis(self) -> str:
+        """Label with unit, for an axis of a picture."""
+        return f"{self.label}, {self.unit}" if self.unit else self.label
+
+
+class DrawnDesign(NamedTuple):
+    """A design that can be drawn.
+
+    Attributes:
+        name: of the robot, or the value or the goals that the design belongs to.
+        words: its result.
+        numbers: free numbers of the design, each with its name and unit.
+        active: bounds and limits that it lies on.
+        nlp: its program.
+        x: (n,) its point.
+        state: the robot there at the first pose; None where it does not exist.
+        task: index of the task that is drawn.
+    """
+
+    name: str
+    words: str
+    numbers: tuple[str, ...]
+    active: tuple[str, ...]
+    nlp: Nlp
+    x: FloatArray
+    state: RobotState | None
+    task: int = 0
+
+
+class DesignDetails(NamedTuple):
+    """Part of a page about one design: its name, sentences, and a table of its dimensions; None without one."""
+
+    name: str
+    sentences: Sequence[str]
+    table: TextTable | None
+
+
+class PageWords(NamedTuple):
+    """Words of the page about a table of designs.
+
+    Attributes:
+        subtitle: below the title.
+        answer: sentence of the answer.
+        picture: anchor and heading of the section of the picture.
+        table: anchor and heading of the section of the table.
+        rules: sentences above the picture.
+        cautions: sentences below it.
+        below: of the picture.
+        designs: heading of the section of the designs.
+        bends: heading of the sentences about changes of active limits; empty for none.
+        is_answer: whether there is an answer.
+    """
+
+    subtitle: str
+    answer: str
+    picture: tuple[str, str]
+    table: tuple[str, str]
+    rules: Sequence[str] = ()
+    cautions: Sequence[str] = ()
+    below: str = ""
+    designs: str = ""
+    bends: str = ""
+    is_answer: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Designs(Generic[Row]):
+    """A table of designs.
+
+    Attributes:
+        word: what filled the table, such as ``trade-off``.
+        case: the case, or the case of the first row.
+        caption: what the rows are, in words.
+        columns: in order.
+        rows: one for each design.
+        join: how the rows belong together.
+        page: words of the page.
+        before, after: lines above and below the table on a terminal.
+        drawn: returns the designs that can be drawn.
+        gaps: indices of rows that a curve does not join with the next one.
+        missing: sentences about rows without an answer.
+        throughout: bounds and limits that are active in every row with an answer, in words.
+        details: what a page says of each design.
+    """
+
+    word: str
+    case: Case
+    caption: str
+    columns: tuple[Column[Row], ...]
+    rows: Sequence[Row]
+    join: Join
+    page: PageWords
+    before: Sequence[Line] = ()
+    after: Sequence[Line] = ()
+    drawn: Callable[[], Sequence[DrawnDesign]] = lambda: ()
+    gaps: tuple[int, ...] = ()
+    missing: Sequence[str] = ()
+    throughout: str = ""
+    details: tuple[DesignDetails, ...] = ()
+
+    def of_kind(self, kind: ColumnKind) -> list[Column[Row]]:
+        """Return the columns of a kind."""
+        return [each for each in self.columns if each.kind is kind]
+
+    @property
+    def title(self) -> str:
+        """Title of the case."""
+        return self.case.title or self.case.name
+
+
+def designs_csv(found: Designs[Row]) -> str:
+    """Return a table of designs as CSV, one row for each design; what has no value is an empty cell."""
+    columns = [each for each in found.columns if each.name]
+    return csv_text([each.name for each in columns], [[each.cell(row) for each in columns] for row in found.rows])
+
+
+def designs_table(found: Designs[Row], most: int | None = None) -> TextTable:
+    """Return a table of designs as text, of at most so many rows."""
+    columns = [each for each in found.columns if each.label]
+    is_curve = found.join in (Join.CURVE, Join.CLOUD)
+    return TextTable(
+        tuple(f"{each.label}\n{each.unit}" if each.unit else each.label for each in columns),
+        tuple(tuple(each.text(row) for each in columns) for row in found.rows[:most]),
+        name=found.word if found.join is Join.LIST else "",
+        extra=1 if is_curve else 0,
+        is_curve=is_curve,
+    )
+
+
+def designs_summary(found: Designs[Row]) -> Iterator[Line | TextTable]:
+    """Yield a table of designs with the lines around it."""
+    yield from found.before
+    yield designs_table(found)
+    yield from found.after
+
+
+def certificate_columns(certificate_of: Callable[[Row], CertificateData | None]) -> Iterator[Column[Row]]:
+    """Yield the columns of the proof of each design: its status, the bound and the gap."""
+
+    def number_of(name: str) -> Callable[[Row], float | None]:
+        return lambda row: None if (proof := certificate_of(row)) is None else getattr(proof, name)
+
+    def status(row: Row) -> str:
+        return "" if (proof := certificate_of(row)) is None else proof.status.value
+
+    yield Column("certificate", status, ColumnKind.PROOF, holds=str, label="certificate", text=status)
+    yield Column("proven_bound", number_of("bound"), ColumnKind.PROOF)
+    yield Column("gap", number_of("gap"), ColumnKind.PROOF)
+
+
+def free_numbers(nlp: Nlp, x: FloatArray) -> tuple[str, ...]:
+    """Return the dimensions and poses of a program that are free, each with its name, value and unit."""
+    units, variables = nlp.case.units, nlp.program.variables
+    found = []
+    for k in design_indices(nlp.program):
+        shown = number(units.shown(float(x[k]), variables[k].dimension), digits=5)
+        found.append(f"{variables[k].name} = {shown} {units.label(variables[k].dimension)}".rstrip())
+    return tuple(found)

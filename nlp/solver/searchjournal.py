@@ -1,0 +1,310 @@
+"""Searches and certificates that are kept in a journal, from which a stopped command goes on.
+
+An entry is found by what was searched: names, bounds and arguments of the program, its values at a few points, settings
+and first points of the search. So a command that repeats a search takes its outcome from the journal, in any order.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...models import Dimension, FloatArray, frozen_array
+from .. import __version__
+from ..case.settings import Search
+from ..evidence.optimality import examine
+from ..evidence.state import state_or_none
+from ..interruption import is_requested
+from ..program.nlp import Nlp, PairPlace
+from ..program.pairs import with_pairs
+from ..program.relaxation import RelaxedLimit
+from ..proof.boxes.tree import TreeRecord
+from ..proof.certificate.branch_and_bound import GAP, CertifyProgress, certify_program
+from ..proof.certificate.certificate import Certificate, CertificateStatus
+from ..system.journal import JournalFile, line_of, row_of
+from .kept import journal_in_force
+from .starts import Optimum, Start, StartStatus
+from .status import Status
+
+#: Points of the box at which values of a program tell it from others.
+_POINTS = 3
+
+
+class KeptSearch(NamedTuple):
+    """Outcome of a search of a program. Numbers are texts, which keep every digit, and those that are not finite.
+
+    Attributes:
+        key: what was searched.
+        status: value of the status.
+        x, lower, upper: the best point, and the bounds of the program that was searched last.
+        pairs: constraints of limits on pairs that the program got.
+        has_evidence: whether there is evidence at ``x``.
+        starts: status, objective, stationarity, violation, iterations, solver and point of each start.
+        optima: objective, count, spread and point of each distinct optimum.
+        relaxation: key, unit, dimension, limit and needed number of each limit that would have to move.
+        seed, seconds, better: as in the solution.
+    """
+
+    key: str
+    status: str
+    x: str
+    lower: str
+    upper: str
+    pairs: tuple[tuple[int, ...], ...]
+    has_evidence: bool
+    starts: tuple[tuple[str, ...], ...]
+    optima: tuple[tuple[str, ...], ...]
+    relaxation: tuple[tuple[str, ...], ...]
+    seed: int
+    seconds: float
+    better: str
+
+
+class KeptCertificate(NamedTuple):
+    """A certificate of a program.
+
+    Attributes:
+        key: what was certified.
+        x: the incumbent; None without one.
+        numbers: fields by name as texts.
+        words: fields by name.
+        counts: fields by name, whole numbers and truth values.
+        history: as in the certificate.
+    """
+
+    key: str
+    x: str | None
+    numbers: Mapping[str, str]
+    words: Mapping[str, str]
+    counts: Mapping[str, int | bool]
+    history: tuple[tuple[float, ...], ...]
+
+
+_NUMBERS, _WORDS = ("incumbent", "bound", "allowed", "seconds", "bound_of_tree"), ("engine", "reason", "scope")
+_COUNTS = ("boxes", "open", "is_relative", "was_beaten", "in_other_mode")
+
+
+class SearchJournal(JournalFile):
+    """Searches and certificates that are done, in a file.
+
+    Args:
+        path: of the file, which is made when missing.
+
+    Raises:
+        InputError: the file cannot be written, is no journal of this version, or is held by another process.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._kept: dict[str, KeptSearch | KeptCertificate] = {}
+        super().__init__(
+            path, {"screwsynth": "searches", "version": __version__}, "command", "choose another --resume, or remove it"
+        )
+
+    def found(self, place: int, line: bytes) -> None:
+        """Take note of an entry that is in the file."""
+        del place
+        with suppress(ValueError):
+            try:
+                entry: KeptSearch | KeptCertificate = row_of(KeptSearch, line)
+            except ValueError:
+                entry = row_of(KeptCertificate, line)
+            self._kept[entry.key] = entry
+
+    def __len__(self) -> int:
+        return len(self._kept)
+
+    def __getitem__(self, key: str) -> KeptSearch | KeptCertificate | None:
+        """Return the entry of a key; None where there is none."""
+        return self._kept.get(key)
+
+    def add(self, entry: KeptSearch | KeptCertificate) -> None:
+        """Append an entry.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        self._kept[entry.key] = entry
+        self.append([line_of(entry)])
+
+    def search(
+        self, nlp: Nlp, search: Search, first: Sequence[FloatArray], solve: Callable[[], Any], make: Callable[..., Any]
+    ) -> Any:  # noqa: ANN401 - as in Keeper
+        """Return the solution of a search that is kept, or the one of a function; see :class:`.Keeper`."""
+        key = _key_of(nlp, repr(search), *first)
+        known = self[key]
+        if isinstance(known, KeptSearch):
+            with suppress(ValueError, LookupError):  # a journal that was written by others
+                return make(**_fields_of(known, nlp))
+        found = solve()
+        if not is_requested():  # a search that was stopped is no outcome
+            self.add(_entry_of(key, found))
+        return found
+
+    @property
+    def words(self) -> str:
+        """How many entries it has, and what goes on from there."""
+        return f"{self.count}: the same command goes on from there" if self._kept else "no search is done"
+
+    @property
+    def count(self) -> str:
+        """How many entries it has."""
+        return f"{len(self):,} search{'es are' if len(self) != 1 else ' is'} in {self.path}"
+
+
+def _key_of(nlp: Nlp, settings: str, *points: FloatArray) -> str:
+    """Return what is searched as a text. Rounding of a program's constants, which may differ, has no part in it."""
+    program = nlp.program
+    names = [[each.name for each in group] for group in (program.variables, program.constraints, program.arguments)]
+    values = [nlp.arguments, nlp.lower, nlp.upper, nlp.g_lower, nlp.g_upper, *points]
+    for share in np.random.default_rng(0).random((_POINTS, nlp.n)):
+        at = nlp.evaluate(nlp.lower + share * (nlp.upper - nlp.lower))
+        values.append(np.append(at.g, at.F))
+    numbers = np.concatenate([np.ravel(each) for each in values])
+    with np.errstate(invalid="ignore"):
+        parts = np.where(np.isfinite(numbers), numbers / (1 + np.abs(numbers)), np.sign(numbers))
+    shown = [f"{round(each, 9) + 0.0:.9f}" for each in parts.tolist()]
+    return hashlib.sha256(repr((names, nlp.sense.value, nlp.in_home_mode, settings, shown)).encode()).hexdigest()[:32]
+
+
+def _text(values: FloatArray) -> str:
+    return " ".join(map(repr, values.tolist()))
+
+
+def _vector(text: str, count: int) -> FloatArray:
+    """Return an array (n,) of a text.
+
+    Raises:
+        ValueError: the text has another count of numbers.
+    """
+    values = [float(part) for part in text.split()]
+    if len(values) != count:
+        raise ValueError("the entry is of another program")
+    return frozen_array(values, (count,))
+
+
+def _entry_of(key: str, found: Any) -> KeptSearch:  # noqa: ANN401 - as above
+    """Return a solution as an entry of a journal."""
+    nlp: Nlp = found.nlp
+    return KeptSearch(
+        key,
+        found.status.value,
+        _text(found.x),
+        _text(nlp.lower),
+        _text(nlp.upper),
+        tuple(tuple(place) for place in nlp.pairs),
+        found.evidence is not None,
+        tuple(
+            (
+                *(each.status.name, repr(each.F), repr(each.stationarity), repr(each.violation)),
+                *(str(each.iterations), each.solver, _text(each.x)),
+            )
+            for each in found.starts
+        ),
+        tuple((repr(each.F), str(each.count), repr(each.spread), _text(each.x)) for each in found.optima),
+        tuple(
+            (each.key, each.unit, each.dimension.value, repr(each.limit), repr(each.needed))
+            for each in found.relaxation
+        ),
+        found.seed,
+        found.seconds,
+        "" if found.better is None else repr(found.better),
+    )
+
+
+def _fields_of(kept: KeptSearch, nlp: Nlp) -> Mapping[str, Any]:
+    """Return the fields of the solution of a program from an entry; state and evidence are computed anew.
+
+    Raises:
+        ValueError: the entry is none of this program; a LookupError likewise.
+    """
+    nlp = with_pairs(nlp, [PairPlace(*place) for place in kept.pairs])
+    nlp = replace(nlp, lower=_vector(kept.lower, nlp.n), upper=_vector(kept.upper, nlp.n))
+    x = _vector(kept.x, nlp.n)
+    return {
+        "status": Status(kept.status),
+        "nlp": nlp,
+        "x": x,
+        "state": state_or_none(nlp, x),
+        "evidence": examine(nlp, x) if kept.has_evidence else None,
+        "starts": tuple(
+            Start(StartStatus[status], _vector(at, nlp.n), float(F), float(still), float(outside), int(count), solver)
+            for status, F, still, outside, count, solver, at in kept.starts
+        ),
+        "optima": tuple(
+            Optimum(float(F), int(count), _vector(at, nlp.n), float(spread), examine(nlp, _vector(at, nlp.n)), nlp)
+            for F, count, spread, at in kept.optima
+        ),
+        "seed": kept.seed,
+        "seconds": kept.seconds,
+        "relaxation": tuple(
+            RelaxedLimit(key=key, limit=float(limit), needed=float(needed), unit=unit, dimension=Dimension(dimension))
+            for key, unit, dimension, limit, needed in kept.relaxation
+        ),
+        "better": float(kept.better) if kept.better else None,
+    }
+
+
+def kept_certificate(
+    nlp: Nlp,
+    x: FloatArray | None,
+    *,
+    claimed: float | None,
+    gap: float = GAP,
+    above: float | None = None,
+    time_limit: float | None = None,
+    jobs: int | None = None,
+    progress: CertifyProgress | None = None,
+    recorder: TreeRecord | None = None,
+) -> Certificate:
+    """Return the certificate of a program from the journal in force, or a new one, which is then kept.
+
+    Arguments are those of :func:`.certify_program`. A certificate with a recorder is never taken from a journal.
+    """
+
+    def certified() -> Certificate:
+        return certify_program(
+            nlp,
+            x,
+            claimed=claimed,
+            gap=gap,
+            above=above,
+            time_limit=time_limit,
+            jobs=jobs,
+            progress=progress,
+            recorder=recorder,
+        )
+
+    journal = journal_in_force()
+    if not isinstance(journal, SearchJournal) or recorder is not None:
+        return certified()
+    key = _key_of(nlp, f"certificate {gap!r} {above!r}", *([] if x is None else [x]))
+    known = journal[key]
+    if isinstance(known, KeptCertificate):
+        with suppress(ValueError, LookupError, TypeError):
+            values: dict[str, Any] = {
+                **{name: float(known.numbers[name]) for name in _NUMBERS},
+                **{name: known.words[name] for name in _WORDS},
+                **{name: known.counts[name] for name in _COUNTS},
+            }
+            history, status = tuple((a, b, c) for a, b, c in known.history), CertificateStatus(known.words["status"])
+            at = None if known.x is None else _vector(known.x, nlp.n)
+            return Certificate(status, nlp, at, above=above, history=history, **values)
+    found = certified()
+    if not is_requested():
+        journal.add(
+            KeptCertificate(
+                key,
+                None if found.x is None else _text(found.x),
+                {name: repr(float(getattr(found, name))) for name in _NUMBERS},
+                {"status": found.status.value, **{name: getattr(found, name) for name in _WORDS}},
+                {name: getattr(found, name) for name in _COUNTS},
+                found.history,
+            )
+        )
+    return found

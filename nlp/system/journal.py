@@ -1,0 +1,159 @@
+"""Journal: a file to which lines of JSON are appended as work is done, and from which a killed run is resumed.
+
+The first line is the head, each other line a row as JSON. An incomplete last line of a killed process is removed when
+the journal is opened again. One process at a time holds a journal.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cache
+from itertools import accumulate
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple, TypeVar, get_type_hints
+
+from ..errors import InputError
+from ..interruption import WRITING
+from .locks import hold
+from .strictjson import json_tree, value_of
+
+if TYPE_CHECKING:
+    from typing import Self
+
+Kind = TypeVar("Kind", bound=NamedTuple)
+
+
+@cache
+def fields_of(kind: type[NamedTuple]) -> tuple[tuple[str, object], ...]:
+    """Return the fields of a row with their types."""
+    return tuple(get_type_hints(kind).items())
+
+
+def line_of(row: NamedTuple) -> str:
+    """Return a row as one line of JSON, with its line end.
+
+    Raises:
+        ValueError: a number is not finite.
+    """
+    return json.dumps(row, separators=(",", ":"), allow_nan=False) + "\n"
+
+
+def row_of(kind: type[Kind], line: str | bytes) -> Kind:
+    """Return the row of a line.
+
+    Raises:
+        ValueError: the line is none of :func:`line_of`.
+    """
+    data, fields = json_tree(line), fields_of(kind)
+    if not isinstance(data, list) or len(data) != len(fields):
+        raise ValueError("the line is no row")
+    return kind(*(value_of(of, value, name) for (name, of), value in zip(fields, data, strict=True)))
+
+
+class JournalFile:
+    """Lines of JSON in a file that this process holds.
+
+    Args:
+        path: of the file, which is made when missing.
+        head: of the file, which tells it from the journals of other work.
+        work: name of the work in messages.
+        other: what to do about a journal of other work.
+
+    Raises:
+        InputError: the file cannot be written, belongs to other work, or is held by another process.
+    """
+
+    def __init__(self, path: Path, head: Mapping[str, object], work: str, other: str) -> None:
+        self.path = path
+        self._head = (json.dumps(head) + "\n").encode()
+        try:
+            self._file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b")
+        except OSError as error:
+            raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+        try:
+            if not hold(self._file.fileno()):
+                raise InputError(f"{path}: another run of this {work} is writing it; wait for its end")
+            self._end = self._read(f"{path}: belongs to another {work}; {other}")
+        except BaseException:
+            self._file.close()
+            raise
+
+    def found(self, place: int, line: bytes) -> None:
+        """Take note of a line that is in the file, at a place."""
+        raise NotImplementedError
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether there are no lines below the head."""
+        return self._end == len(self._head)
+
+    def append(self, lines: Iterable[str]) -> list[int]:
+        """Append lines, and return their places.
+
+        Raises:
+            InputError: the file cannot be written, as on a full disk; what is in it already stays.
+        """
+        with WRITING:
+            content = [line.encode() for line in lines]
+            *places, end = accumulate(map(len, content), initial=self._end)
+            try:
+                self._file.seek(self._end)
+                self._file.write(b"".join(content))
+                self._file.flush()
+            except OSError as error:
+                raise InputError(f"{self.path}: cannot be written: {error.strerror or error}") from None
+            self._end = end
+        return places
+
+    def lines_at(self, places: Iterable[int]) -> Iterator[bytes]:
+        """Yield the lines at places."""
+        with self.path.open("rb") as file:
+            after = -1
+            for place in places:
+                if place != after:
+                    file.seek(place)
+                line = file.readline()
+                after = place + len(line)
+                yield line
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file, which another process may hold from then on; without lines it is removed."""
+        if not self._file.closed and self.is_empty:
+            self.path.unlink(missing_ok=True)
+        self._file.close()
+
+    def remove(self) -> None:
+        """Remove the file, once its rows are in a result."""
+        self.path.unlink(missing_ok=True)
+        self._file.close()
+
+    def _read(self, refusal: str) -> int:
+        """Read the lines, cut off an incomplete last one, and return the file's end.
+
+        Raises:
+            InputError: the journal is of other work, or no journal.
+        """
+        head = self._file.readline()
+        if not head.endswith(b"\n") and self._head.startswith(head):
+            self._file.seek(0)
+            self._file.truncate()
+            self._file.write(self._head)
+            self._file.flush()
+        elif head != self._head:
+            raise InputError(refusal)
+        place = len(self._head)
+        for line in self._file:
+            if not line.endswith(b"\n"):
+                break
+            self.found(place, line)
+            place += len(line)
+        self._file.truncate(place)
+        return place
