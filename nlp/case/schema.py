@@ -33,17 +33,15 @@ if TYPE_CHECKING:
     from .workspacetables import PathTable, WorkspaceTable
 else:
     LimitsTable = Annotated[Any, Later("limits.registry", "LimitsTable")]
-    GravityTable, LoadTable, MotionTable, ObjectiveTable = (
-        Annotated[Any, Later("loadtables", name)]
-        for name in ("GravityTable", "LoadTable", "MotionTable", "ObjectiveTable")
-    )
-    PathTable, WorkspaceTable = (
-        Annotated[Any, Later("workspacetables", name)] for name in ("PathTable", "WorkspaceTable")
-    )
+    GravityTable = Annotated[Any, Later("loadtables", "GravityTable")]
+    LoadTable = Annotated[Any, Later("loadtables", "LoadTable")]
+    MotionTable = Annotated[Any, Later("loadtables", "MotionTable")]
+    ObjectiveTable = Annotated[Any, Later("loadtables", "ObjectiveTable")]
+    PathTable = Annotated[Any, Later("workspacetables", "PathTable")]
+    WorkspaceTable = Annotated[Any, Later("workspacetables", "WorkspaceTable")]
 
 #: Forms of a fixed rotation, each of which stands alone.
 _FIXED = ("rpy", "matrix", "quaternion")
-
 
 Label = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=20)]
 
