@@ -152,7 +152,7 @@ class Build(NamedTuple):
 
 def compiled(name: str, version: str, checkout: Path | None, root: Path) -> Build:
     """Generate and compile the C of a case."""
-    folder, prefix = root / version / name, identifier(name)
+    folder = root / version / name
     folder.mkdir(parents=True)
     environment = dict(os.environ)
     if checkout is not None:
@@ -165,6 +165,14 @@ def compiled(name: str, version: str, checkout: Path | None, root: Path) -> Buil
     case = Path(shutil.copy(find_case(name), root / version / f"{name}.toml"))
     words = [sys.executable, "-P", "-c", GENERATE, str(case), str(folder)]
     subprocess.run(words, env=environment, check=True)
+    build = built(name, version, folder)
+    # The pointers of a version before are others: its stack is painted only.
+    return build if checkout is None else build._replace(bound=None)
+
+
+def built(name: str, version: str, folder: Path) -> Build:
+    """Compile the C of a case in a folder."""
+    prefix = identifier(name)
     text = DRIVER.replace("BIG", prefix.upper()).replace("ID", prefix).replace("CLOCK", "CLOCK_PROCESS_CPUTIME_ID")
     (folder / "driver.c").write_text(text, encoding="utf-8")
     sources = sorted(path.name for path in folder.glob(f"{prefix}*.c"))
@@ -182,9 +190,7 @@ def compiled(name: str, version: str, checkout: Path | None, root: Path) -> Buil
         flash_m7 = size(CORTEX_M7.size, folder / "m7", objects)
     header = (folder / f"{prefix}.h").read_text(encoding="utf-8")
     doubles, ints = (int(re.findall(rf"_SOLVER{part} (\d+)", header)[0]) for part in ("WORK", "IWORK"))
-    graphs = {path.stem: path.read_text(encoding="utf-8") for path in folder.glob("*.ci")}
-    # The pointers of a version before are others: its stack is painted only.
-    bound = stack_bound(graphs, prefix) if checkout is None else None
+    bound = stack_bound({path.stem: path.read_text(encoding="utf-8") for path in folder.glob("*.ci")}, prefix)
     painted = int(output(folder, "./driver", "stack", "0", "0"))
     return Build(name, version, folder, flash, flash_m7, 8 * doubles + 4 * ints, bound, painted)
 
@@ -293,7 +299,6 @@ def sizes_of(build: Build) -> str:
 
 
 def main() -> None:
-    """Measure, print, and write the tables where that is asked for."""
     """Measure, print, and write the tables where that is asked for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--old", type=Path, help="a checkout of the version before")

@@ -15,6 +15,7 @@ import numpy as np
 
 from .actuation import Flags, Velocities, limb_drive
 from .arrays import FloatArray, first_largest
+from .instance import homogenised
 from .model import Model
 from .rows import rank_of
 from .wrench import WrenchKind
@@ -95,8 +96,7 @@ def rank_of_rows(rows: FloatArray, centre: FloatArray, length: float) -> int:
     """Return the rank of wrenches (m, 6) with moments about a centre (3,) in parts of a length."""
     if not len(rows):
         return 0
-    scaled = np.hstack([rows[:, :3], (rows[:, 3:] - np.cross(centre, rows[:, :3])) / length])
-    values = np.linalg.svd(scaled, compute_uv=False)
+    values = np.linalg.svd(np.array(homogenised(rows, centre, length)), compute_uv=False)
     return rank_of(values, max(1.0, float(values[0])))
 
 

@@ -131,7 +131,7 @@ def test_help_does_not_import_the_numerical_libraries() -> None:
 
 
 def test_a_solve_loads_neither_robots_nor_tables_nor_proofs_that_its_case_has_none_of() -> None:
-    unused = ("models.joints.model.robot", "models.mechanism", "nlp.case.limits.registry", "nlp.case.wholeschema")
+    unused = ("models.joints.model.robot", "models.mechanism", "nlp.case.limits.registry", "nlp.case.workspacetables")
     proofs = ("nlp.proof.workspace", "nlp.proof.boxes", "nlp.proof.enclosure", "nlp.proof.checker")
     names = [f"screwsynth.{name}" for name in (*unused, *proofs)]
     code = (

@@ -34,10 +34,10 @@ from .pose import (
     rotation_from_rpy,
 )
 from .robots import insert_robot_file, model_of_table
-from .schema import Document, ExpectTable, Listed, PoseTable, PublishedTable, Range, RotationTable, TaskTable
+from .schema import Document, ExpectTable, Listed, PoseTable, PublishedTable, RotationTable, TaskTable
 from .settings import Expectation, ExpectedValue, Published, Search
 from .source import find_case, inputs_of, named_files, read_text, source_name, tables_of
-from .table import case_error
+from .table import Range, case_error
 from .task import Method, Sense, Task, unit_twist
 from .toml import toml_document
 
@@ -189,18 +189,9 @@ def _parse(tables: dict[str, Any]) -> Document:
         CaseError: the first fault, with its dotted key.
     """
     try:
-        return _kind_of(tables).model_validate(tables)
+        return Document.model_validate(tables)
     except ValidationError as error:
         raise case_error(error.errors(include_url=False)[0]) from None
-
-
-def _kind_of(tables: dict[str, Any]) -> type[Document]:
-    """Return the schema of a document: with the tables of limits, workspace and loads where it states one of them."""
-    if tables.keys() <= {*Document.allowed_keys()} - {"limits", "workspace"}:
-        return Document
-    from .wholeschema import WholeDocument  # noqa: PLC0415 - a case without them starts without their tables
-
-    return WholeDocument
 
 
 def _case_of(written: Document, name: str, source: str, folder: str, robot_file: str | None = None) -> Case:

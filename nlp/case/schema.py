@@ -4,42 +4,46 @@ The classes mirror the file, in the user's units and words. They check keys, typ
 robot need be known. Everything else is checked once, by :class:`screwsynth.nlp.case.case.Case`. A key that may be left
 out has the default of the value that it becomes.
 
-The tables of limits, of the workspace and of loads take as long to make as all others together. A file without them is
-read without them; :mod:`.wholeschema` has the document with them.
+The tables of limits, of the workspace and of loads take as long to make as all others together. They are imported when
+a file states them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import ConfigDict, Discriminator, Field, FiniteFloat, StringConstraints, Tag, model_validator
 
 from ...models.fileversions import VERSION_KEY
-from ..errors import listing
+from ..errors import CaseError, listing
 from ..units import Units
 from .case import Case
 from .loads import NO_LOADING, Loading
 from .pathfile import PathFile
 from .settings import Expectation, Published, Search
-from .table import Table, Vector, empty_list, fault_of
+from .table import FileName, Later, Range, Table, Value, Vector, empty_list, fault_of, tag_of_number
 from .task import Task
 from .workspace import Workspace
+
+if TYPE_CHECKING:
+    from .limits.registry import LimitsTable
+    from .loadtables import GravityTable, LoadTable, MotionTable, ObjectiveTable
+    from .workspacetables import PathTable, WorkspaceTable
+else:
+    LimitsTable = Annotated[Any, Later("limits.registry", "LimitsTable")]
+    GravityTable = Annotated[Any, Later("loadtables", "GravityTable")]
+    LoadTable = Annotated[Any, Later("loadtables", "LoadTable")]
+    MotionTable = Annotated[Any, Later("loadtables", "MotionTable")]
+    ObjectiveTable = Annotated[Any, Later("loadtables", "ObjectiveTable")]
+    PathTable = Annotated[Any, Later("workspacetables", "PathTable")]
+    WorkspaceTable = Annotated[Any, Later("workspacetables", "WorkspaceTable")]
 
 #: Forms of a fixed rotation, each of which stands alone.
 _FIXED = ("rpy", "matrix", "quaternion")
 
-
-FileName = Annotated[str, StringConstraints(min_length=1)]
 Label = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=20)]
-
-
-class Range(Table):
-    """A number that is free between its bounds."""
-
-    min: FiniteFloat = Field(description="lower bound")
-    max: FiniteFloat = Field(description="upper bound, above min")
-    start: FiniteFloat | None = Field(default=None, description="where the first search begins; the middle if left out")
 
 
 class Listed(Table):
@@ -50,11 +54,6 @@ class Listed(Table):
     )
 
 
-def _tag_of_number(value: object) -> str:
-    """Return the branch of a union for a number or a range."""
-    return "<range>" if isinstance(value, dict | Range) else "<number>"
-
-
 def _tag_of_value(value: object) -> str:
     """Return the branch of a union for a number, a range, values or a list of them."""
     return "<list>" if isinstance(value, list | tuple) else _tag_of_dimension(value)
@@ -63,12 +62,9 @@ def _tag_of_value(value: object) -> str:
 def _tag_of_dimension(value: object) -> str:
     """Return the branch of a union for a number, a range or values."""
     is_listed = isinstance(value, Listed) or (isinstance(value, dict) and "values" in value)
-    return "<values>" if is_listed else _tag_of_number(value)
+    return "<values>" if is_listed else tag_of_number(value)
 
 
-Value = Annotated[
-    Annotated[FiniteFloat, Tag("<number>")] | Annotated[Range, Tag("<range>")], Discriminator(_tag_of_number)
-]
 Numbers = Annotated[
     Annotated[FiniteFloat, Tag("<number>")] | Annotated[list[FiniteFloat], Tag("<list>")],
     Discriminator(lambda value: "<list>" if isinstance(value, list) else "<number>"),
@@ -88,7 +84,7 @@ VectorOrValue = Annotated[
 
 NumberOrTable = Annotated[
     Annotated[FiniteFloat, Tag("<number>")] | Annotated[dict[str, FiniteFloat], Tag("<range>")],
-    Discriminator(_tag_of_number),
+    Discriminator(tag_of_number),
 ]
 
 
@@ -317,7 +313,7 @@ class PublishedTable(Table):
 
 
 class Document(Table):
-    """A case file that states no limits, no workspace and no loads."""
+    """A whole case file."""
 
     model_config = ConfigDict(
         title="screwsynth case file",
@@ -349,13 +345,17 @@ class Document(Table):
     poses: FileName | None = Field(default=None, description="CSV file beside this one with a pose in each row")
     tasks: FileName | None = Field(default=None, description="CSV file beside this one with a task in each row")
     combine: CombineTable | None = Field(default=None, description="several tasks or poses only")
-    # Of this document these two are None: one that states them is a whole document.
-    limits: Table | None = None
+    limits: LimitsTable | None = Field(default=None, description="limits that a design must keep to be built")
     tolerance: ToleranceTable | None = Field(default=None, description="manufacturing tolerances")
-    workspace: Table | None = None
+    workspace: WorkspaceTable | None = Field(default=None, description="poses for which a machine is judged")
     solve: SolveTable = SolveTable.model_construct()
     expect: ExpectTable = ExpectTable.model_construct()
     published: list[PublishedTable] = Field(default_factory=empty_list)
+    path: PathTable | None = Field(default=None, description="programmed path along which a machine is judged")
+    load: list[LoadTable] = Field(default_factory=empty_list, description="loads on the platform")
+    motion: MotionTable | None = Field(default=None, description="the platform's fastest motions")
+    gravity: GravityTable | None = Field(default=None, description="gravity, for loads that are masses")
+    objective: ObjectiveTable | None = Field(default=None, description="what is optimised, and over which poses")
 
     @model_validator(mode="after")
     def _refuse_without_pose_or_task(self) -> Document:
@@ -365,16 +365,32 @@ class Document(Table):
                 raise fault_of(key, "is missing")
         return self
 
+    @classmethod
+    def file_schema(cls) -> dict[str, Any]:
+        """Return the JSON Schema of case files, for which all tables are imported."""
+        Later.is_over = True
+        cls.model_rebuild(force=True)
+        return cls.model_json_schema()
+
     def read_worst_everywhere(self) -> bool:
         """Return whether F is its worst over all poses at which limits hold.
 
         Raises:
             CaseError: the limits do not hold there.
         """
-        return False
+        if self.objective is None or self.objective.over is None:
+            return False
+        over = self.objective.over
+        if not self._has_limits_over(over):
+            raise CaseError("objective.over", f"needs limits that hold there too: [limits] over = '{over}'", over)
+        return self.objective.minimise is None  # a number of the actuators is that of all these poses by itself
 
-    def read_workspace(self, units: Units) -> Workspace | None:  # noqa: ARG002 - it has none
-        """Return the workspace that the document states; None where it states none.
+    def _has_limits_over(self, poses: str) -> bool:
+        """Return whether limits hold over the workspace, or along the path."""
+        return self.limits is not None and self.limits.over == poses
+
+    def read_workspace(self, units: Units) -> Workspace | None:
+        """Return the workspace that the document states, over which its limits may hold; None where it states none.
 
         Args:
             units: the document's units.
@@ -382,10 +398,15 @@ class Document(Table):
         Raises:
             CaseError: the axis of its rotations is zero, or limits hold over a workspace that is not stated.
         """
+        has_limits = self._has_limits_over("workspace")
+        if self.workspace is not None:
+            return self.workspace.read(units, has_limits=has_limits)
+        if has_limits:
+            raise CaseError("limits.over", "needs the table [workspace], which states the poses", "workspace")
         return None
 
-    def read_path(self, folder: str, units: Units) -> PathFile | None:  # noqa: ARG002 - it has none
-        """Return the programmed path that the document states; None where it states none.
+    def read_path(self, folder: str, units: Units) -> PathFile | None:
+        """Return the programmed path that the document states, along which its limits may hold; None without one.
 
         Args:
             folder: of the document, beside which the path's file is.
@@ -394,23 +415,36 @@ class Document(Table):
         Raises:
             CaseError: limits hold along a path that is not stated.
         """
+        has_limits = self._has_limits_over("path")
+        if self.path is not None:
+            return self.path.read(folder, units, has_limits=has_limits)
+        if has_limits:
+            raise CaseError("limits.over", "needs the table [path], which names its file", "path")
         return None
 
     def read_tasks(self, tasks: Sequence[Task]) -> list[Task]:
-        """Return the tasks, or what is optimised instead of their F.
+        """Return the tasks, that of a number of the actuators in the place of F of a motion.
 
         Args:
             tasks: those that the document states.
         """
-        return list(tasks)
+        if self.objective is None or self.objective.minimise is None:
+            return list(tasks)
+        if not tasks:
+            return [Task.minimise(self.objective.minimise)]
+        return [replace(task, measure=self.objective.minimise) for task in tasks]
 
-    def read_loading(self, units: Units) -> Loading:  # noqa: ARG002 - it has no angular speed
+    def read_loading(self, units: Units) -> Loading:
         """Return the loads, the motions and the gravity that the document states, and the actuators' stiffness.
 
         Args:
             units: the document's units.
         """
-        given = self.robot.actuator_stiffness
-        if given is None:
-            return NO_LOADING
-        return Loading(stiffness=given if isinstance(given, dict) else {"": given})
+        found, stiffness = NO_LOADING, self.robot.actuator_stiffness
+        if self.load or self.motion is not None or self.gravity is not None:
+            from .loadtables import loading_of  # noqa: PLC0415 - a case without them starts without their tables
+
+            found = loading_of(self.load, self.motion, self.gravity, units)
+        if stiffness is None:
+            return found
+        return found._replace(stiffness=stiffness if isinstance(stiffness, dict) else {"": stiffness})

@@ -3,13 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any
+from importlib import import_module
+from typing import Annotated, Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
-from pydantic_core import ErrorDetails, PydanticCustomError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    FiniteFloat,
+    GetCoreSchemaHandler,
+    StringConstraints,
+    Tag,
+    model_validator,
+)
+from pydantic_core import CoreSchema, ErrorDetails, PydanticCustomError, core_schema
 
 from ..errors import CaseError, nearest
 
+FileName = Annotated[str, StringConstraints(min_length=1)]
 Vector = Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)]
 
 
@@ -41,6 +53,50 @@ class Table(BaseModel):
                         "unknown_key", "{fault}", {"key": key, "fault": f"no such key; {allowed}"}
                     )
         return table
+
+
+class Range(Table):
+    """A number that is free between its bounds."""
+
+    min: FiniteFloat = Field(description="lower bound")
+    max: FiniteFloat = Field(description="upper bound, above min")
+    start: FiniteFloat | None = Field(default=None, description="where the first search begins; the middle if left out")
+
+
+def tag_of_number(value: object) -> str:
+    """Return the branch of a union for a number or a range."""
+    return "<range>" if isinstance(value, dict | Range) else "<number>"
+
+
+Value = Annotated[
+    Annotated[FiniteFloat, Tag("<number>")] | Annotated[Range, Tag("<range>")], Discriminator(tag_of_number)
+]
+
+
+class Later:
+    """The type of a table whose class is imported when a document states the table.
+
+    Args:
+        module: module of this package.
+        name: name of the class.
+
+    Attributes:
+        is_over: whether types that are built now have the class at once, as a schema needs it.
+    """
+
+    is_over: ClassVar[bool] = False
+
+    def __init__(self, module: str, name: str) -> None:
+        self._module, self._name = module, name
+
+    def __get_pydantic_core_schema__(self, _source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        if self.is_over:
+            return handler.generate_schema(self._table())
+        return core_schema.no_info_plain_validator_function(lambda value: self._table().model_validate(value))
+
+    def _table(self) -> type[Table]:
+        kind: type[Table] = getattr(import_module(f".{self._module}", __package__), self._name)
+        return kind
 
 
 #: Parts of a fault's path that stand for branches of a union, or for a key of a table, and are no keys of a file.

@@ -22,7 +22,7 @@ def schema(
 
         found: object = result_schema()
     else:
-        from ..case.wholeschema import WholeDocument
+        from ..case.schema import Document
 
-        found = WholeDocument.model_json_schema()
+        found = Document.file_schema()
     print_line(json.dumps(found, indent=2))

@@ -8,7 +8,6 @@ and versions give the same bytes.
 from __future__ import annotations
 
 import os
-import re
 import tempfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -28,6 +27,7 @@ from ..program.nlp import Nlp
 from ..program.sampling import starting_points
 from ..system.markdown import markdown_text
 from .ctext import (
+    Macros,
     comment_text,
     for_controllers,
     identifier,
@@ -43,7 +43,7 @@ from .loops import find_loops
 from .manifest import MANIFEST, NumberColumns, manifest_text, number_columns
 from .measure import NOT_MEASURED
 from .runtimelimits import held_by_fixed_numbers, held_texts, limit_texts, run_time_limits
-from .stages import StagedFunctions, casadi_work, loop_texts, loop_work, stage_functions
+from .stages import StagedFunctions, loop_texts, stage_functions
 from .subject import Subject, find_subject, magnitude_of, objective_words, turning_joints
 from .worstcase import worst_case_texts
 
@@ -104,6 +104,8 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
     names = _substitutions(subject, staged, columns)
     names |= held_texts(held, limits)
     names |= limit_texts(limits, prefix, columns.limits)
+    core = {ending: _core_text(ending, prefix) for ending in _CORE}
+    names |= _stated_texts(names, core)
     parts = _PARTS | ({"-home.c": "home.c"} if "signs" in staged.functions else {})
     parts |= {"-loops.c": "loops.c"} if staged.loops else {}
     parts |= {"-spectrum.c": "spectrum.c"} if staged.loops.spectra else {}
@@ -112,7 +114,7 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
     names |= {"sources": " ".join(sources), "objects": " ".join(f"{name[:-2]}.o" for name in sources)}
     names["headers"] = " ".join(name for name in own if name.endswith(".h"))
     files = {f"{prefix}{ending}": _fill_template(f"{part}.in", names) for ending, part in parts.items()}
-    files |= {f"{prefix}{ending}": _core_text(ending, prefix, names) for ending in _CORE}
+    files |= {f"{prefix}{ending}": text for ending, text in core.items()}
     files |= {name: _fill_template(f"{name}.in", names) for name in _OTHERS}
     title = markdown_text(" ".join((case.title or case.name).split()))
     files["README.md"] = _fill_template("README.md.in", names | {"title": title})
@@ -153,12 +155,33 @@ def _fill_template(template: str, names: Mapping[str, str]) -> str:
     return Template((_TEMPLATES / template).read_text(encoding="utf-8")).substitute(names)
 
 
-def _core_text(ending: str, prefix: str, names: Mapping[str, str]) -> str:
-    """Return the text of a file of the search, with a case's prefix and with the constants of :mod:`.worstcase`."""
+def _core_text(ending: str, prefix: str) -> str:
+    """Return the text of a file of the search, with a case's prefix."""
     text = (_TEMPLATES / f"{_CORE_PREFIX}{ending}").read_text(encoding="utf-8")
-    text = re.sub(r"(?<=#define TRIALS )\d+", names["trials"], text)
-    text = re.sub(r"(?<=parts\[\] = \{)[^}]+", names["parts"], text)
     return text.replace(_CORE_PREFIX, prefix).replace(_CORE_PREFIX.upper(), prefix.upper())
+
+
+def _stated_texts(names: Mapping[str, str], core: Mapping[str, str]) -> dict[str, str]:
+    """Return the texts for the placeholders about workspaces and the worst case, read from the macros of the C.
+
+    Args:
+        names: all other texts.
+        core: texts of the search.
+    """
+
+    def macros(*templates: str, **further: str) -> Macros:
+        texts = ((_TEMPLATES / f"{each}.in").read_text(encoding="utf-8") for each in templates)
+        return Macros(*core.values(), *(Template(each).safe_substitute(names, **further) for each in texts))
+
+    functions = macros("api.h", "functions.h", "loops.c")
+    of_loops = functions.sum_of_parts("WORKSPACE") if int(names["has_loops"]) else 0
+    work = str(max(of_loops, functions.value(f"{names['ID']}_POSESWORK")))
+    solver = macros("api.h", "scaled.h", "solver.c", work=work)
+    doubles, integers, signs = solver.value("DOUBLES"), solver.value("INTS"), int(names["nsigns"])
+    passes = solver.value(f"{names['ID']}_QPPASSES", int(names["n"]), int(names["nc"]) + signs)
+    worst = worst_case_texts(_SEEDS + 1, 1 + (signs > 0), solver.value("TRIALS"), solver.value("PARTS") + 1)
+    workspaces = {"work": work, "solver_work": str(doubles), "solver_iwork": str(integers)}
+    return {**workspaces, "solver_bytes": str(8 * doubles + 4 * integers), "passes": str(passes), **worst}
 
 
 def _casadi_files(functions: Iterable[ca.Function], name: str) -> dict[str, str]:
@@ -185,14 +208,8 @@ def _substitutions(subject: Subject, staged: StagedFunctions, columns: NumberCol
     level = -1 if program.places.epigraph is None else program.places.epigraph.level
     if level >= 0:
         seeds[:, level] = 0.0
-    n, signs = nlp.n, staged.functions["signs"].numel_out(0) if "signs" in staged.functions else 0
-    c = len(program.constraints) + signs
-    rows = len(program.model.frame_rows)
-    poses, inputs = case.pose_count, program.robot.inputs.numel()
-    work = casadi_work(staged) + max(loop_work(staged, rows, n), poses * inputs if poses > 1 else 0)
-    # Workspace of sqp.c, multipliers, numbers at a point. A test in solver.c keeps it from compiling with too little.
-    solver_work = work + 5 * n**2 + 18 * n + 15 * c + 3 * c * n + 1
-    solver_iwork = 3 * n + 2 * c + 1
+    signs = staged.functions["signs"].numel_out(0) if "signs" in staged.functions else 0
+    poses = case.pose_count
     return {
         "id": prefix,
         "ID": prefix.upper(),
@@ -201,10 +218,10 @@ def _substitutions(subject: Subject, staged: StagedFunctions, columns: NumberCol
         "indices": index_macros(program, prefix),
         "casadi": ca.CasadiMeta.version(),
         "length": comment_text(case.units.length),
-        "n": str(n),
+        "n": str(nlp.n),
         "np": str(len(program.arguments)),
-        "m": str(rows),
-        "nc": str(c - signs),
+        "m": str(len(program.model.frame_rows)),
+        "nc": str(len(program.constraints)),
         "ntasks": str(len(case.tasks)),
         "nweights": str(len(program.places.weights)),
         "nposes": str(poses),
@@ -212,26 +229,21 @@ def _substitutions(subject: Subject, staged: StagedFunctions, columns: NumberCol
         "level": str(level),
         "nturns": str(len(turning_joints(nlp))),
         "nsigns": str(signs),
-        "ninputs": str(inputs),
+        "ninputs": str(program.robot.inputs.numel()),
         "pose_parameter": "int pose, " if poses > 1 else "",
         "pose_or_first": "pose" if poses > 1 else "0",
         "first_pose": "0, " if poses > 1 else "",
         "objective": comment_text(objective_words(nlp)),
         "F_by_loops": str(int(poses > 1 and staged.loops.has_objective)),
         "twist": str(program.places.twists[0].start),
-        "work": str(work),
         "sz_arg": str(max(function.sz_arg() for function in functions)),
         "sz_res": str(max(function.sz_res() for function in functions)),
         **loop_texts(staged, prefix),
         "nk": str(staged.prepare.numel_out(0)),
         "maximise": str(int(nlp.sense is Sense.MAX)),
         "nseeds": str(_SEEDS),
-        **worst_case_texts(n, c, _SEEDS + 1, 1 + (signs > 0)),
         "measured_macros": f"/* {NOT_MEASURED} */",
         "measured_rows": NOT_MEASURED,
-        "solver_work": str(solver_work),
-        "solver_iwork": str(solver_iwork),
-        "solver_bytes": str(8 * solver_work + 4 * solver_iwork),
         "seeds": "/* Where the solver searches from, in half ranges from the middle of the bounds. */\n"
         + matrix_table(f"{prefix}_seeds[{prefix.upper()}_SEEDS][{prefix.upper()}_N + 1]", seeds),
         "tables": _tables(nlp, prefix, columns),

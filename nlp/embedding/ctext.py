@@ -8,8 +8,11 @@ tests are a tenth of the machine code.
 
 from __future__ import annotations
 
+import ast
+import operator
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
+from typing import ClassVar
 
 from ...models import FloatArray
 from ..errors import one_line
@@ -99,6 +102,48 @@ def index_macros(program: Program, prefix: str) -> str:
         names = c_names(scalar.name for scalar in scalars)
         lines += [f"#define {prefix.upper()}_{vector}_{name} {index}" for index, name in enumerate(names)]
     return "\n".join(lines) + "\n"
+
+
+class Macros:
+    """Macros of C texts whose values are whole numbers: sums, products and comparisons of macros and of parameters.
+
+    Of two macros of one name the one of the later text counts.
+    """
+
+    _DEFINITION = re.compile(r"^#define (\w+)(?:\(([\w, ]+)\))?[ \t]+(.+?)[ \t]*$", re.MULTILINE)
+    _OPERATIONS: ClassVar[Mapping[type, Callable[[int, int], int]]] = {
+        ast.Add: operator.add,
+        ast.Mult: operator.mul,
+        ast.Gt: operator.gt,
+    }
+
+    def __init__(self, *texts: str) -> None:
+        joined = re.sub(r"/\*.*?\*/", "", "\n".join(texts), flags=re.DOTALL).replace("\\\n", " ")
+        self._found = {name: (each.split(", "), body) for name, each, body in self._DEFINITION.findall(joined)}
+
+    def value(self, name: str, *arguments: int) -> int:
+        """Return the value of a macro for its arguments."""
+        parameters, body = self._found[name]
+        return self._evaluated(body, dict(zip(parameters, arguments, strict=False)))
+
+    def sum_of_parts(self, name: str) -> int:
+        """Return the sum of the counts in a macro that lists them, such as ``part(values, 3 * N) part(rows, N)``."""
+        return sum(self._evaluated(count, {}) for count in re.findall(r"\w+\(\w+, ([^()]+)\)", self._found[name][1]))
+
+    def _evaluated(self, expression: str, given: Mapping[str, int]) -> int:
+        def of(node: ast.expr) -> int:
+            match node:
+                case ast.Constant(int(number)):
+                    return number
+                case ast.Name(name):
+                    return given[name] if name in given else self.value(name)
+                case ast.Call(ast.Name(name), arguments):
+                    return self.value(name, *map(of, arguments))
+                case ast.BinOp(left, operation, right) | ast.Compare(left, [operation], [right]):
+                    return int(self._OPERATIONS[type(operation)](of(left), of(right)))
+            raise ValueError(f"{expression!r} is no expression of whole numbers that is read here")
+
+        return of(ast.parse(expression, mode="eval").body)
 
 
 def version_texts(version: str) -> dict[str, str]:

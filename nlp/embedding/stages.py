@@ -215,7 +215,7 @@ def _extract(p: SX, expressions: Sequence[SX]) -> tuple[list[SX], SX, SX]:
 
 def loop_texts(staged: StagedFunctions, prefix: str) -> dict[str, str]:
     """Return the texts for the placeholders about loops."""
-    loops, most = staged.loops, _largest(staged)
+    loops = staged.loops
     rows = ""
     if loops:
         what = "limits that repeat, and F over several poses, by loops over functions of `-casadi.c`"
@@ -238,31 +238,12 @@ def loop_texts(staged: StagedFunctions, prefix: str) -> dict[str, str]:
         "constants_at": str(staged.prepare.numel_out(0) - loops.constants.numel()),
         "loop_tables": _tables(staged),
         "loop_cases": _cases(staged.of_loops),
-        **{f"most_{name}": str(count) for name, count in most.items()},
+        **_largest(staged),
         "ncolumns": str(sum(map(len, _columns(staged)))),
-        "casadi_work": str(casadi_work(staged)),
+        "casadi_work": str(max(1, *(function.sz_w() for function in staged.all))),
         # Eigenvalues by another order of operations, and by inverses, lose two digits more.
         "limits_close": "1e-10" if loops.spectra else "1e-12",
     }
-
-
-def casadi_work(staged: StagedFunctions) -> int:
-    """Return the number of doubles in the workspace of CasADi's functions."""
-    return max(1, *(function.sz_w() for function in staged.all))
-
-
-def loop_work(staged: StagedFunctions, rows: int, n: int) -> int:
-    """Return the number of doubles that ``loops.c`` divides its workspace into, beside CasADi's own; see there."""
-    loops = staged.loops
-    if not loops:
-        return 0
-    plain, slots = len(loops.plain), loops.slot_count
-    first = slots + sum(map(len, _columns(staged))) + sum(_largest(staged).values()) + plain * (1 + n)
-    second = slots + plain + loops.entries.numel() + n + n * n + n
-    of_j = 6 * rows
-    # The locals of spectrum.c: matrices (6, 6) along the variables, and second derivatives.
-    spectrum = 10 * n * n + 115 * n + 1080 + of_j
-    return first + second + (3 * of_j + 2 * of_j * n + n * n + spectrum if loops.spectra else 0)
 
 
 def _columns(staged: StagedFunctions) -> list[list[int]]:
@@ -279,21 +260,17 @@ def _columns(staged: StagedFunctions) -> list[list[int]]:
     return [sorted(columns) for columns in own]
 
 
-def _largest(staged: StagedFunctions) -> dict[str, int]:
-    """Return the largest numbers of inputs, values, derivatives and so on of a loop, each at least 1."""
-    counts = [
-        {
-            "inputs": loop.inputs.numel(),
-            "constants": loop.constants.numel(),
-            "values": loop.values.numel(),
-            # The place of the slopes in the workspace has derivatives by the inputs too.
-            "slopes": max(len(own.slopes), loop.inputs.numel()),
-            "second": len(own.second),
-        }
-        for loop, own in zip(staged.loops.all, staged.of_loops, strict=True)
-    ]
-    names = ("inputs", "constants", "values", "slopes", "second")
-    return {name: max((each[name] for each in counts), default=0) or 1 for name in names}
+def _largest(staged: StagedFunctions) -> dict[str, str]:
+    """Return the texts for the largest numbers of inputs, values, derivatives and so on of a loop, each at least 1."""
+    counts = {"inputs": [1], "constants": [1], "values": [1], "slopes": [1], "second": [1]}
+    for loop, own in zip(staged.loops.all, staged.of_loops, strict=True):
+        counts["inputs"].append(loop.inputs.numel())
+        counts["constants"].append(loop.constants.numel())
+        counts["values"].append(loop.values.numel())
+        # The place of the slopes in the workspace has derivatives by the inputs too.
+        counts["slopes"].append(max(len(own.slopes), loop.inputs.numel()))
+        counts["second"].append(len(own.second))
+    return {f"most_{name}": str(max(each)) for name, each in counts.items()}
 
 
 def _tables(staged: StagedFunctions) -> str:

@@ -1,18 +1,15 @@
 """Largest numbers of iterations and evaluations of a solve in C, from the constants of the solver.
 
-The generated C takes the constants from here, so that the bounds and the solver cannot differ.
+The generated C takes the constants from here, and those of the search are read from its C.
 """
 
 from __future__ import annotations
 
-#: Largest number of iterations of one search, and of trial lengths of a step in one iteration.
+#: Largest number of iterations of one search.
 _ITERATIONS = 100
-_TRIALS = 30
 #: Number of times that F is scaled in one search, and that it looks for a feasible point first.
 _ROUNDS = 3
 _RESTORES = 2
-#: Parts of the way to contradicting bounds that are tried: a quadratic program for each.
-_PARTS = ("1.0", "0.25", "0.0625", "0.015625", "0.00390625", "0.0")
 #: Second derivatives in one iteration: for the step; along the sides that are active at the point, to recognise a
 #: saddle; and again for the step.
 _CURVATURES = 3
@@ -21,7 +18,7 @@ _CURVATURES = 3
 _DERIVATIVES = 4
 
 
-def worst_case_texts(n: int, c: int, searches: int, phases: int) -> dict[str, str]:
+def worst_case_texts(searches: int, phases: int, trials: int, programs: int) -> dict[str, str]:
     """Return the texts of the placeholders for the solver's constants and for its worst case.
 
     A search counts its first derivatives, and may have a few for each point that it has judged beside those of one line
@@ -29,22 +26,19 @@ def worst_case_texts(n: int, c: int, searches: int, phases: int) -> dict[str, st
     of F and for each feasible point found. The point where it begins, which scales the constraints, is counted too.
 
     Args:
-        n: number of variables.
-        c: number of constraints.
         searches: largest number of searches of a solve.
         phases: number of times that a search begins: again within home's assembly where it has left that one.
+        trials: largest number of trial lengths of a step in one iteration.
+        programs: largest number of quadratic programs in one iteration.
     """
     parts = phases * (_ROUNDS + _RESTORES)
-    by_iteration, by_search, magnitudes = _DERIVATIVES, _TRIALS + _DERIVATIVES * parts, 1 + phases + parts
-    programs = len(_PARTS) + 1
-    passes = 20 * (2 * (n + c) + 5)
+    by_iteration, by_search, magnitudes = _DERIVATIVES, trials + _DERIVATIVES * parts, 1 + phases + parts
     iterations = searches * _ITERATIONS
     return {
         "iterations": str(_ITERATIONS),
-        "trials": str(_TRIALS),
+        "trials": str(trials),
         "rounds": str(_ROUNDS),
         "restores": str(_RESTORES),
-        "parts": ", ".join(_PARTS),
         "most_searches": str(searches),
         "most_iterations": str(iterations),
         "derivatives_by_iteration": str(by_iteration),
@@ -52,7 +46,6 @@ def worst_case_texts(n: int, c: int, searches: int, phases: int) -> dict[str, st
         "curvatures_by_iteration": str(_CURVATURES),
         "magnitudes_by_search": str(magnitudes),
         "programs_by_iteration": str(programs),
-        "passes": str(passes),
         "most_derivatives": str(by_iteration * iterations + by_search * searches),
         "most_curvatures": str(_CURVATURES * iterations),
         "most_magnitudes": str(magnitudes * searches),

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Annotated
 
+import casadi as ca
 import numpy as np
 
 from ...models import (
@@ -158,6 +159,15 @@ def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
             }
         ),
     )
+
+
+def legs_at(nlp: Nlp, x: FloatArray, pose: int = 0) -> tuple[FloatArray, FloatArray]:
+    """Return the base joints (k, 3) of straight legs at a point, and the vectors (k, 3) to their platform joints."""
+    legs = nlp.program.robots[pose].legs
+    ends = [ca.horzcat(ca.SX(3, 0), *[getattr(leg, each) for leg in legs]) for each in ("base", "span")]
+    function = ca.Function("legs", [nlp.program.x, nlp.program.p], [ca.densify(each) for each in ends])
+    base, span = (each.full().T for each in function(x, nlp.arguments))
+    return base, span
 
 
 def loops_are_closed(nlp: Nlp, x: FloatArray) -> bool:

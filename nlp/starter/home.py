@@ -20,6 +20,7 @@ from ...models import (
     WrenchKind,
     axis_from_screw,
     constraint_rows,
+    homogenised,
     screw_from_axis,
 )
 from ...models.mechanism.freedoms import null_space
@@ -213,7 +214,7 @@ def _place(nlp: Nlp, x: FloatArray) -> _Place:
 
 def _scaled(rows: FloatArray, centre: FloatArray, size: float) -> FloatArray:
     """Return wrenches (m, 6) with moments about a centre, in parts of a length."""
-    return np.hstack([rows[:, :3], (rows[:, 3:] - np.cross(centre, rows[:, :3])) / size])
+    return np.column_stack(homogenised(rows, centre, size))
 
 
 def _arm(place: _Place, size: float) -> float:

@@ -105,13 +105,9 @@ def _robot_lines(model: Model, robot_file: str | None, arm: float) -> list[str]:
 def _pose_lines(model: Model, home: Home) -> list[str]:
     """Return the table of the pose, with those numbers free that the robot can change."""
     turning = home.turning
-    position = [
-        _free_number(value, home.reach) if is_free else f"{value:.10g}"
-        for value, is_free in zip(model.home, home.moves, strict=True)
-    ]
     lines = [
         _commented("[pose]", "of the platform in the base's frame; its axes are parallel at home"),
-        f"position = [{', '.join(position)}]",
+        _position_line(model, home, home.reach),
     ]
     degrees = round(math.degrees(turning.largest))
     angle = f"angle = {{ min = {-degrees}, max = {degrees} }}"
@@ -233,11 +229,7 @@ def _workspace_lines(model: Model, home: Home, units: Units) -> list[str]:
     """Return a box of poses about home as comments; nothing where the robot has one pose, or free joints."""
     if model.free_joints or not (any(home.moves) or home.turning.numbers):
         return []
-    half = round_number(_BOX * home.reach)
-    position = [
-        _free_number(value, half) if is_free else f"{value:.10g}"
-        for value, is_free in zip(model.home, home.moves, strict=True)
-    ]
+    position = _position_line(model, home, round_number(_BOX * home.reach))
     turning = home.turning
     degrees = _BOX_TURN * round(turning.largest / TURN)
     angle = f"{{ min = {-degrees}, max = {degrees} }}"
@@ -254,7 +246,14 @@ def _workspace_lines(model: Model, home: Home, units: Units) -> list[str]:
         value = [_number(units.shown(each, item.dimension)) for each in starter_values(item)]
         fixed = f" --set {item.name}={','.join(value)}"
     question = f"for screwsynth workspace{fixed}: is the machine good at all these poses?"
-    return [_commented("[workspace]", question), f"position = [{', '.join(position)}]", *rotation]
+    return [_commented("[workspace]", question), position, *rotation]
+
+
+def _position_line(model: Model, home: Home, half: float) -> str:
+    """Return the line of a position about home's, by so much to each side where the robot can move."""
+    parts = zip(model.home, home.moves, strict=True)
+    texts = [_free_number(value, half) if is_free else f"{value:.10g}" for value, is_free in parts]
+    return f"position = [{', '.join(texts)}]"
 
 
 def _size(model: Model) -> float:

@@ -28,7 +28,7 @@ from generated import (
 
 from screwsynth.nlp import formulate, generate_c, load_case, shipped_cases, solve
 from screwsynth.nlp.embedding.codegen import size_words
-from screwsynth.nlp.embedding.ctext import identifier
+from screwsynth.nlp.embedding.ctext import Macros, identifier
 from screwsynth.nlp.embedding.measure import CORTEX_M7, NOT_MEASURED, X86_64, measure, stack_bound, with_figures
 from screwsynth.nlp.embedding.subject import find_subject
 
@@ -57,6 +57,24 @@ def test_shipped_cases_compile_without_warnings_and_pass_tests(name: str, tmp_pa
     assert f"{identifier(name)}-casadi.o" not in printed
     (counts,) = re.findall(r"^(\d+) passed, 0 failed$", printed, flags=re.MULTILINE)
     assert int(counts) >= 14
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", ["hexapod-machining", "flight-simulator"])
+def test_workspaces_are_those_that_the_compiler_counts(name: str, tmp_path: Path, embedded: OfCase) -> None:
+    where, parts = Path(shutil.copytree(embedded(name).folder, tmp_path / "c")), ("solver.c", "loops.c")
+    for source in [where / f"{identifier(name)}-{part}" for part in parts]:
+        text, pattern = source.read_text(encoding="utf-8"), r"^(typedef char enough_\w+\[\w+ )>="
+        source.write_text(re.sub(pattern, r"\1==", text, flags=re.MULTILINE), encoding="utf-8")
+        assert text != source.read_text(encoding="utf-8")
+        run(COMPILERS[0], *STRICT.split(), "-fsyntax-only", source.name, where=where)
+
+
+def test_macros_are_read_as_the_preprocessor_reads_them() -> None:
+    text = "#define A(n, c) (2 * (n) * (n) + (c)) /* doubles */\n#define B (A(3, 4) + (2 > 1) * 5)\n#define C 7\n"
+    macros = Macros(text, "#define PARTS(part) \\\n    part(x, B) \\\n    part(y, C * 2) part(z, 0)\n#define C 10\n")
+    assert (macros.value("A", 1, 2), macros.value("B"), macros.value("C")) == (4, 27, 10)
+    assert macros.sum_of_parts("PARTS") == 47
 
 
 @pytest.mark.slow

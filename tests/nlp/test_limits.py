@@ -34,8 +34,8 @@ from screwsynth.nlp.case.limits.limit import PosedRobot
 from screwsynth.nlp.case.limits.plates import JointSpacing
 from screwsynth.nlp.case.limits.registry import LIMIT_TYPES
 from screwsynth.nlp.case.limits.singular_values import largest_eigenvalue, smallest_eigenvalue
+from screwsynth.nlp.case.schema import Document
 from screwsynth.nlp.case.settings import Search
-from screwsynth.nlp.case.wholeschema import WholeDocument
 from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.evidence.margins import margins_of
 from screwsynth.nlp.program.formulation import formulate
@@ -384,7 +384,7 @@ KEYS = [key for kind in LIMIT_TYPES for key in kind.fields()]
 
 
 def test_registry_schema_and_documentation_have_every_limit_and_no_other() -> None:
-    table = WholeDocument.model_json_schema()["$defs"]["LimitsTable"]
+    table = Document.file_schema()["$defs"]["LimitsTable"]
     assert list(table["properties"]) == ["over", *KEYS]
     assert all(field["description"] for field in table["properties"].values())
     # The measures of robots are the other keys.
@@ -430,7 +430,7 @@ import screwsynth.nlp
 from screwsynth.models import stewart_gough
 from screwsynth.nlp import CaseError, Status, case_from_tables, formulate, json_data, result_of, solve
 from screwsynth.nlp.case.limits.platform_height import PlatformHeight
-from screwsynth.nlp.case.wholeschema import WholeDocument
+from screwsynth.nlp.case.schema import Document
 from screwsynth.nlp.starter.text import starter_case
 
 starter = tomllib.loads(starter_case(stewart_gough()))
@@ -459,7 +459,7 @@ print(json.dumps({
     "limits": json_data(result_of(solution))["limits"],
     "slope": (moved.F - solution.F) / 0.01,
     "relaxed": [[row.key, row.needed] for row in contradicting.relaxation],
-    "schema": WholeDocument.model_json_schema()["$defs"]["LimitsTable"]["properties"]["platform_height"],
+    "schema": Document.file_schema()["$defs"]["LimitsTable"]["properties"]["platform_height"],
 }))
 """
 

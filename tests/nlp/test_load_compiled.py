@@ -18,7 +18,7 @@ from builders import saved, starter
 from generated import BAD_INPUT, COMPILERS, OK, written
 
 from screwsynth.nlp import CompiledCase, InputError, formulate, load_case, load_compiled, shipped_cases
-from screwsynth.nlp.embedding import worstcase
+from screwsynth.nlp.embedding import codegen, worstcase
 from screwsynth.nlp.program.sampling import starting_points
 
 NAME = "paper-4.1-helical"
@@ -387,7 +387,10 @@ def test_a_search_has_no_more_first_derivatives_than_its_share(
 ) -> None:
     """With a share so small that searches end by it, what they need comes near to the bound and never exceeds it."""
     monkeypatch.setattr(worstcase, "_DERIVATIVES", 1)
-    monkeypatch.setattr(worstcase, "_TRIALS", 3)
+    core = codegen._core_text
+    monkeypatch.setattr(
+        codegen, "_core_text", lambda *arguments: core(*arguments).replace("#define TRIALS 30", "#define TRIALS 3")
+    )
     case = replace(load_case("paper-4.1-helical"), name="small-share")
     ok, stopped, _, _, _, *closest, _ = count(embed(case, "-O1"), tmp_path, 1000, None)
     assert min(ok, stopped) > 0

@@ -1,5 +1,8 @@
 """Forms of second order of the reference against 200-bit ball arithmetic, and the kernel's first pass against it."""
 
+import re
+from pathlib import Path
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -207,3 +210,18 @@ def test_no_point_above_the_threshold_is_cut_off(name: str) -> None:
     inside = (x[:, good] >= found.lower[:, of[good]]) & (x[:, good] <= found.upper[:, of[good]])
     assert inside.all()
     assert good.size > 200
+
+
+def test_the_headers_of_the_kernel_name_their_references_where_they_are() -> None:
+    root, named = Path(__file__).parents[2], set[str]()
+    for header in (root / "nlp/proof/enclosure/kernel").glob("*.h"):
+        text = header.read_text(encoding="utf-8")
+        assert not re.findall(r"(?<![\w/])\w+\.py", text), f"{header.name}: a path begins at the root"
+        for path in re.findall(r"[\w/]+\.py", text):
+            assert (root / path).is_file(), f"{header.name}: {path}"
+            named.add(path)
+        for name, path in re.findall(r"(\w{3,}) in (tests/[\w/]+\.py)", text):
+            defined = re.findall(rf"^ *(?:def|class) {name}\b", (root / path).read_text(encoding="utf-8"), re.MULTILINE)
+            assert defined, f"{header.name}: {name} in {path}"
+    modules = {str(each.relative_to(root)) for each in (root / "tests/reference/numpy_engine").glob("[a-z]*.py")}
+    assert modules <= named

@@ -113,7 +113,7 @@ static void let_go(double *J, double *R, int *active, double *u, int n, int coun
 }
 
 int screwsynth_QP(const screwsynth_QP_data *q, double *d, double *multipliers, double *work, int *iwork) {
-    const int n = q->n, sides = 2 * (q->n + q->c), most = 20 * (sides + 5); /* stated in the README */
+    const int n = q->n, sides = 2 * (q->n + q->c), most = SCREWSYNTH_QPPASSES(q->n, q->c);
     double *J = work, *R = J + n * n, *t = R + n * n, *r = t + n, *u = r + n, *products = u + n;
     int *active = iwork, *held = iwork + n;
     double lenient = LENIENT;

@@ -17,6 +17,8 @@ typedef struct {
 /* Doubles and ints in the workspace of the quadratic program. */
 #define SCREWSYNTH_QPWORK(n, c) (2 * (n) * (n) + 3 * (n) + (c))
 #define SCREWSYNTH_QPIWORK(n, c) ((n) + 2 * ((n) + (c)))
+/* Largest number of passes of a quadratic program. */
+#define SCREWSYNTH_QPPASSES(n, c) (20 * (2 * ((n) + (c)) + 5))
 
 /* Solution d and the multiplier of each side: n lower bounds, n upper bounds, lower and upper bounds of c rows. That of an
  * equation is among the lower ones, and may have any sign. Returns 0, or 1 where there is no solution. */

@@ -8,6 +8,7 @@
 #define LEAST 1e-8        /* smallest first shift, in parts of the curvature */
 #define FLAT 1e-6         /* curvature assumed for a function without any */
 #define CURVED 1e-7       /* part of the largest curvature below whose negative a curvature counts as negative */
+#define PARTS 6           /* parts of the way to contradicting bounds that are tried: a quadratic program for each */
 #define ROUNDED 1e-13     /* curvature of f, which is of order 1, below whose negative it may be rounding error */
 
 double screwsynth_SQP_largest(const double *values, int n) {
@@ -170,9 +171,9 @@ int screwsynth_SQP_step_within(search *of, double *d, double *u) {
 }
 
 int screwsynth_SQP_find_step(search *of) {
-    static const double parts[] = {1.0, 0.25, 0.0625, 0.015625, 0.00390625, 0.0};
+    static const double parts[PARTS] = {1.0, 0.25, 0.0625, 0.015625, 0.00390625, 0.0};
     const int n = of->p->n, c = of->p->c;
-    const int last = (int)(sizeof parts / sizeof *parts) - 1;
+    const int last = PARTS - 1;
     int failed = 1, i, j;
     of->q.gradient = of->at.gradient;
     of->q.rows = of->at.rows;

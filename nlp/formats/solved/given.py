@@ -10,14 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ....models import Dimension, Model
-from ....models.catalog import gallery_names, gallery_tables
+from ....models.catalog import definition_of
 from ....models.joints.home.chain import home_of
 from ....models.joints.home.mechanisms import mechanism_at_home
 from ....models.joints.written.words import read_robot
 from ....models.limbjoints import LimbJoint
 from ....models.mechanism import Mechanism
 from ....models.mechanism.closing import ClosedMechanism, close, closed_near
-from ...case.toml import plain_value
 from ...errors import InputError
 from ...evidence.state import RobotState
 from .words import ExportedJoint, RobotMechanism, extent_of, framed, joint_name, link_name, renamed, unique_names
@@ -57,15 +56,6 @@ class GivenRobot(NamedTuple):
     coordinates: Mapping[tuple[str, str], float]
 
 
-def tables_of(model: Model) -> Mapping[str, object]:
-    """Return the tables of a robot's file; none of a robot that is given by its rows."""
-    definition = model.options.get("definition")
-    if definition is None and model.structure and model.name in gallery_names():
-        return gallery_tables(model.name)
-    tables = plain_value(definition or {})
-    return tables if isinstance(tables, Mapping) else {}
-
-
 def given_mechanism(robot: GivenRobot) -> RobotMechanism:
     """Return a robot given joint by joint as a mechanism at its pose.
 
@@ -73,7 +63,7 @@ def given_mechanism(robot: GivenRobot) -> RobotMechanism:
         InputError: the actuators do not lead from home to the pose and to the program's coordinates.
         MechanismError: the loops do not close there.
     """
-    home = home_of(read_robot(tables_of(robot.model)))
+    home = home_of(read_robot(definition_of(robot.model)))
     has_networks = home.graph is not None and bool(home.graph.networks)
     angles = {name for name, each in home.words.dimensions.items() if each.kind is Dimension.ANGLE}
     numbers = {name: float(value.item()) for name, value in robot.state.parameters.items()}

@@ -14,13 +14,14 @@ import casadi as ca
 import numpy as np
 
 from ....models import FloatArray
+from ....models.catalog import definition_of
 from ....models.limbjoints import LimbJoint
 from ....models.mechanism import Mechanism, MechanismJoint
 from ....models.mechanism.topology import reached
 from ...case.case import Case
-from ...evidence.state import RobotState, evaluate
+from ...evidence.state import RobotState, evaluate, legs_at
 from ...program.nlp import Nlp
-from .given import GivenRobot, given_mechanism, tables_of
+from .given import GivenRobot, given_mechanism
 from .legs import PosedLeg, axes_of, check_legs, leg_mechanism
 from .words import ExportedJoint, RobotMechanism, Travel
 
@@ -60,7 +61,7 @@ def mechanism_of(nlp: Nlp, x: FloatArray, pose: int = 1) -> Exported:
     state = evaluate(nlp, x, pose - 1)
     model, known = nlp.program.model, nlp.program.robots[pose - 1].joints
     legs = _legs(nlp, x, pose - 1, state)
-    if tables_of(model):
+    if definition_of(model):
         coordinates = _coordinates(nlp, x, pose - 1)
         given = GivenRobot(model, state, known, coordinates)
         found = given_mechanism(given)
@@ -97,18 +98,9 @@ def _coordinates(nlp: Nlp, x: FloatArray, pose: int) -> dict[tuple[str, str], fl
 
 def _values_at(nlp: Nlp, x: FloatArray, pose: int) -> dict[tuple[str, str], float]:
     """Return coordinates from home by label and part of the joint, and lengths of legs by limb and the word length."""
-    legs, span = nlp.program.robots[pose].legs, _ends_of_legs(nlp, x, pose)[1]
-    lengths = {(leg.name, "length"): float(np.linalg.norm(span[:, k])) for k, leg in enumerate(legs)}
+    spans = zip(nlp.program.model.legs, legs_at(nlp, x, pose)[1], strict=True)
+    lengths = {(leg.name, "length"): float(np.linalg.norm(span)) for leg, span in spans}
     return {**_coordinates(nlp, x, pose), **lengths}
-
-
-def _ends_of_legs(nlp: Nlp, x: FloatArray, pose: int) -> tuple[FloatArray, FloatArray]:
-    """Return the base joints (3, k) of the legs at a pose, and the vectors (3, k) to their platform joints."""
-    legs = nlp.program.robots[pose].legs
-    ends = [ca.horzcat(ca.SX(3, 0), *[getattr(leg, each) for leg in legs]) for each in ("base", "span")]
-    function = ca.Function("legs", [nlp.program.x, nlp.program.p], [ca.densify(each) for each in ends])
-    base, span = (each.full() for each in function(x, nlp.arguments))
-    return base, span
 
 
 def _travel(
@@ -157,8 +149,8 @@ def _largest_stroke(case: Case, ends: tuple[float, float], shortest: float, *, i
 
 def _legs(nlp: Nlp, x: FloatArray, pose: int, state: RobotState) -> list[PosedLeg]:
     """Return the legs at a pose, with the axes of upper universal joints from the drawing."""
-    model, legs = nlp.program.model, nlp.program.robots[pose].legs
-    base, span = _ends_of_legs(nlp, x, pose)
+    model = nlp.program.model
+    base, span = legs_at(nlp, x, pose)
     vectors = [each.vector for each in model.scene.directions]
     directions = ca.Function(
         "directions",
@@ -168,8 +160,8 @@ def _legs(nlp: Nlp, x: FloatArray, pose: int, state: RobotState) -> list[PosedLe
     parameters = np.concatenate([np.zeros(0), *[state.parameters[each.name] for each in model.parameters]])
     axes = directions(parameters, state.rotation, state.position).full()
     return [
-        PosedLeg(leg.name, base[:, k], base[:, k] + span[:, k], tuple(axes[:, i] for i in axes_of(model, leg.name)))
-        for k, leg in enumerate(legs)
+        PosedLeg(leg.name, base[k], base[k] + span[k], tuple(axes[:, i] for i in axes_of(model, leg.name)))
+        for k, leg in enumerate(model.legs)
     ]
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Literal, NamedTuple
 
-import casadi as ca
 import numpy as np
 
 from ....models import Dimension, FloatArray, JointKind, Model, frozen_array
@@ -13,7 +12,7 @@ from ....models.statics import driven_joints
 from ...case.forces import dimension_of_force
 from ...case.loads import LoadCase
 from ...evidence.loads import HeldLoad, loads_at
-from ...evidence.state import RobotState
+from ...evidence.state import RobotState, legs_at
 from ...program.nlp import Nlp
 from .posture import Posture
 
@@ -161,13 +160,8 @@ class _Line(NamedTuple):
 
 def _legs(nlp: Nlp, x: FloatArray, pose: int) -> dict[str, _Line]:
     """Return the lines of straight legs, with their joints on the platform, by their actuators."""
-    robot = nlp.program.robots[pose]
-    if not robot.legs:
-        return {}
-    parts = [ca.horzcat(*[getattr(leg, part) for leg in robot.legs]) for part in ("base", "span")]
-    function = ca.Function("legs", [nlp.program.x, nlp.program.p], [ca.densify(each) for each in parts])
-    base, span = (each.full().T for each in function(x, nlp.arguments))
-    limbs = [leg.name for leg in robot.legs]
+    base, span = legs_at(nlp, x, pose)
+    limbs = [leg.name for leg in nlp.program.model.legs]
     return {
         joint.name: _Line(base[k] + span[k], span[k] / _norm(span[k]), is_leg=True)
         for joint in driven_joints(nlp.program.model)

@@ -1,11 +1,12 @@
-/* Ends of a box for which a model can reach a level; quadratic_models.py. */
+/* Ends of a box for which a model can reach a level.
+ * Reference in NumPy: tests/reference/numpy_engine/quadratic_models.py. */
 #ifndef CONTRACTION_H
 #define CONTRACTION_H
 
 #include "quadratic.h"
 
 #define ROOT_SLACK 1e-12
-#define LEAST_SIZE 1e-140 /* quadratic_models.py */
+#define LEAST_SIZE 1e-140 /* tests/reference/numpy_engine/quadratic_models.py */
 
 /* First and last t in [0, 1] with linear t + 1/2 quadratic t^2 >= need; last < first without one. */
 static void roots(double linear, double quadratic, double need, double *first, double *last)

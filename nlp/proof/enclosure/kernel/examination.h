@@ -1,4 +1,5 @@
-/* The examination of one box; bounding.py and limb_models.py. */
+/* The examination of one box.
+ * Reference in NumPy: tests/reference/numpy_engine/bounding.py and tests/reference/numpy_engine/limb_models.py. */
 #ifndef EXAMINATION_H
 #define EXAMINATION_H
 
@@ -10,7 +11,7 @@
 
 enum { OPEN, BOUNDED, INFEASIBLE, MONOTONE, EMPTIED };
 
-/* Arrays of results for B boxes, as in boxes/engine.py; the ends and reasons of variable i begin at i * B. */
+/* Arrays of results for B boxes, as in nlp/proof/boxes/engine.py; the ends and reasons of variable i begin at i * B. */
 typedef struct {
     Py_ssize_t B;
     const double *lower, *upper;
@@ -24,7 +25,7 @@ typedef struct {
 
 static Py_ssize_t rows_of_models(int n, int shared) { return 3 + 4 * n + n * n + 4 * shared; }
 
-/* Writes row after row of a box's model: boxes/engine.py reads them. */
+/* Writes row after row of a box's model: nlp/proof/boxes/engine.py reads them. */
 static void write_model(const Form *form, const Box *x, Report *report, Py_ssize_t at, int defined)
 {
     int n = x->n, J = x->J, R = x->R;
@@ -203,7 +204,7 @@ static int judge(const Form *form, Box *x, Report *report, Py_ssize_t at, double
         x->left[i] = score = left > 0 ? score : -1.0;
         most = score > most ? score : most;
     }
-    /* The first of the largest up to rounding, as in bounding.py. */
+    /* The first of the largest up to rounding, as in tests/reference/numpy_engine/bounding.py. */
     for (int i = n - 1; i >= 0; i--)
         if (x->left[i] >= (1 - TIE) * most)
             split = i;

@@ -1,4 +1,5 @@
-/* The first pass over a box, by forms of second order of its expressions alone; first_pass.py. */
+/* The first pass over a box, by forms of second order of its expressions alone.
+ * Reference in NumPy: tests/reference/numpy_engine/first_pass.py. */
 #ifndef FIRSTPASS_H
 #define FIRSTPASS_H
 

@@ -1,4 +1,5 @@
-/* The interpreter of a tape in forms of first or second order over LANES boxes; first_order.py and second_order.py. */
+/* The interpreter of a tape in forms of first or second order over LANES boxes.
+ * Reference in NumPy: tests/reference/numpy_engine/first_order.py and tests/reference/numpy_engine/second_order.py. */
 #ifndef FORMS_H
 #define FORMS_H
 

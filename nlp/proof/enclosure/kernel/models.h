@@ -1,4 +1,5 @@
-/* Bounds of quadratic models over many boxes, and ends that reach levels, for the search by limbs; quadratic_models.py. */
+/* Bounds of quadratic models over many boxes, and ends that reach levels, for the search by limbs.
+ * Reference in NumPy: tests/reference/numpy_engine/quadratic_models.py. */
 #ifndef MODELS_H
 #define MODELS_H
 

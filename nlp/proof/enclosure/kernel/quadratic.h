@@ -1,4 +1,5 @@
-/* Upper models of the Lagrangian over one box, and their bounds; bounding.py and quadratic_models.py. */
+/* Upper models of the Lagrangian over one box, and their bounds.
+ * Reference in NumPy: tests/reference/numpy_engine/bounding.py and tests/reference/numpy_engine/quadratic_models.py. */
 #ifndef QUADRATIC_H
 #define QUADRATIC_H
 
@@ -6,7 +7,7 @@
 
 #define MULTIPLIER_ROUNDS 8
 #define TANGENT_ROUNDS 3
-#define LARGEST_WEIGHT 1e20 /* quadratic_models.py */
+#define LARGEST_WEIGHT 1e20 /* tests/reference/numpy_engine/quadratic_models.py */
 
 /* Enclosures of the expressions over one box, and an upper model middle + b e + 1/2 e'He + w |e| of a weighted sum. */
 typedef struct {
@@ -59,7 +60,7 @@ static double size_of_row(const Box *x, int r)
 }
 
 /* The gradient is made small in the variables from number first on; rounding errors are those of the gradients' forms, or
- * of the values: quadratic_models.py's multipliers. */
+ * of the values: multipliers in tests/reference/numpy_engine/quadratic_models.py. */
 static void choose_multipliers(Box *x, const int *equation, int first)
 {
     int n = x->n, J = x->J, R = x->R, m = x->is_second ? 1 : n;
@@ -110,7 +111,7 @@ static void choose_multipliers(Box *x, const int *equation, int first)
 }
 
 /* One variable's part of a model, from the parts of a gradient's form and the size of what cancelled in them:
- * quadratic_models.py's integral. */
+ * integral in tests/reference/numpy_engine/quadratic_models.py. */
 static double finish_model(double *b, double *w, double *low, double *high, double across, double p, double q, double s,
                            double size)
 {

@@ -1,11 +1,12 @@
-/* Functions that are sums of squared quotients: their models from those of N and D; squared_quotients.py. */
+/* Functions that are sums of squared quotients: their models from those of N and D.
+ * Reference in NumPy: tests/reference/numpy_engine/squared_quotients.py. */
 #ifndef QUOTIENTS_H
 #define QUOTIENTS_H
 
 #include "quadratic.h"
 
 #define SUM (64 * ULP)
-#define LEAST 1e-20 /* squared_quotients.py */
+#define LEAST 1e-20 /* tests/reference/numpy_engine/squared_quotients.py */
 
 /* The model c + b e + 1/2 e'He +- w |e| +- s of one row, with its ends over the box. */
 typedef struct {
@@ -86,7 +87,8 @@ static void where_it_matters(double *r_lo, double *r_hi, const RowModel *D, int 
     *r_lo = low, *r_hi = high;
 }
 
-/* N and D, r = N / D over the box, and what models of the quotient are made of: squared_quotients.py's _Ratio. */
+/* N and D, r = N / D over the box, and what models of the quotient are made of:
+ * _Ratio in tests/reference/numpy_engine/squared_quotients.py. */
 typedef struct {
     RowModel N, D;
     double rho, reach, rest, error, lo, hi;

@@ -1,4 +1,5 @@
-/* The rank of a matrix over boxes, from forms of its entries; workspace/ranks/rank_rule.py. */
+/* The rank of a matrix over boxes, from forms of its entries.
+ * Reference in NumPy: tests/reference/numpy_engine/rank_rule.py. */
 #ifndef RANK_H
 #define RANK_H
 

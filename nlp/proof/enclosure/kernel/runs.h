@@ -1,4 +1,5 @@
-/* Runs of a tape over many boxes, LANES at once; first_order.py and second_order.py. */
+/* Runs of a tape over many boxes, LANES at once.
+ * Reference in NumPy: tests/reference/numpy_engine/first_order.py and tests/reference/numpy_engine/second_order.py. */
 #ifndef RUNS_H
 #define RUNS_H
 

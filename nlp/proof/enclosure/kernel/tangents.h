@@ -1,4 +1,5 @@
-/* Tangents to squares over a box: forms of second order of functions that take squared quotients away; tangent_bounds.py. */
+/* Tangents to squares over a box: forms of second order of functions that take squared quotients away.
+ * Reference in NumPy: tests/reference/numpy_engine/tangent_bounds.py. */
 #ifndef TANGENTS_H
 #define TANGENTS_H
 

@@ -1,4 +1,5 @@
-/* Functions of one variable: f(c) + f'(c) Y + [least, most] Y^2, half the second derivative at c, and ranges; univariate.py. */
+/* Functions of one variable: f(c) + f'(c) Y + [least, most] Y^2, half the second derivative at c, and ranges.
+ * Reference in NumPy: tests/reference/numpy_engine/univariate.py. */
 #ifndef UNIVARIATE_H
 #define UNIVARIATE_H
 

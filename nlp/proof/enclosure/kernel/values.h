@@ -1,4 +1,5 @@
-/* Types of the kernel: tapes, forms, and enclosures over LANES boxes at once; first_order.py. */
+/* Types of the kernel: tapes, forms, and enclosures over LANES boxes at once.
+ * Reference in NumPy: tests/reference/numpy_engine/first_order.py. */
 #ifndef VALUES_H
 #define VALUES_H
 
@@ -18,7 +19,7 @@
 #define EACH for (int l = 0; l < LANES; l++)
 #define ULP 0x1p-51
 #define TINY 1e-300
-#define LARGEST 1e150 /* intervals.py */
+#define LARGEST 1e150 /* tests/reference/numpy_engine/intervals.py */
 #define TIE 1e-6 /* part by which sizes may differ and count as the same: models/arrays.py */
 
 enum { CONSTANT, INPUT, OUTPUT, ADD, SUB, MUL, DIV, SHIFT, SCALE, SQUARE, SQRT, SIN, COS, EXP, LOG, ATAN, RAMP, STEP };

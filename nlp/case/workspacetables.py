@@ -1,25 +1,17 @@
-"""Schema of case files with all their tables: those of the workspace, and of limits, too."""
+"""Tables of the workspace and of the programmed path in a case file, and what they state."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
 from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Discriminator, Field, FiniteFloat, Tag, model_validator
 
 from ...models import Dimension, unit_vector
-from ..errors import CaseError
 from ..units import Units
 from .checks import check_direction
-from .limits.registry import LimitsTable
-from .loads import Loading
-from .loadtables import GravityTable, LoadTable, MotionTable, ObjectiveTable, loading_of
 from .pathfile import PLACE, Convention, PathFile
 from .pose import internal_value
-from .schema import Document, FileName, Value
-from .table import Table, Vector, empty_list, fault_of
-from .task import Task
+from .table import FileName, Table, Value, Vector, fault_of
 from .workspace import TURNS, TurnKind, Turns, Workspace
 
 
@@ -80,6 +72,15 @@ class WorkspaceTable(Table):
     )
     rotation: WorkspaceRotationTable | None = Field(default=None, description="left out: no rotation")
 
+    def read(self, units: Units, *, has_limits: bool) -> Workspace:
+        """Return the workspace, over which limits may hold.
+
+        Raises:
+            CaseError: the axis of its rotations is zero.
+        """
+        position = [internal_value(value, units, Dimension.LENGTH) for value in self.position]
+        return Workspace(position, _turns(self.rotation, units), has_limits, about_pose=self.about == "pose")
+
 
 Six = Annotated[list[FiniteFloat], Field(min_length=6, max_length=6)]
 
@@ -110,64 +111,14 @@ class PathTable(Table):
     between: Literal["angles", "slerp"] | None = Field(default=None, description="motion between two points")
     place: PlaceTable | None = Field(default=None, description="of the path's frame; left out: that of the world")
 
-
-class WholeDocument(Document):
-    """A whole case file."""
-
-    limits: LimitsTable | None = Field(default=None, description="limits that a design must keep to be built")
-    workspace: WorkspaceTable | None = Field(default=None, description="poses for which a machine is judged")
-    path: PathTable | None = Field(default=None, description="programmed path along which a machine is judged")
-    load: list[LoadTable] = Field(default_factory=empty_list, description="loads on the platform")
-    motion: MotionTable | None = Field(default=None, description="the platform's fastest motions")
-    gravity: GravityTable | None = Field(default=None, description="gravity, for loads that are masses")
-    objective: ObjectiveTable | None = Field(default=None, description="what is optimised, and over which poses")
-
-    def read_workspace(self, units: Units) -> Workspace | None:
-        """Return the workspace that the document states, over which its limits may hold."""
-        has_limits = self.limits is not None and self.limits.over == "workspace"
-        if self.workspace is None:
-            if has_limits:
-                raise CaseError("limits.over", "needs the table [workspace], which states the poses", "workspace")
-            return None
-        position = [internal_value(value, units, Dimension.LENGTH) for value in self.workspace.position]
-        turns, is_about = _turns(self.workspace.rotation, units), self.workspace.about == "pose"
-        return Workspace(position, turns, has_limits, about_pose=is_about)
-
-    def read_path(self, folder: str, units: Units) -> PathFile | None:
-        """Return the programmed path that the document states, along which its limits may hold."""
-        has_limits = self.limits is not None and self.limits.over == "path"
-        if self.path is None:
-            if has_limits:
-                raise CaseError("limits.over", "needs the table [path], which names its file", "path")
-            return None
-        given, stated = dict(self.path), self.path.place
+    def read(self, folder: str, units: Units, *, has_limits: bool) -> PathFile:
+        """Return the programmed path, along which limits may hold; its file is beside the document, in the folder."""
+        given, stated = dict(self), self.place
         given["place"] = tuple(
             0.0 if stated is None else internal_value(getattr(stated, name), units, dimension)
             for name, dimension in PLACE.items()
         )
         return PathFile(folder=folder, has_limits=has_limits, **given)
-
-    def read_worst_everywhere(self) -> bool:
-        """Return whether F is its worst over all poses at which limits hold."""
-        if self.objective is None or self.objective.over is None:
-            return False
-        over = self.objective.over
-        if self.limits is None or self.limits.over != over:
-            raise CaseError("objective.over", f"needs limits that hold there too: [limits] over = '{over}'", over)
-        return self.objective.minimise is None  # a number of the actuators is that of all these poses by itself
-
-    def read_tasks(self, tasks: Sequence[Task]) -> list[Task]:
-        """Return the tasks, that of a number of the actuators in the place of F of a motion."""
-        if self.objective is None or self.objective.minimise is None:
-            return list(tasks)
-        if not tasks:
-            return [Task.minimise(self.objective.minimise)]
-        return [replace(task, measure=self.objective.minimise) for task in tasks]
-
-    def read_loading(self, units: Units) -> Loading:
-        """Return the loads, the motions and the gravity that the document states, and the actuators' stiffness."""
-        stiffness = super().read_loading(units).stiffness
-        return loading_of(self.load, self.motion, self.gravity, units)._replace(stiffness=stiffness)
 
 
 def _turns(rotation: WorkspaceRotationTable | None, units: Units) -> Turns:
