@@ -16,8 +16,8 @@ from screwsynth.models.arrays import first_largest
 from screwsynth.nlp.proof.boxes.engine import (
     COLLAPSED,
     UNMOVED,
+    BoxState,
     Examination,
-    Verdict,
     objective_tape,
     search_tape,
     value_tape,
@@ -57,7 +57,7 @@ class Remainder:
         open_boxes = np.zeros(lower.shape[1], dtype=np.int32)
         return cls(lower.copy(), upper.copy(), cuts, cuts.copy(), open_boxes, open_boxes.copy())
 
-    def close(self, which: NDArray[np.bool_], verdict: Verdict, reason: int | NDArray[np.intp]) -> None:
+    def close(self, which: NDArray[np.bool_], verdict: BoxState, reason: int | NDArray[np.intp]) -> None:
         """Close some boxes for a reason."""
         self.verdict[which], self.reason[which] = verdict, reason
 
@@ -114,7 +114,7 @@ class NumpyEngine:
                 value=first.value,
                 centre=midpoints(lower, upper).centre,
             )
-            rest = np.flatnonzero(first.verdict == Verdict.OPEN)
+            rest = np.flatnonzero(first.verdict == BoxState.OPEN)
             if self._objective is not None:
                 rest = self._objective.examine_functions(first, result, rest, threshold)
             cuts, known = first.cuts.select(rest), first.bound[rest]
@@ -170,11 +170,11 @@ class NumpyEngine:
         left = self.collapse_monotone(model, binding, lower, upper)
         self.contract(model, L, left, box, threshold, cuts)
         some = np.asarray(impossible.any(axis=0))
-        left.close(some, Verdict.INFEASIBLE, impossible.argmax(axis=0)[some])
-        left.verdict[~defined & (left.verdict != Verdict.INFEASIBLE)] = Verdict.OPEN
+        left.close(some, BoxState.INFEASIBLE, impossible.argmax(axis=0)[some])
+        left.verdict[~defined & (left.verdict != BoxState.INFEASIBLE)] = BoxState.OPEN
         left.lower[:, ~defined], left.upper[:, ~defined] = lower[:, ~defined], upper[:, ~defined]
         left.cut_lower[:, ~defined] = left.cut_upper[:, ~defined] = UNMOVED
-        left.close(bound <= threshold, Verdict.BOUNDED, 0)
+        left.close(bound <= threshold, BoxState.BOUNDED, 0)
         conditions_hold = (middle[J:] + error[J:] <= 0).all(axis=0)
         return Examination(
             verdict=left.verdict,
@@ -231,10 +231,10 @@ class NumpyEngine:
                 else:
                     rises, falls = (g_hi[:J] < 0).all(axis=0), g_lo > 0
                 stopped = binding & self.depends[:, i, None] & ~(falls & ~self.equation[:, None])
-                applies = rises & ~stopped.any(axis=0) & width & (left.verdict == Verdict.OPEN)
+                applies = rises & ~stopped.any(axis=0) & width & (left.verdict == BoxState.OPEN)
                 whole = self.form.upper[i] if side > 0 else self.form.lower[i]
                 at_face = (upper[i] if side > 0 else lower[i]) == whole
-                left.close(applies & ~at_face, Verdict.MONOTONE, i)
+                left.close(applies & ~at_face, BoxState.MONOTONE, i)
                 collapsed = applies & at_face
                 (left.lower if side > 0 else left.upper)[i, collapsed] = whole
                 (left.cut_lower if side > 0 else left.cut_upper)[i, collapsed] = COLLAPSED
@@ -279,7 +279,7 @@ class NumpyEngine:
         left.upper[moved], left.cut_upper[moved] = new_hi[moved], why_hi[moved]
         emptied = left.lower > left.upper
         which = np.asarray(emptied.any(axis=0))
-        left.close(which, Verdict.EMPTIED, emptied.argmax(axis=0)[which])
+        left.close(which, BoxState.EMPTIED, emptied.argmax(axis=0)[which])
 
     def _split(
         self,
