@@ -30,6 +30,7 @@ from screwsynth.nlp.proof.statement.tolerance import built_model, is_smooth
 from screwsynth.nlp.proof.workspace.numbers import expressions
 from screwsynth.nlp.proof.workspace.numbers import machines as tolerance
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal, smallest_values
+from screwsynth.nlp.proof.workspace.numbers.extremes import NumberSearch
 from screwsynth.nlp.proof.workspace.numbers.machines import Machines
 from screwsynth.nlp.proof.workspace.ranks import rank_rule as rank
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner, LoopBoxes
@@ -192,7 +193,7 @@ def ratios(name: str, gap: float = 1e-4, only: tuple[str, ...] | None = None) ->
     case, robot = case_from(tables_of(name)), SAMPLED[name]
     found = machines(case)
     every = found.symbols.claims([each.name for each in found.built.model.quantities])[1]
-    bounds = [found.extreme(each, gap=gap, jobs=1) for each in every if each.name in (only or robot.names)]
+    bounds = [found.extreme(each, NumberSearch(gap, 1)) for each in every if each.name in (only or robot.names)]
     box = found.family.problem.box
     poses = np.array([box.coordinates(each.pose) for each in bounds if each.pose is not None])
     built, exact = samples(robot, box, found.family.tolerance, poses)

@@ -26,7 +26,7 @@ from screwsynth.nlp.proof.statement.machine import Legs, legs_of, workspace_of_c
 from screwsynth.nlp.proof.statement.posed_layout import posed_layout
 from screwsynth.nlp.proof.statement.tolerance import built_model
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal, Number
-from screwsynth.nlp.proof.workspace.numbers.extremes import prove_extreme
+from screwsynth.nlp.proof.workspace.numbers.extremes import NumberSearch, prove_extreme
 from screwsynth.nlp.proof.workspace.numbers.machines import Machines as EveryMachine
 from screwsynth.nlp.proof.workspace.numbers.pose_error import pose_errors
 from screwsynth.nlp.proof.workspace.numbers.strokes import _better
@@ -154,7 +154,7 @@ def test_no_machine_within_the_tolerance_is_outside_of_a_proven_bound(case: Case
     every = EveryMachine(case, closed_form(case.model), problem_of(case))
     picked = [name for name in sampled if " 1-" in name or " 2+" in name or " " not in name]
     claims = [each for each in every.symbols.claims(["base_joint_angle"])[1] if each.name in picked]
-    for each in (every.extreme(claim, gap=1e-3, jobs=1) for claim in claims):
+    for each in (every.extreme(claim, NumberSearch(jobs=1)) for claim in claims):
         seen.add((each.name.partition(" ")[0], each.key == ""))
         assert beyond(each, sampled[each.name]) <= 0, each.name
         # Proven bounds are near: a hundredth of the largest number of the exact machine, with the gap.
