@@ -332,6 +332,9 @@ def main() -> int:
         print(f"{item.name:36} {old.seconds:8.2f} s {ratios[-1]:6.2f} {'same' if not lines else 'DIFFERS'}", flush=True)
         for line in lines[:12]:
             print(f"    {line}", flush=True)
+    if not ratios:
+        print(f"no item has the name {given.only!r}")
+        return 2
     ratios.sort()
     print(f"{different} of {len(ratios)} differ; CPU time of new over old: median {statistics.median(ratios):.2f}, "
           f"90 % {ratios[int(0.9 * (len(ratios) - 1))]:.2f}, largest {ratios[-1]:.2f}")  # fmt: skip

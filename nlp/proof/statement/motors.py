@@ -10,7 +10,7 @@ import casadi as ca
 from casadi import SX
 
 from ....models import Dimension
-from ....models.statics import DrivenJoint, driven_joints
+from ....models.statics import DrivenJoint, driven_joints, statics_hindrance
 from ...case.case import Case
 from ...case.forces import dimension_of_force, dimension_of_speed
 from ...case.limits.constraint import Reading
@@ -44,6 +44,11 @@ def actuator_coordinates(layout: Layout) -> dict[str, SX]:
         if model.actuators and quantity.name in ACTUATED:
             found |= {owner: values[k] for k, owner in enumerate(quantity.owners)}
     return {each.name: found[each.name] for each in driven_joints(model) if each.name in found}
+
+
+def in_path_motion(case: Case) -> Case:
+    """Return a case whose actuators have powers in the motion of a path, where forces are known."""
+    return case if statics_hindrance(case.model) else in_motion(case)
 
 
 def speed_claims(case: Case) -> Iterator[Claim]:

@@ -1,4 +1,7 @@
-"""Judgement of a robot over a box of poses."""
+"""Judgement of a robot over a box of poses.
+
+Expressions of the pose are bounded by the search of ``certify`` or by that of boxes; the choice is in ``expressions``.
+"""
 
 from __future__ import annotations
 

@@ -12,7 +12,6 @@ from dataclasses import replace
 
 import casadi as ca
 
-from ....models.statics import statics_hindrance
 from ...case.case import Case
 from ...case.checks import check_determined_joints
 from ...case.motors import MotorNumber
@@ -24,7 +23,7 @@ from ...program.layout import robot_length
 from ..boxes.search import TOO_SMALL
 from ..enclosure.engine import kernel
 from ..statement.claims import ACTUATED, CONSTRAINTS, REGULAR, Claim, ClaimKind, dependent_claims
-from ..statement.motors import in_motion, motor_claims
+from ..statement.motors import in_motion, in_path_motion, motor_claims
 from ..statement.tolerance import Directions
 from .judgement import Judgement
 from .judging import Judging
@@ -203,7 +202,7 @@ class _AlongPath(Judging):
         # Powers are those in the path's motion, whether the case states another one or none.
         speeds, case = speeds_on_path(self._robots, self._cover, self.search.gap, self.search.record), subject.case
         yield from speeds.verdicts
-        moving = case if statics_hindrance(case.model) else in_motion(case)  # forces that are not known have no power
+        moving = in_path_motion(case)
         if speeds.number is not None:
             self._keep_faults(speeds.number, refuted(speeds.verdicts))
             subject = replace(subject, case=moving, machines=speeds.number.problem)

@@ -26,7 +26,7 @@ from ....path.path import ProgrammedPath
 from ....program.layout import Layout
 from ...statement.claims import ERRORS, REACH, Claim, ClaimKind
 from ...statement.machine import Legs, check_leg_error, workspace_of_case
-from ...statement.motors import actuator_coordinates
+from ...statement.motors import actuator_coordinates, in_path_motion
 from ...statement.posed_layout import extreme_program
 from ...statement.tolerance import Directions, length_of_one_machine, second_order_name
 from ..check import check_proof
@@ -55,7 +55,6 @@ from .statement import (
     expected_claims,
     hold_premises,
     hold_robot,
-    in_path_motion,
     leg_error_of,
     refuse_other_lemmas,
     robot_along_path,

@@ -13,7 +13,6 @@ from casadi import SX
 from .....models import Model, WrenchKind
 from .....models.joints import RobotError
 from .....models.joints.model.closedform import closed_form
-from .....models.statics import statics_hindrance
 from ....case.case import Case
 from ....case.checks import check_determined_joints
 from ....case.limits.legs import LegLength
@@ -39,7 +38,7 @@ from ...statement.claims import (
     searched_claims,
 )
 from ...statement.machine import Legs, legs_of
-from ...statement.motors import in_motion, motor_claims, speed_claims
+from ...statement.motors import in_motion, in_path_motion, motor_claims, speed_claims
 from ...statement.posed_layout import closed_layout, posed_layout, reach_claims
 from ...statement.tolerance import (
     BuiltModel,
@@ -279,11 +278,6 @@ def expected_along_path(case: Case, robot: RobotClaims, *, is_timed: bool) -> li
 def _number_of(claim: Claim) -> MotorNumber | None:
     """Return the number of an actuator that a claim is about."""
     return None if claim.motor is None else claim.motor.number
-
-
-def in_path_motion(case: Case) -> Case:
-    """Return a case whose actuators have powers in the motion of a path, where forces are known."""
-    return case if statics_hindrance(case.model) else in_motion(case)
 
 
 def refuse_other_lemmas(lemmas: Sequence[ProofClaim], expected: Sequence[Claim]) -> None:
