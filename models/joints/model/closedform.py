@@ -150,7 +150,7 @@ def _solved(model: Model, unknown: Unknown, equation: Closure, extended: bool) -
         return Solved.angle(sine, cosine, 1 - D * D / square)
     c0, c1, twice = _at_zero(expression, q, [q, (q, q)])
     c2 = twice / 2
-    if _is_same(model, c2, SX(0)) or not _is_same(model, expression, c0 + c1 * q + c2 * q * q):
+    if _is_same(model, c2 * unknown.size**2, SX(0)) or not _is_same(model, expression, c0 + c1 * q + c2 * q * q):
         return None
     square = c1 * c1 - 4 * c0 * c2
     # With an equation in parts of twice the rod's squared length, 2 c2 square is the squared cosine.
