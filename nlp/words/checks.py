@@ -2,9 +2,9 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from .regression import CaseCheck, PublishedCheck, decimals_of
+from ..results.regression import CaseCheck, PublishedCheck, decimals_of
+from .lines import counted
 from .text import Line, TextTable, Tone, in_part
-from .wording import counted
 
 #: So many numbers that do not hold are shown in full in a short view.
 _FAULTS = 8
