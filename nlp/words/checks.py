@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from ..results.regression import CaseCheck, PublishedCheck, decimals_of
+from ..results.checks import CaseCheck, PublishedCheck, decimals_of
 from .lines import counted
 from .text import Line, TextTable, Tone, in_part
 

@@ -30,7 +30,7 @@ from screwsynth.nlp.output.report.markup import html_table, paragraphs
 from screwsynth.nlp.output.report.report import report_of
 from screwsynth.nlp.output.report.webpage import page_of
 from screwsynth.nlp.results import data, parts
-from screwsynth.nlp.results.regression import check_case
+from screwsynth.nlp.results.checks import check_case
 from screwsynth.nlp.results.schema import RESULTS, _object, result_from_json, result_schema
 from screwsynth.nlp.solver import multistart, starts
 from screwsynth.nlp.system.jsonvalues import (

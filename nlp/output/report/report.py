@@ -16,9 +16,9 @@ from ...case.case import Case
 from ...evidence.loads import loads_at
 from ...evidence.state import RobotState
 from ...program.nlp import Nlp
+from ...results.checks import CaseCheck
 from ...results.data import CaseResult
 from ...results.objective import pose_objective, unit_of_objective
-from ...results.regression import CaseCheck
 from ...results.rounding import ordered
 from ...results.tradeoff import TradeoffResult
 from ...solver.multistart import ProgramSolution
