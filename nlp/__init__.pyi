@@ -118,8 +118,8 @@ from .proof.workspace.scale import Scale as Scale
 from .proof.workspace.scale import largest_scale as largest_scale
 from .proof.workspace.verdict import Outcome as Outcome
 from .proof.workspace.verdict import Verdict as Verdict
-from .results.regression import CaseCheck as CaseCheck
-from .results.regression import check as check
+from .results.checks import CaseCheck as CaseCheck
+from .results.checks import check as check
 from .results.result import result_of as result_of
 from .results.schema import load_result as load_result
 from .results.tradeoff import tradeoff_result as tradeoff_result

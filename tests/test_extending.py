@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from screwsynth.nlp import Solution, Status, load_case, result_of, solve
-from screwsynth.nlp.results.summary import case_summary
+from screwsynth.nlp.words.summary import case_summary
 
 Module = Callable[[str, str], ModuleType]
 
@@ -95,7 +95,7 @@ CSV = '''
 import csv
 import io
 
-from screwsynth.nlp.results.text import Line
+from screwsynth.nlp.words.text import Line
 
 
 def as_csv(summary):

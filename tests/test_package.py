@@ -119,7 +119,8 @@ def test_what_commands_deliver_is_loaded_when_it_is_used() -> None:
     )
     assert all(callable(getattr(contents, name)) for name in names)
     code = (
-        "import sys, screwsynth.nlp.cli.contents; sys.exit(any('.output' in m or '.results' in m for m in sys.modules))"
+        "import sys, screwsynth.nlp.cli.contents; rooms = ['output', 'results', 'words']\n"
+        "sys.exit(any(m.startswith(f'screwsynth.nlp.{room}') for room in rooms for m in sys.modules))"
     )
     assert subprocess.run([sys.executable, "-P", "-c", code], check=False).returncode == 0
 

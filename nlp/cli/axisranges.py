@@ -38,7 +38,8 @@ def show_ranges(
         InputError: a number is not allowed.
     """
     from ..proof.workspace.axis_ranges import TIME_LIMIT, axis_ranges
-    from ..results.axisranges import axis_ranges_result, axis_ranges_summary, axis_ranges_tables
+    from ..results.axisranges import axis_ranges_result
+    from ..words.axisranges import axis_ranges_summary, axis_ranges_tables
 
     pose = None if start is None else [*start[:3], *map(math.radians, start[3:])]
     limit = TIME_LIMIT if time is None else time

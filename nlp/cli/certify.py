@@ -10,7 +10,7 @@ from .commandline import print_notice
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from ..results.text import Line, TextTable
+    from ..words.text import Line, TextTable
 
 
 def certify(

@@ -23,8 +23,8 @@ def check(
     from ..case.source import case_inputs, shipped_cases
     from ..errors import InputError
     from ..interruption import Milestone, answer_after, is_requested, why_stopped
-    from ..results.regression import check as check_cases
-    from ..results.regression import checks_of
+    from ..results.checks import check as check_cases
+    from ..results.checks import checks_of
 
     if [json_file, junit, "-" if markdown else None].count("-") > 1:
         raise InputError("standard output can take one of --json -, --junit - and --markdown only")

@@ -11,9 +11,9 @@ from .commandline import print_notice
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
-    from ..results.designs import Designs, Row
-    from ..results.text import Line, TextTable
     from ..system.jsonvalues import JsonObject
+    from ..words.designs import Designs, Row
+    from ..words.text import Line, TextTable
     from .options import Outputs
 
 

@@ -34,7 +34,7 @@ def export(
     from ..evidence.state import loops_are_closed
     from ..formats.export import check_formats, check_pose, check_same_robot, files_at, fixed_point
     from ..output.files import check_folder, check_outputs, write_folder
-    from ..results.text import Line
+    from ..words.text import Line
     from .progress import solve_with_progress
 
     chosen = check_formats(formats)

@@ -67,7 +67,7 @@ def import_(
     from ..formats.reading.words import offer_lines, summary_lines
     from ..output.files import check_origin, check_outputs, write_text
     from ..output.terminal import show
-    from ..results.text import Line, Tone
+    from ..words.text import Line, Tone
 
     if not platform:
         raise InputError("--platform: needs a value, BODY")

@@ -28,7 +28,7 @@ def models(
     from ...models import model_names
     from ..case.robots import build_model, model_options
     from ..errors import InputError
-    from ..results.robotwording import model_words, models_words
+    from ..words.models import model_words, models_words
 
     file = name if name is not None and name.endswith(".toml") else None
     files = options.Outputs(plot=plot)

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from ..case.case import Case
     from ..case.overrides import Settings
     from ..case.reader import CaseFile
-    from ..results.text import Line, TextTable
     from ..system.jsonvalues import JsonObject
+    from ..words.text import Line, TextTable
 
 
 class WholeNumber:
@@ -408,7 +408,7 @@ def check_csv(target: str | None, table: str | None, case: Case, *, at_point: bo
         InputError: it is refused.
     """
     from ..errors import InputError, listing
-    from ..results.summary import table_names
+    from ..words.summary import table_names
 
     if target is None and table is not None:
         raise InputError(f"--table {table}: needs --csv FILE")

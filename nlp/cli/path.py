@@ -60,7 +60,7 @@ def path(
     from ..path.reader import options_of, path_of_case, read_path
     from ..proof.workspace.path_judge import TIME_LIMIT, judge_path
     from ..results.path import path_result
-    from ..results.posewording import evaluate_command
+    from ..words.poses import evaluate_command
     from .proofs import path_premises, path_proof_text, proof_record
 
     sampling = _sampling(step, within, is_written=csv_file is not None)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from ..proof.checker.workspace.check import CheckedClaim, VerifiedWorkspace
     from ..proof.workspace.judgement import Judgement
     from ..proof.workspace.proof_record import ProofRecord
-    from ..results.text import Line
+    from ..words.text import Line
 
 
 def proof_record(target: str | None, json_file: str | None) -> ProofRecord | None:
@@ -169,8 +169,8 @@ def _checked_lines(
     """Yield what a checked proof proves: the counts, claims that have no proof, then every premise and claim."""
     from ..proof.checker.premises import exact
     from ..proof.statement.claims import ERRORS
-    from ..results.text import Line
-    from ..results.verdictwording import SHOWN
+    from ..words.text import Line
+    from ..words.verdicts import SHOWN
 
     count = len(checked.claims) + len(proof.unproved)
     if case.joint_centre_tolerance:

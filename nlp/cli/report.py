@@ -40,7 +40,7 @@ def report(
     check_library("matplotlib", "reports")
     from ..output.report.report import report_of
     from ..output.report.webpage import page_of
-    from ..results.regression import check_case
+    from ..results.checks import check_case
     from ..results.result import result_of
     from ..results.tradeoff import limit_curves
 

@@ -14,10 +14,10 @@ from .progress import counting_line
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from ..results.text import Line
     from ..sweeps.engines import EngineKind
     from ..sweeps.points import Points
     from ..sweeps.sweep import Sweep
+    from ..words.text import Line
 
 
 def sweep(

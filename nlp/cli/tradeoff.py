@@ -41,10 +41,11 @@ def tradeoff(
     from ..case.reader import read_case
     from ..errors import InputError, UncoveredError
     from ..interruption import Milestone, answer_after, is_requested, why_stopped
-    from ..results.tradeoff import tradeoff_designs, tradeoff_result
+    from ..results.tradeoff import tradeoff_result
     from ..solver.status import Status
     from ..solver.tradeoff import tradeoff as solve_along
     from ..sweeps.points import grid
+    from ..words.tradeoff import tradeoff_designs
 
     answer_after(Milestone.VALUE)
     points = grid([over])

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from ..case.case import Case
     from ..proof.checker.proof_file import PathPremises, ProofClaim, Statement
-    from ..results.text import Line
+    from ..words.text import Line
 
 
 def verify_proof(
@@ -43,8 +43,8 @@ def verify_proof(
     from .. import __version__
     from ..errors import InputError
     from ..proof.checker.proof_file import LARGEST_PROOF, PathPremises, Statement, read_proof
-    from ..results.text import Line
     from ..system.reading import read_limited
+    from ..words.text import Line
     from .proofs import verified_lines, verified_path_lines
 
     of_path = {"--along": along, "--unit": unit, "--start": start, "--offset": offset} | {
@@ -136,7 +136,7 @@ def _verify(
     from ..proof.checker.premises import claim_words, hold_statement, program_of, root_below
     from ..proof.checker.proof_file import ProofError
     from ..results.objective import unit_of_objective
-    from ..results.text import Line
+    from ..words.text import Line
 
     try:
         hold_statement(case, statement, above=above, all_assemblies=all_assemblies)

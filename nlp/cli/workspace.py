@@ -41,8 +41,8 @@ def workspace(
     """Prove regular poses and limits over a whole workspace."""
     from ..interruption import Milestone, answer_after, seconds_left, within
     from ..proof.statement.machine import workspace_of_case
-    from ..results.posewording import evaluate_command
     from ..results.workspace import scale_data, workspace_of
+    from ..words.poses import evaluate_command
     from .proofs import proof_record, proof_text
 
     record = proof_record(proof, json_file)
@@ -134,7 +134,7 @@ def _worst(case: Case, result: WorkspaceResult, target: str | None) -> Figure:
         InputError: no pose is known.
     """
     from ..errors import InputError
-    from ..results.workspaceposes import worst_claim
+    from ..results.claims import worst_claim
 
     worst = worst_claim(result, case.tasks[0].sense)
     if worst is None:

@@ -22,19 +22,18 @@ from ..results.comparison import (
     ComparedStrokeData,
     ComparedTaskData,
     ComparisonResult,
-    comparison_columns,
-    comparison_lines,
 )
-from ..results.designs import DesignDetails, Designs, DrawnDesign, Join, PageWords, free_numbers
 from ..results.evidence import certificate_data
 from ..results.objective import unit_of_objective
 from ..results.parts import SCHEMA, UnitsData
 from ..results.point import versions, violations
-from ..results.text import Line, TextTable, Tone
 from ..solver.solution import Solution
 from ..solver.status import Status
 from ..system.jsonvalues import finite_or_none
 from ..units import rate_unit
+from ..words.comparison import comparison_columns, comparison_lines
+from ..words.designs import DesignDetails, Designs, DrawnDesign, Join, PageWords, free_numbers
+from ..words.text import Line, TextTable, Tone
 from .compare import Comparison, part_of
 from .entry import Entry, TaskFit, driven_wrenches
 

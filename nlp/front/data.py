@@ -10,23 +10,13 @@ from ..evidence.optimality import Evidence
 from ..program.places import Scalar
 from ..program.program import design_indices, design_names
 from ..proof.certificate.certificate import CertificateStatus
-from ..results.designs import (
-    SEPARATOR,
-    Cell,
-    Column,
-    ColumnKind,
-    Designs,
-    DrawnDesign,
-    Join,
-    PageWords,
-    free_numbers,
-)
 from ..results.evidence import certificate_data
 from ..results.explorations import FrontGoalData, FrontPointData, FrontResult
 from ..results.objective import unit_of_objective
 from ..results.point import head_data, stated_pose_notice, versions
-from ..results.text import Line
 from ..system.jsonvalues import finite_or_none
+from ..words.designs import SEPARATOR, Cell, Column, ColumnKind, Designs, DrawnDesign, Join, PageWords, free_numbers
+from ..words.text import Line
 from .front import Front, FrontPoint
 from .goals import Goal
 

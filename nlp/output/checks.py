@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from xml.etree import ElementTree
 
 from ..errors import one_line
-from ..results.checks import published_words, reproduction_table
-from ..results.regression import CaseCheck
+from ..results.checks import CaseCheck
+from ..words.checks import published_words, reproduction_table
 from .tables import markdown
 
 

@@ -22,14 +22,14 @@ from ..proof.certificate.certificate import Certificate
 from ..results.evidence import certificate_data
 from ..results.point import task_data
 from ..results.result import result_of
-from ..results.robottables import free_words
-from ..results.robotwording import model_words
-from ..results.rounding import number
-from ..results.summary import case_summary
-from ..results.text import Line, TextTable
-from ..results.wording import certificate_lines, task_lines, title_line
 from ..solver.certified import Certified
 from ..solver.solution import Solution
+from ..words.lines import certificate_lines, task_lines, title_line
+from ..words.models import model_words
+from ..words.numbers import number
+from ..words.robot import free_words
+from ..words.summary import case_summary
+from ..words.text import Line, TextTable
 from .pictures.drawing import Drawing, drawing_of, drawing_of_model
 from .pictures.requirements import check_library
 from .pictures.solutions import drawings_of

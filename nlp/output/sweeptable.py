@@ -19,13 +19,13 @@ from ...models import FloatArray
 from ..case.case import Case
 from ..errors import InputError, check_seconds
 from ..interruption import one_call, within
-from ..results.designs import Column
 from ..sweeps.columns import SweepColumns, columns_of, row_reader, sweep_columns
 from ..sweeps.engines import EngineKind
 from ..sweeps.journal import Row
 from ..sweeps.points import CaseSource, Points, grid_of
 from ..sweeps.sweep import Sweep, SweepProgress, run_sweep
 from ..system.csvtext import csv_row, text_of_cell
+from ..words.designs import Column
 from .files import check_target, write_whole
 
 #: Endings of a table's file.

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from ..errors import InputError, listing
-from ..results.designs import Designs, Row, designs_table
-from ..results.text import Figure, Line, TextTable
 from ..system.csvtext import csv_text
 from ..system.markdown import markdown_text
+from ..words.designs import Designs, Row, designs_table
+from ..words.text import Figure, Line, TextTable
 
 
 def tables_as_csv(items: Iterable[Line | TextTable], name: str | None = None) -> str:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from rich.cells import cell_len
 
 from ..errors import one_line
-from ..results.text import Line, TextTable, Tone
+from ..words.text import Line, TextTable, Tone
 
 if TYPE_CHECKING:
     from rich.console import Console

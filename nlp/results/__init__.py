@@ -1,1 +1,1 @@
-"""Solutions as data, and in words."""
+"""Results as data."""

@@ -1,103 +1,351 @@
-"""Checks of cases as lines and tables of text."""
+"""Checks of cases against expected and published values.
 
-from collections.abc import Iterable, Iterator, Sequence
+Three kinds of value are kept apart: those that this program **computes**, those that the case **expects**, with a
+tolerance of its own, and those that the literature prints (**published**). A published number is *reproduced* by one of
+two rules, and no other:
 
-from .regression import CaseCheck, PublishedCheck, decimals_of
-from .text import Line, TextTable, Tone, in_part
-from .wording import counted
+* ``digits``: the computed number is within half a unit of the last printed digit, in every component;
+* ``flat``: for an argument of the optimum, F at the printed point is within 1e-5 of the best F with this argument free
+  and the other printed arguments held fixed. Where F is flat, or best on a whole set, fewer digits of an argument are
+  significant than are printed.
 
-#: So many numbers that do not hold are shown in full in a short view.
-_FAULTS = 8
+A number that a case marks reproduced and that is not, or the other way round, is *newly changed*, and fails the check.
+"""
 
+import math
+import time
+from collections.abc import Sequence
+from typing import Annotated, TypeAlias
 
-def checks_summary(checks: Sequence[CaseCheck]) -> Iterator[Line | TextTable]:
-    """Yield the count of numbers that hold in each case, and every number that does not."""
-    faults = [fault for check in checks for fault in _faults(check)]
-    yield Line(f"{len(faults)} do not hold", tone=Tone.NO_ANSWER) if faults else Line("all hold", tone=Tone.HOLDS)
-    published = [row for check in checks for row in check.published]
-    held = sum(row.passed for check in checks for row in check.expected)
-    count = f"{held} of {sum(len(check.expected) for check in checks)} expected numbers hold"
-    reproduced = sum(row.is_reproduced for row in published)
-    words = f"; of {len(published)} published ones {reproduced} are reproduced" if published else ""
-    yield Line(f"{counted(len(checks), 'case')}: {count}{words}")
-    for k, fault in enumerate(faults):
-        yield Line(fault, tone=Tone.FAULT, part="numbers that do not hold" if k >= _FAULTS else "")
-    rows = tuple(_summary_row(check) for check in checks)
-    yield from in_part("cases", [TextTable(("case", "expected", "published", "seconds"), rows)])
+from ...models import component_names
+from ..case.case import Case
+from ..case.overrides import Settings
+from ..case.reader import load_case
+from ..case.settings import Published, Search
+from ..case.source import shipped_cases
+from ..errors import CaseError, EvaluationError, InputError
+from ..interruption import Milestone, is_requested, reached
+from ..program.formulation import formulate_each
+from ..solver.multistart import solve_program
+from ..solver.solve import solve
+from ..system.jsonvalues import JsonObject, JsonValue, Key, Vector, json_data
+from .data import CaseResult
+from .parts import SCHEMA, RobotData, SchemaVersion
+from .result import result_of
 
-
-def _summary_row(check: CaseCheck) -> tuple[str | Line, ...]:
-    """Return a case's row: its name, counts and seconds."""
-    reproduced = sum(row.is_reproduced for row in check.published)
-    held = sum(row.passed for row in check.expected)
-    published = f"{reproduced} reproduced, {len(check.published) - reproduced} not" if check.published else ""
-    name = Line(check.name, tone=Tone.PLAIN if check.passed else Tone.NO_ANSWER)
-    return name, f"{held} of {len(check.expected)} hold", published, f"{check.seconds:.1f}"
-
-
-def _faults(check: CaseCheck) -> Iterator[str]:
-    """Yield a sentence for each number of a case that does not hold."""
-    for row in check.expected:
-        if not row.passed:
-            yield f"{check.name}: {row.quantity} is {row.computed}, expected {row.expected} within {row.tolerance:g}"
-    for published in check.published:
-        if not published.passed:
-            yield f"{check.name}: newly changed: {published_words(published)}"
+#: A result as JSON's own types.
+JsonData: TypeAlias = dict[str, JsonValue]
+#: Relative difference of F within which an argument of a flat optimum counts as reproduced.
+FLAT = 1e-5
+#: Starting points for the search over a single argument.
+_STARTS = 8
 
 
-def reproduction_table(checks: Iterable[CaseCheck]) -> TextTable:
-    """Return the published numbers of cases: printed, computed, verdict and reason."""
-    rows = []
-    for check in checks:
-        for row in check.published:
-            reason = row.because if not row.is_reproduced else row.rule.partition(":")[0]
-            rows.append((check.name, row.source, _quantity(row), _printed(row), _computed(row), row.verdict, reason))
-    return TextTable(("case", "where", "quantity", "printed", "computed", "verdict", "rule or reason"), tuple(rows))
+class ExpectedCheck(JsonObject):
+    """A computed number beside the one that the case expects.
+
+    Attributes:
+        quantity: dotted path in the case's result.
+        expected: by the case.
+        computed: as the result has it; null where it has none.
+        tolerance: allowed difference.
+        passed: whether the expectation holds.
+    """
+
+    quantity: str
+    expected: float | bool | str
+    computed: object
+    tolerance: float
+    passed: bool
 
 
-def published_table(check: CaseCheck) -> TextTable:
-    """Return the published numbers of one case beside the computed ones."""
-    rows = [
-        (
-            row.quantity,
-            ", ".join(f"{value:g}" for value in row.value),
-            ", ".join(f"{value:.7g}" for value in row.computed) or "none",
-            row.verdict,
-            row.source,
-            row.because or row.rule,
+class PublishedCheck(JsonObject):
+    """A published number beside the computed one.
+
+    Attributes:
+        quantity: dotted path in the case's result, or gain.
+        value: as printed.
+        source: place in the literature.
+        reproduced: whether the case says that the number is reproduced.
+        because: the reason, where it is not.
+        decimals: printed digits behind the point, where the value does not show them.
+        over: name of the case that a gain is over.
+        computed: the computed number; empty where there is none.
+        verdict: of the check.
+        rule: that decided, with its figures.
+        passed: whether the check confirms the case.
+    """
+
+    quantity: str
+    value: Vector
+    source: str
+    reproduced: bool
+    because: str
+    decimals: int | None
+    over: str | None
+    computed: Vector
+    verdict: str
+    rule: str
+    passed: bool
+
+    @property
+    def is_reproduced(self) -> bool:
+        """Whether a rule finds the number reproduced."""
+        return self.passed == self.reproduced
+
+
+class CaseCheck(JsonObject):
+    """Checks of one case.
+
+    Attributes:
+        name: name of the case.
+        title: title of the case.
+        passed: whether everything holds.
+        seconds: wall time.
+        expected: numbers that the case expects.
+        published: numbers that the literature prints.
+    """
+
+    name: Annotated[str, Key("case")]
+    title: str
+    passed: bool
+    seconds: float
+    expected: tuple[ExpectedCheck, ...]
+    published: tuple[PublishedCheck, ...]
+
+
+class ChecksResult(JsonObject):
+    """Result of checking cases.
+
+    Attributes:
+        schema: version of the result's keys.
+        passed: whether everything holds.
+        cases: checks of each case.
+    """
+
+    schema: SchemaVersion
+    passed: bool
+    cases: tuple[CaseCheck, ...]
+
+
+def checks_of(checks: Sequence[CaseCheck]) -> ChecksResult:
+    """Return the checks of several cases."""
+    return ChecksResult(schema=SCHEMA, passed=all(check.passed for check in checks), cases=tuple(checks))
+
+
+def check(names: Sequence[str] | None = None) -> list[CaseCheck]:
+    """Solve cases and check their expected and published values; a case that others refer to is solved once.
+
+    Where the work is requested to stop, the cases that are checked by then are returned.
+
+    Args:
+        names: paths of case files, or bare names of shipped cases; left out, all shipped cases.
+
+    Raises:
+        InputError: a case, or one that it refers to, cannot be read.
+    """
+    solved: dict[str, CaseResult] = {}
+    checks: list[CaseCheck] = []
+    for name in names or shipped_cases():
+        found = check_case(name, solved)
+        if is_requested():  # an interrupted solve is no check
+            break
+        checks.append(found)
+        reached(Milestone.CASE)
+    return checks
+
+
+def check_case(name: str, solved: dict[str, CaseResult] | None = None) -> CaseCheck:
+    """Solve a case and check it.
+
+    Args:
+        name: path of a case file, or the bare name of a shipped case.
+        solved: results of cases by name, for cases that refer to each other; new results are added.
+
+    Raises:
+        InputError: the case, or one that it refers to, cannot be read.
+    """
+    began = time.perf_counter()
+    solved = {} if solved is None else solved
+    case = load_case(name)
+    result = _result_for(name, solved, case)
+    data = json_data(result)
+    expected = tuple(_check_expected(case, result, data))
+    published = tuple(_check_published(name, case, row, result, data, solved) for row in case.published)
+    return CaseCheck(
+        name=case.name,
+        title=case.title,
+        passed=all(row.passed for row in expected) and all(row.passed for row in published),
+        seconds=time.perf_counter() - began,
+        expected=expected,
+        published=published,
+    )
+
+
+def _result_for(name: str, solved: dict[str, CaseResult], case: Case | None = None) -> CaseResult:
+    """Return the result of a case by name; each case is solved once.
+
+    Args:
+        name: of the case.
+        solved: results by name; a new result is added.
+        case: the case, where it is read already.
+    """
+    if name not in solved:
+        case = case or load_case(name)
+        solved[name] = result_of(solve(case))
+    return solved[name]
+
+
+def _check_expected(case: Case, result: CaseResult, data: JsonData) -> list[ExpectedCheck]:
+    """Return the expected numbers of a case beside the computed ones, its status first."""
+    expect, rows = case.expect, list[ExpectedCheck]()
+
+    def add(quantity: str, expected: float | bool | str, computed: object, tolerance: float, *, passed: bool) -> None:
+        rows.append(
+            ExpectedCheck(quantity=quantity, expected=expected, computed=computed, tolerance=tolerance, passed=passed)
         )
-        for row in check.published
-    ]
-    return TextTable(("quantity", "published", "computed", "", "where", "how it is known"), tuple(rows))
+
+    add("status", "an answer", result.status.value, 0.0, passed=result.status.is_answer)
+    if expect.F is not None:
+        F = _number(data, "F")
+        off = math.inf if F is None else abs(F - expect.F)
+        add("F", expect.F, F, expect.tolerance, passed=off <= expect.tolerance * (abs(expect.F) or 1.0))
+    if expect.singular is not None:
+        singular = _lookup(data, "singular" if "F" in data else "combined.singular")
+        add("singular", expect.singular, singular, 0.0, passed=singular == expect.singular)
+    for row in expect.values:
+        value = _lookup(data, row.quantity)
+        near = isinstance(value, float | int) and abs(value - row.value) <= row.within
+        add(row.quantity, row.value, value, row.within, passed=near)
+    return rows
 
 
-def published_words(row: PublishedCheck) -> str:
-    """Return a published number, the computed one and the rule, in one line."""
-    return f"{_quantity(row)}: printed {_printed(row)}, computed {_computed(row)} ({row.rule})"
+def _lookup(data: JsonValue, path: str) -> JsonValue:
+    """Return the value at a dotted path of JSON data, where a number is an index in a list; None without one."""
+    found = data
+    for part in path.split("."):
+        if isinstance(found, dict):
+            found = found.get(part)
+        elif isinstance(found, list) and part.isdigit() and int(part) < len(found):
+            found = found[int(part)]
+        else:
+            return None
+    return found
 
 
-def _quantity(row: PublishedCheck) -> str:
-    """Return the name of a published quantity."""
-    return row.quantity if row.over is None else f"gain over {row.over}, %"
+def _number(data: JsonValue, path: str) -> float | None:
+    """Return the number at a dotted path of JSON data, or None where there is none."""
+    found = _lookup(data, path)
+    return float(found) if isinstance(found, float | int) else None
 
 
-def _printed(row: PublishedCheck) -> str:
-    """Return a published number with the digits that were printed."""
-    return _tuple(f"{value:.{_decimals(row, value)}f}" for value in row.value)
+def _numbers(data: JsonValue, path: str) -> tuple[float, ...]:
+    """Return the number, or the list of numbers, at a dotted path of JSON data; empty where there is neither."""
+    found = _lookup(data, path)
+    parts = found if isinstance(found, list) else [found]
+    numbers = tuple(float(part) for part in parts if isinstance(part, float | int))
+    return numbers if len(numbers) == len(parts) else ()
 
 
-def _computed(row: PublishedCheck) -> str:
-    """Return the computed number with two digits more than were printed."""
-    if not row.computed:
-        return "none"
-    shown = zip(row.computed, row.value, strict=True)
-    return _tuple(f"{value + 0.0:.{_decimals(row, said) + 2}f}" for value, said in shown)
+def _check_published(
+    name: str, case: Case, row: Published, result: CaseResult, data: JsonData, solved: dict[str, CaseResult]
+) -> PublishedCheck:
+    """Return a published number beside the computed one, with the rule that decided.
+
+    Raises:
+        CaseError: the quantity is no number of the result, or has another number of components.
+    """
+    if row.over is None:
+        computed = _numbers(data, row.quantity)
+    else:
+        over, F = _number(json_data(_result_for(row.over, solved)), "F"), _number(data, "F")
+        computed = (100 * (F - over) / over,) if F is not None and over else ()
+    if not result.status.is_answer:
+        return _published(row, (), f"the case has no answer: it is {result.status.value}", found=False)
+    if len(computed) != len(row.value):
+        source = case.source or name
+        fault = f"is no number of this result with {len(row.value)} components"
+        raise CaseError(f"published: {row.quantity}", fault, source=source)
+    halves = [0.5 * 10.0 ** -(decimals_of(value) if row.decimals is None else row.decimals) for value in row.value]
+    off = max(abs(c - v) / h for c, v, h in zip(computed, row.value, halves, strict=True))
+    if off <= 1 + 1e-9:
+        return _published(row, computed, "digits", found=True)
+    flat = _flat_difference(name, case, row, result)
+    if flat is None:
+        return _published(row, computed, "digits", found=False)
+    return _published(row, computed, f"flat: F is off its best by {flat:.1e}", found=flat <= FLAT)
 
 
-def _decimals(row: PublishedCheck, value: float) -> int:
-    return decimals_of(value) if row.decimals is None else row.decimals
+def _published(row: Published, computed: tuple[float, ...], rule: str, *, found: bool) -> PublishedCheck:
+    """Return the check of a published number, which a rule finds reproduced or not."""
+    passed = found == row.reproduced
+    verdict = "newly changed" if not passed else "reproduced" if found else "not reproduced"
+    return PublishedCheck.of(row, computed=computed, verdict=verdict, rule=rule, passed=passed)
 
 
-def _tuple(texts: Iterable[str]) -> str:
-    parts = list(texts)
-    return parts[0] if len(parts) == 1 else f"({', '.join(parts)})"
+def decimals_of(value: float) -> int:
+    """Return the number of digits behind the point of the shortest text of a number."""
+    text = f"{value:.15g}"
+    if "e" in text:
+        return 15
+    return len(text.partition(".")[2])
+
+
+def _flat_difference(name: str, case: Case, row: Published, result: CaseResult) -> float | None:
+    """Return the relative difference of F between the printed point and the best with this argument free.
+
+    None when the number is no argument of F, or the printed point is no robot.
+    """
+    printed: dict[str, float | list[float]] = {}
+    for each in case.published:
+        printed.update(_argument_settings(case, each.quantity, each.value))
+    own, robot = _argument_settings(case, row.quantity, row.value), result.robot
+    if not own or robot is None:
+        return None
+    settings = {**_computed_settings(case, robot), **printed}
+    try:
+        at_printed = _best_objectives(load_case(name, settings))
+        best = _best_objectives(load_case(name, {key: value for key, value in settings.items() if key not in own}))
+    except (InputError, EvaluationError):
+        return None
+    differences = []
+    for (F, size), (G, _) in zip(at_printed, best, strict=True):
+        zero = max(F, G) <= FLAT**2 * size
+        differences.append(0.0 if zero else abs(F - G) / max(F, G))
+    return max(differences)
+
+
+def _argument_settings(case: Case, quantity: str, value: Sequence[float]) -> Settings:
+    """Return an argument of F as settings of the case; empty for another quantity."""
+    path = quantity.removeprefix("combined.")
+    if path == "pose.position":
+        return dict(zip(component_names("p", 3), value, strict=True))
+    if path in ("pose.angle", "pose.axis"):
+        return {path.removeprefix("pose."): list(value) if path == "pose.axis" else value[0]}
+    name = path.removeprefix("parameters.")
+    if path.startswith("parameters.") and name in case.parameters:
+        return {case.parameter_name(name): value[0] if len(value) == 1 else list(value)}
+    return {}
+
+
+def _computed_settings(case: Case, robot: RobotData) -> Settings:
+    """Return the computed point as settings of the case."""
+    settings: dict[str, float | list[float]] = {
+        case.parameter_name(name): list(value) if isinstance(value, tuple) else value
+        for name, value in robot.parameters.items()
+    }
+    settings |= dict(zip(component_names("p", 3), robot.pose.position, strict=True))
+    settings["angle"] = robot.pose.angle
+    settings["axis"] = list(robot.pose.axis) if case.axis is None else case.axis.tolist()
+    return settings
+
+
+def _best_objectives(case: Case) -> list[tuple[float, float]]:
+    """Return the best F of each task over the numbers that are still free, and its size without cancellation."""
+    values = []
+    for nlp in formulate_each(case):
+        solution = solve_program(nlp, Search(starts=_STARTS))
+        if solution.state is None or not solution.status.is_answer:
+            raise EvaluationError(f"no optimum: {solution.status.value}")
+        values.append((solution.F, solution.state.size))
+    return values

@@ -1,4 +1,4 @@
-"""What is optimised: F of a task, or the largest force, speed or power of the actuators; its unit and its words."""
+"""What is optimised: F of a task, or the largest force, speed or power of the actuators; its unit."""
 
 import math
 from typing import TYPE_CHECKING
@@ -8,7 +8,6 @@ from ...models.statics import driven_joints
 from ..case.case import Case
 from ..case.forces import dimension_of_measure
 from ..case.limits.objective import ObjectiveLimit
-from ..case.task import Sense
 from ..evidence.loads import PoseLoads, largest_of
 from ..proof.certificate.certificate import Certificate
 from ..system.jsonvalues import Absent, JsonObject, finite_or_none
@@ -84,17 +83,6 @@ def over_workspace(case: Case, judged: "Judgement") -> float:
     return bounds[0] if bounds else math.nan
 
 
-def objective_words(case: Case) -> str:
-    """Return what is optimised instead of F of the stated poses, in words; empty for that."""
-    measure = case.tasks[0].measure
-    if not measure:
-        is_least = case.tasks[0].sense is Sense.MAX
-        worst = f"the {'smallest' if is_least else 'largest'} {case.limits_where}, to be as"
-        return f"{worst} {'large' if is_least else 'small'} as possible" if case.worst_everywhere else ""
-    over = "actuators" if measure == "actuator_speed" else "actuators and loads"
-    return f"the largest {measure.replace('_', ' ')} over all {over}, to be as small as possible"
-
-
 def pose_objective(case: Case, found: PoseLoads) -> float:
     """Return the number of the actuators that a case optimises, at one pose."""
     return _in_unit(case, largest_of(found, case.tasks[0].measure))
@@ -134,9 +122,3 @@ def unit_of_claim(case: Case, name: str, dimension: Dimension) -> str:
     tasks = [k for k, task in enumerate(case.tasks) if name in ("F", f"F of {task.name}")]
     is_of_F = dimension is Dimension.NUMBER and tasks and not case.tasks[0].measure
     return unit_of_objective(case, tasks[0]) if is_of_F else case.units.label(dimension)
-
-
-def objective_label(case: Case, task: int | None = None) -> str:
-    """Return F with its unit, for an axis; arguments are those of :func:`unit_of_objective`."""
-    unit = unit_of_objective(case, task)
-    return f"F, {unit}" if unit else "F"

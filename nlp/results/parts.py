@@ -16,7 +16,7 @@ from ..evidence.state import PlatformPose
 from ..program.free_joints import FreeJoint
 from ..program.nlp import Bound
 from ..system.jsonvalues import Absent, Inline, JsonObject, Known, Vector, Vector3, Vector6
-from .jointdata import JointsData
+from .joints import JointsData
 
 #: Version of a result, the newest of :data:`screwsynth.models.fileversions.RESULT_FILES`.
 SchemaVersion: TypeAlias = Literal[1]

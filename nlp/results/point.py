@@ -25,7 +25,7 @@ from ..program.free_joints import FreeJoint, free_joints
 from ..program.nlp import Nlp
 from ..program.pairs import with_pairs_at
 from ..system.jsonvalues import Vector, vector
-from .jointdata import joints_data
+from .joints import joints_data
 from .objective import pose_objective
 from .parts import (
     SCHEMA,

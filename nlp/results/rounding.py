@@ -1,20 +1,18 @@
-"""Numbers as text, 0 where they are below their error bound.
+"""Error bounds of numbers, and numbers that are 0 where they are below them.
 
 A number that is the sum of larger terms, or that a search has found within a range, has an error in proportion to
-these. Where it is smaller than that, its digits mean nothing, and its text is 0. In JSON every number stands as it is.
+these. For people it is 0 where it is smaller than that; in JSON every number stands as it is.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from typing import TYPE_CHECKING
 
 from ...models import Dimension
 from ..evidence.state import ZERO_F
 from ..units import Units
-from .text import Figure
 
 if TYPE_CHECKING:
     from .parts import Jacobian, RobotData, TaskData
@@ -23,12 +21,8 @@ if TYPE_CHECKING:
 NOISE = 1e-9
 #: Error bound of a number that a case states, as a part of the largest beside it: the rounding of a sine, some times.
 STATED = 1e-14
-#: Error bound of a residual in scaled terms: corrections end at a tenth of it.
-_RESIDUAL = 1e-12
 #: Significant digits by which numbers are put in an order: rounding decides on no order.
 _ORDERED = 6
-#: Significant digits of a number that a search has found: the others are rounding error.
-_SOLVED = 9
 #: A rotation by less than this, radians, has no axis that means anything.
 TURNED = 1e-9
 
@@ -36,39 +30,6 @@ TURNED = 1e-9
 def settled(value: float, size: float, part: float = NOISE) -> float:
     """Return a number, or 0 where it is below a part of a size."""
     return 0.0 if abs(value) <= part * size else value + 0.0
-
-
-def number(value: float, size: float = 0.0, *, digits: int = 7, signed: bool = False, part: float = NOISE) -> Figure:
-    """Return the text of a number.
-
-    Args:
-        value: the number.
-        size: of its terms, its neighbours or its range; the number is 0 where it is below a part of this.
-        digits: number of significant digits.
-        signed: whether a positive number has its sign.
-        part: the error bound as a part of the size.
-    """
-    value = settled(value, size, part)
-    return Figure(f"{value:{'+' if signed and value else ''}.{digits}g}", value)
-
-
-def rounded_to(value: float, digits: int, *, up: bool) -> str:
-    """Return the text of a number, rounded up or down where it has more digits than rounding error leaves of it."""
-    settled_value = Context(prec=_SOLVED).create_decimal(value)
-    context = Context(prec=digits, rounding=ROUND_CEILING if up else ROUND_FLOOR)
-    return f"{float(context.plus(settled_value)):.{digits}g}"
-
-
-def listed(values: Iterable[float]) -> str:
-    """Return numbers with five digits each, 0 where they are rounding error beside the largest."""
-    numbers = list(values)
-    size = max(map(abs, numbers), default=0.0)
-    return "  ".join(number(value, size, digits=5) for value in numbers)
-
-
-def residual(value: float) -> str:
-    """Return the text of a residual in scaled terms, of which no digit means anything below its error bound."""
-    return f"{value:.1e}" if value > _RESIDUAL else f"below {_RESIDUAL:.0e}"
 
 
 def ordered(value: float) -> float:

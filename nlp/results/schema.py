@@ -16,13 +16,13 @@ from ..system.jsonvalues import JsonObject, JsonValue, Mark, kinds_of
 from ..system.reading import check_version, read_limited
 from ..system.strictjson import Size, WrongValueError, below, json_tree, value_of
 from .axisranges import AxisRangesResult
+from .checks import ChecksResult
 from .comparison import ComparisonResult
 from .data import CombinedResult, SolveResult
 from .evaluation import EvaluationResult
 from .evidence import CertifiedResult
 from .explorations import FrontResult, SweepResult
 from .path import PathResult
-from .regression import ChecksResult
 from .tradeoff import TradeoffResult
 from .workspace import WorkspaceResult
 

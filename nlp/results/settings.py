@@ -12,14 +12,14 @@ from ..case.pose import Free, Pose, RotationForm
 from ..errors import InputError
 from ..evidence.state import PlatformPose
 from ..system.jsonvalues import Vector
+from .claims import refuted_claims
 from .data import CombinedResult, SolveResult
 from .evaluation import EvaluationResult
 from .parts import RobotData, settings_from_data
 from .path import PathResult
-from .posewording import rotation_form, rotation_numbers
+from .poses import rotation_form, rotation_numbers
 from .schema import load_result
 from .workspace import WorkspaceResult
-from .workspaceposes import refuted_claims
 
 Answer: TypeAlias = SolveResult | CombinedResult | EvaluationResult
 #: Names of the numbers of a pose, behind its prefix.

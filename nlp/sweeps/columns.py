@@ -17,16 +17,16 @@ from ..errors import InputError
 from ..program.formulation import formulate_each
 from ..program.nlp import Nlp
 from ..results.design import limits_data, margins_data
-from ..results.designs import SEPARATOR, Cell, Column, ColumnKind, Designs, Join, PageWords
 from ..results.explorations import Numbers, SweepResult
 from ..results.objective import unit_of_objective
 from ..results.point import head_data, stated_pose_notice, versions
-from ..results.rounding import number
-from ..results.tables import sizes_of_variables
-from ..results.text import Line
 from ..results.tradeoff import unit_of_number
 from ..system.journal import fields_of
 from ..system.jsonvalues import finite_or_none, vector
+from ..words.designs import SEPARATOR, Cell, Column, ColumnKind, Designs, Join, PageWords
+from ..words.numbers import number
+from ..words.tables import sizes_of_variables
+from ..words.text import Line
 from .journal import Row
 from .points import Points
 from .sweep import Sweep

@@ -54,8 +54,8 @@ from screwsynth.nlp.program.blocks import Blocks
 from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.checker.proof_file import ProofError
 from screwsynth.nlp.proof.statement.standard_form import Kind, is_in_home_mode, standard_form
-from screwsynth.nlp.results.wording import starts_lines
 from screwsynth.nlp.solver.certified import certify, proof_of
+from screwsynth.nlp.words.lines import starts_lines
 
 TASK = Task(np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2]))
 

@@ -26,7 +26,7 @@ from screwsynth.nlp.output.pictures.figures import figure_of, picture
 from screwsynth.nlp.output.pictures.segments import distances_to_segments, segments_cross, segments_in_boxes
 from screwsynth.nlp.output.pictures.solutions import drawings_of
 from screwsynth.nlp.output.pictures.view import clearest_view
-from screwsynth.nlp.results.robottables import robot_table
+from screwsynth.nlp.words.robot import robot_table
 
 #: Robots whose functions say where their parameters are in a picture; a robot file does not.
 DRAWN_BY_HAND = [name for name in model_names() if name not in gallery_names()]

@@ -25,9 +25,9 @@ from screwsynth.nlp.evidence.paths import velocities_at
 from screwsynth.nlp.evidence.sensitivity import Hindrance
 from screwsynth.nlp.evidence.state import loops_are_closed
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
-from screwsynth.nlp.results.summary import case_summary, case_tables, table_names
-from screwsynth.nlp.results.text import Line, TextTable
 from screwsynth.nlp.starter.text import starter_case
+from screwsynth.nlp.words.summary import case_summary, case_tables, table_names
+from screwsynth.nlp.words.text import Line, TextTable
 
 #: Freedoms of the robots with fewer than six, and what each one's task is called.
 TASKS = {

@@ -23,7 +23,7 @@ from screwsynth.nlp.evidence.screwvalues import ScrewMotion, ScrewWrench, wrench
 from screwsynth.nlp.evidence.singularities import Singularity, SingularityKind, _null_twists, is_passive_singular
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.verdict import Outcome
-from screwsynth.nlp.results.summary import case_summary
+from screwsynth.nlp.words.summary import case_summary
 
 TURN = [Task.screw("max", axis=[0, 0, 1], point=[0, 0, 0], pitch=0)]
 LEG = [

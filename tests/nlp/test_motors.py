@@ -34,8 +34,8 @@ from screwsynth.nlp.proof.workspace.slices.slice_limits import KEPT, UNDECIDED
 from screwsynth.nlp.proof.workspace.slices.slices import slices_of
 from screwsynth.nlp.proof.workspace.verdict import Outcome, Verdict
 from screwsynth.nlp.results.workspace import workspace_of
-from screwsynth.nlp.results.workspacemotors import motor_tables
-from screwsynth.nlp.results.workspacewording import verdict_words
+from screwsynth.nlp.words.motors import motor_tables
+from screwsynth.nlp.words.workspace import verdict_words
 
 #: Key of a number: what, of which actuator, under which load, and the sense.
 Numbers = dict[tuple[str, int, str, Sense], Verdict]

@@ -12,7 +12,7 @@ from builders import Run, edited, output_of, refusal_of, saved
 
 from screwsynth.nlp import PointKind, Solution, Status, load_case, shipped_cases, solve
 from screwsynth.nlp.output.checks import checks_as_junit, checks_as_markdown
-from screwsynth.nlp.results.regression import CaseCheck, check, check_case, decimals_of
+from screwsynth.nlp.results.checks import CaseCheck, check, check_case, decimals_of
 
 STARTS = 64
 

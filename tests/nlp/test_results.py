@@ -30,10 +30,8 @@ from screwsynth.nlp.output.report.markup import html_table, paragraphs
 from screwsynth.nlp.output.report.report import report_of
 from screwsynth.nlp.output.report.webpage import page_of
 from screwsynth.nlp.results import data, parts
-from screwsynth.nlp.results.regression import check_case
+from screwsynth.nlp.results.checks import check_case
 from screwsynth.nlp.results.schema import RESULTS, _object, result_from_json, result_schema
-from screwsynth.nlp.results.summary import case_summary
-from screwsynth.nlp.results.text import Line, TextTable, Tone
 from screwsynth.nlp.solver import multistart, starts
 from screwsynth.nlp.system.jsonvalues import (
     Absent,
@@ -47,6 +45,8 @@ from screwsynth.nlp.system.jsonvalues import (
     Slope,
 )
 from screwsynth.nlp.system.strictjson import WrongValueError
+from screwsynth.nlp.words.summary import case_summary
+from screwsynth.nlp.words.text import Line, TextTable, Tone
 
 Json = dict[str, Any]
 
@@ -339,7 +339,7 @@ def test_numbers_that_are_none_and_arrays_are_read_again() -> None:
 
 def test_words_need_neither_terminal_nor_page() -> None:
     loaded = "print(*(name for name in ('rich', 'html', 'pydantic') if name in sys.modules))"
-    words = "import sys; import screwsynth.nlp.results.summary, screwsynth.nlp.results.checks; " + loaded
+    words = "import sys; import screwsynth.nlp.words.summary, screwsynth.nlp.words.checks; " + loaded
     page = "import sys; import screwsynth.nlp.output.report.webpage; " + loaded
     for code, expected in ((words, {"pydantic"}), (page, {"html", "pydantic"})):
         done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True, check=True)

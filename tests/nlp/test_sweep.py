@@ -22,7 +22,6 @@ from screwsynth.nlp.case.reader import read_case
 from screwsynth.nlp.evidence.many import Numbers, _scales, judge_many
 from screwsynth.nlp.output.pictures.designs import designs_figure, legend_of
 from screwsynth.nlp.output.sweeptable import table_rows, write_table
-from screwsynth.nlp.results.designs import Designs
 from screwsynth.nlp.results.explorations import SweepResult
 from screwsynth.nlp.sweeps import workers
 from screwsynth.nlp.sweeps.columns import sweep_designs
@@ -32,6 +31,7 @@ from screwsynth.nlp.sweeps.points import CaseSource, Points, grid, points_of_csv
 from screwsynth.nlp.sweeps.sweep import Sweep, run_sweep
 from screwsynth.nlp.sweeps.workers import PointBlock, answer_in_processes
 from screwsynth.nlp.system.journal import line_of, row_of
+from screwsynth.nlp.words.designs import Designs
 
 CASE = "paper-4.1-helical"
 #: Case files that say the same number in two ways are the same to this part.

@@ -50,15 +50,16 @@ from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.results.data import SolveResult
 from screwsynth.nlp.results.evaluation import EvaluationResult, evaluation_of
 from screwsynth.nlp.results.evidence import certificate_data
-from screwsynth.nlp.results.posewording import evaluate_command, pose_words, rotation_form, rotation_numbers
+from screwsynth.nlp.results.poses import rotation_form, rotation_numbers
 from screwsynth.nlp.results.result import result_of
-from screwsynth.nlp.results.robotwording import model_words
-from screwsynth.nlp.results.rounding import listed, number
-from screwsynth.nlp.results.summary import case_summary, evaluation_summary
-from screwsynth.nlp.results.tables import limit_table, margin_table, optimum_table
-from screwsynth.nlp.results.text import Line, TextTable, Tone
 from screwsynth.nlp.results.verdicts import WorkspacePose
-from screwsynth.nlp.results.wording import certificate_lines, headline, motion_words, task_words
+from screwsynth.nlp.words.lines import certificate_lines, headline, motion_words, task_words
+from screwsynth.nlp.words.models import model_words
+from screwsynth.nlp.words.numbers import listed, number
+from screwsynth.nlp.words.poses import evaluate_command, pose_words
+from screwsynth.nlp.words.summary import case_summary, evaluation_summary
+from screwsynth.nlp.words.tables import limit_table, margin_table, optimum_table
+from screwsynth.nlp.words.text import Line, TextTable, Tone
 
 #: A command on a shipped case, and whether everything of it is printed too.
 COMMANDS = [

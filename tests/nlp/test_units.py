@@ -37,15 +37,16 @@ from screwsynth.nlp.proof.enclosure.tape import compile_tape
 from screwsynth.nlp.proof.statement.standard_form import standard_form
 from screwsynth.nlp.proof.workspace.path_judge import judge_path
 from screwsynth.nlp.results.evaluation import evaluation_of
-from screwsynth.nlp.results.rounding import ordered, residual
-from screwsynth.nlp.results.summary import case_summary, evaluation_summary
-from screwsynth.nlp.results.text import Line, TextTable
+from screwsynth.nlp.results.rounding import ordered
 from screwsynth.nlp.results.workspace import WorkspaceResult, workspace_of
-from screwsynth.nlp.results.workspacewording import workspace_summary
 from screwsynth.nlp.sweeps.columns import sweep_designs
 from screwsynth.nlp.sweeps.journal import Row
 from screwsynth.nlp.sweeps.points import CaseSource, Points
 from screwsynth.nlp.sweeps.sweep import Sweep
+from screwsynth.nlp.words.numbers import residual
+from screwsynth.nlp.words.summary import case_summary, evaluation_summary
+from screwsynth.nlp.words.text import Line, TextTable
+from screwsynth.nlp.words.workspace import workspace_summary
 
 Tables = dict[str, Any]
 Make = Callable[[Case], tuple[object, Iterable[Line | TextTable]]]

@@ -35,9 +35,10 @@ from screwsynth.nlp.proof.workspace.scale import ACCURACY, largest_scale
 from screwsynth.nlp.proof.workspace.slices.slice_limits import UNDECIDED, LimitState, SliceLimits
 from screwsynth.nlp.proof.workspace.slices.slices import slices_of
 from screwsynth.nlp.proof.workspace.verdict import Verdict
+from screwsynth.nlp.results.claims import refuted_claims, worst_claim
 from screwsynth.nlp.results.workspace import WorkspaceResult, workspace_of
-from screwsynth.nlp.results.workspaceposes import refuted_claims, seeing_lines, worst_claim
-from screwsynth.nlp.results.workspacewording import verdict_words
+from screwsynth.nlp.words.claims import claim_words, seeing_lines
+from screwsynth.nlp.words.workspace import verdict_words
 
 Value = TypeVar("Value")
 
@@ -474,13 +475,13 @@ def test_the_page_has_verdicts_poses_and_slices(refuted: tuple[str, WorkspaceRes
     assert all(each.startswith("data:image/") for each in page.images)
     assert "http" not in re.sub(r"http-equiv|http://www\.w3\.org/\S+", "", text)
     for claim in refuted_claims(result):
-        assert claim.words in page.words
+        assert claim_words(claim) in page.words
     assert len(text) < 1_000_000
     worst = worst_claim(result, Sense.MAX)
-    assert worst.words in page.words
+    assert claim_words(worst) in page.words
     assert 'id="limb 1+"' in (folder / "worst.svg").read_text(encoding="utf-8")
     headline = drawing_at(load_case(limited, {"x3": 6}), worst).headline
-    assert headline.startswith(f"refuted: {worst.words}; shown at ")
+    assert headline.startswith(f"refuted: {claim_words(worst)}; shown at ")
     said = [float(each) for each in re.findall(r"-?[\d.]+(?:e-?\d+)?", headline.partition("shown at ")[2])]
     assert said[:3] == pytest.approx(list(worst.pose.position), rel=1e-4, abs=1e-4)
 

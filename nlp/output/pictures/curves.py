@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ....models import FloatArray
-from ...results.designs import Column, ColumnKind, Designs, Row
-from ...results.objective import objective_label
+from ...words.designs import Column, ColumnKind, Designs, Row
+from ...words.objective import objective_label
 from .canvas import INK, RED, draw_edges
 
 

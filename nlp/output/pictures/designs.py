@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...errors import EvaluationError
-from ...results.designs import ColumnKind, Designs, Join, Row
+from ...words.designs import ColumnKind, Designs, Join, Row
 from .curves import goals_figure, lines_figure
 from .drawing import Drawing
 from .figures import picture_of

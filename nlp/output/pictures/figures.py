@@ -16,8 +16,8 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from ...results.robottables import rate_word
 from ...units import rate_unit
+from ...words.robot import rate_word
 from .canvas import INK, MUTED, RED
 from .drawing import Drawing
 from .fonts import families, legible, needs_other_font

@@ -19,8 +19,8 @@ from ...proof.workspace.judgement import Judgement
 from ...proof.workspace.path_samples import PathSamples, SampledNumber, motor_numbers
 from ...proof.workspace.verdict import Outcome
 from ...results.path import PathResult, PathVerdictData
-from ...results.pathwording import checked_claims
-from ...results.rounding import number
+from ...words.numbers import number
+from ...words.path import checked_claims
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ...results.pathwording import verdict_words
+from ...words.path import verdict_words
 from .canvas import INK, MUTED, RED
 from .curves import draw_grid
 from .fonts import legible

@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ....models import FloatArray
-from ...results.designs import ColumnKind, Designs, Row
-from ...results.objective import objective_label
+from ...words.designs import ColumnKind, Designs, Row
+from ...words.objective import objective_label
 from .canvas import INK, MUTED, draw_edges
 from .curves import numbers_of
 from .fonts import legible

@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 
 from ....models import Dimension
 from ...errors import EvaluationError
-from ...results.designs import Designs, DrawnDesign, Row
+from ...words.designs import Designs, DrawnDesign, Row
 from .canvas import INK, MUTED
 from .drawing import Drawing, drawing_of
 from .figures import add_colour_bar, add_legend, picture_of

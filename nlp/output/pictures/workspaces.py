@@ -24,9 +24,10 @@ from ...proof.statement.posed_layout import at_one_pose
 from ...proof.workspace.slices.slice_limits import KEPT, UNDECIDED
 from ...proof.workspace.slices.slices import Region, Slice
 from ...proof.workspace.verdict import Outcome
-from ...results.posewording import pose_words
-from ...results.rounding import number
-from ...results.workspaceposes import PosedClaim
+from ...results.claims import PosedClaim
+from ...words.claims import claim_words
+from ...words.numbers import number
+from ...words.poses import pose_words
 from .canvas import INK, draw_edges
 from .drawing import Drawing, drawing_of
 from .figures import picture_of
@@ -57,7 +58,7 @@ def drawing_at(case: Case, claim: PosedClaim) -> Drawing:
         # Numbers of the pose that follow from others are those of the machine: the design's loops do not close there.
         raise EvaluationError("the worst pose is that of a machine within the tolerance, not of the design") from None
     x = closed_start(nlp)
-    headline = f"{claim.outcome.value}: {claim.words}; shown at {pose_words(case, pose)}"
+    headline = f"{claim.outcome.value}: {claim_words(claim)}; shown at {pose_words(case, pose)}"
     return drawing_of(nlp, x, evaluate(nlp, x), headline=headline, is_answer=claim.outcome is not Outcome.REFUTED)
 
 

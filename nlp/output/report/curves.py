@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from ...results.designs import Column, ColumnKind, Designs, Row
-from ...results.objective import objective_label
+from ...words.designs import Column, ColumnKind, Designs, Row
+from ...words.objective import objective_label
 from .charts import Curve, Spot, line_chart
 from .markup import Markup, tag
 

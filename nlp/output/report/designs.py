@@ -8,7 +8,7 @@ from contextlib import suppress
 import numpy as np
 
 from ...errors import EvaluationError
-from ...results.designs import ColumnKind, Designs, DrawnDesign, Join, Row, designs_table
+from ...words.designs import ColumnKind, Designs, DrawnDesign, Join, Row, designs_table
 from ..pictures.designs import design_pictures, designs_figure, legend_of
 from ..pictures.drawing import Drawing, drawing_of
 from ..pictures.figures import picture_of

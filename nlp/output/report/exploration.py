@@ -9,14 +9,16 @@ import numpy as np
 
 from ...evidence.state import ZERO_F
 from ...results.data import SolveResult
-from ...results.objective import objective_label, unit_of_objective
+from ...results.objective import unit_of_objective
 from ...results.parts import LimitData, RobotData
-from ...results.rounding import number, settled, task_F
-from ...results.tables import MOST_OPTIMA, optimum_table
-from ...results.tradeoff import tradeoff_designs
-from ...results.wording import counted
+from ...results.rounding import settled, task_F
 from ...solver.multistart import ProgramSolution
 from ...solver.starts import StartStatus
+from ...words.lines import counted
+from ...words.numbers import number
+from ...words.objective import objective_label
+from ...words.tables import MOST_OPTIMA, optimum_table
+from ...words.tradeoff import tradeoff_designs
 from .charts import Curve, Spot, count_chart, line_chart
 from .curves import curve_figures
 from .designs import designs_rows

@@ -9,9 +9,9 @@ import numpy as np
 
 from ....models import Dimension, FloatArray, JointSymbol, WrenchKind
 from ...evidence.state import ZERO_F
-from ...results.robottables import rate_word
 from ...results.rounding import settled
 from ...units import Units, objective_unit, rate_unit
+from ...words.robot import rate_word
 from ..pictures.drawing import Drawing, Motion
 from ..pictures.loads import DrawnForces
 from ..pictures.posture import Posture

@@ -12,7 +12,7 @@ from importlib.resources import files
 from string import Template
 from typing import Any
 
-from ...results.text import Line, TextTable
+from ...words.text import Line, TextTable
 
 
 class Markup(str):

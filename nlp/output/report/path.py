@@ -7,10 +7,10 @@ from collections.abc import Callable
 import numpy as np
 
 from ...case.pose import RotationForm
-from ...results.pathwording import checked_claims, fault_words, first_refuted, path_summary, verdict_words
-from ...results.posewording import pose_words
 from ...results.verdicts import WorkspacePose
 from ...system.jsonvalues import json_data
+from ...words.path import checked_claims, fault_words, first_refuted, path_summary, verdict_words
+from ...words.poses import pose_words
 from ..pictures.figures import picture as picture_file
 from ..pictures.pathpanels import (
     ACTUATOR_COLOURS,

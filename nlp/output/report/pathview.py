@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict
 import numpy as np
 
 from ....models import FloatArray
-from ...results.rounding import number
+from ...words.numbers import number
 from ..pictures.drawing import Drawing, drawing_without_task
 from ..pictures.pathpanels import LIMIT_COLOURS, PathPicture, percent
 from ..pictures.posture import Linkage, Posture

@@ -16,14 +16,16 @@ from ...case.case import Case
 from ...evidence.loads import loads_at
 from ...evidence.state import RobotState
 from ...program.nlp import Nlp
+from ...results.checks import CaseCheck
 from ...results.data import CaseResult
-from ...results.objective import objective_label, pose_objective, unit_of_objective
-from ...results.regression import CaseCheck
-from ...results.rounding import number, ordered
+from ...results.objective import pose_objective, unit_of_objective
+from ...results.rounding import ordered
 from ...results.tradeoff import TradeoffResult
 from ...solver.multistart import ProgramSolution
 from ...solver.solution import Solution, TaskOutcome
 from ...system.jsonvalues import json_data
+from ...words.numbers import number
+from ...words.objective import objective_label
 from ..pictures.drawing import Drawing, drawing_of
 from ..pictures.posture import states_at_poses, worst_pose
 from .frames import PoseView, ViewData, view_data

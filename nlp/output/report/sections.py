@@ -8,16 +8,12 @@ from ...case.case import Case
 from ...case.choices import listed_numbers
 from ...case.pose import sizes_of_turn
 from ...evidence.optimality import CURVED, Evidence
-from ...results.checks import published_table
 from ...results.data import CertificateData, CombinedData, CombinedResult, SolveResult
-from ...results.jointwording import limb_part_table
-from ...results.objective import objective_words
-from ...results.pathwording import along_table, path_proof_lines
 from ...results.point import task_data
-from ...results.robottables import combined_design_table, robot_tables, solved_design_table
-from ...results.rounding import number, size_of_F
-from ...results.tables import active_table, limit_table, limits_title, margin_table, origin_table, outcome_table
-from ...results.wording import (
+from ...results.rounding import size_of_F
+from ...words.checks import published_table
+from ...words.joints import limb_part_table
+from ...words.lines import (
     certificate_lines,
     choice_lines,
     costliest_words,
@@ -30,7 +26,12 @@ from ...results.wording import (
     task_words,
     tolerance_line,
 )
-from ...results.workspacewording import proof_lines, proof_tables
+from ...words.numbers import number
+from ...words.objective import objective_words
+from ...words.path import along_table, path_proof_lines
+from ...words.robot import combined_design_table, robot_tables, solved_design_table
+from ...words.tables import active_table, limit_table, limits_title, margin_table, origin_table, outcome_table
+from ...words.workspace import proof_lines, proof_tables
 from .charts import Curve, Spot, line_chart
 from .exploration import optima, surroundings
 from .markup import Markup, html_table, join_markup, paragraphs, tag

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from ...results.parts import VersionsData
-from ...results.tables import origin_table
-from ...results.text import Line, TextTable
+from ...words.tables import origin_table
+from ...words.text import Line, TextTable
 from .markup import Markup, html_table, join_markup, paragraphs, tag
 
 

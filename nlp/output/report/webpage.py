@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ...case.case import Case
 from ...errors import CaseError
-from ...results.regression import CaseCheck
+from ...results.checks import CaseCheck
 from ...results.result import result_of
 from ...results.tradeoff import TradeoffResult
 from ...solver.certified import Certified

@@ -8,15 +8,16 @@ from dataclasses import dataclass
 from ...case.case import Case
 from ...errors import EvaluationError
 from ...proof.workspace.slices.slices import Slice
-from ...results.posewording import pose_words
-from ...results.rounding import number
-from ...results.text import TextTable
+from ...results.claims import refuted_claims, worst_claim
 from ...results.verdicts import WorkspacePose
-from ...results.verdictwording import machine_lines
 from ...results.workspace import WorkspaceResult
-from ...results.workspaceposes import refuted_claims, worst_claim
-from ...results.workspacewording import verdict_words, workspace_summary
 from ...system.jsonvalues import json_data
+from ...words.claims import claim_words
+from ...words.numbers import number
+from ...words.poses import pose_words
+from ...words.text import TextTable
+from ...words.verdicts import machine_lines
+from ...words.workspace import verdict_words, workspace_summary
 from ..pictures.figures import picture
 from ..pictures.workspaces import Kind, drawing_at, slice_images, slices_legend, slices_notes
 from .markup import (
@@ -89,7 +90,7 @@ def _verdicts(report: WorkspaceReport) -> Markup:
 def _refuted(report: WorkspaceReport) -> Markup:
     """Return each refuted claim with its pose and the command that shows it; empty without one."""
     return join_markup(
-        refuting_place(claim.words, pose_words(report.case, claim.pose), report.command(claim.pose))
+        refuting_place(claim_words(claim), pose_words(report.case, claim.pose), report.command(claim.pose))
         for claim in refuted_claims(report.result)
     )
 
@@ -118,8 +119,8 @@ def _robot(report: WorkspaceReport) -> Markup:
     except EvaluationError as error:
         return tag("p", f"No picture: {error}.")
     at = pose_words(report.case, worst.pose)
-    image = tag("img", src=image_source(content), alt=f"The robot at {at}: {worst.words}", class_="posed")
-    figure = tag("figure", image, tag("figcaption", f"The machine at its worst pose, {at}: {worst.words}."))
+    image = tag("img", src=image_source(content), alt=f"The robot at {at}: {claim_words(worst)}", class_="posed")
+    figure = tag("figure", image, tag("figcaption", f"The machine at its worst pose, {at}: {claim_words(worst)}."))
     return join_markup([figure, shown_command(report.command(worst.pose))])
 
 

@@ -12,10 +12,13 @@ from ..case.pose import ends_of
 from ..case.task import Sense
 from ..interruption import STOPPED
 from ..proof.workspace.verdict import EVERYWHERE, Outcome
-from .posewording import pose_words
-from .rounding import number
+from .claims import seeing_lines
+from .lines import title_line
+from .motors import TONES, ends_of_motor, motor_tables
+from .numbers import number
+from .poses import pose_words
 from .text import Line, TextTable, Tone, in_part
-from .verdictwording import (
+from .verdicts import (
     answer_line,
     answer_words,
     exchange_lines,
@@ -28,13 +31,10 @@ from .verdictwording import (
     tightest_table,
     verdict_table,
 )
-from .wording import title_line
-from .workspacemotors import TONES, ends_of_motor, motor_tables
-from .workspaceposes import seeing_lines
 
 if TYPE_CHECKING:
-    from .verdicts import RegularData, VerdictData, WorkspacePose
-    from .workspace import ScaleData, WorkspaceProofData, WorkspaceResult
+    from ..results.verdicts import RegularData, VerdictData, WorkspacePose
+    from ..results.workspace import ScaleData, WorkspaceProofData, WorkspaceResult
 
 
 def verdict_lines(case: Case, result: WorkspaceResult) -> Iterator[Line]:

@@ -1,4 +1,4 @@
-"""Motors over a workspace: what each actuator needs at every pose, as data and as one table."""
+"""Motors over a workspace: what each actuator needs at every pose, as one table."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from ..case.forces import dimension_of_force, dimension_of_speed
 from ..case.motors import MotorNumber
 from ..case.task import Sense
 from ..proof.workspace.verdict import Outcome
-from .rounding import number
+from .numbers import number
 from .text import Line, TextTable, Tone
 
 if TYPE_CHECKING:
-    from .workspace import MotorData, MotorEndData
+    from ..results.workspace import MotorData, MotorEndData
 
 #: Tone of each outcome.
 TONES = {Outcome.PROVED: Tone.HOLDS, Outcome.REFUTED: Tone.FAULT, Outcome.OPEN: Tone.CAUTION}

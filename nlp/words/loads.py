@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 
 from ...models import Dimension
 from ..case.case import Case
-from .rounding import number, robot_size
+from ..results.rounding import robot_size
+from .numbers import number
 from .text import TextTable
 
 if TYPE_CHECKING:
     from ..evidence.loads import HeldLoad, TopSpeed
-    from .parts import RobotData
+    from ..results.parts import RobotData
 
 
 def loading_tables(case: Case, robot: RobotData) -> Iterator[TextTable]:

@@ -13,14 +13,10 @@ from ...models import Dimension, Model, WrenchKind, component_names
 from ..case.case import Case
 from ..case.pose import Free, RotationForm, Value, sizes_of_turn
 from ..case.task import Sense
-from ..units import Units, rate_unit, slope_unit
-from .loadtables import loading_tables
-from .posewording import rotation_numbers
-from .rounding import (
+from ..results.poses import rotation_numbers
+from ..results.rounding import (
     STATED,
     TURNED,
-    listed,
-    number,
     ordered,
     rate_sizes,
     robot_size,
@@ -30,6 +26,9 @@ from .rounding import (
     size_of,
     size_of_F,
 )
+from ..units import Units, rate_unit, slope_unit
+from .loads import loading_tables
+from .numbers import listed, number
 from .text import FEWEST_FOLDED, Figure, TextTable
 
 if TYPE_CHECKING:
@@ -37,8 +36,8 @@ if TYPE_CHECKING:
     from ..evidence.sensitivity import Sensitivity
     from ..evidence.state import PlatformPose
     from ..program.free_joints import FreeJoint
-    from .data import CombinedData, SolveResult
-    from .parts import ByOwner, PosesData, PoseStateData, RobotData, TaskData
+    from ..results.data import CombinedData, SolveResult
+    from ..results.parts import ByOwner, PosesData, PoseStateData, RobotData, TaskData
 
 #: So many fixed numbers are shown where others are free; those that F feels most, where that is known.
 _FIXED = 6

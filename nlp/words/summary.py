@@ -8,24 +8,11 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from ..case.case import Case
 from ..evidence.state import ZERO_F
+from ..results.data import CombinedResult
+from ..results.rounding import robot_size, size_of_F
 from ..units import objective_unit
-from .data import CombinedResult
-from .jointwording import limb_part_table
-from .loadtables import loading_tables
-from .robottables import (
-    combined_design_table,
-    design_table,
-    jacobian_table,
-    plural_name,
-    robot_table,
-    robot_tables,
-    robot_tables_by_limb,
-    solved_design_table,
-)
-from .rounding import listed, number, robot_size, size_of_F
-from .tables import limit_table, limits_title, margin_table, outcome_table, principal_table
-from .text import Line, TextTable, Tone, in_part
-from .wording import (
+from .joints import limb_part_table
+from .lines import (
     better_line,
     certificate_lines,
     check_lines,
@@ -45,13 +32,27 @@ from .wording import (
     verdict_line,
     violation_lines,
 )
+from .loads import loading_tables
+from .numbers import listed, number
+from .robot import (
+    combined_design_table,
+    design_table,
+    jacobian_table,
+    plural_name,
+    robot_table,
+    robot_tables,
+    robot_tables_by_limb,
+    solved_design_table,
+)
+from .tables import limit_table, limits_title, margin_table, outcome_table, principal_table
+from .text import Line, TextTable, Tone, in_part
 
 if TYPE_CHECKING:
     from ..evidence.margins import Margin
-    from .data import CaseResult, SolveResult
-    from .evaluation import EvaluationResult
-    from .evidence import CertifiedResult
-    from .parts import RobotData
+    from ..results.data import CaseResult, SolveResult
+    from ..results.evaluation import EvaluationResult
+    from ..results.evidence import CertifiedResult
+    from ..results.parts import RobotData
 
 Summary: TypeAlias = Iterator[Line | TextTable]
 
@@ -112,13 +113,13 @@ def _proof_lines(case: Case, result: CaseResult) -> Iterator[Line]:
     """Yield the proof of a design over a workspace, or along a path."""
     if result.workspace is not None:
         # Few cases have a proof, and what shows it loads the room of proofs.
-        from .verdictwording import machine_lines  # noqa: PLC0415
-        from .workspacewording import proof_lines  # noqa: PLC0415
+        from .verdicts import machine_lines  # noqa: PLC0415
+        from .workspace import proof_lines  # noqa: PLC0415
 
         yield from proof_lines(result.workspace)
         yield from machine_lines(case, result.workspace.joint_centre)
     if result.path is not None:
-        from .pathwording import path_proof_lines  # noqa: PLC0415 - in the same way
+        from .path import path_proof_lines  # noqa: PLC0415 - in the same way
 
         yield from path_proof_lines(case, result.path)
 
@@ -126,11 +127,11 @@ def _proof_lines(case: Case, result: CaseResult) -> Iterator[Line]:
 def _proof_digest(result: CaseResult) -> Summary:
     """Yield the tightest claims of the proof of a design."""
     if result.workspace is not None:
-        from .verdictwording import tightest_table  # noqa: PLC0415 - as above
+        from .verdicts import tightest_table  # noqa: PLC0415 - as above
 
         yield from tightest_table(result.workspace.extremes)
     if result.path is not None:
-        from .pathwording import tightest_along  # noqa: PLC0415 - as above
+        from .path import tightest_along  # noqa: PLC0415 - as above
 
         yield from tightest_along(result.path)
 

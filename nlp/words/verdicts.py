@@ -11,15 +11,16 @@ from ..case.pose import RotationForm
 from ..case.task import Sense
 from ..case.workspace import POSITION
 from ..proof.workspace.verdict import Outcome
-from .posewording import pose_words
-from .rounding import number, ordered
+from ..results.rounding import ordered
+from .lines import counted
+from .motors import TONES
+from .numbers import number
+from .poses import pose_words
 from .text import Line, TextTable, Tone
-from .wording import counted
-from .workspacemotors import TONES
 
 if TYPE_CHECKING:
-    from .exchange import ExchangeData
-    from .verdicts import MachineData, VerdictData
+    from ..results.exchange import ExchangeData
+    from ..results.verdicts import MachineData, VerdictData
 
 #: So many claims are in the digest, and so many kinds of limits in the count of an outcome.
 _TIGHTEST, _GROUPS = 5, 6

@@ -6,12 +6,13 @@ import math
 from typing import TYPE_CHECKING
 
 from ..evidence.kkt import ACTIVE
+from ..results.data import CombinedData
+from ..results.rounding import NOISE, rate_sizes, settled, settled_F, task_F
 from ..units import Units, slope_unit
-from .data import CombinedData
-from .jointwording import motion_words
-from .rounding import NOISE, number, rate_sizes, settled, settled_F, task_F
+from .joints import motion_words
+from .lines import SET, counted
+from .numbers import number
 from .text import TextTable
-from .wording import SET, counted
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -21,11 +22,11 @@ if TYPE_CHECKING:
     from ..evidence.margins import Margin
     from ..evidence.principal_motions import TaskAnalysis
     from ..program.nlp import Nlp
+    from ..results.data import SolveResult
+    from ..results.parts import LimitData, RobotData, VersionsData
+    from ..results.path import PathProofData
+    from ..results.workspace import WorkspaceProofData
     from ..solver.multistart import ProgramSolution
-    from .data import SolveResult
-    from .parts import LimitData, RobotData, VersionsData
-    from .path import PathProofData
-    from .workspace import WorkspaceProofData
 
 #: So many places where a limit is active are named.
 _PLACES = 3

@@ -7,18 +7,17 @@ import shlex
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from ...models import Dimension, component_names
 from ..case.pose import Free, Rotation, RotationForm
-from ..case.workspace import TurnKind
-from .jointwording import triple
-from .rounding import TURNED, number
+from ..results.poses import rotation_form, rotation_numbers
+from ..results.rounding import TURNED
+from .joints import triple
+from .numbers import number
 
 if TYPE_CHECKING:
     from ..case.case import Case
     from ..case.overrides import Settings
-    from .verdicts import WorkspacePose
+    from ..results.verdicts import WorkspacePose
 
 #: Digits of a pose in a command: as few as show what all digits show, and so many where they show nothing.
 _FEWEST, _ENOUGH, _ALL = 3, 6, 17
@@ -26,39 +25,6 @@ _FEWEST, _ENOUGH, _ALL = 3, 6, 17
 _IMPOSSIBLE, _OPEN = "impossible", "open loops"
 #: Keys of a rotation, behind the prefix of its pose.
 _ROTATION = ("axis", "angle", *(each.value for each in (RotationForm.RPY, RotationForm.QUATERNION)))
-
-
-def rotation_form(case: Case) -> RotationForm:
-    """Return the form in which the poses of a case are shown: that of its workspace or its path, else of its pose."""
-    if case.workspace is not None:
-        is_rpy = case.workspace.turns.kind is TurnKind.ROLL_PITCH_YAW
-        return RotationForm.RPY if is_rpy else RotationForm.AXIS_ANGLE
-    return RotationForm.RPY if case.path is not None else case.rotation.form
-
-
-def rotation_numbers(case: Case, axis: Sequence[float], angle: float, form: RotationForm) -> dict[str, list[float]]:
-    """Return a rotation in a form: its numbers, by the names that ``--set`` has for them.
-
-    Args:
-        case: the case.
-        axis: (3,) unit axis.
-        angle: about it, in the case's unit.
-        form: of the numbers.
-    """
-    if form is RotationForm.AXIS_ANGLE:
-        turns = None if case.workspace is None else case.workspace.turns
-        # About an axis that the case states, an angle has a sign.
-        is_back = turns is not None and turns.kind is TurnKind.AXIS and np.dot(axis, turns.axis) < 0
-        sign = -1.0 if is_back else 1.0
-        return {"axis": [sign * each for each in axis], "angle": [sign * angle]}
-    from ..path.orientation import roll_pitch_yaw  # noqa: PLC0415 - few cases state such rotations
-
-    half = case.units.to_internal(angle, Dimension.ANGLE) / 2
-    quaternion = [math.cos(half), *(math.sin(half) * each for each in axis)]
-    if form is RotationForm.QUATERNION:
-        return {form.value: quaternion}
-    angles = roll_pitch_yaw(np.array([quaternion]))[0].tolist()
-    return {form.value: [case.units.shown(each, Dimension.ANGLE) for each in angles]}
 
 
 def _rotation(case: Case, numbers: Mapping[str, list[float]]) -> Rotation:

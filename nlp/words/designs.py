@@ -12,9 +12,9 @@ from ..case.case import Case
 from ..evidence.state import RobotState
 from ..program.nlp import Nlp
 from ..program.program import design_indices
+from ..results.data import CertificateData
 from ..system.csvtext import csv_text
-from .data import CertificateData
-from .rounding import number
+from .numbers import number
 from .text import Line, TextTable
 
 #: Between several values in a cell of CSV.

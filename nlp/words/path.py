@@ -9,9 +9,11 @@ from ..case.pathfile import PLACE
 from ..case.pose import Free
 from ..case.task import Sense
 from ..proof.workspace.verdict import Outcome
-from .rounding import number
+from .lines import title_line
+from .motors import TONES
+from .numbers import number
 from .text import Line, TextTable, Tone, in_part
-from .verdictwording import (
+from .verdicts import (
     SHOWN,
     answer_line,
     answer_words,
@@ -24,13 +26,11 @@ from .verdictwording import (
     tightest_table,
     verdict_table,
 )
-from .wording import title_line
-from .workspacemotors import TONES
 
 if TYPE_CHECKING:
     from ..case.case import Case
-    from .path import PathData, PathFaultData, PathProofData, PathResult, PathVerdictData
-    from .verdicts import WorkspacePose
+    from ..results.path import PathData, PathFaultData, PathProofData, PathResult, PathVerdictData
+    from ..results.verdicts import WorkspacePose
 
 #: So many words that move nothing are shown.
 _SHOWN = 6

@@ -8,9 +8,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from ...models import Model, Parameter
 from ..case.robots import ModelOption
 from ..units import Units
-from .jointwording import idle_words
+from .joints import idle_words
+from .lines import counted
 from .text import Line, TextTable, Tone, in_part
-from .wording import counted
 
 
 def models_table(models: Iterable[tuple[str, str]]) -> TextTable:

@@ -10,19 +10,20 @@ from ..case.case import Case
 from ..case.task import Sense
 from ..evidence.optimality import CURVED, PointKind
 from ..proof.certificate.certificate import CertificateStatus
+from ..results.rounding import ordered, robot_size, settled, task_F
 from ..solver.status import Status
 from ..units import Units, objective_unit, slope_unit
-from .jointwording import convention_lines, joint_lines, motion_words, reach_of, screw_words, triple
+from .joints import convention_lines, joint_lines, motion_words, reach_of, screw_words, triple
+from .numbers import number, residual, rounded_to
 from .objective import objective_words
-from .rounding import number, ordered, residual, robot_size, rounded_to, settled, task_F
 from .text import Line, Tone
 
 if TYPE_CHECKING:
     from ..evidence.optimality import Evidence
     from ..evidence.tolerance import ToleranceLoss
-    from .choices import ChoiceData, RoundingData
-    from .data import CertificateData, CombinedData, CombinedResult, SolveResult, StartsData
-    from .parts import LimitData, RobotData, TaskData, ViolationData
+    from ..results.choices import ChoiceData, RoundingData
+    from ..results.data import CertificateData, CombinedData, CombinedResult, SolveResult, StartsData
+    from ..results.parts import LimitData, RobotData, TaskData, ViolationData
 
 #: So many violated limits, and so many optima, are shown.
 _VIOLATIONS, _OPTIMA = 8, 5

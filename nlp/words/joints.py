@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING
 
 from ...models import Dimension
 from ..case.case import Case
+from ..results.rounding import NOISE, robot_size, settled
 from ..units import Units, objective_unit, rate_unit
-from .rounding import NOISE, number, robot_size, settled
+from .numbers import number
 from .text import Figure, Line, TextTable, Tone
 
 if TYPE_CHECKING:
     from ..evidence.screwvalues import ScrewMotion, ScrewWrench
     from ..evidence.singularities import Singularity
-    from .jointdata import JointsData
-    from .parts import RobotData
+    from ..results.joints import JointsData
+    from ..results.parts import RobotData
 
 
 def motion_words(motion: ScrewMotion, units: Units, size: float = 0.0, part: float = NOISE) -> str:

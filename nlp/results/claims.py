@@ -1,0 +1,106 @@
+"""Poses that a judged workspace names: those that refute a claim, and the worst one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+from ..case.task import Sense
+from ..proof.statement.claims import CONSTRAINTS, REGULAR
+from ..proof.workspace.verdict import Outcome
+from .rounding import ordered
+
+if TYPE_CHECKING:
+    from .verdicts import VerdictData, WorkspacePose
+    from .workspace import WorkspaceResult
+
+#: Beginning of the keys of limits that no single pose refutes, but two: the shortest and the longest length of a leg.
+_OVER_POSES = "actuator."
+#: Beginning of the names of the lengths of legs.
+_LENGTH = "leg_length limb "
+
+
+class PosedClaim(NamedTuple):
+    """A claim at a pose.
+
+    Attributes:
+        name: of the claim, up to a colon.
+        outcome: of the claim over the workspace.
+        pose: the pose.
+        verdict: on the claim, where it is about a number.
+        length: verdict on the length of a leg that is extreme at the pose, for a claim that needs two poses.
+    """
+
+    name: str
+    outcome: Outcome
+    pose: WorkspacePose
+    verdict: VerdictData | None = None
+    length: VerdictData | None = None
+
+    @property
+    def key(self) -> str:
+        """Dotted key, below ``limits``, of the limit in the case; empty for regular poses and without a limit."""
+        return "" if self.verdict is None else self.verdict.key or ""
+
+    @property
+    def beyond(self) -> float:
+        """Part of the limit by which it is passed; negative where it is kept."""
+        return 0.0 if self.verdict is None else _beyond(self.verdict)
+
+
+def refuted_claims(result: WorkspaceResult) -> Iterator[PosedClaim]:
+    """Yield the claims that are refuted, each with its pose; a limit on a stroke has two poses."""
+    for name, rank in ((REGULAR, result.regular), (CONSTRAINTS, result.constraints)):
+        if rank is not None and rank.outcome is Outcome.REFUTED and rank.pose is not None:
+            yield PosedClaim(name, rank.outcome, rank.pose)
+    for each in result.extremes:
+        if each.outcome is Outcome.REFUTED:
+            yield from _at_poses(result, each)
+
+
+def worst_claim(result: WorkspaceResult, sense: Sense) -> PosedClaim | None:
+    """Return the claim that is farthest beyond its limit, or, where all are kept, nearest to it; with its pose.
+
+    A singular pose is worse than any limit. Without limits it is the worst F. None where no pose is known.
+
+    Args:
+        result: of judging the workspace.
+        sense: of the first task.
+    """
+    singular = next((each for each in refuted_claims(result) if each.name == REGULAR and each.verdict is None), None)
+    if singular is not None:
+        return singular
+    limited = [(_beyond(each), each) for each in result.extremes if each.limit is not None and each.reached is not None]
+    for _, each in sorted(limited, key=lambda pair: -ordered(pair[0])):
+        found = next(_at_poses(result, each), None)
+        if found is not None:
+            return found
+    worst = Sense.MIN if sense is Sense.MAX else Sense.MAX
+    for each in result.extremes:
+        if each.limit is None and each.sense is worst and (each.name == "F" or each.name.startswith("F of ")):
+            return next(_at_poses(result, each), None)
+    return None
+
+
+def _at_poses(result: WorkspaceResult, each: VerdictData) -> Iterator[PosedClaim]:
+    """Yield an extreme with the poses at which it is reached."""
+    name = each.name.partition(":")[0]
+    if each.key is not None and each.key.startswith(_OVER_POSES):
+        for length in _lengths(result.extremes, each.name.partition(" limb ")[2]):
+            if length.pose is not None:
+                yield PosedClaim(name, each.outcome, length.pose, each, length)
+    elif each.pose is not None:
+        yield PosedClaim(name, each.outcome, each.pose, each)
+
+
+def _lengths(extremes: Sequence[VerdictData], limb: str) -> list[VerdictData]:
+    """Return the smallest and the largest length of a leg."""
+    return [each for each in extremes if each.name == f"{_LENGTH}{limb}"]
+
+
+def _beyond(each: VerdictData) -> float:
+    """Return how far a number is beyond its limit, as a part of the limit; negative where it is kept."""
+    if each.limit is None or each.reached is None or each.sense is None:
+        return float("-inf")
+    sign = each.sense.sign
+    return sign * (each.reached - each.limit) / (abs(each.limit) or 1.0)
