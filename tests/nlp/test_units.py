@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import math
 import re
+import tomllib
 from collections.abc import Callable, Iterable, Iterator
 from decimal import Decimal
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +21,9 @@ from numpy_engine.first_order import enclose
 from numpy_engine.quadratic_models import multipliers
 from numpy_engine.second_order import enclose_second
 
-from screwsynth.models import Dimension, Model, robot_function
+from screwsynth.models import Dimension, Model, robot, robot_function
 from screwsynth.models.catalog import SHIPPED
+from screwsynth.models.joints.model.closedform import closed_form
 from screwsynth.nlp import Case, Outcome, certify, json_data, judge_workspace, pareto, result_of, solve
 from screwsynth.nlp.case.reader import load_case, read_case
 from screwsynth.nlp.case.toml import toml_document
@@ -459,3 +462,16 @@ def test_the_force_that_a_limit_bounds_is_that_of_the_load_in_every_unit(cli: Ru
         assert speed == pytest.approx(max(each["value"] for each in data["speeds"]), rel=1e-9)
         found.append([force, speed * unit])
     np.testing.assert_allclose(found, [found[0]] * len(LENGTHS), rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["6-pus", "3-puu", "6-ups"])
+def test_slides_follow_in_closed_form_in_every_unit(name: str) -> None:
+    """The coefficient of a squared slide is the inverse of a squared length: small in small units."""
+    text = (files("screwsynth.models") / "robots" / f"{name}.toml").read_text(encoding="utf-8")
+    found = []
+    for unit in UNITS.values():
+        definition = tomllib.loads(text)
+        for item in definition["dimensions"].values():
+            item["typical"] *= 1.0 if item.get("kind") == "angle" else unit
+        found.append([each.name for each in closed_form(robot(**definition)).model.unknowns])
+    assert found == [found[0]] * len(UNITS)
