@@ -7,14 +7,13 @@ minimise the motion that the limb resists (:mod:`screwsynth.models.actuation`).
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Annotated
 
 import numpy as np
 
 from ...models import FloatArray, GenericRanks, LimbDrive, constraint_rows, limb_drive, rank_of_rows
 from ...models.values import dataclass
 from ..program.nlp import Nlp
-from ..system.jsonvalues import JsonObject, Key
+from ..system.jsonvalues import JsonObject
 from .paths import numbers_at
 from .singularities import (
     Singularity,
@@ -36,13 +35,13 @@ class LimbPart(JsonObject):
         limb: its name.
         F: sum of the squared work rates of its wrenches; of actuation and constraints.
         actuation: part that its actuators can move with.
-        constraint: part that no actuator can move with: 0 in every limb for a motion that is possible.
+        constraints: part that no actuator can move with: 0 in every limb for a motion that is possible.
     """
 
     limb: str
     F: float
     actuation: float
-    constraint: Annotated[float, Key("constraints")]
+    constraints: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +113,7 @@ def mobility_of(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> Mo
         actuator_rates=MappingProxyType(rates),
         constrained=0.0 if is_feasible else left / state.F,
         parts=tuple(
-            LimbPart(limb=limb, F=actuation + constraint, actuation=actuation, constraint=constraint)
+            LimbPart(limb=limb, F=actuation + constraint, actuation=actuation, constraints=constraint)
             for limb, (actuation, constraint) in by_limb.items()
         ),
         singularities=tuple(found),

@@ -147,8 +147,8 @@ def limb_part_table(case: Case, robot: RobotData) -> TextTable | None:
     total = sum(each.F for each in parts)
     rows = []
     for each in parts:
-        share = 100 * each.constraint / total if total > 0 else 0.0
-        cells = (number(each.F, total), number(each.actuation, total), number(each.constraint, total))
+        share = 100 * each.constraints / total if total > 0 else 0.0
+        cells = (number(each.F, total), number(each.actuation, total), number(each.constraints, total))
         rows.append((each.limb, *cells, Figure(f"{share:.3g}", share)))
     headers = ("limb", f"F\n{unit}", f"actuation\n{unit}", f"constraints\n{unit}", "constraints\n% of F")
     return TextTable(headers, tuple(rows), "actuation", "actuation and constraints by limb")

@@ -344,14 +344,14 @@ def test_actuation_and_constraints_of_limbs_sum_to_f(name: str) -> None:
         found = mobility_of(each, each.start, state)
         parts = found.parts
         assert sum(part.F for part in parts) == pytest.approx(state.F, rel=1e-9)
-        carried = sum(part.constraint for part in parts) / state.F
+        carried = sum(part.constraints for part in parts) / state.F
         assert carried == pytest.approx(found.constrained, abs=1e-12)
         assert (found.constrained == 0) == (is_feasible or name == "6-rus")
         # By limb: the rates of its rows, and the least squares of them by its actuators.
         rows = np.array([row.limb for row in each.program.model.rows])
         for part in parts:
             of_limb = np.sum(state.rates[rows == part.limb] ** 2)
-            assert part.F == part.actuation + part.constraint == pytest.approx(of_limb, rel=1e-9, abs=1e-12 * state.F)
+            assert part.F == part.actuation + part.constraints == pytest.approx(of_limb, rel=1e-9, abs=1e-12 * state.F)
             if part.limb not in {actuator.limb for actuator in each.program.model.actuators}:
                 assert part.actuation == 0
 
