@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import Run, edited, output_of, refusal_of, saved
+from builders import Run, case_from, edited, output_of, refusal_of, saved, starter_tables
 from path_cases import extreme, hexapod, leg_lengths, program, robot_of, table
 
 from screwsynth.nlp import Case, Outcome, ProgrammedPath, Sense
@@ -19,8 +19,9 @@ from screwsynth.nlp.path.orientation import ORDERS
 from screwsynth.nlp.path.path import Kind
 from screwsynth.nlp.path.placing import placed
 from screwsynth.nlp.path.reader import path_of_text
+from screwsynth.nlp.proof.checker.check import fingerprint
 from screwsynth.nlp.proof.checker.polynomials import middles
-from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, Unproved, read_proof
+from screwsynth.nlp.proof.checker.proof_file import Proof, ProofClaim, ProofError, Unproved, read_proof
 from screwsynth.nlp.proof.checker.tree import Node, node_bytes
 from screwsynth.nlp.proof.checker.workspace.check import VerifiedWorkspace, check_path_proof
 from screwsynth.nlp.proof.checker.workspace.closed_loops import ClosedBoxes
@@ -28,6 +29,8 @@ from screwsynth.nlp.proof.checker.workspace.loop_claims import posed_loops
 from screwsynth.nlp.proof.checker.workspace.path_poses import PathPoses
 from screwsynth.nlp.proof.checker.workspace.path_premises import carried_path, premises_of
 from screwsynth.nlp.proof.checker.workspace.path_root import PathRoot
+from screwsynth.nlp.proof.checker.workspace.statement import expected_along_path, robot_along_path
+from screwsynth.nlp.proof.statement.posed_layout import extreme_program
 from screwsynth.nlp.proof.workspace.judgement import Judgement
 from screwsynth.nlp.proof.workspace.path_judge import judge_path
 from screwsynth.nlp.proof.workspace.path_proof_writer import path_proof_of
@@ -334,6 +337,37 @@ def test_claims_of_another_case_or_left_out_are_rejected(proof: Proof) -> None:
     assert "not those of the case, each once" in rejected(replace(proof, unproved=proof.unproved[1:]), machine())
     assert verified(alone(proof, "leg_length limb 1-", "max"), fewer).claims
     assert "claims nothing" in rejected(replace(proof, claims=()), machine())
+
+
+#: A circle by eight turns, whose eighths all end at one point.
+EIGHT_TURNS = "G90 G94\nF60\nG0 X4 Y0 Z20 A0 B0 C0\nG3 X4 Y0 I-4 J0 P8\nM2"
+
+
+def test_a_tree_of_a_program_proves_nothing_of_a_path() -> None:
+    """Its box holds places of the path and not all poses: legs are longer elsewhere on this circle."""
+    case, label = hexapod({"max": 32}), ("leg_length limb 1-", "max")
+    path = path_of_text(EIGHT_TURNS, "part.ngc", case.units, PathOptions(unit="in"))
+    robot = robot_along_path(case, PathRoot(case, path), with_angles=True)
+    expected = {each.label: each for each in expected_along_path(case, robot, is_timed=True)}
+    nlp = extreme_program(robot.layout, expected.pop(label).expression, Sense.MAX)
+    claim = ProofClaim(*label, "program", 32.0**2, fingerprint(nlp), bytes([Node.BOUNDED]))
+    premises = premises_of(case, "part.ngc", EIGHT_TURNS, PathOptions(unit="in"), of_case=False)
+    others = tuple(Unproved(*each, "") for each in expected)
+    proof = Proof("", case.name, premises, (claim,), (), others)
+    assert leg_lengths(*path.poses_at([0] * 99, np.linspace(0, 1, 99))).max() > 32.8
+    assert "'program' is no reason of a claim about a path" in rejected(proof, case)
+
+
+@pytest.mark.parametrize("turns", [1, 8, 16, 41])
+def test_whole_turns_that_the_robot_cannot_make_are_rejected(turns: int) -> None:
+    """x and y follow from the others, although the circle begins and ends where they are meant to be."""
+    tables = starter_tables("3-rps") | {"limits": {}, "units": {"length": "m"}}
+    tables["robot"]["parameters"] |= {"rb": 1.0}
+    case = case_from(tables)
+    text = f"G0 Z1080 A2 B-3\nG1 Z1100 A0 B-1\nG3 X0 Y0 I-50 J0 P{turns}\nG1 Z1120 A-2 B1\nM2"
+    path = path_of_text(f"G90 G94 F600 G21\nG0 X0 Y0 C0\n{text}", "part.ngc", case.units, PathOptions())
+    with pytest.raises(ProofError, match="the path moves x and y, which this robot cannot choose"):
+        PathRoot(case, path)
 
 
 def test_a_singular_pose_of_a_path_is_proved_by_two_places() -> None:

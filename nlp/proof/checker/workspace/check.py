@@ -67,6 +67,8 @@ _ROUNDING = 1e-15
 _ON_LIMIT = 1e-9
 #: Names of the errors of the pose, whose bounds to first order a proof states.
 _FIRSTS = tuple(each.name for each in ERRORS)
+#: Reasons of claims about a path.
+_ALONG_PATH = ("regular", "singular", "boxes", "lengths")
 #: The tree of one leaf.
 _WHOLE = bytes([Node.BOUNDED])
 
@@ -427,6 +429,12 @@ class _PathChecker(_Checker):
         self.expected = expected_along_path(case, robot, is_timed=path.is_timed)
         if path.is_timed:
             self._case = in_path_motion(case)
+
+    def check(self, each: Claim, given: ProofClaim) -> CheckedClaim:
+        """Check one claim; poses of a tree of ``certify`` are in a box about some places of the path, not all."""
+        if given.reason not in _ALONG_PATH:
+            raise ProofError(f"'{given.reason}' is no reason of a claim about a path")
+        return super().check(each, given)
 
     def _coordinate(self, motor: Motor | None) -> SX | None:
         """Return the coordinate of an actuator whose rate is its speed; None for speeds in any motion of the case."""

@@ -43,7 +43,8 @@ _TERMS, _SERIES = 12, 4e-15
 _HALF = 1e-14
 #: Number of a segment's numbers for its position: both knots, and an arc.
 _KNOTS, _ARC = 6, 6
-#: Number of places of each segment from which ranges of coordinates are taken.
+#: Number of places of each segment, and of the first turn of an arc with more, from which ranges of coordinates are
+#: taken.
 _SAMPLES = 9
 
 
@@ -254,9 +255,12 @@ class PathPoses:
     def ranges(self) -> tuple[FloatArray, FloatArray]:
         """Return the ends (c,) of all coordinates along the path: computed."""
         lower, upper = self.constant.copy(), self.constant.copy()
-        parts = np.linspace(0, 1, _SAMPLES)
+        part = np.ones(len(self))
+        # Equal parts of several turns may all end at one point.
+        part[self._path.arc_segments] = math.tau / np.maximum(np.abs(self._path.arcs[:, 5]), math.tau)
+        parts = part[:, None] * np.linspace(0, 1, _SAMPLES)
         # The end of a segment is the beginning of the next one.
-        values = self.at(np.append((np.arange(len(self))[:, None] + parts[:-1]).ravel(), len(self)))[0]
+        values = self.at(np.append((np.arange(len(self))[:, None] + parts[:, :-1]).ravel(), len(self)))[0]
         lower[self.varying], upper[self.varying] = values.min(axis=0), values.max(axis=0)
         return lower, upper
 
