@@ -433,6 +433,20 @@ def test_a_proof_of_a_robot_with_loops_holds(name: str) -> None:
     assert number in {each.name for each in checked.claims}
 
 
+def test_a_way_out_of_reach_is_rejected() -> None:
+    """The loops do not close at its second point."""
+    case, text = robot_of("planar-3-rrr", {}, rb=1.0), "x,y,z\n0,0,0\n0.6,0,0\n0,0,0\n"
+    options, names = PathOptions(), ("regular", "constraints regular")
+    path = path_of_text(text, "part.csv", case.units, options)
+    robot = robot_along_path(case, PathRoot(case, path), with_angles=True)
+    others = tuple(
+        Unproved(*each.label, "") for each in expected_along_path(case, robot, is_timed=False) if each.name not in names
+    )
+    claims = tuple(ProofClaim(each, "", "regular", tree=bytes([Node.BOUNDED] * 2)) for each in names)
+    premises = premises_of(case, "part.csv", text, options, of_case=False)
+    assert "could not be shown" in rejected(Proof("", case.name, premises, claims, (), others), case)
+
+
 def test_pieces_of_other_assemblies_are_rejected() -> None:
     case = robot_of("planar-3-rrr", {}, rb=1.0)
     path = table(case, [(0, 0, 0, 0, 0, 0), (0.06, -0.05, 0, 0, 0, 4), (0, 0.05, 0, 0, 0, 0)])

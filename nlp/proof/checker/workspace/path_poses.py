@@ -232,8 +232,11 @@ class PathPoses:
         return _SERIES if self._is_slerp and coordinate >= POSITION else 0.0
 
     def segments(self, lower: FloatArray, upper: FloatArray) -> NDArray[np.intp]:
-        """Return the segments (B,) of pieces, by their middles; of a knot the segment that begins there."""
-        return np.clip(np.floor(0.5 * lower + 0.5 * upper), 0, len(self) - 1).astype(np.intp)
+        """Return the segments (B,) of pieces, by their middles; of a knot the segment that begins there.
+
+        NaN, the place of loops that do not close, is of the first one.
+        """
+        return np.clip(np.floor(np.nan_to_num(0.5 * lower + 0.5 * upper)), 0, len(self) - 1).astype(np.intp)
 
     def inverse_seconds(self, segments: NDArray[np.intp]) -> Polynomial:
         """Return 1 over the times of segments (B,); 0, as if the platform stood there, where none is known."""
