@@ -197,7 +197,7 @@ def environment() -> dict[str, str]:
 
 def copied() -> None:
     """Make the copy of the project."""
-    for name in ("nlp", "models", "cases", "tests", "docs"):
+    for name in ("nlp", "models", "cases", "tests", "docs", "bench"):
         shutil.rmtree(COPY / name, ignore_errors=True)
         shutil.copytree(ROOT / name, COPY / name, ignore=shutil.ignore_patterns("__pycache__"))
     for name in ("pyproject.toml", "README.md", "CHANGELOG.md"):
