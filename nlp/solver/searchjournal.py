@@ -34,6 +34,9 @@ from .status import Status
 
 #: Points of the box at which values of a program tell it from others.
 _POINTS = 3
+#: Significant digits of the numbers that tell two searches apart, and part of the largest number of an array below which
+#: another one is rounding.
+_DIGITS, _ROUNDING = 12, 1e-14
 
 
 class KeptSearch(NamedTuple):
@@ -158,17 +161,23 @@ class SearchJournal(JournalFile):
 
 
 def _key_of(nlp: Nlp, settings: str, *points: FloatArray) -> str:
-    """Return what is searched as a text. Rounding of a program's constants, which may differ, has no part in it."""
+    """Return a text that tells a search from others, in any unit.
+
+    The last digits of numbers have no part in it: a repeated command may compute a program's constants with others.
+    """
     program = nlp.program
     names = [[each.name for each in group] for group in (program.variables, program.constraints, program.arguments)]
     values = [nlp.arguments, nlp.lower, nlp.upper, nlp.g_lower, nlp.g_upper, *points]
     for share in np.random.default_rng(0).random((_POINTS, nlp.n)):
         at = nlp.evaluate(nlp.lower + share * (nlp.upper - nlp.lower))
         values.append(np.append(at.g, at.F))
-    numbers = np.concatenate([np.ravel(each) for each in values])
-    with np.errstate(invalid="ignore"):
-        parts = np.where(np.isfinite(numbers), numbers / (1 + np.abs(numbers)), np.sign(numbers))
-    shown = [f"{round(each, 9) + 0.0:.9f}" for each in parts.tolist()]
+    # A number that is rounding beside the largest of its array is 0.
+    shown = [
+        f"{0.0 if abs(each) <= _ROUNDING * size else each:.{_DIGITS}g}"
+        for group in values
+        for size in [float(np.max(np.abs(group), initial=0.0, where=np.isfinite(group)))]
+        for each in np.ravel(group).tolist()
+    ]
     return hashlib.sha256(repr((names, nlp.sense.value, nlp.in_home_mode, settings, shown)).encode()).hexdigest()[:32]
 
 

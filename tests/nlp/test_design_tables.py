@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from builders import TWO_GOALS, Run, output_of, refusal_of, rows_of, saved, unbroken
+from builders import TWO_GOALS, Run, edited, output_of, refusal_of, rows_of, saved, unbroken
 
 import screwsynth.nlp as sn
 from screwsynth.nlp.solver import multistart
+from screwsynth.nlp.solver.kept import kept_in
 from screwsynth.nlp.solver.searchjournal import KeptCertificate, KeptSearch, SearchJournal
 
 #: The first task of the case alone: F is that of legs of one length and of one horizontal distance of their ends.
@@ -100,6 +101,19 @@ def test_a_stopped_run_is_taken_up(
     assert not journal.exists()
     one, other = (without_times(json.loads(file.read_text())) for file in files)
     assert one == other
+
+
+def test_limits_that_differ_by_little_in_a_small_unit_are_searched_each(tmp_path: Path) -> None:
+    scaled = (("x1 = 12, x2 = 4", "x1 = 120000, x2 = 40000"), ("min = 5, max = 40", "min = 50000, max = 400000"))
+    case = saved(tmp_path / "up.toml", edited(UP, ('"cm"', '"um"'), *scaled, ("min = 2, max = 60", "max = 600000")))
+    lost = []
+    with SearchJournal(tmp_path / "journal") as journal, kept_in(journal):
+        for longest in (160000.0, 160010.0):
+            found = sn.solve(sn.load_case(case, {LONGEST: longest}))
+            # F = 6 (1 - d^2 / l^2), as above.
+            lost.append((6 - found.F) * longest**2)
+        assert len(journal) == 2
+    assert lost[0] == pytest.approx(lost[1], rel=1e-9)
 
 
 def test_journals_of_others_are_left_as_they_are(up: str, tmp_path: Path, cli: Run) -> None:
