@@ -61,7 +61,7 @@ def proof_text(
 
     if target is None or record is None:
         return None
-    return _told(target, proof_of(judged, record, text, quantities=quantities, leg_error=leg_error))
+    return _proof_file_text(target, proof_of(judged, record, text, quantities=quantities, leg_error=leg_error))
 
 
 def path_premises(target: str | None, case: Case, along: str | None, choices: PathOptions) -> PathPremises | None:
@@ -108,10 +108,10 @@ def path_proof_text(
 
     if target is None or record is None or premises is None:
         return None
-    return _told(target, path_proof_of(case, judged, record, text, premises))
+    return _proof_file_text(target, path_proof_of(case, judged, record, text, premises))
 
 
-def _told(target: str, proof: Proof) -> str | None:
+def _proof_file_text(target: str, proof: Proof) -> str | None:
     """Return a proof as the text of a file, and say what has none; None where nothing has."""
     from ..errors import one_line
 

@@ -17,6 +17,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from ..case.case import Case
 from ..case.settings import Search
 from ..errors import EvaluationError, InputError
 from ..interruption import Milestone, is_requested, one_call, reached, seconds_left, why_stopped, within
+from ..proof.certificate.branch_and_bound import certify_program
 from ..proof.certificate.certificate import Certificate
 from ..proof.enclosure.engine import kernel
 from ..solver.multistart import ProgramSolution, solve_program
@@ -330,4 +332,5 @@ def _undominated(points: list[FrontPoint], goals: tuple[Goal, ...], size: FloatA
 def _certificate(point: FrontPoint, jobs: int | None, left: int) -> Certificate:
     """Return the proven bound of a point's optimised goal, in an equal part of the time that so many points share."""
     with within(seconds_left() / left):
-        return kept_certificate(point.solution.nlp, point.solution.x, claimed=point.solution.F, jobs=jobs)
+        nlp, x = point.solution.nlp, point.solution.x
+        return kept_certificate(nlp, x, partial(certify_program, nlp, x, claimed=point.solution.F, jobs=jobs))

@@ -19,7 +19,7 @@ from ..interruption import is_requested, one_call, reason_of, seconds_left, with
 from ..program.formulation import formulate_each
 from ..proof.boxes.engine import search_tape
 from ..proof.boxes.tree import TreeRecord
-from ..proof.certificate.branch_and_bound import GAP, CertifyProgress
+from ..proof.certificate.branch_and_bound import GAP, CertifyProgress, certify_program
 from ..proof.certificate.certificate import Certificate, CertificateStatus
 from ..proof.checker.premises import check_minimum, fingerprint, has_both_senses, has_modes, program_of
 from ..proof.checker.proof_file import OPTIMUM, Proof, ProofClaim, Statement
@@ -230,8 +230,10 @@ def _certify(
         """Certify a program with an equal part of the time left, which so many programs share."""
         x, claimed = _incumbent(own)
         in_home_mode = with_mode and (x is None or is_in_home_mode(own.nlp, x) is True)
-        certificate = kept_certificate(
-            replace(own.nlp, in_home_mode=True) if in_home_mode else own.nlp,
+        program = replace(own.nlp, in_home_mode=True) if in_home_mode else own.nlp
+        certified = partial(
+            certify_program,
+            program,
             x,
             claimed=claimed,
             gap=options.gap,
@@ -241,6 +243,9 @@ def _certify(
             progress=None if progress is None else progress(name),
             recorder=recorder,
         )
+        # A journal has no trees.
+        is_kept = recorder is None
+        certificate = kept_certificate(program, x, certified, gap=options.gap, above=above) if is_kept else certified()
         return _after_solve(certificate, own, search.starts)
 
     if not several:
@@ -333,8 +338,10 @@ def _certify_from_poses(
     """
     own = solution.outcomes[0].own
     x, claimed = (own.x, own.F) if own.status.is_answer else (None, None)
-    certificate = kept_certificate(
-        with_margin(own.nlp, 0.0),
+    nlp = with_margin(own.nlp, 0.0)
+    certified = partial(
+        certify_program,
+        nlp,
         x,
         claimed=claimed,
         gap=options.gap,
@@ -342,6 +349,7 @@ def _certify_from_poses(
         jobs=options.jobs,
         progress=None if progress is None else progress(solution.case.tasks[0].name),
     )
+    certificate = kept_certificate(nlp, x, certified, gap=options.gap, above=options.above)
     if x is None and options.above is None and certificate.status is CertificateStatus.PROVED:
         # The incumbent keeps the limits at these poses only, so the bound has no design to be compared with.
         certificate = replace(

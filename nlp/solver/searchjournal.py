@@ -24,8 +24,7 @@ from ..interruption import is_requested
 from ..program.nlp import Nlp, PairPlace
 from ..program.pairs import with_pairs
 from ..program.relaxation import RelaxedLimit
-from ..proof.boxes.tree import TreeRecord
-from ..proof.certificate.branch_and_bound import GAP, CertifyProgress, certify_program
+from ..proof.certificate.branch_and_bound import GAP
 from ..proof.certificate.certificate import Certificate, CertificateStatus
 from ..system.journal import JournalFile, line_of, row_of
 from .kept import journal_in_force
@@ -34,8 +33,8 @@ from .status import Status
 
 #: Points of the box at which values of a program tell it from others.
 _POINTS = 3
-#: Significant digits of the numbers that tell two searches apart, and part of the largest number of an array below which
-#: another one is rounding.
+#: Significant digits of the numbers that tell two searches apart, and part of the largest number of an array below
+#: which another one is rounding.
 _DIGITS, _ROUNDING = 12, 1e-14
 
 
@@ -262,35 +261,22 @@ def _fields_of(kept: KeptSearch, nlp: Nlp) -> Mapping[str, Any]:
 def kept_certificate(
     nlp: Nlp,
     x: FloatArray | None,
+    certified: Callable[[], Certificate],
     *,
-    claimed: float | None,
     gap: float = GAP,
     above: float | None = None,
-    time_limit: float | None = None,
-    jobs: int | None = None,
-    progress: CertifyProgress | None = None,
-    recorder: TreeRecord | None = None,
 ) -> Certificate:
-    """Return the certificate of a program from the journal in force, or a new one, which is then kept.
+    """Return the certificate of a program from the journal in force, or that of a function, which is then kept.
 
-    Arguments are those of :func:`.certify_program`. A certificate with a recorder is never taken from a journal.
+    Args:
+        nlp: the program.
+        x: (n,) best known point; None without one.
+        certified: certifies the program from this point.
+        gap: gap of its search, as for :func:`.certify_program`.
+        above: value of which it proves that F is above, likewise.
     """
-
-    def certified() -> Certificate:
-        return certify_program(
-            nlp,
-            x,
-            claimed=claimed,
-            gap=gap,
-            above=above,
-            time_limit=time_limit,
-            jobs=jobs,
-            progress=progress,
-            recorder=recorder,
-        )
-
     journal = journal_in_force()
-    if not isinstance(journal, SearchJournal) or recorder is not None:
+    if not isinstance(journal, SearchJournal):
         return certified()
     key = _key_of(nlp, f"certificate {gap!r} {above!r}", *([] if x is None else [x]))
     known = journal[key]

@@ -10,7 +10,7 @@ from ..checker.workspace.path_root import PathRoot
 from ..checker.workspace.statement import case_along_path, expected_along_path, robot_along_path
 from ..statement.claims import Claim, ClaimKind
 from .path_closing import closed_form_along
-from .proof_writer import NO_LENGTHS, NOT_JUDGED, bound_on_record, words_of
+from .proof_writer import NO_LENGTHS, NOT_JUDGED, bound_on_record, words_of, write_each
 from .verdict import Outcome
 
 if TYPE_CHECKING:
@@ -35,20 +35,14 @@ def path_proof_of(case: Case, judged: Judgement, record: ProofRecord, text: str,
     """
     premises = replace(premises, with_angles=closed_form_along(case, judged.path).has_angles)
     own, path = case_along_path(case, judged.path), judged.path
-    writer, unproved = _Writer(judged, record), list[Unproved]()
+    writer = _Writer(judged, record)
     try:
         robot = robot_along_path(own, PathRoot(own, path), with_angles=premises.with_angles)
         expected = expected_along_path(own, robot, is_timed=path.is_timed)
     except ProofError as error:
         every = [*writer.ranks, *writer.numbers]
         return Proof(text, case.name, premises, (), (), tuple(Unproved(*key, str(error)) for key in every))
-    for each in expected:
-        try:
-            writer.proved[each.label] = writer.proof(each)
-        except ProofError as error:
-            unproved.append(Unproved(*each.label, str(error)))
-    known = {each.label for each in expected}
-    unproved += [Unproved(*key, _NO_RECORD) for key in writer.numbers if key not in known]
+    unproved = write_each(writer, expected, writer.numbers, _NO_RECORD)
     return Proof(text, case.name, premises, tuple(writer.proved.values()), (), tuple(unproved))
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Protocol
 
 import numpy as np
 
@@ -48,14 +49,7 @@ def proof_of(
     """
     writer = _Writer(judged, record)
     expected = expected_claims(judged.case, writer.robot, quantities, leg_error)
-    unproved = []
-    for each in expected:
-        try:
-            writer.proved[each.label] = writer.proof(each)
-        except ProofError as error:
-            unproved.append(Unproved(*each.label, str(error)))
-    known = {each.label for each in expected}
-    unproved += [Unproved(*key, _NO_RULES) for key in writer.extremes if key not in known]
+    unproved = write_each(writer, expected, writer.extremes, _NO_RULES)
     # The whole errors follow from those of first order together, and from the lengths of legs.
     missing = [each for each in ERRORS if each.label not in writer.proved]
     for other in ERRORS if len(missing) == 1 else ():
@@ -70,6 +64,42 @@ def proof_of(
     )
     claims, lemmas = tuple(writer.proved.values()), tuple(writer.lemmas())
     return Proof(text, judged.case.name, premises, claims, lemmas, tuple(unproved))
+
+
+class ClaimWriter(Protocol):
+    """Writer of the proofs of claims.
+
+    Attributes:
+        proved: the claims so far, by label.
+    """
+
+    proved: dict[Key, ProofClaim]
+
+    def proof(self, each: Claim) -> ProofClaim:
+        """Return a claim with its proof.
+
+        Raises:
+            ProofError: it has none, with the reason.
+        """
+
+
+def write_each(writer: ClaimWriter, expected: Sequence[Claim], judged: Iterable[Key], no_rules: str) -> list[Unproved]:
+    """Write the claims with a proof, and return those without one.
+
+    Args:
+        writer: writer of the claims.
+        expected: claims that the checker knows.
+        judged: labels of the numbers that were judged.
+        no_rules: reason for those that the checker does not know.
+    """
+    unproved = []
+    for each in expected:
+        try:
+            writer.proved[each.label] = writer.proof(each)
+        except ProofError as error:
+            unproved.append(Unproved(*each.label, str(error)))
+    known = {each.label for each in expected}
+    return unproved + [Unproved(*key, no_rules) for key in judged if key not in known]
 
 
 class _Writer:

@@ -41,8 +41,8 @@ _LARGEST = math.radians(149)
 _TERMS, _SERIES = 12, 4e-15
 #: Rounding of half an angle that is computed from two unit quaternions.
 _HALF = 1e-14
-#: Number of a segment's numbers for its position: both knots, and an arc.
-_KNOTS, _ARC = 6, 6
+#: Numbers of an arc.
+_ARC = 6
 #: Number of places of each segment, and of the first turn of an arc with more, from which ranges of coordinates are
 #: taken.
 _SAMPLES = 9
