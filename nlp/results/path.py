@@ -16,7 +16,7 @@ from .exchange import ExchangeData, exchange_fields
 from .parts import HeadData, SettingsData, VersionsData, settings_data
 from .pathtable import knot_motion
 from .point import head_data, versions
-from .verdicts import VerdictData, WorkspacePose, pose_data, verdict_fields
+from .verdicts import VerdictData, WorkspacePose, pose_data, posed_fields
 
 if TYPE_CHECKING:
     from ..case.overrides import Settings
@@ -244,8 +244,10 @@ def _claims(judged: "Judgement") -> tuple[PathVerdictData, ...]:
 def _verdict(each: "Verdict", judged: "Judgement") -> PathVerdictData:
     """Return a verdict with its place."""
     place, fault = each.place if each.pose is not None else None, each.first_fault
-    return PathVerdictData(
-        **verdict_fields(each, judged.case),
+    return PathVerdictData.of(
+        each,
+        judged.case.units,
+        **posed_fields(each, judged.case),
         line=None if place is None else int(judged.path.lines[place.segment]),
         segment=None if place is None else place.segment,
         parameter=None if place is None else place.parameter,

@@ -1,7 +1,6 @@
 """Verdicts of a judgement as a result: on ranks and numbers, over a workspace or along a path."""
 
-import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from ...models import Dimension
 from ..case.task import Sense
@@ -9,7 +8,7 @@ from ..proof.enclosure.engine import ENGINE
 from ..proof.statement.machine import has_straight_legs
 from ..proof.workspace.robot.pose_box import pose_box
 from ..proof.workspace.verdict import Outcome
-from ..system.jsonvalues import Absent, JsonObject, Vector3, vector
+from ..system.jsonvalues import Absent, JsonObject, Mark, Measure, Vector3, vector
 from ..units import Units
 from .objective import unit_of_claim
 
@@ -32,7 +31,7 @@ class WorkspacePose(JsonObject):
 
     position: Vector3
     axis: Vector3
-    angle: float
+    angle: Annotated[float, Dimension.ANGLE]
 
 
 class CentreData(JsonObject):
@@ -113,10 +112,10 @@ class VerdictData(JsonObject):
     name: str
     unit: Absent[str]
     sense: Absent[Sense]
-    bound: float | None
-    reached: float | None
+    bound: Annotated[float | None, Measure.NUMBER]
+    reached: Annotated[float | None, Measure.NUMBER]
     key: Absent[str]
-    limit: Absent[float]
+    limit: Annotated[float | None, Mark.ABSENT, Measure.NUMBER]
     outcome: Outcome
     pose: WorkspacePose | None
     boxes: Absent[int]
@@ -127,7 +126,7 @@ class VerdictData(JsonObject):
 
 def pose_data(pose: "PoseNumbers", units: Units) -> WorkspacePose:
     """Return a pose in a case's units."""
-    return WorkspacePose.of(pose, angle=units.shown(pose.angle, Dimension.ANGLE))
+    return WorkspacePose.of(pose, units)
 
 
 def rank_data(found: "Verdict", judged: "Judgement") -> RegularData:
@@ -141,7 +140,6 @@ def rank_data(found: "Verdict", judged: "Judgement") -> RegularData:
         pose=None if found.pose is None else pose_data(found.pose, case.units),
         between=sides,
         engine=ENGINE if found.boxes else "none",
-        reason=found.reason or None,
         machine=machine_data(found.errors, case),
     )
 
@@ -159,28 +157,14 @@ def machine_data(errors: "JointErrors | None", case: "Case") -> MachineData | No
 
 def verdict_data(each: "Verdict", case: "Case") -> VerdictData:
     """Return a verdict in a case's units."""
-    return VerdictData(**verdict_fields(each, case))
+    return VerdictData.of(each, case.units, **posed_fields(each, case))
 
 
-def verdict_fields(each: "Verdict", case: "Case") -> dict[str, Any]:
-    """Return the fields of a verdict in a case's units, by name."""
-    units = case.units
-
-    def shown(value: float | None) -> float | None:
-        return units.shown(value, each.dimension) if value is not None and math.isfinite(value) else None
-
+def posed_fields(each: "Verdict", case: "Case") -> dict[str, Any]:
+    """Return the fields of a verdict that depend on its kind and its robot, in a case's units, by name."""
     return {
-        "name": each.name,
         "unit": None if each.is_rank else unit_of_claim(case, each.name, each.dimension),
         "sense": None if each.is_rank else each.sense,
-        "bound": shown(each.bound),
-        "reached": shown(each.reached),
-        "key": each.key or None,
-        "limit": shown(each.limit),
-        "outcome": each.outcome,
-        "pose": None if each.pose is None else pose_data(each.pose, units),
-        "boxes": each.boxes,
-        "seconds": each.seconds,
-        "reason": each.reason or None,
+        "pose": None if each.pose is None else pose_data(each.pose, case.units),
         "machine": machine_data(each.errors, case),
     }
