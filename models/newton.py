@@ -57,11 +57,11 @@ def newton(
     That is where the equations end the search, where they refuse each trial of a step, or after a number of steps.
 
     Args:
-        equations: of the point.
+        equations: equations of the point.
         at: first point.
         steps: largest number of steps.
         zeros: parts of the largest singular value below which others are zero, one for each trial; None for rounding.
-        parts: of the step, one for each further trial with the same singular values.
+        parts: parts of the step, one for each further trial with the same singular values.
     """
     for _ in range(steps):
         linear = equations.linear(at)
@@ -100,10 +100,10 @@ class VectorEquations:
     """Equations in a vector, of which some numbers move, by full steps that are shortest in parts of their sizes.
 
     Args:
-        values: of a vector (n,): left sides (m,) or (m, 1), and derivatives (m, n or more).
+        values: function of a vector (n,), which returns left sides (m,) or (m, 1), and derivatives (m, n or more).
         closed: largest left side where the equations hold.
         moving: indices of the numbers that move; all if left out.
-        size: of each number that moves; 1 if left out.
+        size: size of each number that moves; 1 if left out.
     """
 
     def __init__(

@@ -53,8 +53,8 @@ class Descent:
     """Equations of a mechanism for Newton's method, which accepts only steps that make the residual smaller.
 
     Args:
-        motions: of the mechanism.
-        equations: as functions of coordinates, and of the mechanism at these.
+        motions: kinematics of the mechanism.
+        equations: functions of coordinates, and of the mechanism at these.
         free: indices of the coordinates that move.
         closed: largest left side where the equations hold.
         size: (f,) of each of these: least-norm steps are shortest in parts of it.

@@ -47,12 +47,14 @@ def proof_text(
     quantities: Sequence[str],
     leg_error: float,
 ) -> str | None:
-    """Return the proof of a judgement as the text of a file, and say what has none; None where nothing has.
+    """Return the text of the proof file of a judgement; None without a proof.
+
+    Claims without a proof are named in notices.
 
     Args:
         target: file name; ``-`` is standard output.
         judged: the verdicts.
-        record: of the searches that led to them; there is no proof without one.
+        record: record of their searches; there is no proof without one.
         text: the case file's text.
         quantities: measures that were asked for.
         leg_error: largest error of a leg's length.
@@ -71,7 +73,7 @@ def path_premises(target: str | None, case: Case, along: str | None, choices: Pa
         target: name of the proof's file; None without a proof.
         case: the case.
         along: the path's file; None for that of the case.
-        choices: of reading it.
+        choices: options that say how the file is read.
 
     Raises:
         InputError: the file cannot be read, or is longer than a proof carries.
@@ -100,9 +102,9 @@ def path_proof_text(
         target: file name; ``-`` is standard output.
         case: the case.
         judged: the verdicts.
-        record: of the searches that led to them; there is no proof without one.
+        record: record of their searches; there is no proof without one.
         text: the case file's text.
-        premises: of the path.
+        premises: premises about the path.
     """
     from ..proof.workspace.path_proof_writer import path_proof_of
 
@@ -112,7 +114,7 @@ def path_proof_text(
 
 
 def _proof_file_text(target: str, proof: Proof) -> str | None:
-    """Return a proof as the text of a file, and say what has none; None where nothing has."""
+    """Return the text of a proof file, and print a notice for each claim without a proof; None without any proof."""
     from ..errors import one_line
 
     if not proof.claims:

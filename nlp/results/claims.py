@@ -24,8 +24,8 @@ class PosedClaim(NamedTuple):
     """A claim at a pose.
 
     Attributes:
-        name: of the claim, up to a colon.
-        outcome: of the claim over the workspace.
+        name: name of the claim, up to a colon.
+        outcome: outcome of the claim over the workspace.
         pose: the pose.
         verdict: on the claim, where it is about a number.
         length: verdict on the length of a leg that is extreme at the pose, for a claim that needs two poses.
@@ -64,8 +64,8 @@ def worst_claim(result: WorkspaceResult, sense: Sense) -> PosedClaim | None:
     A singular pose is worse than any limit. Without limits it is the worst F. None where no pose is known.
 
     Args:
-        result: of judging the workspace.
-        sense: of the first task.
+        result: judgement over the workspace.
+        sense: sense of the first task.
     """
     singular = next((each for each in refuted_claims(result) if each.name == REGULAR and each.verdict is None), None)
     if singular is not None:

@@ -13,7 +13,7 @@ class BindingData(JsonObject):
     """A pose at which a claim is a constraint of the program.
 
     Attributes:
-        claim: that the pose refuted.
+        claim: claim that the pose refuted.
         pose: the pose.
     """
 
@@ -25,7 +25,7 @@ class DesignData(JsonObject):
     """A design on the way to the proven one.
 
     Attributes:
-        F: of the design.
+        F: F of the design.
         unproved: number of claims about the workspace that it does not keep, or that stay open.
     """
 

@@ -31,11 +31,11 @@ class PathFaultData(JsonObject):
     """A point of a path that refutes a claim.
 
     Attributes:
-        value: of the number there; null of a rank.
+        value: value of the number at this point; null of a rank.
         line: line of the file, or row of a table, of the segment.
         segment: its index, from 0.
         parameter: along the segment, from 0 to 1.
-        pose: there.
+        pose: pose of the platform at this point.
     """
 
     value: float | None
@@ -66,7 +66,7 @@ class PathActuatorData(JsonObject):
 
     Attributes:
         actuator: its name.
-        unit: of its coordinate.
+        unit: unit of its coordinate.
         smallest: proven smallest coordinate; null where nothing is proved.
         largest: proven largest coordinate.
         speed: proven largest speed, in this unit by seconds, in the path's motion where it states times; absent without
@@ -87,8 +87,8 @@ class PathKnotsData(JsonObject):
     """Knots of a path, of which a table has the coordinates of the actuators.
 
     Attributes:
-        number: of knots.
-        closed: of those that the machine reaches.
+        number: number of knots.
+        closed: number of knots that the robot reaches.
         within: largest distance asked for between the path and the platform's origin, as actuators move linearly from
             knot to knot; absent where steps were asked for.
         deviation: the proven largest distance; absent where none was asked for, and null where none is proved.
@@ -124,11 +124,11 @@ class PathData(JsonObject):
         segments: their number.
         time: seconds of the segments whose time is stated; absent where none is.
         untimed: number of the others, of which speeds are not known; absent where no time is stated.
-        idle: what moves nothing, in the order of the lines.
+        idle: words of the program without a motion, in the order of the lines.
         dependent: names of the coordinates of the pose that follow from the others; absent without any.
         claims: ranks first.
-        actuators: of the robot.
-        knots: of a table of the actuators; absent where none is asked for.
+        actuators: ranges of the actuators.
+        knots: knots of the table of actuators; absent where none is requested.
     """
 
     file: str
@@ -151,7 +151,7 @@ class PathResult(JsonObject):
             without any, and in results of earlier versions.
         proved: whether all ranks and limits are proved at every point.
         path: the path.
-        versions: of the programs.
+        versions: versions of the programs.
     """
 
     head: Inline[HeadData]

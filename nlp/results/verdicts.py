@@ -26,7 +26,7 @@ class WorkspacePose(JsonObject):
     Attributes:
         position: origin of the platform frame in the world frame.
         axis: unit axis of the rotation; z without rotation.
-        angle: about it.
+        angle: angle of the rotation about the axis.
     """
 
     position: Vector3
@@ -50,9 +50,9 @@ class MachineData(JsonObject):
     """Errors of the joint centres of a machine.
 
     Attributes:
-        base: of the base joints of six straight legs, in the world frame, length; absent for another robot.
-        platform: of their platform joints, in the platform frame, length; absent for another robot.
-        centres: of another robot; absent for six straight legs.
+        base: errors of the base joints of six straight legs, in the world frame, length; absent for another robot.
+        platform: errors of their platform joints, in the platform frame, length; absent for another robot.
+        centres: errors of the joint centres of another robot; absent for six straight legs.
     """
 
     base: Absent[tuple[Vector3, ...]]
@@ -66,7 +66,7 @@ class RegularData(JsonObject):
     Attributes:
         outcome: ``proved``; ``refuted``, with a singular pose; ``open``, with the middle of the widest box that is
             left.
-        pose: that pose; absent where the claim is proved.
+        pose: the singular pose, or that middle; absent where the claim is proved.
         between: two poses at which the determinant of the rows is proved to have opposite signs; absent where the
             claim is not refuted so.
         boxes: number of boxes examined.
@@ -75,7 +75,8 @@ class RegularData(JsonObject):
         seconds: wall time.
         engine: ``c``, or ``none`` where no search was made.
         reason: for stopping early, or how a singular pose was found that is not between two; absent without one.
-        machine: that is singular at the pose; absent where the claim is not refuted, or the exact machine is.
+        machine: joint-centre errors of the singular robot; absent where the claim is not refuted, or the exact robot is
+            singular.
     """
 
     outcome: Outcome

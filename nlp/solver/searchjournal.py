@@ -42,7 +42,7 @@ class KeptSearch(NamedTuple):
     """Outcome of a search of a program. Numbers are texts, which keep every digit, and those that are not finite.
 
     Attributes:
-        key: what was searched.
+        key: text that tells the search from others.
         status: value of the status.
         x, lower, upper: the best point, and the bounds of the program that was searched last.
         pairs: constraints of limits on pairs that the program got.
@@ -50,7 +50,7 @@ class KeptSearch(NamedTuple):
         starts: status, objective, stationarity, violation, iterations, solver and point of each start.
         optima: objective, count, spread and point of each distinct optimum.
         relaxation: key, unit, dimension, limit and needed number of each limit that would have to move.
-        seed, seconds, better: as in the solution.
+        seed, seconds, better: fields of the solution.
     """
 
     key: str
@@ -72,12 +72,12 @@ class KeptCertificate(NamedTuple):
     """A certificate of a program.
 
     Attributes:
-        key: what was certified.
+        key: text that tells the search from others.
         x: the incumbent; None without one.
         numbers: fields by name as texts.
         words: fields by name.
         counts: fields by name, whole numbers and truth values.
-        history: as in the certificate.
+        history: history of the certificate.
     """
 
     key: str
@@ -96,7 +96,7 @@ class SearchJournal(JournalFile):
     """Searches and certificates that are done, in a file.
 
     Args:
-        path: of the file, which is made when missing.
+        path: name of the file, which is made when missing.
 
     Raises:
         InputError: the file cannot be written, is no journal of this version, or is held by another process.

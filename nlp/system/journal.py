@@ -56,10 +56,10 @@ class JournalFile:
     """Lines of JSON in a file that this process holds.
 
     Args:
-        path: of the file, which is made when missing.
-        head: of the file, which tells it from the journals of other work.
+        path: name of the file, which is made when missing.
+        head: first line of the file, which tells it from the journals of other work.
         work: name of the work in messages.
-        other: what to do about a journal of other work.
+        other: advice about a journal of other work.
 
     Raises:
         InputError: the file cannot be written, belongs to other work, or is held by another process.

@@ -39,7 +39,7 @@ def seeing_lines(result: WorkspaceResult, command: Callable[[WorkspacePose], str
     """Yield the commands that show what refutes claims: of each limit the claim that is farthest beyond it.
 
     Args:
-        result: of judging the workspace.
+        result: judgement over the workspace.
         command: returns the command that shows a pose.
     """
     claims = list(refuted_claims(result))

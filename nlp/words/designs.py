@@ -54,7 +54,7 @@ class Column(Generic[Row]):
         kind: meaning of the cells.
         holds: type of the cells: ``float``, ``int`` or ``str``.
         label: name in tables of text, pages and pictures; empty for a column of CSV alone.
-        unit: of the numbers; empty for a plain number.
+        unit: unit of the numbers; empty for a plain number.
         text: returns the text of a row in tables.
         series: name of the line in pictures, where it is not the label.
     """
@@ -78,7 +78,7 @@ class DrawnDesign(NamedTuple):
     """A design that can be drawn.
 
     Attributes:
-        name: of the robot, or the value or the goals that the design belongs to.
+        name: name of the robot, or the value or the goals of the design.
         words: its result.
         numbers: free numbers of the design, each with its name and unit.
         active: bounds and limits that it lies on.
@@ -116,7 +116,7 @@ class PageWords(NamedTuple):
         table: anchor and heading of the section of the table.
         rules: sentences above the picture.
         cautions: sentences below it.
-        below: of the picture.
+        below: text below the picture.
         designs: heading of the section of the designs.
         bends: heading of the sentences about changes of active limits; empty for none.
         is_answer: whether there is an answer.
@@ -139,19 +139,19 @@ class Designs(Generic[Row]):
     """A table of designs.
 
     Attributes:
-        word: what filled the table, such as ``trade-off``.
+        word: kind of the table, such as ``trade-off``.
         case: the case, or the case of the first row.
-        caption: what the rows are, in words.
+        caption: description of the rows.
         columns: in order.
         rows: one for each design.
-        join: how the rows belong together.
+        join: relation of the rows: a curve, a grid, a cloud or a list.
         page: words of the page.
         before, after: lines above and below the table on a terminal.
         drawn: returns the designs that can be drawn.
         gaps: indices of rows that a curve does not join with the next one.
         missing: sentences about rows without an answer.
         throughout: bounds and limits that are active in every row with an answer, in words.
-        details: what a page says of each design.
+        details: text of a page about each design.
     """
 
     word: str

@@ -60,8 +60,8 @@ def exchange_lines(proof: ExchangeData, where: str) -> Iterator[Line]:
     """Yield the designs of an exchange, and the number of its poses.
 
     Args:
-        proof: of a solved design.
-        where: of what the poses are.
+        proof: proof of a solved design.
+        where: domain of the poses: the workspace, or the path.
     """
     steps = ", ".join(f"{each.F:.7g} ({each.unproved} refuted or open)" for each in proof.designs)
     yield Line(f"F = {steps}", label="designs")

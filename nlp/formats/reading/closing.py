@@ -38,7 +38,7 @@ class Gap(NamedTuple):
     """How far a loop is open.
 
     Attributes:
-        name: of the joint that closes it.
+        name: name of the joint that closes it.
         distance: in length.
         angle: in radians.
     """
@@ -139,11 +139,11 @@ class _Loops:
 
     Args:
         given: the description.
-        size: of the robot, by which lengths become plain numbers.
+        size: size of the robot, by which lengths become plain numbers.
         keeps_driven: whether driven joints stay where they are.
 
     Attributes:
-        motions: of the tree.
+        motions: kinematics of the tree.
     """
 
     def __init__(self, given: Description, size: float, *, keeps_driven: bool) -> None:
@@ -264,7 +264,7 @@ def close(given: Description, size: float) -> Closed:
 
     Args:
         given: the description.
-        size: of the robot, by which lengths become plain numbers.
+        size: size of the robot, by which lengths become plain numbers.
 
     Returns:
         The best that was reached; the gaps of its closures say how good it is.

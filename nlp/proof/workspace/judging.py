@@ -36,7 +36,7 @@ class Judging(ABC):
         until_fault: whether the work ends at the first rank or limit that is not proved.
 
     Attributes:
-        case, workspace, measures, search, until_fault: as given.
+        case, workspace, measures, search, until_fault: the arguments.
         has_numbers: whether numbers can be judged.
         verdicts: the verdicts so far, by claim. A finer verdict on a claim takes the place of the one before.
     """

@@ -29,9 +29,9 @@ def path_proof_of(case: Case, judged: Judgement, record: ProofRecord, text: str,
     Args:
         case: the case that was judged, as it was read.
         judged: the verdicts.
-        record: of the searches that led to them.
+        record: record of their searches.
         text: the case file's text.
-        premises: of the path.
+        premises: premises about the path.
     """
     premises = replace(premises, with_angles=closed_form_along(case, judged.path).has_angles)
     own, path = case_along_path(case, judged.path), judged.path
@@ -51,7 +51,7 @@ class _Writer:
 
     Args:
         judged: the verdicts.
-        record: of the searches that led to them.
+        record: record of their searches.
 
     Attributes:
         ranks, numbers: the verdicts by their labels; of two of one label the first.

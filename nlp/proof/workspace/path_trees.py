@@ -25,7 +25,7 @@ def tree_of_path(record: TreeRecord, pieces: FloatArray) -> bytes:
     """Return the tree of a search.
 
     Args:
-        record: of the search.
+        record: record of the search.
         pieces: (M, 3) those with which it began: equal parts of each segment, in the order of the path.
     """
     parts = list[bytes]()

@@ -42,7 +42,7 @@ def proof_of(
 
     Args:
         judged: the verdicts.
-        record: of the searches that led to them.
+        record: record of their searches.
         text: the case file's text.
         quantities: measures that were asked for.
         leg_error: largest error of a leg's length.
@@ -107,7 +107,7 @@ class _Writer:
 
     Args:
         judged: the verdicts.
-        record: of the searches that led to them.
+        record: record of their searches.
 
     Attributes:
         robot: the robot as the check has it, with the symbols in which its numbers were bounded.

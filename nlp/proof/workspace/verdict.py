@@ -44,7 +44,7 @@ class Verdict:
 
     Attributes:
         claim: the claim: a rank, or the smallest or the largest value of a number, with its limit.
-        outcome: of the rank or the limit; of a number without a limit, whether the requested gap was reached.
+        outcome: outcome of the rank or the limit; of a number without a limit, whether the requested gap was reached.
         bound: proven bound of the number: no pose has a smaller, or a larger, value. Radians for angles; infinite where
             nothing is proved; NaN of a rank.
         reached: smallest or largest known value of the number; NaN without one, and of a rank.

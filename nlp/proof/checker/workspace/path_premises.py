@@ -29,7 +29,7 @@ def premises_of(
     Args:
         case: with fixed dimensions.
         file: name of the path's file.
-        text: of the file.
+        text: text of the file.
         options: choices that the file leaves open.
         of_case: whether the path is that of the case, in its place.
         with_angles: whether angles of joints are replaced by closed forms.

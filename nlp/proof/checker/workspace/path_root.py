@@ -47,8 +47,8 @@ class PathRoot:
         workspace: the same, with the coordinates that the robot cannot choose; those stand still, and have no range.
         stated: (v,) indices of the coordinates of a pose that vary, and do not follow from others.
         coordinates: number of coordinates of a piece: the place along the path.
-        lower, upper, middle, dependent: of the place, and of the coordinates that follow from others; see
-            :class:`.pose_boxes.PoseRoot`.
+        lower, upper, middle, dependent: ends and middle of the place, and of the coordinates that follow from others;
+            see :class:`.pose_boxes.PoseRoot`.
 
     Raises:
         ProofError: the path moves a coordinate that the robot cannot choose.
