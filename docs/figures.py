@@ -2,25 +2,27 @@
 
 The paper's Figs. 4, 5, 7, 8, 10 and 11 from their cases, the hexapod with limits, the worked design problems, and the
 robots with their parameters; slices of a workspace and a path; the gallery of robots given joint by joint on one sheet,
-and the Delta of robots.md.
+the Delta of robots.md, and the optimum of README.md.
 """
 
 import re
 import tomllib
 from pathlib import Path
 
+import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from screwsynth.models import model_names
 from screwsynth.models.catalog import gallery_names
-from screwsynth.nlp import build_model, case_from_tables, load_case, plot, solve
+from screwsynth.nlp import Status, build_model, case_from_tables, certify, evaluate, load_case, plot, solve, tradeoff
 from screwsynth.nlp.case.robots import model_options
 from screwsynth.nlp.output.pictures.drawing import drawing_of_model
 from screwsynth.nlp.output.pictures.figures import picture_of
 from screwsynth.nlp.output.pictures.painting import Panel
 from screwsynth.nlp.output.pictures.pathpanels import path_picture
 from screwsynth.nlp.output.pictures.paths import path_figure
+from screwsynth.nlp.output.pictures.solutions import drawings_of
 from screwsynth.nlp.output.pictures.view import clearest_view
 from screwsynth.nlp.output.pictures.workspaces import slices_figure
 from screwsynth.nlp.path.gcode import read_program
@@ -73,6 +75,38 @@ def draw_gallery() -> None:
     figure.savefig(FOLDER / "gallery.png", dpi=60, metadata={"Software": None})
 
 
+def draw_optimum() -> None:
+    """Draw the robot of a case at its start and at its optimum, and beside it F over one dimension with both marked."""
+    name, radii = "drilling-spindle", [*range(300, 320, 4), *range(320, 451, 5)]
+    best = solve(load_case(name))
+    (drawing,) = drawings_of(best, 1)
+    start = evaluate(best.nlp, best.nlp.start)
+    top, radius = certify(best).certificate.bound, float(np.ravel(best.state.parameters["x1"])[0])
+    curve = tradeoff(lambda value: load_case(name, {"x1": value}), [*radii, radius + 1e-3], name="x1").points
+    kept = sorted((point.value, point.solution.F) for point in curve if point.solution.status is Status.OPTIMAL)
+    figure = Figure(figsize=(11.0, 5.2), facecolor="white")
+    FigureCanvasAgg(figure)
+    robot, chart = figure.add_axes((0.0, 0.02, 0.5, 0.86)), figure.add_axes((0.57, 0.13, 0.41, 0.72))
+    Panel(robot, clearest_view(drawing), drawing).paint()
+    figure.text(0.02, 0.88, "black arrow: the drill; purple: velocities of the joints", fontsize=10, color="#5a6670")
+    figure.text(0.02, 0.93, "Start (grey) and best design (orange)", fontsize=13, fontweight="bold")
+    figure.text(0.57, 0.93, "Stiffness along the drill", fontsize=13, fontweight="bold")
+    figure.text(0.57, 0.88, "best F for each base radius; legs of stiffness k give k F", fontsize=10, color="#5a6670")
+    chart.axvspan(300, radius, color="#e6eaee")
+    chart.text(310.5, 4.8, "no design keeps\nall limits", ha="center", va="center", rotation=90, color="#5a6670")
+    chart.axhline(top, color="#6d2a8c", linestyle="--", linewidth=1.4)
+    chart.text(449, top + 0.03, f"proved: no design has F above {top:.4f}", ha="right", color="#6d2a8c")
+    chart.plot(*zip(*kept, strict=True), color="#0b4f9c", linewidth=2.4)
+    chart.plot([radius], [best.F], "o", color="#b34700", markersize=10)
+    chart.annotate(f"optimum: F = {best.F:.3f}\nat {radius:.1f} mm", (radius, best.F), (327, 4.99), color="#b34700")
+    first = float(np.ravel(start.parameters["x1"])[0])
+    chart.plot([first], [start.F], "o", color="#8a949d", markersize=10)
+    chart.text(first, start.F + 0.07, f"start: F = {start.F:.3f}\n(joints too close)", ha="center", color="#5a6670")
+    chart.set(xlim=(300, 450), ylim=(4.0, 5.7), xlabel="radius of the base joints, mm", ylabel="F, (mm/mm)²")
+    chart.spines[["top", "right"]].set_visible(False)
+    figure.savefig(FOLDER / "optimum.png", dpi=110, metadata={"Software": None})
+
+
 def path_of_page(page: str) -> str:
     """Return the program of G-code that a page of the documentation shows."""
     text = (FOLDER.parent / page).read_text(encoding="utf-8")
@@ -90,6 +124,7 @@ def case_of_page(page: str, number: int) -> dict[str, object]:
 
 FOLDER.mkdir(exist_ok=True)
 draw_gallery()
+draw_optimum()
 plot(solve(case_from_tables(case_of_page("robots.md", 0), name="delta", source="robots.md")), FOLDER / "delta.png")
 for name in SLICED:
     machine = load_case(name)
