@@ -17,7 +17,7 @@ CASES = ROOT / "docs" / "cases.md"
 CASES_HEAD = """# Cases
 
 These cases come with the package: each command below finds its case by the name. `make docs` writes this page from the
-case files, and `make figures` draws the pictures. [Choosing](choosing.md) works through six of them;
+case files, and `make figures` draws the pictures. [Six worked designs](worked-designs.md) explain six of them;
 [the paper's numbers](reproduction.md) are those of the cases of the paper.
 """
 
