@@ -80,8 +80,10 @@ def draw_optimum() -> None:
     name, radii = "drilling-spindle", [*range(300, 320, 4), *range(320, 451, 5)]
     best = solve(load_case(name))
     (drawing,) = drawings_of(best, 1)
+    certificate = certify(best).certificate
+    assert certificate is not None  # noqa: S101 - a script of the documentation
     start = evaluate(best.nlp, best.nlp.start)
-    top, radius = certify(best).certificate.bound, float(np.ravel(best.state.parameters["x1"])[0])
+    top, radius = certificate.bound, float(np.ravel(evaluate(best.nlp, best.x).parameters["x1"])[0])
     curve = tradeoff(lambda value: load_case(name, {"x1": value}), [*radii, radius + 1e-3], name="x1").points
     kept = sorted((point.value, point.solution.F) for point in curve if point.solution.status is Status.OPTIMAL)
     figure = Figure(figsize=(11.0, 5.2), facecolor="white")
