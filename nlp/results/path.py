@@ -10,13 +10,14 @@ from ...models import Dimension
 from ...models.statics import driven_joints
 from ..case.pathfile import PLACE
 from ..case.task import Sense
+from ..evidence.state import WorkspacePose
 from ..proof.statement.claims import ACTUATED
 from ..system.jsonvalues import Absent, Inline, JsonObject
 from .exchange import ExchangeData, exchange_fields
 from .parts import HeadData, SettingsData, VersionsData, settings_data
 from .pathtable import knot_motion
 from .point import head_data, versions
-from .verdicts import VerdictData, WorkspacePose, pose_data, posed_fields
+from .verdicts import VerdictData, pose_data, posed_fields
 
 if TYPE_CHECKING:
     from ..case.overrides import Settings

@@ -27,8 +27,8 @@ from .verdicts import (
 
 if TYPE_CHECKING:
     from ..case.case import Case
+    from ..evidence.state import WorkspacePose
     from ..results.path import PathData, PathFaultData, PathProofData, PathResult, PathVerdictData
-    from ..results.verdicts import WorkspacePose
 
 #: So many words that move nothing are shown.
 _SHOWN = 6
