@@ -204,6 +204,7 @@ def test_a_result_is_read_again_from_its_file(cli: Run, tmp_path: Path) -> None:
     [
         (lambda table: table.pop("schema"), "schema: is missing"),
         (lambda table: table.update(extra=1), "extra: no such key; allowed: schema, case"),
+        (lambda table: table.update(titel=""), r"titel: no such key; did you mean 'title'\? allowed: schema"),
         (lambda table: table.update(status="perfect"), "status: must be one of 'optimal'"),
         (lambda table: table.update(F="large"), "F: must be a number"),
         (lambda table: table.update(seed=1.5), "seed: must be an integer"),
