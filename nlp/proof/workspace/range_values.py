@@ -15,10 +15,10 @@ class RangeStop(JsonObject):
 
     Attributes:
         name: name of the claim.
-        outcome: refuted at the pose, or open on the way to it.
+        outcome: outcome of the claim: refuted at the pose, or open on the way to it.
         key: dotted key, below ``limits``, of the limit in the case; absent of a rank.
         unit: unit of the limit, empty for a plain number; absent of a rank.
-        sense: whether the number is below a smallest or above a largest value; absent of a rank.
+        sense: kind of the limit, a smallest or a largest value; absent of a rank.
         limit: the limit; absent of a rank.
         value: value of the number at the pose; null where it is not known, and of a rank.
         pose: the pose; null where none is known.
@@ -63,11 +63,11 @@ class AxisRange(JsonObject):
     """How far a coordinate can move alone.
 
     Attributes:
-        axis: ``x``, ``y``, ``z``, ``roll``, ``pitch`` or ``yaw``.
-        unit: unit of its values in the case.
-        at: its value at the pose.
+        axis: name of the coordinate: ``x``, ``y``, ``z``, ``roll``, ``pitch`` or ``yaw``.
+        unit: unit of the values in the case.
+        at: value at the pose.
         lower: the lower end of the proved range about the pose.
-        upper: the upper end.
+        upper: the upper end of the range.
         dimension: dimension of the coordinate, in radians for an angle.
     """
 
