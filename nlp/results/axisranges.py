@@ -20,12 +20,12 @@ class AxisRangesResult(JsonObject):
         proved: whether everything is proved at the pose, and a range about it of a coordinate.
         pose: position, and roll, pitch and yaw.
         largest: length and angle by which coordinates were moved at most.
-        faults: what is not proved at the pose itself.
+        faults: claims that are not proved at the pose itself.
         axes: the independent coordinates alone.
         pairs: each two of them.
         not_alone: coordinates that the robot cannot choose: they follow from the others, and move with them.
         reason: why the work ended before all axes and pairs were judged; absent otherwise.
-        versions: of the programs.
+        versions: versions of the programs.
     """
 
     head: Inline[HeadData]

@@ -151,7 +151,7 @@ def value_of(kind: object, value: object, key: str = "") -> Any:  # noqa: ANN401
     Args:
         kind: the annotation: a plain type, an enumeration, a class of :func:`object_of`, ``Literal``, a union, a tuple
             of one kind, or a mapping from texts.
-        value: as :func:`json_tree` returns it.
+        value: value that :func:`json_tree` returns.
         key: its dotted key, for messages.
 
     Raises:

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 
 def _about_lines(case: Case, result: WorkspaceResult) -> Iterator[Line]:
-    """Yield the machines and the poses that a verdict covers, where these are more than the exact one and the box."""
+    """Yield the robots and the poses that a verdict covers, beside the exact robot and the box."""
     yield from machine_lines(case, result.joint_centre)
     if result.poses is not None:
         yield Line(result.poses, label="poses")
