@@ -1,4 +1,4 @@
-"""Run the commands of the introductions, of some how-to pages and of README.md, and write what they print there: run by ``make docs``.
+"""Run the commands of the introductions, how-to pages and README.md, and write their output into them: ``make docs``.
 
 A page has three kinds of blocks. ``<!-- file: NAME -->`` stands before a block that is a file. ``<!-- run: WORDS -->``
 stands before a block that begins with ``$`` and a command, and has the lines of its output below that WORDS choose, see
@@ -16,7 +16,7 @@ from pathlib import Path
 
 FOLDER = Path(__file__).parent
 INTRODUCTIONS = ("intro-machine-tool", "intro-delta", "intro-motion-base", "intro-wrist")
-PAGES = (*INTRODUCTIONS, "loads", "workspace", "../README")
+PAGES = (*INTRODUCTIONS, "certificate", "loads", "workspace", "../README")
 _PYTHON = [sys.executable, "-P"]
 #: Programs of the commands, and what runs them.
 _PROGRAMS = {"screwsynth": [*_PYTHON, "-m", "screwsynth.nlp"], "python": _PYTHON, "make": ["make", "--silent"]}
