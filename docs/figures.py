@@ -106,25 +106,31 @@ def draw_method() -> None:
     axes.plot(*seen([base[0], top[0]]), color="0.25", lw=4, zorder=4)
     axes.plot(*seen([base[0], top[0]]), "o", color="0.25", ms=8, zorder=5)
     origin, middle, unit = np.zeros(3), np.array([0, 0, 4.0]), np.array([-0.6, 0, 0.8])
+    along_y, below = np.array([0, 1.0, 0]), top[0] - np.array([0, 0, 2.0])
     for along, name in ((np.array([1.2, 0, 0]), "x"), (np.array([0, 1.2, 0]), "y"), (np.array([0, 0, 1.2]), "z")):
         axes.plot(*seen([origin, along]), color="black", lw=1.2)
         label(1.18 * along, name, (-0.05, 0.0))
-    # The task: a rotation about an axis along y through the middle of the platform, and what it does to the joint.
-    axes.plot(*seen([middle - [0, 3.6, 0], middle + [0, 3.6, 0]]), color=task, lw=1.6, ls=(0, (6, 3)), zorder=3)
+    # The task: a rotation about an axis along y through the middle of the platform, and the velocity of the joint.
+    axes.plot(*seen([middle - 3.6 * along_y, middle + 3.6 * along_y]), color=task, lw=1.6, ls=(0, (6, 3)), zorder=3)
     angles = np.linspace(-0.6, np.pi * 0.95, 60)
-    circle = middle - [0, 2.9, 0] + 0.55 * np.array([np.cos(angles), 0 * angles, -np.sin(angles)]).T
+    circle = middle - 2.9 * along_y + 0.55 * np.array([np.cos(angles), 0 * angles, -np.sin(angles)]).T
     axes.plot(*seen(circle), color=task, lw=2.2)
     arrow(circle[-4], circle[-1], task)
     arrow(top[0], top[0] + 2.1 * unit, wrench)
-    arrow(top[0], top[0] - [0, 0, 2], rate)
+    arrow(top[0], below, rate)
     foot = top[0] - 1.6 * unit
-    axes.plot(*seen([top[0] - [0, 0, 2], foot]), color=rate, lw=1.2, ls=":")
+    axes.plot(*seen([below, foot]), color=rate, lw=1.2, ls=":")
     axes.plot(*seen([top[0], foot]), color=rate, lw=6, alpha=0.5, zorder=5, solid_capstyle="butt")
     label(base[0], "base joint $B_1$", (0.2, -0.05))
     label(top[0], "platform joint $P_1$", (0.25, 0.12))
     label(top[0] + 2.1 * unit, "unit wrench $L_1 = (f_1, m_1)$\nof leg 1: force along the leg", (0.25, 0.2), wrench)
-    label(middle - [0, 3.6, 0], "task twist $\\chi = (\\omega, v)$,\nhere a rotation\nabout the axis $s$", (-3.5, 1.2), task)
-    label(top[0] - [0, 0, 2], "velocity of $P_1$", (-2.3, 0.25), rate)
+    label(
+        middle - 3.6 * along_y,
+        "task twist $\\chi = (\\omega, v)$,\nhere a rotation\nabout the axis $s$",
+        (-3.5, 1.2),
+        task,
+    )
+    label(below, "velocity of $P_1$", (-2.3, 0.25), rate)
     label(foot, "its component along the leg:\nwork rate $L_1 \\wedge \\chi$", (0.3, 0.1), rate)
     axes.set_xlim(-6.4, 8.6)
     axes.set_ylim(-1.6, 6.9)

@@ -17,8 +17,9 @@ CASES = ROOT / "docs" / "cases.md"
 CASES_HEAD = """# Cases
 
 These [cases](glossary.md#optimisation) come with the package. Each command below finds its case by the name.
-[Choosing](choosing.md) works through six of them, and [the paper's results](reproduction.md) come from the cases named `paper`.
-`make docs` writes this page from the case files, and `make figures` draws the pictures.
+[Choosing](choosing.md) works through six of them. The cases `paper-...` give
+[the paper's results](reproduction.md). `make docs` writes this page from the case files, and `make figures` draws the
+pictures.
 """
 
 

@@ -44,7 +44,7 @@ def chosen(lines: list[str], words: str) -> list[str]:
     """Return the lines of an output that words choose, in the order of the words; spaces in lines count once.
 
     Args:
-        lines: of the output.
+        lines: lines of the output.
         words: nothing for all lines, ``none``, or parts with ``|`` between them: ``A`` for all lines that begin with A,
             ``A!`` for the first of them, ``A .. B`` for the first of them and all before one that begins with B. The
             further lines of one that is broken, with two spaces before them, belong to it.
