@@ -1,4 +1,4 @@
-"""Run the commands of the introductions, First steps and README.md, and write their output there: run by ``make docs``.
+"""Run the commands of tutorials, how-to pages and README.md, and write their output into them: ``make docs``.
 
 A page has three kinds of blocks. ``<!-- file: NAME -->`` stands before a block that is a file. ``<!-- run: WORDS -->``
 stands before a block that begins with ``$`` and a command. Below are the lines of its output that WORDS choose, see
@@ -17,7 +17,7 @@ from pathlib import Path
 
 FOLDER = Path(__file__).parent
 INTRODUCTIONS = ("intro-machine-tool", "intro-delta", "intro-motion-base", "intro-wrist")
-PAGES = (*INTRODUCTIONS, "start", "../README")
+PAGES = (*INTRODUCTIONS, "start", "certificate", "loads", "workspace", "../README")
 _PYTHON = [sys.executable, "-P"]
 #: Programs of the commands, and what runs them.
 _PROGRAMS = {"screwsynth": [*_PYTHON, "-m", "screwsynth.nlp"], "python": _PYTHON, "make": ["make", "--silent"]}
@@ -48,7 +48,7 @@ def chosen(lines: list[str], words: str) -> list[str]:
     """Return the lines of an output that words choose, in the order of the words; spaces in lines count once.
 
     Args:
-        lines: of the output.
+        lines: lines of the output.
         words: nothing for all lines, ``none``, or parts with ``|`` between them: ``A`` for all lines that begin with A,
             ``A!`` for the first of them, ``A .. B`` for the first of them and all before one that begins with B. The
             further lines of one that is broken, with two spaces before them, belong to it.
