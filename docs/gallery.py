@@ -17,8 +17,9 @@ CASES = ROOT / "docs" / "cases.md"
 CASES_HEAD = """# Cases
 
 These [cases](glossary.md#case) come with the package. Each command below finds its case by the name.
-[Six worked designs](worked-designs.md) explain six of them. The cases `paper-...` give [the paper's results](reproduction.md).
-`make docs` writes this page from the case files, and `make figures` draws the pictures.
+[Six worked designs](worked-designs.md) explain six of them. The cases `paper-...` give
+[the paper's results](reproduction.md). `make docs` writes this page from the case files, and `make figures` draws the
+pictures.
 """
 
 
