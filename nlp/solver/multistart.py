@@ -112,7 +112,7 @@ def solve_program(
     solver: Solver = ipopt,
     phase: PhaseProgress = no_phase,
 ) -> ProgramSolution:
-    """Solve a program; where its limits seem to contradict each other, search the smallest relaxation.
+    """Solve a program; where its limits seem to contradict each other, search for the smallest relaxation.
 
     Args:
         nlp: the nonlinear program.
