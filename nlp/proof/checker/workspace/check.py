@@ -28,7 +28,7 @@ from ...statement.claims import ERRORS, REACH, Claim, ClaimKind
 from ...statement.machine import Legs, check_leg_error, workspace_of_case
 from ...statement.motors import actuator_coordinates, in_path_motion
 from ...statement.posed_layout import extreme_program
-from ...statement.tolerance import Directions, length_of_one_machine, second_order_name
+from ...statement.tolerance import Directions, length_of_one_robot, second_order_name
 from ..check import check_proof
 from ..proof_file import PathPremises, Premises, Proof, ProofClaim, ProofError
 from ..tree import Node
@@ -48,8 +48,8 @@ from .path_root import PathRoot
 from .pose_boxes import BoxClaim, pose_root
 from .ranks import rank_claim
 from .statement import (
-    Machines,
     RobotClaims,
+    RobotsWithinTolerance,
     case_along_path,
     expected_along_path,
     expected_claims,
@@ -212,7 +212,7 @@ class _Checker:
             (ClaimKind.SPECTRUM, "boxes"): self._singular,
             (ClaimKind.MOTOR, "boxes"): self._motor,
         }
-        if self._tolerance and self.robot.machines is None:
+        if self._tolerance and self.robot.within_tolerance is None:
             raise ProofError("errors of joint centres take freedoms from this robot")
         if each.kind is ClaimKind.RANK and given.reason in ("regular", "singular"):
             return self._rank(each, given)
@@ -236,14 +236,14 @@ class _Checker:
 
     def _rank(self, each: Claim, given: ProofClaim) -> CheckedClaim:
         """Check that J, or the constraint wrenches, keep their rank, or that J is singular between two points."""
-        is_refuted, machines = given.reason == "singular", self.robot.machines
+        is_refuted, robots = given.reason == "singular", self.robot.within_tolerance
         by_machine = is_refuted and any(len(side) > self._root.coordinates for side in given.sides)
-        if by_machine and machines is None:
+        if by_machine and robots is None:
             raise ProofError("the claim is about the exact machine")
         tolerance = self._tolerance if by_machine or not is_refuted else 0.0
         # The errors of six straight legs have a bound in their rows that shows larger boxes.
         has_errors = by_machine or self.robot.legs is None
-        built = machines.symbols.built if machines is not None and tolerance and has_errors else None
+        built = robots.symbols.built if robots is not None and tolerance and has_errors else None
         claim = rank_claim(self._case, self.robot.model, self._root, each.name, tolerance, built)
         if is_refuted:
             claim.show_sign_change(self._root, given.sides)
@@ -266,11 +266,11 @@ class _Checker:
         layout = self.robot.place if claim.key == REACH else self.robot.layout
         if self.robot.dependent:
             raise ProofError("dependent coordinates of the pose are followed over boxes")
-        if self.robot.machines is None:
+        if self.robot.within_tolerance is None:
             return self._program(claim.expression, claim.sense, given, layout)
         if claim.key != REACH and any(reach.label not in self._bounds for reach in self.robot.reaches):
             raise ProofError("the reach of limbs of every machine has no proof")
-        return self._of_machines(self.robot.machines, claim, given)
+        return self._within_tolerance(self.robot.within_tolerance, claim, given)
 
     def _followed(self, claim: Claim, given: ProofClaim) -> float:
         """Return the bound of a number that a tree of boxes proves, in which the loops are followed."""
@@ -284,15 +284,15 @@ class _Checker:
         number.finish()
         return bound
 
-    def _of_machines(self, machines: Machines, claim: Claim, given: ProofClaim) -> float:
+    def _within_tolerance(self, robots: RobotsWithinTolerance, claim: Claim, given: ProofClaim) -> float:
         """Return the bound of a number over all machines that a tree of ``certify``, and a lemma, prove."""
-        if not machines.varies(claim):
-            return self._program(machines.number(claim, 0.0), claim.sense, given, machines.design)
+        if not robots.varies(claim):
+            return self._program(robots.number(claim, 0.0), claim.sense, given, robots.design)
         lemma = self._lemma(second_order_name(claim.name), claim.sense)
         rest = _stated(lemma)
-        bound = self._program(machines.number(claim, rest), claim.sense, given, machines.design)
+        bound = self._program(robots.number(claim, rest), claim.sense, given, robots.design)
         try:
-            self._show(SecondOrderClaim(machines, claim.expression, rest), _WHOLE)
+            self._show(SecondOrderClaim(robots, claim.expression, rest), _WHOLE)
         except UncoveredError as error:
             raise ProofError(f"the check has no rule for {error}") from None
         except ProofError as error:
@@ -321,20 +321,20 @@ class _Checker:
 
     def _lengths(self, each: Claim, given: ProofClaim) -> float:
         """Return the bound of a number made of the longest and the shortest length of a leg."""
-        senses, machines = (Sense.MAX, Sense.MIN), self.robot.machines
+        senses, robots = (Sense.MAX, Sense.MIN), self.robot.within_tolerance
         left, (leg,) = 0.0, each.legs
         if given.reason == "lengths":
             lengths = [self._length(self._case.model.legs[leg].name, sense) for sense in senses]
         else:
             # Lengths of one machine at two poses, without the part along c_b and c_p of its errors.
             about = [np.array(side, dtype=float) for side in given.sides]
-            if machines is None:
+            if robots is None:
                 raise ProofError("the claim is about the exact machine")
             if len(about) != 2 or any(side.shape != (3,) or not np.isfinite(side).all() for side in about):
                 raise ProofError("the claim has no two directions")
             directions = Directions(each.name, *about)
-            claims = [length_of_one_machine(machines.symbols, leg, sense, directions) for sense in senses]
-            lengths = [self._of_machines(machines, one, self._lemma(one.name, one.sense)) for one in claims]
+            claims = [length_of_one_robot(robots.symbols, leg, sense, directions) for sense in senses]
+            lengths = [self._within_tolerance(robots, one, self._lemma(one.name, one.sense)) for one in claims]
             # This part is the same at both poses, of as many lengths as are left.
             left = abs(sum(each.weights)) * self._tolerance * sum(float(np.linalg.norm(side)) for side in about)
         parts = [weight * length for weight, length in zip(each.weights, lengths, strict=True)]
@@ -403,8 +403,8 @@ class _Checker:
     @cached_property
     def _loops(self) -> PosedLoops:
         """The machines that are meant as expressions of the pose, of the closed loops, and of errors."""
-        machines = self.robot.machines
-        built = None if machines is None else machines.symbols.built
+        robots = self.robot.within_tolerance
+        built = None if robots is None else robots.symbols.built
         return posed_loops(self._case, self.robot.model, self._root, self._tolerance, built)
 
     @cached_property

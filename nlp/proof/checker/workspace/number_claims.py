@@ -38,7 +38,7 @@ from .forms import ENLARGED, PRODUCT, UP, AffineMatrix, FormArithmetic, solved
 from .loop_claims import LoopClaim, PosedLoops
 from .motion_matrix import PosedRobot
 from .pose_boxes import Attempt
-from .statement import Machines
+from .statement import RobotsWithinTolerance
 
 #: Part of a bound by which a number at a pose must be beyond it to show that a claim is wrong: far more than rounding.
 _WRONG = 1e-6
@@ -88,9 +88,9 @@ class SecondOrderClaim:
         UncoveredError: an expression holds an operation without a rule.
     """
 
-    def __init__(self, machines: Machines, expression: SX, bound: float) -> None:
-        symbols = machines.symbols
-        self.free = [k for k, each in enumerate(machines.root.values) if isinstance(each, Free)]
+    def __init__(self, robots: RobotsWithinTolerance, expression: SX, bound: float) -> None:
+        symbols = robots.symbols
+        self.free = [k for k, each in enumerate(robots.root.values) if isinstance(each, Free)]
         self._bound, self._tolerance = bound, symbols.tolerance
         pose, errors = SX.sym("pose", len(self.free)), SX.sym("errors", symbols.errors.numel())
         number = symbols.of(expression, errors, pose)

@@ -34,7 +34,7 @@ from ...statement.claims import (
     claims_of,
     dependent_claims,
     length_claims,
-    one_machine_name,
+    one_robot_name,
     searched_claims,
 )
 from ...statement.machine import Legs, legs_of
@@ -42,12 +42,12 @@ from ...statement.motors import in_motion, in_path_motion, motor_claims, speed_c
 from ...statement.posed_layout import closed_layout, posed_layout, reach_claims
 from ...statement.tolerance import (
     BuiltModel,
-    MachineLayout,
     PoseCoordinates,
+    ToleranceLayout,
     built_model,
     design_layout,
-    machine_layout,
     second_order_name,
+    tolerance_layout,
 )
 from ..premises import exact
 from ..proof_file import PathPremises, Premises, ProofClaim, ProofError, workspace_numbers
@@ -59,7 +59,7 @@ from .pose_boxes import pose_root
 _SAME = 1e-9
 
 
-class Machines:
+class RobotsWithinTolerance:
     """Every machine within a tolerance on joint centres, as the check states it.
 
     With the derivatives g_j of a number g by the error of centre j, and the blocks H_jk of its second derivatives, the
@@ -82,7 +82,7 @@ class Machines:
     def __init__(self, case: Case, model: Model, root: Root, *, with_angles: bool = True) -> None:
         self._case, self.model, self.root, self._at = case, model, root, coordinates_of(root)
         tolerance = case.joint_centre_tolerance or 0.0
-        self.symbols: MachineLayout = machine_layout(
+        self.symbols: ToleranceLayout = tolerance_layout(
             case, built_model(case.model, with_angles=with_angles), tolerance, self._at
         )
 
@@ -122,8 +122,8 @@ class RobotClaims:
         reaches: claims that limbs reach every pose.
         numbers_at: assemblies that its numbers are about, but for those of actuators under loads, in words; empty for a
             robot without unknowns.
-        machines: every machine within the tolerance, in whose symbols the numbers and ``reaches`` are then; None where
-            the design is meant, or machines cannot be assembled.
+        within_tolerance: robots within the tolerance, in whose symbols the numbers and ``reaches`` are then; None where
+            the design is meant, or robots cannot be assembled.
         dependent: claims about dependent coordinates of the pose.
         followed: the symbols of the numbers of a robot whose loops are followed in the home assembly mode, as they are
             with dependent coordinates and within a tolerance; else None.
@@ -135,9 +135,9 @@ class RobotClaims:
     place: Layout
     reaches: tuple[Claim, ...] = ()
     numbers_at: str = ""
-    machines: Machines | None = None
+    within_tolerance: RobotsWithinTolerance | None = None
     dependent: tuple[Claim, ...] = ()
-    followed: MachineLayout | None = None
+    followed: ToleranceLayout | None = None
 
 
 def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> RobotClaims:
@@ -145,13 +145,13 @@ def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> 
     legs, closed, is_open = legs_of(case), closed_form(case.model), bool(case.model.unknowns)
     if case.joint_centre_tolerance:
         try:
-            machines = Machines(case, closed.model, pose_root(workspace))
+            robots = RobotsWithinTolerance(case, closed.model, pose_root(workspace))
         except RobotError:
             pass
         else:
-            return _followed(legs, closed.model, workspace, machines.symbols, is_open=is_open, machines=machines)
+            return _followed(legs, closed.model, workspace, robots.symbols, is_open=is_open, within_tolerance=robots)
     if workspace.dependent:
-        symbols = machine_layout(
+        symbols = tolerance_layout(
             case, BuiltModel(closed.model, (), closed.reaches), 0.0, coordinates_of(pose_root(workspace))
         )
         return _followed(legs, closed.model, workspace, symbols, is_open=is_open)
@@ -193,34 +193,34 @@ def robot_along_path(case: Case, root: PathRoot, *, with_angles: bool) -> RobotC
     Raises:
         ProofError: the robot cannot be assembled with errors of its joint centres.
     """
-    closed, machines = closed_form(case.model, with_angles=with_angles), None
+    closed, robots = closed_form(case.model, with_angles=with_angles), None
     if case.joint_centre_tolerance:
         try:
-            machines = Machines(case, closed.model, root, with_angles=with_angles)
+            robots = RobotsWithinTolerance(case, closed.model, root, with_angles=with_angles)
         except RobotError as error:
             raise ProofError(str(error)) from None
     symbols = (
-        machine_layout(case, BuiltModel(closed.model, (), closed.reaches), 0.0, coordinates_of(root))
-        if machines is None
-        else machines.symbols
+        tolerance_layout(case, BuiltModel(closed.model, (), closed.reaches), 0.0, coordinates_of(root))
+        if robots is None
+        else robots.symbols
     )
     is_open = bool(case.model.unknowns)
-    return _followed(legs_of(case), closed.model, root.workspace, symbols, is_open=is_open, machines=machines)
+    return _followed(legs_of(case), closed.model, root.workspace, symbols, is_open=is_open, within_tolerance=robots)
 
 
 def _followed(
     legs: Legs | None,
     model: Model,
     workspace: Workspace,
-    symbols: MachineLayout,
+    symbols: ToleranceLayout,
     *,
     is_open: bool,
-    machines: Machines | None = None,
+    within_tolerance: RobotsWithinTolerance | None = None,
 ) -> RobotClaims:
     """Return the claims about a robot whose loops are followed."""
     home = "the assembly of home" if is_open else ""
     reaches, dependent = symbols.claims(())[0], tuple(dependent_claims(symbols.layout.robots[0], workspace))
-    whole = RobotClaims(legs, symbols.layout, model, symbols.layout, tuple(reaches), home, machines)
+    whole = RobotClaims(legs, symbols.layout, model, symbols.layout, tuple(reaches), home, within_tolerance)
     return replace(whole, dependent=dependent, followed=symbols)
 
 
@@ -283,7 +283,7 @@ def _number_of(claim: Claim) -> MotorNumber | None:
 def refuse_other_lemmas(lemmas: Sequence[ProofClaim], expected: Sequence[Claim]) -> None:
     """Refuse lemmas on which no claim of a case can rest."""
     claims = [each.label for each in expected]
-    strokes = [(one_machine_name(each.name), sense.value) for each in expected for sense in Sense]
+    strokes = [(one_robot_name(each.name), sense.value) for each in expected for sense in Sense]
     allowed = {*strokes, *((second_order_name(name), sense) for name, sense in claims + strokes)}
     for each in lemmas:
         if (each.name, each.sense) not in allowed:
