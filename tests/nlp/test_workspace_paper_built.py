@@ -137,7 +137,7 @@ def test_another_tolerance_is_rejected(proof: Proof) -> None:
     assert "does not keep" in rejections(proof, smaller)("leg_length limb 2-", "max")
     reject = rejections(stating(proof, joint_centre=0.0), without)
     assert "other expressions" in reject("F", "max")
-    assert "about the exact machine" in reject("actuator.stroke_max limb 2+", "max")
+    assert "about the exact robot" in reject("actuator.stroke_max limb 2+", "max")
 
 
 def value_of(name: str, sense: str, number: float) -> float:
@@ -398,7 +398,7 @@ def test_the_commands_say_which_machines_a_proof_is_about(cli: Run, tmp_path: Pa
     content["case"] = edited(content["case"], ("joint_centre = 0.02", "joint_centre = 0.002"))
     code, _, err = cli("verify-proof", str(saved(target, json.dumps(content))))
     assert code == 1
-    assert err.startswith("rejected: the proof is for machines within another tolerance")
+    assert err.startswith("rejected: the proof is for another joint-centre tolerance")
 
 
 def test_asked_singular_values_of_the_exact_machine_are_on_paper() -> None:

@@ -229,10 +229,10 @@ def test_a_singular_pose_of_a_robot_without_loops_is_on_paper() -> None:
     ("name", "reached", "words"),
     [
         ("6-sps", True, ""),
-        ("6-rus", True, "the assembly of home"),
-        ("6-rus", False, "every assembly"),
-        ("planar-3-prr", True, "every assembly in which limbs in closed form are as at home"),
-        ("3-rps", True, "every assembly"),
+        ("6-rus", True, "the home assembly mode"),
+        ("6-rus", False, "every assembly mode"),
+        ("planar-3-prr", True, "every assembly mode in which limbs in closed form are as at home"),
+        ("3-rps", True, "every assembly mode"),
     ],
 )
 def test_claims_name_the_assemblies_of_their_numbers(name: str, reached: bool, words: str) -> None:
