@@ -280,7 +280,7 @@ class _Chart:
         self.size = np.concatenate([[length] * 3, np.ones(3), system.sizes])
         self.ranged: list[int] = np.flatnonzero(self.half > _STILL * self.size[:6]).tolist()
         constraints = 0 if model.generic is None else model.generic.constraints
-        self._freedoms = 6 - constraints
+        self._mobility = 6 - constraints
         self.loops = Loops(ca.vertcat(y, u), system.equations, system.every, system.signs, self.size)
 
     def ends(self, y: FloatArray) -> FloatArray:
@@ -295,11 +295,11 @@ class _Chart:
         """Return the indices of independent pose coordinates at a closed point, one for each degree of freedom."""
         moves = self._moves(z)
         ranged, weighted = self.ranged, moves * np.repeat([_POSITION, 1.0], 3)[:, None]
-        chosen = _largest(weighted, ranged, [], min(_rank(moves[ranged]), self._freedoms))
+        chosen = _largest(weighted, ranged, [], min(_rank(moves[ranged]), self._mobility))
         # A case with one range of a tilt mostly wants all tilts; a case without one wants positions.
         turns_first = any(k >= 3 for k in ranged)
         others = sorted((k for k in range(6) if k not in ranged), key=lambda k: ((k < 3) == turns_first, k))
-        count = min(self._freedoms, _rank(moves)) - len(chosen)
+        count = min(self._mobility, _rank(moves)) - len(chosen)
         return sorted(_largest(weighted, others, chosen, count, enough=_ENOUGH))
 
     def points(self, z: FloatArray, independent: list[int]) -> FloatArray | None:

@@ -208,7 +208,7 @@ def _linearise(nlp: Nlp, x: FloatArray, numbers: Numbers, scales: _Scales) -> _L
     )
 
 
-class _Found(NamedTuple):
+class _Multipliers(NamedTuple):
     """Multipliers of one active set of k sides at m points.
 
     Attributes:
@@ -224,12 +224,14 @@ class _Found(NamedTuple):
     tangents: FloatArray
 
 
-def _multipliers(gradient: FloatArray, A: FloatArray) -> _Found:
+def _multipliers(gradient: FloatArray, A: FloatArray) -> _Multipliers:
     """Return the multipliers of active sides with normals A (m, k, n) at points with gradients (m, n)."""
     m, k, n = A.shape
     if not k:
         identity = np.broadcast_to(np.eye(n), (m, n, n))
-        return _Found(np.zeros((m, 0)), np.abs(gradient).max(axis=1, initial=0.0), np.ones(m, dtype=bool), identity)
+        return _Multipliers(
+            np.zeros((m, 0)), np.abs(gradient).max(axis=1, initial=0.0), np.ones(m, dtype=bool), identity
+        )
     U, sizes, V = np.linalg.svd(A)
     smallest = sizes[:, -1]
     safe = np.where(smallest > _DEPENDENT, 1.0, np.nan)[:, None] / sizes
@@ -237,7 +239,7 @@ def _multipliers(gradient: FloatArray, A: FloatArray) -> _Found:
     mu = -np.einsum("mij,mj->mi", U, along * safe)
     left = gradient + np.einsum("mki,mk->mi", A, mu)
     stationarity = np.where(smallest > _DEPENDENT, np.abs(left).max(axis=1), np.inf)
-    return _Found(np.nan_to_num(mu), stationarity, smallest > _DEPENDENT, np.swapaxes(V[:, k:], 1, 2))
+    return _Multipliers(np.nan_to_num(mu), stationarity, smallest > _DEPENDENT, np.swapaxes(V[:, k:], 1, 2))
 
 
 def _groups(

@@ -165,10 +165,10 @@ def platform_singularities(
     found = []
     lost = generic[0] - ranks[0]
     if lost > 0:
-        alone = len(state.free_twists) == lost
-        gained = state.free_twists if alone else _null_twists(constraints, state.position)
+        has_same_motions = len(state.free_twists) == lost
+        gained = state.free_twists if has_same_motions else _null_twists(constraints, state.position)
         found.append(singularity(SingularityKind.CONSTRAINT, gained=gained))
-        if alone:
+        if has_same_motions:
             return found
     if ranks[1] < generic[1]:
         found.append(singularity(SingularityKind.ACTUATION, gained=state.free_twists))

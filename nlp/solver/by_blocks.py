@@ -53,7 +53,7 @@ def searched_starts(
     """
     if not blocks.blocks:
         return SearchedStarts(points, {})
-    found = _Found(nlp, points)
+    found = _BlockResults(nlp, points)
     for block in blocks.blocks if solver is ipopt and search.screen else ():
         program, columns = blocks.program(block), blocks.columns(block)
         if is_requested() or not can_screen(program):
@@ -65,7 +65,7 @@ def searched_starts(
     return SearchedStarts(found.x, starts)
 
 
-class _Found:
+class _BlockResults:
     """Results of the searches of all blocks, combined in the order of the starting points.
 
     Args:

@@ -264,16 +264,16 @@ def _certify(
         return Certified(solution, (certificate,), None, statement, _complete_tree(writer, certificate))
     solution = given or _in_half(lambda: solve_programs(case, nlps, search, jobs=jobs))
     count = len(solution.outcomes) + 1  # tasks and the combined program
-    alone = tuple(
+    separate = tuple(
         certify_one(outcome.own, outcome.task.name, None, count - k) for k, outcome in enumerate(solution.outcomes)
     )
     if solution.combination is None or solution.combination.combined is None:
-        return Certified(solution, alone, None, Statement(), None)
+        return Certified(solution, separate, None, Statement(), None)
     combined = solution.combination.combined
     writer = TreeRecord() if with_proof and combined.nlp.n else None
     certificate = certify_one(combined, case.method.value, writer)
     statement = replace(_combined_statement(case, combined), in_home_mode=certificate.nlp.in_home_mode)
-    return Certified(solution, alone, certificate, statement, _complete_tree(writer, certificate))
+    return Certified(solution, separate, certificate, statement, _complete_tree(writer, certificate))
 
 
 def _incumbent(own: ProgramSolution) -> tuple[FloatArray | None, float | None]:

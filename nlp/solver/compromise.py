@@ -111,8 +111,8 @@ def combine(
         status=status,
         x=frozen_array(x, (nlps[0].n,)),
         outcomes=tuple(
-            _outcome(nlp, replace(task, weight=weight), solution, alone, point, x)
-            for nlp, task, weight, solution, alone, point in zip(
+            _outcome(nlp, replace(task, weight=weight), solution, is_unique, point, x)
+            for nlp, task, weight, solution, is_unique, point in zip(
                 nlps, case.tasks, weights, own, unique, points, strict=True
             )
         ),

@@ -250,10 +250,10 @@ class Solution(Whole, Shown, Answer):
 
         An interrupted search, for example over listed values, is no answer, even if its best program is solved.
         """
-        alone = all(outcome.own.status.is_answer for outcome in self.outcomes)
+        has_answers = all(outcome.own.status.is_answer for outcome in self.outcomes)
         decisive = self.decided_by
         is_whole = self.status is not Status.INTERRUPTED
-        return is_whole and alone and (decisive is None or decisive.status.is_answer)
+        return is_whole and has_answers and (decisive is None or decisive.status.is_answer)
 
     @property
     def F(self) -> float:  # noqa: N802 - the objective's name

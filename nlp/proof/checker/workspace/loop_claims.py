@@ -88,7 +88,7 @@ def posed_loops(
     except UncoveredError as error:
         raise ProofError(f"the check has no rule for {error}") from None
     if built is not None:
-        _refuse_other_freedoms(robot, assembly)
+        _refuse_other_mobility(robot, assembly)
     if len(needed) < robot.equations.numel():
         _refuse_narrow(robot, assembly, root)
     return PosedLoops(robot, start, assembly, tolerance, needed)
@@ -123,7 +123,7 @@ def _refuse_narrow(robot: PosedRobot, assembly: Assembly, root: PoseRoot) -> Non
                 raise ProofError("the loops cannot be closed everywhere in the workspace")
 
 
-def _refuse_other_freedoms(robot: PosedRobot, assembly: Assembly) -> None:
+def _refuse_other_mobility(robot: PosedRobot, assembly: Assembly) -> None:
     """Refuse a tolerance if, at random errors, omitted equations or screws do not follow from the others."""
     rng, n = np.random.default_rng(_SEED), len(assembly.start) - robot.errors
     poses = [j for j in assembly.independent if j < n]

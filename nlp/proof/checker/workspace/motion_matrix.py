@@ -220,15 +220,15 @@ def motion_matrix(robot: PosedRobot, start: FloatArray, *, is_locked: bool) -> t
         matrix = ca.vertcat(SX(0, 6), *[_work(robot, row) for row in robot.rows if row.kind is WrenchKind.COUPLE])
     generic = robot.model.generic
     if generic is not None:
-        freedoms, idle = 6 - generic.constraints, generic.idle
+        mobility, idle = 6 - generic.constraints, generic.idle
     else:
         # If all poses are closed, the rank is that at almost all poses.
         away = np.random.default_rng(0).uniform(-0.5, 0.5, (4, len(start))) * robot.size * (not robot.model.unknowns)
         spectra = np.linalg.svd(np.hsplit(robot.at(matrix, (start + away).T), len(away)), compute_uv=False)
-        freedoms, idle = matrix.shape[1] - max(int(np.count_nonzero(each > _ZERO * each[0])) for each in spectra), 0
-    if not 0 < freedoms < 6:
+        mobility, idle = matrix.shape[1] - max(int(np.count_nonzero(each > _ZERO * each[0])) for each in spectra), 0
+    if not 0 < mobility < 6:
         raise ProofError("the robot has no constraint wrenches whose rank could be claimed")
-    return matrix, freedoms + idle
+    return matrix, mobility + idle
 
 
 def driven_matrices(robot: PosedRobot, start: FloatArray) -> tuple[SX, SX]:

@@ -84,6 +84,6 @@ def hold_path(given: PathPremises, own: PathPremises) -> None:
     if given.text != own.text or is_table(given.file) != is_table(own.file):
         raise ProofError(f"the proof is for another path than that of {own.file}")
     for option, name in _OPTIONS.items():
-        stated, meant = getattr(given, option), getattr(own, option)
-        if stated != meant:
+        stated, requested = getattr(given, option), getattr(own, option)
+        if stated != requested:
             raise ProofError(f"the proof is for a path that is read with other options: see {name}")

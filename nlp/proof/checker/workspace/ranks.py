@@ -70,9 +70,9 @@ class RankClaim(LoopClaim):
     Joint-centre errors are changes of the rows of six straight legs, or coordinates of the robot.
     """
 
-    def __init__(self, loops: PosedLoops, matrix: SX, freedoms: int) -> None:
+    def __init__(self, loops: PosedLoops, matrix: SX, nullity: int) -> None:
         robot = loops.robot
-        self._freedoms, self._length, self._shape = freedoms, robot.length, matrix.shape
+        self._nullity, self._length, self._shape = nullity, robot.length, matrix.shape
         self._at = np.array(matrix.sparsity().get_triplet(), dtype=np.intp)
         self._off = np.zeros(matrix.shape)
         self._off[tuple(self._at)] = [0.0 if each.is_zero() else _CONSTANTS for each in ca.vertsplit(matrix.nz[:])]
@@ -92,7 +92,7 @@ class RankClaim(LoopClaim):
         the determinant changes continuously, and is 0 at some point.
         """
         # The matrix must be J itself, with rows that are neither normalised nor zero, over poses without loops.
-        if self._shape != (6, 6) or self._freedoms or self.assembly.dependent:
+        if self._shape != (6, 6) or self._nullity or self.assembly.dependent:
             raise ProofError("singular poses can be proved only for robots with six rows and without loops")
         points, poses = [np.array(each, dtype=float) for each in sides], self.coordinates
         if len(points) != 2 or any(y.shape != (poses + self.errors,) for y in points):
@@ -143,9 +143,9 @@ class RankClaim(LoopClaim):
         sizes = np.sqrt((M * M).sum(axis=2, keepdims=True))
         scale = 2.0 ** -np.round(np.log2(np.where(sizes > 0, sizes, 1.0)))
         M, E, A = M * scale, E * scale + self._off, A * scale[:, None]
-        if self._freedoms:
+        if self._nullity:
             known = np.asarray(np.isfinite(M).all(axis=(1, 2)))
-            null = np.linalg.svd(np.where(known[:, None, None], M, 0.0), full_matrices=True)[2][:, -self._freedoms :]
+            null = np.linalg.svd(np.where(known[:, None, None], M, 0.0), full_matrices=True)[2][:, -self._nullity :]
             none = np.zeros((len(M), A.shape[1], *null.shape[1:]))
             rows = (M, null), (E, np.zeros_like(null)), (A, none)
             M, E, A = (np.concatenate(each, axis=-2) for each in rows)
