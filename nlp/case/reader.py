@@ -163,7 +163,7 @@ def case_from_tables(
     """
     origins = TableOrigins()
     try:
-        if "robot" not in tables and not _OF_ROBOT_FILES.isdisjoint(tables):
+        if is_robot_file(tables):
             fault = f'is a robot file, and not a case; [robot] file = "{source}" in a case reads it, and screwsynth new'
             raise CaseError("the file", f"{fault} writes such a case")
         check_version(CASE_FILES, tables)
@@ -177,6 +177,11 @@ def case_from_tables(
         return _case_of(written, name, source, "" if folder is None else str(folder), robot_file)
     except CaseError as error:
         raise (error if error.source else origins.error_in(error, source)) from None
+
+
+def is_robot_file(tables: Mapping[str, Any]) -> bool:
+    """Return whether a TOML document is a robot file instead of a case."""
+    return "robot" not in tables and not _OF_ROBOT_FILES.isdisjoint(tables)
 
 
 def _parse(tables: dict[str, Any]) -> Document:

@@ -19,9 +19,26 @@ def codegen(
     no_measure: Annotated[
         bool, options.flag("--no-measure", "Do not compile the C to write its flash and stack into it")
     ] = False,
+    kinematics: Annotated[
+        bool, options.flag("--kinematics", "Write only the kinematics: motors, rates, torques and forward kinematics")
+    ] = False,
+    single: Annotated[
+        bool, options.flag("--single", "With --kinematics: positions, rates and torques in single precision")
+    ] = False,
+    coordinates: Annotated[
+        str, options.text("--coordinates", "NAME", "With --kinematics: pose, or a limb whose joint coordinates are used too")
+    ] = "pose",
     force: options.Force = False,
 ) -> None:
-    """Write F and its derivatives as C for embedding."""
+    """Write F and its derivatives, or the kinematics alone, as C for embedding."""
+    from ..errors import InputError
+
+    if kinematics:
+        _write_kinematics(case, out, settings, of, single=single, coordinates=coordinates, force=force)
+        return
+    for option, given in (("--single", single), ("--coordinates", coordinates != "pose")):
+        if given:
+            raise InputError(f"{option}: is only for --kinematics; add --kinematics, or leave {option} out")
     from ..embedding.codegen import generate_c, size_words
     from ..embedding.ctext import identifier
     from ..errors import one_line
@@ -38,6 +55,38 @@ def codegen(
         print_line(loaded.stated_pose_notice)
     if not no_measure:
         files = _measured(files, identifier(loaded.name))
+    write_folder(out, files, force=force)
+    command = f"make -C {shlex.quote(one_line(out))} test"
+    print_line(f"{len(files)} files in {one_line(out)}; {command} compiles and tests them")
+
+
+def _write_kinematics(
+    name: str,
+    out: str,
+    settings: list[str] | None,
+    of: str | None,
+    *,
+    single: bool,
+    coordinates: str,
+    force: bool,
+) -> None:
+    """Write the kinematics of a robot as C."""
+    from ..case.robotcase import read_robot_case
+    from ..embedding.kinematicsfiles import generate_kinematics
+    from ..errors import one_line
+    from ..output.files import check_folder, check_outputs, write_folder
+
+    if not force:
+        check_folder(out)
+    if of is None:
+        loaded, text, inputs = read_robot_case(name, options.read_settings(settings))
+    else:
+        loaded, text, inputs = options.read_machine(name, settings, of).file
+    files = generate_kinematics(loaded, text, single=single, coordinates=coordinates)
+    for each in files if Path(out).is_dir() else ():
+        check_outputs(inputs, {"--out": str(Path(out) / each)})
+    size = sum(len(text.encode()) for each, text in files.items() if each.endswith((".c", ".h")))
+    print_line(f"{size / 1000:.0f} kB of C")
     write_folder(out, files, force=force)
     command = f"make -C {shlex.quote(one_line(out))} test"
     print_line(f"{len(files)} files in {one_line(out)}; {command} compiles and tests them")

@@ -7,10 +7,7 @@ files. The same case and versions give the same bytes.
 
 from __future__ import annotations
 
-import os
-import tempfile
-from collections.abc import Iterable, Mapping
-from pathlib import Path
+from collections.abc import Mapping
 from string import Template
 
 import casadi as ca
@@ -29,7 +26,6 @@ from ..system.markdown import markdown_text
 from .ctext import (
     Macros,
     comment_text,
-    for_controllers,
     identifier,
     index_macros,
     integer_table,
@@ -45,9 +41,9 @@ from .measure import NOT_MEASURED
 from .runtimelimits import held_by_fixed_numbers, held_texts, limit_texts, run_time_limits
 from .stages import StagedFunctions, loop_texts, stage_functions
 from .subject import Subject, find_subject, magnitude_of, objective_words, turning_joints
+from .templates import TEMPLATES, casadi_texts, fill_template
 from .worstcase import worst_case_texts
 
-_TEMPLATES = Path(__file__).parent / "c"
 #: Suffixes of the files whose names begin with the case's prefix, and their templates.
 _PARTS = {
     ".h": "api.h",
@@ -113,12 +109,12 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
     sources = [name for name in own if name.endswith(".c")]
     names |= {"sources": " ".join(sources), "objects": " ".join(f"{name[:-2]}.o" for name in sources)}
     names["headers"] = " ".join(name for name in own if name.endswith(".h"))
-    files = {f"{prefix}{ending}": _fill_template(f"{part}.in", names) for ending, part in parts.items()}
+    files = {f"{prefix}{ending}": fill_template(f"{part}.in", names) for ending, part in parts.items()}
     files |= {f"{prefix}{ending}": text for ending, text in core.items()}
-    files |= {name: _fill_template(f"{name}.in", names) for name in _OTHERS}
+    files |= {name: fill_template(f"{name}.in", names) for name in _OTHERS}
     title = markdown_text(" ".join((case.title or case.name).split()))
-    files["README.md"] = _fill_template("README.md.in", names | {"title": title})
-    casadi = _casadi_files((*staged.all, *limits.functions), f"{prefix}_CASADI")
+    files["README.md"] = fill_template("README.md.in", names | {"title": title})
+    casadi = casadi_texts((*staged.all, *limits.functions), f"{prefix}_CASADI")
     files |= {f"{prefix}-casadi{end}": text for end, text in casadi.items()} | {"case.toml": source}
     return files | {MANIFEST: manifest_text(nlp, columns, names, files)}
 
@@ -147,17 +143,12 @@ def size_words(case: Case, files: Mapping[str, str]) -> str:
 
 def budget_files(prefix: str) -> dict[str, str]:
     """Return C for separate budgets of many problems, for the library that Python loads."""
-    return {f"{prefix}-deadline.c": _fill_template("deadline.c.in", {"id": prefix})}
-
-
-def _fill_template(template: str, names: Mapping[str, str]) -> str:
-    """Return a template's text with its placeholders replaced."""
-    return Template((_TEMPLATES / template).read_text(encoding="utf-8")).substitute(names)
+    return {f"{prefix}-deadline.c": fill_template("deadline.c.in", {"id": prefix})}
 
 
 def _core_text(ending: str, prefix: str) -> str:
     """Return the text of a search file, with the prefix of a case."""
-    text = (_TEMPLATES / f"{_CORE_PREFIX}{ending}").read_text(encoding="utf-8")
+    text = (TEMPLATES / f"{_CORE_PREFIX}{ending}").read_text(encoding="utf-8")
     return text.replace(_CORE_PREFIX, prefix).replace(_CORE_PREFIX.upper(), prefix.upper())
 
 
@@ -170,7 +161,7 @@ def _stated_texts(names: Mapping[str, str], core: Mapping[str, str]) -> dict[str
     """
 
     def macros(*templates: str, **further: str) -> Macros:
-        texts = ((_TEMPLATES / f"{each}.in").read_text(encoding="utf-8") for each in templates)
+        texts = ((TEMPLATES / f"{each}.in").read_text(encoding="utf-8") for each in templates)
         return Macros(*core.values(), *(Template(each).safe_substitute(names, **further) for each in texts))
 
     functions = macros("api.h", "functions.h", "loops.c")
@@ -182,18 +173,6 @@ def _stated_texts(names: Mapping[str, str], core: Mapping[str, str]) -> dict[str
     worst = worst_case_texts(_SEEDS + 1, 1 + (signs > 0), solver.value("TRIALS"), solver.value("PARTS") + 1)
     workspaces = {"work": work, "solver_work": str(doubles), "solver_iwork": str(integers)}
     return {**workspaces, "solver_bytes": str(8 * doubles + 4 * integers), "passes": str(passes), **worst}
-
-
-def _casadi_files(functions: Iterable[ca.Function], name: str) -> dict[str, str]:
-    """Generate C and header, by suffix; CasADi's names in them begin with the given name."""
-    generator = ca.CodeGenerator(f"{name}.c", {"with_header": True, "casadi_int": "int", "indent": 0})
-    for function in functions:
-        generator.add(function)
-    # CasADi writes only files.
-    with tempfile.TemporaryDirectory() as folder:
-        generator.generate(folder + os.sep)
-        texts = {end: (Path(folder) / f"{name}{end}").read_text(encoding="utf-8") for end in (".c", ".h")}
-    return {end: for_controllers(text) for end, text in texts.items()}
 
 
 def _substitutions(subject: Subject, staged: StagedFunctions, columns: NumberColumns) -> dict[str, str]:

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 #: Number of poses in one block: the arrays of a block fit into the cache of a processor.
 _BLOCK = 256
 #: Components of a pose: the rotation column by column, then the position.
-_POSE = 12
+POSE = 12
 #: Attempts along a path: number of its steps, and largest correction of an extrapolated unknown of order 1 in a step.
 #: The last attempt has the step limit of :mod:`.assembly`, beyond which a step is a jump.
 _WAYS = ((4, 0.2), (16, 0.1), (64, 0.05))
@@ -134,7 +134,7 @@ def inverse(
 
 def _inverse(case: Case, p: FloatArray, R: FloatArray, follow: str) -> InversePoses:
     """Return the joints at positions (N, 3) with rotations (N, 3, 3), without changing dependent coordinates."""
-    robot = _functions_of(case)
+    robot = functions_of(case)
     poses = np.concatenate([R.transpose(0, 2, 1).reshape(-1, 9), p], axis=1)
     is_pose = _are_poses(R, p)
     moving = np.full((len(p), len(robot.size)), np.nan)
@@ -175,12 +175,36 @@ class _Values(NamedTuple):
 
 
 @lru_cache(maxsize=4)
-def _functions_of(case: Case) -> _RobotFunctions:
+def functions_of(case: Case) -> RobotFunctions:
     """Return the functions of a case's robot; the last cases are cached, as a controller calls repeatedly."""
-    return _RobotFunctions(case)
+    return RobotFunctions(case)
 
 
-class _RobotFunctions:
+class RobotExpressions(NamedTuple):
+    """Expressions of a robot with fixed dimensions; Python evaluates them here, and C in ``embedding``.
+
+    Attributes:
+        coordinates: (a, 1) actuator coordinates, radians or length.
+        unknowns: (u, 1) coordinates of the passive joints that are unknowns of the robot.
+        jacobian: (m, 6) Jacobian, as in :class:`InversePoses`.
+        rates: (a, 6) actuator rates, as in :class:`InversePoses`.
+        margin: (1, 1) relative determinant of ``J'J``.
+        residual: (e, 1) left sides of all loop equations, of order 1.
+        signs: (s, 1) expressions that are positive in the home assembly mode.
+        modes: (w, 1) expressions that are positive in the home working mode too.
+    """
+
+    coordinates: SX
+    unknowns: SX
+    jacobian: SX
+    rates: SX
+    margin: SX
+    residual: SX
+    signs: SX
+    modes: SX
+
+
+class RobotFunctions:
     """A robot with fixed dimensions, as functions of the pose and of the unknowns without a closed form.
 
     Args:
@@ -188,7 +212,12 @@ class _RobotFunctions:
 
     Attributes:
         actuators, measures, joints: names and quantities of :class:`InversePoses`.
+        model: model of the robot, without the unknowns that have a closed form.
+        robot: the robot at the pose ``z``.
+        z: (12 + f, 1) symbols of the pose, rotation column by column, then position, and of these unknowns.
+        expressions: the results, as expressions of ``z``.
         turning: indices of the actuators that turn.
+        moving: indices of the actuators that the pose determines.
         size: (f,) sizes of the unknowns without a closed form.
     """
 
@@ -203,16 +232,17 @@ class _RobotFunctions:
             model = replace(model, quantities=(*model.quantities, listed))
         at_home = with_joints_at_home(model)
         kept = tuple(each for each in at_home.actuators if each.joint not in model.free_joints)
-        self._model = closed_form(replace(at_home, actuators=kept)).model
-        own, pose = self._model.unknowns, SX.sym("pose", _POSE)
+        self.model = closed_form(replace(at_home, actuators=kept)).model
+        own, pose = self.model.unknowns, SX.sym("pose", POSE)
         z = ca.vertcat(pose, SX.sym("z", len(own)))
         position = pose[9:]
-        given = Substitution(SX(ca.DM(self._parameters)), z[_POSE:], ca.reshape(pose[:9], 3, 3), position)
-        robot = instantiate(self._model, given, SX(case.characteristic_length), [SX([0, 0, 1, 0, 0, 0])])
-        values = {each.name: robot.quantities[k] for k, each in enumerate(self._model.quantities)}
+        self.z = z
+        given = Substitution(SX(ca.DM(self._parameters)), z[POSE:], ca.reshape(pose[:9], 3, 3), position)
+        robot = instantiate(self.model, given, SX(case.characteristic_length), [SX([0, 0, 1, 0, 0, 0])])
+        values = {each.name: robot.quantities[k] for k, each in enumerate(self.model.quantities)}
         known = {
             owner: (each.name, values[each.name][k])
-            for each in self._model.quantities
+            for each in self.model.quantities
             if each.name in (_MEASURES if model.actuators else ("leg_length",))
             for k, owner in enumerate(each.owners)
         }
@@ -224,23 +254,26 @@ class _RobotFunctions:
         sizes = ca.Function("sizes", [model.symbols], [ca.vertcat(SX(0, 1), *[each.size for each in own])])
         self.size = np.asarray(sizes(self._parameters).full().ravel(), dtype=np.float64)
         every = ca.vertcat(robot.loops, robot.closure)
-        size = np.concatenate([np.ones(_POSE), self.size])
+        size = np.concatenate([np.ones(POSE), self.size])
         self._loops = Loops(z, robot.closure, every, robot.signs, size)
-        is_mode = [each.is_mode for each in self._model.signs]
+        is_mode = [each.is_mode for each in self.model.signs]
         rates = SX(len(drives), 6)
-        moving = [each.name for each in driven_joints(self._model)]
-        turned = [k for k, each in enumerate(drives) if each.name in moving]
-        rates[turned, :] = inverse_rates(self._model, robot)
-        outputs = [
+        moving = [each.name for each in driven_joints(self.model)]
+        self.moving = [k for k, each in enumerate(drives) if each.name in moving]
+        rates[self.moving, :] = inverse_rates(self.model, robot)
+        self.robot = robot
+        self.expressions = RobotExpressions(
             ca.vertcat(*[known[name][1] for name in self.actuators]),
             values.get("every unknown", SX(0, 1)),
-            robot.jacobian.T,
-            rates.T,
+            robot.jacobian,
+            rates,
             _margin(rows_about(robot.jacobian, position)),
             every,
             robot.signs[[k for k, mode in enumerate(is_mode) if not mode], :],
             robot.signs[[k for k, mode in enumerate(is_mode) if mode], :],
-        ]
+        )
+        # CasADi's columns are NumPy's rows.
+        outputs = self.expressions._replace(jacobian=robot.jacobian.T, rates=rates.T)
         self._function = ca.Function("inverse", [z], [ca.densify(each) for each in outputs])
         # CasADi caches a mapped function while it is referenced: making it takes as long as evaluating it.
         self._mapped = self._function.map(_BLOCK)
@@ -259,7 +292,7 @@ class _RobotFunctions:
             one_by_one: If true, follow the joints from each pose to the next.
         """
         found = np.full((len(poses), len(self.size)), np.nan)
-        start = self._start(poses)
+        start = self.start(poses)
         if start is None:
             return found
         loops = self._loops.some(self._independent(start))
@@ -272,13 +305,13 @@ class _RobotFunctions:
             start = np.concatenate([poses[k], found[k]]) if np.isfinite(found[k]).all() else start
         return found
 
-    def _start(self, poses: FloatArray) -> FloatArray | None:
+    def start(self, poses: FloatArray) -> FloatArray | None:
         """Return a pose with its unknowns (12 + f,) in the home assembly mode: home, or one of the given poses."""
-        at_home = np.concatenate([np.eye(3).ravel(), home_position(self._model, self._parameters)])
+        at_home = np.concatenate([np.eye(3).ravel(), home_position(self.model, self._parameters)])
         chosen = poses[np.unique(np.linspace(0, len(poses) - 1, _REFERENCES).astype(int))]
         for pose in (at_home, *chosen):
             axis, angle = axis_angle_from_matrix(pose[:9].reshape(3, 3).T)
-            unknowns = unknowns_from_home(self._model, self._parameters, np.concatenate([angle * axis, pose[9:]]))
+            unknowns = unknowns_from_home(self.model, self._parameters, np.concatenate([angle * axis, pose[9:]]))
             if unknowns is not None:
                 return np.concatenate([pose, unknowns])
         return None
@@ -287,9 +320,9 @@ class _RobotFunctions:
         """Return the indices of independent loop equations, which determine the unknowns about a point (12 + f,)."""
         rng = np.random.default_rng(0)
         spread = 0.1 * self._loops.size
-        spread[:_POSE] = 0.0
+        spread[:POSE] = 0.0
         near = start + np.vstack([np.zeros(len(start)), spread * rng.uniform(-1, 1, (4, len(start)))])
-        slopes = (self._loops.slopes(near.T) * self._loops.size)[:, :, _POSE:]
+        slopes = (self._loops.slopes(near.T) * self._loops.size)[:, :, POSE:]
         return independent_rows(list(slopes))
 
     def _reached(
@@ -299,17 +332,17 @@ class _RobotFunctions:
         found = np.full((len(poses), len(self.size)), np.nan)
         left = np.arange(len(poses))
         for steps, largest in ways:
-            at = start[_POSE:] + np.zeros((len(left), 1))
+            at = start[POSE:] + np.zeros((len(left), 1))
             before = at
-            for pose in _path(start[:_POSE], poses[left], steps):
+            for pose in _path(start[:POSE], poses[left], steps):
                 kept = np.isfinite(at).all(axis=1)
                 guess = 2 * at[kept] - before[kept]
                 square = loops.count == len(self.size)
                 z = loops.all_closed(
                     np.hstack([pose[kept], guess]).T,
-                    range(_POSE, _POSE + len(self.size)),
+                    range(POSE, POSE + len(self.size)),
                     zero=None if square else DEPENDENT,
-                )[_POSE:].T
+                )[POSE:].T
                 with np.errstate(invalid="ignore"):
                     z[~(np.abs(z - guess) <= largest * self.size).all(axis=1)] = np.nan
                 before, at = at, np.full(at.shape, np.nan)

@@ -1,0 +1,396 @@
+"""C files of kinematics: functions, header, self-test, example and description."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ...models import Dimension, FloatArray
+from .. import __version__
+from ..case.case import Case
+from ..case.controller import SAME, Controller
+from ..evidence.inverse import inverse
+from ..system.markdown import markdown_text
+from .ctext import comment_text, identifier, matrix_table, string_literal
+from .kinematics import Kinematics, matrix_of_rpy
+from .kinematicsjoints import LimbCoordinates, coordinate_texts, limb_coordinates
+from .kinematicslimits import KinematicLimit, limit_texts, limits_of
+from .templates import casadi_texts, fill_template
+
+#: Number of poses of the self-test, the seed of their random choice, and their largest distances from home: parts of the
+#: robot's size and radians; few are farther away.
+_POSES, _SEED, _NEAR, _FAR = 48, 3, 0.08, 0.6
+#: Constants of C in double, and names of the coordinates of a pose.
+_NUMBER = re.compile(r"(?<![\w.])(\d+\.\d*(?:[eE][+-]?\d+)?)(?![\w.])")
+_COORDINATES = ("x", "y", "z", "a", "b", "c")
+#: Functions of the mathematics library that generated C may call.
+_LIBM = ("sin", "cos", "tan", "asin", "acos", "atan2", "atan", "sqrt", "floor", "fabs", "fmax", "fmin", "exp", "log", "pow")
+
+
+class KinematicsFiles(NamedTuple):
+    """Texts of the kinematics of a case.
+
+    Attributes:
+        files: library, header and sources by file name.
+        names: texts for the placeholders of further templates.
+    """
+
+    files: Mapping[str, str]
+    names: Mapping[str, str]
+
+
+def kinematics_prefix(name: str) -> str:
+    """Return the prefix of the C names of the kinematics of a case.
+
+    No name of the solver of another case begins with it.
+    """
+    return identifier(name).replace("screwsynth_", "kinematics_", 1)
+
+
+def generate_kinematics(
+    case: Case, source: str, *, controller: Controller = SAME, single: bool = False, coordinates: str = "pose"
+) -> dict[str, str]:
+    """Generate the files of a folder with the kinematics of a case.
+
+    Args:
+        case: case with fixed dimensions.
+        source: text of its case file, which goes into the folder as ``case.toml``.
+        controller: conventions of the controller.
+        single: If true, positions, rates and torques are in single precision.
+        coordinates: ``pose``, or the name of a limb whose joint coordinates are used too.
+
+    Returns:
+        Text by file name.
+
+    Raises:
+        CaseError: a dimension is free, a unit is unknown, or no closed configuration is known.
+        InputError: an actuator coordinate is not known.
+    """
+    files, names = kinematics_files(case, controller=controller, single=single, coordinates=coordinates)
+    title = markdown_text(" ".join((case.title or case.name).split()))
+    whole = {**names, "title": title, "id": identifier(case.name)}
+    whole["conventions"] = fill_template("kinematics/conventions.md.in", whole)
+    objects = " ".join(f"{name[:-2]}.o" for name in files if name.endswith(".c"))
+    others = ("selftest.c", "bench.c", "example.c", "Makefile", "README.md")
+    texts = {name: fill_template(f"kinematics/{name}.in", whole | {"objects": objects}) for name in others}
+    return {**files, **texts, "case.toml": source}
+
+
+def kinematics_files(
+    case: Case, *, controller: Controller = SAME, single: bool = False, coordinates: str = "pose"
+) -> KinematicsFiles:
+    """Return the library of the kinematics of a case, and the texts for its test, example and description.
+
+    Raises:
+        CaseError: as for :func:`generate_kinematics`.
+        InputError: likewise.
+    """
+    robot = Kinematics(case, controller)
+    limits = limits_of(robot)
+    joints = None if coordinates == "pose" else limb_coordinates(robot, coordinates)
+    kin, file = kinematics_prefix(case.name), f"{identifier(case.name)}-kinematics"
+    names = {"kin": kin, "KIN": kin.upper(), "file": file, "single": str(int(single))}
+    functions = _functions(robot, kin, limits, joints)
+    names |= _substitutions(robot, functions)
+    names |= limit_texts(robot, limits, kin)
+    names |= coordinate_texts(robot, joints, coordinates, kin)
+    names["prototypes"] += f"\n{names['limits_prototype']}\n{names['coordinates_prototype']}"
+    sources = {
+        "-casadi.c": casadi_texts(functions.of_results, f"{kin}_CASADI")[".c"],
+        "-newton.c": casadi_texts(functions.of_newton, f"{kin}_NEWTON")[".c"],
+    }
+    head = f'#include "{file}.h"\n#if {kin.upper()}_SINGLE\n#include <tgmath.h>\n#endif\n#define casadi_real {kin}_real\n'
+    sources["-casadi.c"] = head + _NUMBER.sub(r"((casadi_real)\1)", sources["-casadi.c"])
+    names["libm"] = " ".join(each for each in _LIBM if re.search(rf"\b{each}\(", "".join(sources.values()))) or "none"
+    files = {f"{file}{end}": fill_template(f"kinematics/kinematics{end}.in", names) for end in (".h", ".c")}
+    return KinematicsFiles({**files, **{f"{file}{end}": text for end, text in sources.items()}}, names)
+
+
+class _Functions(NamedTuple):
+    of_results: tuple[ca.Function, ...]
+    of_newton: tuple[ca.Function, ...]
+
+    @property
+    def all(self) -> tuple[ca.Function, ...]:
+        return (*self.of_results, *self.of_newton)
+
+
+def _functions(
+    robot: Kinematics, kin: str, limits: Sequence[KinematicLimit], joints: LimbCoordinates | None
+) -> _Functions:
+    """Return the functions that C calls, with dense results."""
+
+    def made(name: str, inputs: Sequence[SX], outputs: Sequence[SX]) -> ca.Function:
+        return ca.Function(f"{kin}_{name}", list(inputs), ca.cse([ca.densify(each) for each in outputs]))
+
+    z, results = robot.z, [robot.q, robot.equations, robot.signs]
+    of_results = [made("CASADI_motors", [z], results), made("CASADI_rates", [z], [robot.rates.T])]
+    if not robot.unknowns:
+        of_results += [made(f"CASADI_motor{i}", [z], [robot.q[i]]) for i in range(len(robot.drives))]
+    if limits:
+        of_results.append(made("CASADI_limits", [z], [ca.vertcat(*[each.margin for each in limits])]))
+    if joints is not None:
+        of_results.append(made("CASADI_pose", [joints.values], [joints.pose, joints.twists]))
+        of_results.append(made("CASADI_joints", [z], [joints.measured]))
+    chosen = robot.equations[: robot.independent, :]
+    slopes = ca.vertcat(robot.by_step(ca.vertcat(robot.q, chosen)), robot.held)
+    values = ca.vertcat(chosen, SX(robot.held.shape[0], 1))
+    of_newton = [made("NEWTON_check", [z], results), made("NEWTON_step", [z], [robot.q, values, robot.signs, slopes.T])]
+    if robot.unknowns:
+        own = robot.equations[list(robot.loops.rows), :]
+        columns = [6 + k for k in robot.loops.columns]
+        by_joints = robot.by_step(own)[:, columns] @ ca.diag(ca.DM(robot.step_sizes[columns]))
+        of_newton.append(made("NEWTON_loops", [z], [own, by_joints.T]))
+    return _Functions(tuple(of_results), tuple(of_newton))
+
+
+def _row(values: Sequence[float] | FloatArray) -> str:
+    return ", ".join([*(repr(float(each)) for each in values), "0"])
+
+
+def _integers(values: Sequence[int]) -> str:
+    return ", ".join(str(int(each)) for each in [*values, 0])
+
+
+def _substitutions(robot: Kinematics, functions: _Functions) -> dict[str, str]:
+    """Return the texts for the placeholders of the templates."""
+    case, controller, drives, f = robot.case, robot.controller, robot.drives, robot.unknowns
+    kin = functions.of_results[0].name().removesuffix("_CASADI_motors")
+    KIN, a = kin.upper(), len(drives)
+    forward = robot.forward
+    completes = robot.complete is not None
+    square = forward is not None
+    length = controller.length or case.units.length
+    turning = [each.dimension is Dimension.ANGLE for each in drives]
+    labels = [controller.angle if each else length for each in turning]
+    complete = robot.complete or forward
+    tables = [
+        f"static const double home[] = {{{_row(robot.home)}}};",
+        f"static const int turns[] = {{{_integers(turning)}}};",
+    ]
+    if forward is not None or robot.complete is not None or f:
+        tables.append(f"static const double unknown_sizes[] = {{{_row(robot.sizes)}}};")
+    if forward is not None:
+        tables += [
+            f"static const int chosen_rows[] = {{{_integers(forward.rows)}}};",
+            f"static const int chosen_columns[] = {{{_integers(forward.columns)}}};",
+        ]
+    if robot.complete is not None:
+        tables += [
+            f"static const int complete_rows[] = {{{_integers(robot.complete.rows)}}};",
+            f"static const int complete_columns[] = {{{_integers(robot.complete.columns)}}};",
+        ]
+    if f:
+        tables.append(f"static const int moving[] = {{{_integers(robot.loops.columns)}}};")
+    frame = _frame_words(controller, case)
+    at_home = robot.home_coordinates
+    lines = [
+        f" *           {i}: {comment_text(each.name)}, {'angle' if turns else 'length'} in {label}, {value:.10g} at home"
+        for i, (each, turns, label, value) in enumerate(zip(drives, turning, labels, at_home, strict=True))
+    ]
+    rows = ["| actuator | coordinate | unit | sense | at home |", "|---|---|---|---|---|"]
+    rows += [
+        f"| {i}: {markdown_text(each.name)} | {measure.replace('_', ' ')} | {label} "
+        f"| {'+' if controller.sign_of(each.name) > 0 else '-'} | {value:.10g} |"
+        for i, (each, measure, label, value) in enumerate(zip(drives, robot.robot.measures, labels, at_home, strict=True))
+    ]
+    given = " ".join(_COORDINATES[k] for k in robot.coordinates)
+    freedom = f"the platform has {robot.freedoms} degree{'s' * (robot.freedoms != 1)} of freedom; all coordinates are given."
+    if completes:
+        freedom = (
+            f"the platform has {robot.freedoms} degrees of freedom. The caller gives a full pose whose dependent coordinates "
+            f"fit; `{kin}_complete` computes them from {given}. Another value gives `LOOPS_OPEN`."
+        )
+    limbs = "Loops are closed in closed form." if not f else f"{f} joint coordinates are followed by Newton's method from a state."
+    notes = "" if not f else (
+        f"A state `double u[{KIN}_STATE]` belongs to the caller, one for each thread: `{kin}_start(u)` is home. Each call follows\n"
+        "the joints along a straight path from the pose of the state, in at most 85 steps of at most 15 iterations, and keeps the\n"
+        "new state if its status is OK."
+    )
+    return {
+        "title": comment_text(case.title or case.name),
+        "robot": comment_text(case.model.description or case.model.name),
+        "version": __version__,
+        "casadi": ca.CasadiMeta.version(),
+        "frame": frame,
+        "length": comment_text(length),
+        "angle": controller.angle,
+        "actuator_table": " * Actuators, with their values at home:\n" + "\n".join(lines),
+        "actuator_rows": "\n".join(rows),
+        "freedom": freedom,
+        "limbs": limbs,
+        "notes": notes,
+        "na": str(a),
+        "nf": str(f),
+        "nstate": str(12 + f if f else 1),
+        "dof": str(robot.freedoms),
+        "ne": str(robot.equations.numel()),
+        "nn": str(robot.independent + robot.held.shape[0]),
+        "ng": str(robot.signs.numel()),
+        "nm": str(len(forward.rows) if forward else 1),
+        "nh": str(len(robot.loops.rows)),
+        "nc": str(len(complete.rows) if complete else 1),
+        "moves": str(int(square or completes or f > 0)),
+        "square": str(int(square)),
+        "completes": str(int(completes)),
+        "has_forward": str(int(square)),
+        "has_torques": str(int(not robot.no_torques)),
+        "no_forward": "" if square else ", because actuators and loops do not determine the pose",
+        "no_torques": f": {comment_text(robot.no_torques)}" if robot.no_torques else "",
+        "angle_unit": repr(robot.transform.degrees),
+        "size": f"{robot.size!r}",
+        "independent": given,
+        "tables": "\n".join(tables),
+        "names": ", ".join(string_literal(each.name) for each in drives),
+        "sz_arg": str(max(each.sz_arg() for each in functions.all)),
+        "sz_res": str(max(each.sz_res() for each in functions.all)),
+        "work": str(max(each.sz_w() for each in functions.all)),
+        "moved": str(next((k for k in (2, 0, 1) if k in robot.coordinates), 2)),
+        "motor_step": repr(1e-5 * float(robot.motor_sizes[0])),
+        **_motor_texts(robot, kin),
+        **_state_texts(f, kin),
+        **_reference_texts(robot),
+    }
+
+
+def _frame_words(controller: Controller, case: Case) -> str:
+    """Return a sentence about the world frame."""
+    if not any((*controller.turn, *controller.offset)):
+        return "The world frame is that of the case."
+    shown = [case.units.text(each, Dimension.LENGTH) for each in controller.offset]
+    turned = [case.units.text(each, Dimension.ANGLE) for each in controller.turn]
+    return (
+        f"The world frame of the controller has its origin at {', '.join(shown)} in the world frame of the case, "
+        f"and is turned by roll, pitch and yaw of {', '.join(turned)}."
+    )
+
+
+def _motor_texts(robot: Kinematics, kin: str) -> dict[str, str]:
+    """Return the texts about one motor alone."""
+    KIN = kin.upper()
+    if robot.unknowns:
+        return dict.fromkeys(("motor", "motor_body", "prototypes", "test_motor", "bench_motor"), "")
+    count = range(len(robot.drives))
+    prototypes = "\n".join(
+        f"int {kin}_CASADI_motor{i}(const real **arg, real **res, int *iw, real *w, int mem);" for i in count
+    )
+    cases = "\n".join(
+        f"        case {i}: failed = {kin}_CASADI_motor{i}(arg, res, 0, w, 0); break;" for i in count
+    )
+    return {
+        "motor": (
+            "/* One coordinate alone, of actuator 0 and so on: for step generators. Loops of other limbs and dependent\n"
+            " * coordinates are not checked. */\n"
+            f"int {kin}_motor(int actuator, const {kin}_real position[3], const {kin}_real rotation[9], {kin}_real *q);\n"
+        ),
+        "motor_body": f"""int {kin}_motor(int actuator, const {kin}_real position[3], const {kin}_real rotation[9], {kin}_real *q) {{
+    double z[Z];
+    real point[Z], value[1], w[WORK + 1];
+    const real *arg[4];
+    real *res[4];
+    int failed = 1;
+    if (!get_pose(position, rotation, z)) return {KIN}_BAD_INPUT;
+    to_real(z, point, Z);
+    arg[0] = point;
+    res[0] = value;
+    switch (actuator) {{
+{cases}
+        default: return {KIN}_BAD_INPUT;
+    }}
+    if (failed || !is_finite(value[0])) return {KIN}_OUT_OF_REACH;
+    *q = value[0];
+    return {KIN}_OK;
+}}
+""",
+        "prototypes": prototypes,
+        "test_motor": (
+            "    for (i = 0; i < A; ++i) {\n"
+            f"        {kin}_real one = 0;\n"
+            f'        expect("one motor", pose, {kin}_motor(i, p, R, &one) == {KIN}_OK && fabs(one - q[i]) <= most * motor_sizes[i]);\n'
+            "    }\n"
+        ),
+        "bench_motor": (
+            "    begin = clock();\n    for (r = 0; r < RUNS; ++r) {\n"
+            f"        p[{next((k for k in (2, 0, 1) if k in robot.coordinates), 2)}] = z + ({kin}_real)({robot.size!r} * 1e-4 * (r % 64));\n"
+            f"        if ({kin}_motor(0, p, R, q) == {KIN}_OK) sum += q[0];\n    }}\n"
+            '    printf("motor     %9.1f ns, one motor alone\\n", elapsed(begin));\n'
+        ),
+    }
+
+
+def _state_texts(unknowns: int, kin: str) -> dict[str, str]:
+    """Return the texts about the state of joint coordinates without closed form."""
+    if not unknowns:
+        keys = ("u", "u_end", "pass_u", "start", "state_declaration", "state_start", "void_u")
+        return dict.fromkeys(keys, "")
+    return {
+        "u": "double *u, ",
+        "u_end": ", double *u",
+        "pass_u": "u, ",
+        "void_u": ", (void)u",
+        "start": (
+            "\n/* State at home. A state belongs to the caller: each call follows the joints from the pose of the state to the\n"
+            " * given one, and keeps the new state if its status is OK. */\n"
+            f"void {kin}_start(double u[{kin.upper()}_STATE]);\n"
+        ),
+        "state_declaration": f"    double u[{kin.upper()}_STATE];",
+        "state_start": f"    {kin}_start(u);",
+    }
+
+
+def _reference_texts(robot: Kinematics) -> dict[str, str]:
+    """Return the poses of the self-test with the results of inverse kinematics in Python."""
+    rng = np.random.default_rng(_SEED)
+    near, any_pose = np.arange(_POSES) % 4 != 3, np.arange(_POSES) % 8 == 7
+    spread = np.where(near, _NEAR, _FAR)[:, None]
+    # The robot may not change all coordinates of the pose; one pose in eight changes all.
+    free = np.isin(range(6), robot.coordinates) | any_pose[:, None]
+    steps = np.where(free, rng.uniform(-1, 1, (_POSES, 6)) * spread, 0.0)
+    steps[0] = 0.0
+    home = robot.home
+    poses = np.hstack([np.zeros((_POSES, 9)), home[9:12] + robot.size * steps[:, :3]])
+    for pose, (a, b, c) in zip(poses, 2 * steps[:, 3:], strict=True):
+        pose[:9] = (matrix_of_rpy(a, b, c) @ home[:9].reshape(3, 3)).ravel()
+    p, R = robot.transform.world_poses(poses)
+    found = inverse(robot.case, p, R)
+    p, R, closed = found.positions, found.rotations, found.closed
+    poses = robot.transform.poses(p, R)
+    q = np.where(closed[:, None], robot.transform.coordinates(found.coordinates), 0.0)
+    rates = np.where(closed[:, None, None], robot.transform.rates(found.rates), 0.0)
+    twists, loads = np.zeros((_POSES, 6)), rng.uniform(-1, 1, (_POSES, 6))
+    for k in np.flatnonzero(closed):
+        z, motion = robot.point(poses[k], found.unknowns[k]), rng.uniform(-1, 1, len(robot.step_sizes))
+        twists[k] = robot.feasible(z, motion)
+    singular = found.singular | ~closed
+
+    def table(name: str, values: FloatArray) -> str:
+        return matrix_table(f"{name}[COUNT][{values.shape[1] + 1}]", list(values))
+
+    flags = "\n".join(
+        f"static const int {name}[] = {{{_integers([int(each) for each in values])}}};"
+        for name, values in (("is_closed", closed), ("is_singular", singular), ("is_near", near))
+    )
+    sizes = f"static const double motor_sizes[] = {{{_row(robot.motor_sizes)}}};"
+    turning = [each.dimension is Dimension.ANGLE for each in robot.drives]
+    units = [robot.transform.degrees if each else 1.0 for each in turning]
+    return {
+        "count": str(_POSES),
+        "references": "\n".join(
+            [
+                flags,
+                sizes,
+                f"static const double angle_units[] = {{{_row(units)}}}, angle_unit = {robot.transform.degrees!r};",
+                table("poses", poses),
+                table("motors", q),
+                table("rates", rates.reshape(_POSES, -1)),
+                table("twists", twists),
+                table("loads", loads),
+            ]
+        ),
+    }
+
