@@ -30,6 +30,7 @@ from .checks import (
     check_value,
     check_vector,
 )
+from .controller import SAME, Controller
 from .excursions import NotHeld, check_excursions, in_world, not_held, refuse_free
 from .existence import fault_of_dimensions
 from .limits.limit import Limit, LimitedCase
@@ -67,6 +68,7 @@ class Case(Whole, Shown):
         workspace: poses for which a machine with these dimensions is judged; None for none.
         path: programmed path along which a machine with these dimensions is judged; None for none.
         loading: loads on the platform, and its fastest motions.
+        controller: conventions of a controller, for generated kinematics.
         search: settings of the search.
         method: method that combines several tasks; the average is equation 15.
         title: one line for people.
@@ -96,6 +98,7 @@ class Case(Whole, Shown):
     workspace: Workspace | None = None
     path: PathFile | None = None
     loading: Loading = NO_LOADING
+    controller: Controller = SAME
     search: Search = field(default_factory=Search)
     method: Method = Method.AVERAGE
     title: str = ""
@@ -135,6 +138,7 @@ class Case(Whole, Shown):
         _check_choices(self)
         _check_worst_everywhere(self)
         _check_loading(self)
+        self.controller.check(driven_joints(self.model), self.units)
         self.limits.check(self.as_limited)
         if self.limits_over:
             check_determined_joints(self.model, "limits.over", self.source)

@@ -17,6 +17,7 @@ from ..system.reading import check_version
 from ..units import Units
 from .case import Case
 from .checks import check_direction
+from .controller import SAME
 from .csvrows import TableOrigins, insert_rows, pose_tables
 from .displacements import read_displacements
 from .limits.limits import Limits
@@ -248,6 +249,7 @@ def _case_of(written: Document, name: str, source: str, folder: str, robot_file:
         workspace=written.read_workspace(units),
         path=written.read_path(folder, units),
         loading=written.read_loading(units),
+        controller=SAME if written.controller is None else written.controller.read(model, units),
         tasks=written.read_tasks(tasks),
         units=units,
         characteristic_length=written.robot.characteristic_length,

@@ -30,9 +30,11 @@ from .workspace import Workspace
 if TYPE_CHECKING:
     from .limits.registry import LimitsTable
     from .loadtables import GravityTable, LoadTable, MotionTable, ObjectiveTable
+    from .controllertable import ControllerTable
     from .workspacetables import PathTable, WorkspaceTable
 else:
     LimitsTable = Annotated[Any, Later("limits.registry", "LimitsTable")]
+    ControllerTable = Annotated[Any, Later("controllertable", "ControllerTable")]
     GravityTable = Annotated[Any, Later("loadtables", "GravityTable")]
     LoadTable = Annotated[Any, Later("loadtables", "LoadTable")]
     MotionTable = Annotated[Any, Later("loadtables", "MotionTable")]
@@ -356,6 +358,7 @@ class Document(Table):
     motion: MotionTable | None = Field(default=None, description="the platform's fastest motions")
     gravity: GravityTable | None = Field(default=None, description="gravity, for loads that are masses")
     objective: ObjectiveTable | None = Field(default=None, description="what is optimised, and over which poses")
+    controller: ControllerTable | None = Field(default=None, description="conventions of generated kinematics in C")
 
     @model_validator(mode="after")
     def _refuse_without_pose_or_task(self) -> Document:

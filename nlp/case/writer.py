@@ -15,6 +15,7 @@ import casadi as ca
 import numpy as np
 
 from ...models import Dimension, FloatArray, Model, Substitution, axis_from_screw, unit_vector
+from ...models.statics import driven_joints
 from ..errors import CaseError
 from ..units import Units
 from .case import Case
@@ -84,6 +85,7 @@ def _lines(case: Case) -> Iterator[str]:
         yield from toml_table("[objective]", {"minimise": task.measure or None, "over": over})
     yield from toml_table("[combine]", _combination(case))
     yield from _loading(case.loading, units)
+    yield from toml_table("[controller]", case.controller.to_keys(driven_joints(model), units))
     yield from toml_table("[limits]", _limits(case))
     yield from toml_table("[tolerance]", {"joint_centre": case.joint_centre_tolerance})
     if case.workspace is not None:

@@ -26,7 +26,7 @@ from ...models.rows import RANK_TOLERANCE, independent_rows
 from ...models.statics import DrivenJoint, driven_joints, freedoms_of, rows_about, statics_hindrance
 from ...models.wrench import WrenchKind
 from ..case.case import Case
-from ..case.controller import METRES, SAME, Controller
+from ..case.controller import Controller
 from ..case.pose import Free
 from ..case.workspace import TurnKind, Turns, Workspace
 from ..errors import CaseError
@@ -102,19 +102,13 @@ def transform_of(case: Case, drives: Sequence[DrivenJoint], controller: Controll
     Raises:
         CaseError: a unit of length has no known size.
     """
-    scale = 1.0
-    if controller.length and controller.length != case.units.length:
-        for key, label in (("controller.length", controller.length), ("units.length", case.units.length)):
-            if label not in METRES:
-                fault = f"is a unit of unknown size: must be one of {', '.join(METRES)}"
-                raise CaseError(key, fault, label, case.source)
-        scale = METRES[case.units.length] / METRES[controller.length]
+    scale = controller.scale(case.units)
     unit = math.radians(1.0) if controller.angle == "deg" else 1.0
     own = np.array([1 / unit if each.dimension is Dimension.ANGLE else scale for each in drives])
     zero = own * np.array([controller.zero_of(each.name) for each in drives])
     slope = own * np.array([controller.sign_of(each.name) for each in drives])
-    a, b, c = controller.turn
-    return Transform(scale, unit, matrix_of_rpy(a, b, c), np.array(controller.offset), zero, slope)
+    a, b, c = controller.rpy
+    return Transform(scale, unit, matrix_of_rpy(a, b, c), np.array(controller.origin), zero, slope)
 
 
 def matrix_of_rpy(a: float, b: float, c: float) -> FloatArray:
@@ -140,10 +134,10 @@ class Kinematics:
     rotation vector, a translation, and changes of these joint coordinates.
 
     Args:
-        case: case with fixed dimensions.
-        controller: conventions of the controller.
+        case: case with fixed dimensions and the conventions of a controller.
 
     Attributes:
+        controller: these conventions.
         drives: the actuators.
         transform: the conventions as numbers.
         size: a length of the robot, in the controller's unit.
@@ -159,8 +153,8 @@ class Kinematics:
         InputError: an actuator coordinate is not known.
     """
 
-    def __init__(self, case: Case, controller: Controller = SAME) -> None:
-        self.case = case
+    def __init__(self, case: Case) -> None:
+        self.case, controller = case, case.controller
         robot = functions_of(case)
         self.robot: RobotFunctions = robot
         self.drives = driven_joints(case.model)
@@ -278,8 +272,25 @@ class Kinematics:
         self.forward = self._forward(np.concatenate([slopes[:, : a + self.independent], held], axis=1))
         self.coordinates = self._independent_coordinates(slopes[:, a : a + self.independent])
         self.complete = self._complete(slopes[:, a : a + self.independent])
+        self._move_home()
         function = ca.Function("home", [self.z], [self.q])
         self.home_coordinates = np.array(function(self.home), dtype=np.float64).ravel()
+
+    def _move_home(self) -> None:
+        """Move the home point to the configuration where all actuator coordinates of the case are 0, if that is near.
+
+        Where the dimensions differ from those of the robot file, the platform's place at home does too.
+        """
+        if self.forward is None or set(self.robot.measures) == {"leg_length"}:
+            return
+        own = (self.q - ca.DM(self.transform.zero)) / ca.DM(self.motor_sizes)
+        closing = _Closing(self, ca.vertcat(own, self.equations))
+        found = newton(closing, self.home, steps=2 * _STEPS, parts=(1.0, 0.5, 0.25, 0.125))
+        signs = np.array(ca.Function("signs", [self.z], [self.signs])(found), dtype=np.float64)
+        if closing.error(found) <= _CLOSED and (signs > 0).all():
+            self.home = found
+            p, R = self.transform.world_poses(found[None, :POSE])
+            self.start = np.concatenate([R[0].T.ravel(), p[0], found[POSE:]])
 
     @cached_property
     def motor_sizes(self) -> FloatArray:
@@ -363,6 +374,26 @@ class Kinematics:
         slopes = np.array(self._slopes(z), dtype=np.float64) * self.step_sizes
         return np.asarray((step - np.linalg.pinv(slopes, rcond=RANK_TOLERANCE) @ (slopes @ step))[:6])
 
+    def side(self, z: FloatArray) -> float:
+        """Return the determinant of the equations of forward kinematics at a point, as a part of that at home.
+
+        It is 0 at a singularity; NaN where actuators do not determine the pose.
+        """
+        if self.forward is None:
+            return math.nan
+        now, home = (
+            np.linalg.det((np.array(self._forward_slopes(each)) * self.step_sizes)[:, self.forward.columns])
+            for each in (z, self.home)
+        )
+        return float(now / home) if home else math.nan
+
+    @cached_property
+    def _forward_slopes(self) -> ca.Function:
+        chosen = self.equations[: self.independent, :]
+        every = ca.vertcat(self.by_step(ca.vertcat(self.q, chosen)), self.held)
+        rows = list(self.forward.rows) if self.forward is not None else []
+        return ca.Function("slopes", [self.z], [ca.densify(every[rows, :])])
+
     @cached_property
     def _slopes(self) -> ca.Function:
         outputs = ca.vertcat(self.by_step(self.equations), self.held)
@@ -408,6 +439,7 @@ class _Closing:
             return None
         return Linear(values.ravel(), slopes * self._of.step_sizes)
 
-    def moved(self, at: FloatArray, step: FloatArray) -> FloatArray:
-        """Return the point after a step."""
-        return self._of.moved(at, step)
+    def moved(self, at: FloatArray, step: FloatArray) -> FloatArray | None:
+        """Return the point after a step; None where the equations get worse, or are not defined."""
+        found = self._of.moved(at, step)
+        return found if self.error(found) < self.error(at) else None

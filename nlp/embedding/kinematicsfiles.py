@@ -13,7 +13,7 @@ from casadi import SX
 from ...models import Dimension, FloatArray
 from .. import __version__
 from ..case.case import Case
-from ..case.controller import SAME, Controller
+from ..case.controller import Controller
 from ..evidence.inverse import inverse
 from ..system.markdown import markdown_text
 from .ctext import comment_text, identifier, matrix_table, string_literal
@@ -25,6 +25,8 @@ from .templates import casadi_texts, fill_template
 #: Number of poses of the self-test, the seed of their random choice, and their largest distances from home: parts of the
 #: robot's size and radians; few are farther away.
 _POSES, _SEED, _NEAR, _FAR = 48, 3, 0.08, 0.6
+#: Part of the determinant at home above which a pose of the self-test counts as reached without a singularity.
+_REGULAR = 0.05
 #: Constants of C in double, and names of the coordinates of a pose.
 _NUMBER = re.compile(r"(?<![\w.])(\d+\.\d*(?:[eE][+-]?\d+)?)(?![\w.])")
 _COORDINATES = ("x", "y", "z", "a", "b", "c")
@@ -53,14 +55,13 @@ def kinematics_prefix(name: str) -> str:
 
 
 def generate_kinematics(
-    case: Case, source: str, *, controller: Controller = SAME, single: bool = False, coordinates: str = "pose"
+    case: Case, source: str, *, single: bool = False, coordinates: str = "pose"
 ) -> dict[str, str]:
     """Generate the files of a folder with the kinematics of a case.
 
     Args:
         case: case with fixed dimensions.
         source: text of its case file, which goes into the folder as ``case.toml``.
-        controller: conventions of the controller.
         single: If true, positions, rates and torques are in single precision.
         coordinates: ``pose``, or the name of a limb whose joint coordinates are used too.
 
@@ -71,7 +72,7 @@ def generate_kinematics(
         CaseError: a dimension is free, a unit is unknown, or no closed configuration is known.
         InputError: an actuator coordinate is not known.
     """
-    files, names = kinematics_files(case, controller=controller, single=single, coordinates=coordinates)
+    files, names = kinematics_files(case, single=single, coordinates=coordinates)
     title = markdown_text(" ".join((case.title or case.name).split()))
     whole = {**names, "title": title, "id": identifier(case.name)}
     whole["conventions"] = fill_template("kinematics/conventions.md.in", whole)
@@ -82,7 +83,7 @@ def generate_kinematics(
 
 
 def kinematics_files(
-    case: Case, *, controller: Controller = SAME, single: bool = False, coordinates: str = "pose"
+    case: Case, *, single: bool = False, coordinates: str = "pose"
 ) -> KinematicsFiles:
     """Return the library of the kinematics of a case, and the texts for its test, example and description.
 
@@ -90,7 +91,7 @@ def kinematics_files(
         CaseError: as for :func:`generate_kinematics`.
         InputError: likewise.
     """
-    robot = Kinematics(case, controller)
+    robot = Kinematics(case)
     limits = limits_of(robot)
     joints = None if coordinates == "pose" else limb_coordinates(robot, coordinates)
     kin, file = kinematics_prefix(case.name), f"{identifier(case.name)}-kinematics"
@@ -260,10 +261,10 @@ def _substitutions(robot: Kinematics, functions: _Functions) -> dict[str, str]:
 
 def _frame_words(controller: Controller, case: Case) -> str:
     """Return a sentence about the world frame."""
-    if not any((*controller.turn, *controller.offset)):
+    if not any((*controller.rpy, *controller.origin)):
         return "The world frame is that of the case."
-    shown = [case.units.text(each, Dimension.LENGTH) for each in controller.offset]
-    turned = [case.units.text(each, Dimension.ANGLE) for each in controller.turn]
+    shown = [case.units.text(each, Dimension.LENGTH) for each in controller.origin]
+    turned = [case.units.text(each, Dimension.ANGLE) for each in controller.rpy]
     return (
         f"The world frame of the controller has its origin at {', '.join(shown)} in the world frame of the case, "
         f"and is turned by roll, pitch and yaw of {', '.join(turned)}."
@@ -366,6 +367,8 @@ def _reference_texts(robot: Kinematics) -> dict[str, str]:
     for k in np.flatnonzero(closed):
         z, motion = robot.point(poses[k], found.unknowns[k]), rng.uniform(-1, 1, len(robot.step_sizes))
         twists[k] = robot.feasible(z, motion)
+        # Between home and a pose with another sign lies a singularity, and before it may be another pose with the motors.
+        near[k] &= robot.side(z) > _REGULAR
     singular = found.singular | ~closed
 
     def table(name: str, values: FloatArray) -> str:
