@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -80,4 +81,6 @@ def _read(
     case = case_from_tables(tables, name=name, source=source, settings=settings or {}, folder=folder or Path())
     for key in lacks:
         del tables[key]
+    if "pose" in lacks:
+        case = replace(case, position=case.model.home)
     return CaseFile(case, toml_document(tables), inputs)

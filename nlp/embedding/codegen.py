@@ -35,6 +35,7 @@ from .ctext import (
     string_table,
     version_texts,
 )
+from .kinematicsfiles import combined_kinematics
 from .loops import find_loops
 from .manifest import MANIFEST, NumberColumns, manifest_text, number_columns
 from .measure import NOT_MEASURED
@@ -106,11 +107,15 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
     parts |= {"-loops.c": "loops.c"} if staged.loops else {}
     parts |= {"-spectrum.c": "spectrum.c"} if staged.loops.spectra else {}
     own = [f"{prefix}{ending}" for ending in (*parts, *_CORE, "-casadi.c", "-casadi.h")]
+    kinematics = combined_kinematics(case)
+    own += [name for name in kinematics.files if name.startswith(prefix)]
+    names |= kinematics.names
     sources = [name for name in own if name.endswith(".c")]
     names |= {"sources": " ".join(sources), "objects": " ".join(f"{name[:-2]}.o" for name in sources)}
     names["headers"] = " ".join(name for name in own if name.endswith(".h"))
     files = {f"{prefix}{ending}": fill_template(f"{part}.in", names) for ending, part in parts.items()}
     files |= {f"{prefix}{ending}": text for ending, text in core.items()}
+    files |= kinematics.files
     files |= {name: fill_template(f"{name}.in", names) for name in _OTHERS}
     title = markdown_text(" ".join((case.title or case.name).split()))
     files["README.md"] = fill_template("README.md.in", names | {"title": title})

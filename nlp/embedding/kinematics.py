@@ -166,7 +166,8 @@ class Kinematics:
         self.unknowns = len(robot.size)
         self.step_sizes = np.concatenate([np.ones(3), np.full(3, self.size), self.sizes])
         self._express()
-        start = robot.start(self.stated_poses())
+        # A robot given by its rows has no home of its own: the pose of the case is near its work.
+        start = self.stated_poses()[0] if case.model.generic is None else robot.start(self.stated_poses())
         if start is None:
             fault = "no closed configuration in the home assembly mode is known at home or at the pose of the case"
             raise CaseError("pose", f"{fault}: state a pose that the robot can take", source=case.source)
@@ -179,7 +180,7 @@ class Kinematics:
         """Return poses (N, 12) of the case, columns of the rotation first; at least one, in the middle of ranges."""
         found = []
         for pose in self.case.poses:
-            middle = [0.5 * (v.min + v.max) if isinstance(v, Free) else v for v in pose.position]
+            middle = [0.5 * (v.lower + v.upper) if isinstance(v, Free) else v for v in pose.position]
             found.append([*np.eye(3).ravel(), *middle])
         return np.array(found, dtype=np.float64)
 

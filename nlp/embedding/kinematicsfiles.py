@@ -14,6 +14,7 @@ from ...models import Dimension, FloatArray
 from .. import __version__
 from ..case.case import Case
 from ..case.controller import Controller
+from ..errors import InputError
 from ..evidence.inverse import inverse
 from ..system.markdown import markdown_text
 from .ctext import comment_text, identifier, matrix_table, string_literal
@@ -110,6 +111,38 @@ def kinematics_files(
     names["libm"] = " ".join(each for each in _LIBM if re.search(rf"\b{each}\(", "".join(sources.values()))) or "none"
     files = {f"{file}{end}": fill_template(f"kinematics/kinematics{end}.in", names) for end in (".h", ".c")}
     return KinematicsFiles({**files, **{f"{file}{end}": text for end, text in sources.items()}}, names)
+
+
+def combined_kinematics(case: Case) -> KinematicsFiles:
+    """Return the kinematics for the folder of a solver: files, and texts for its build files and description.
+
+    They have no files where a dimension is free, or where no closed configuration is known; the description says so.
+    """
+    none = ("programs", "test", "cmake", "header", "rows")
+    try:
+        files, names = kinematics_files(case)
+    except InputError as error:
+        reason = markdown_text(str(error))
+        section = f"## Kinematics\n\nThis folder has no functions for motors, rates, torques and forward kinematics: {reason}."
+        return KinematicsFiles({}, {f"kinematics_{each}": "" for each in none} | {"kinematics_section": section})
+    kin, file, prefix = names["kin"], names["file"], identifier(case.name)
+    program = "selftest-kinematics"
+    test = fill_template("kinematics/selftest.c.in", names)
+    conventions = fill_template("kinematics/conventions.md.in", names).replace("## Conventions", "## Kinematics", 1)
+    texts = {
+        "programs": f" {program}",
+        "test": f"\n\t./{program}",
+        "cmake": (
+            f"  add_executable({prefix}-{program} {program}.c)\n"
+            f"  set_target_properties({prefix}-{program} PROPERTIES OUTPUT_NAME {program} C_STANDARD 99)\n"
+            f"  target_link_libraries({prefix}-{program} {prefix})\n"
+            f"  add_test(NAME {prefix}-{program} COMMAND {prefix}-{program})\n"
+        ),
+        "header": f" {file}.h",
+        "rows": f"| `{file}.h`, `.c`, `-casadi.c`, `-newton.c`, `{program}.c` | kinematics: `{kin}_motors` and others |\n",
+        "section": conventions,
+    }
+    return KinematicsFiles({**files, f"{program}.c": test}, {f"kinematics_{key}": text for key, text in texts.items()})
 
 
 class _Functions(NamedTuple):

@@ -148,11 +148,17 @@ def manifest_text(nlp: Nlp, columns: NumberColumns, names: Mapping[str, str], fi
         "seeds": int(names["nseeds"]),
         "statuses": [{"code": code, "name": name, "meaning": text} for code, (name, text) in enumerate(statuses)],
         "measured": [],
-        "sources": sorted(name for name in files if name.startswith(prefix) and name.endswith(".c")),
-        "headers": sorted(name for name in files if name.startswith(prefix) and name.endswith((".h", ".hpp"))),
+        "sources": solver_files(files, prefix, ".c"),
+        "headers": solver_files(files, prefix, ".h", ".hpp"),
         "files": sorted([*files, MANIFEST]),
     }
     return json_text(manifest)
+
+
+def solver_files(files: Iterable[str], prefix: str, *endings: str) -> list[str]:
+    """Return the names of the solver's files with the given endings, in order; those of the kinematics are left out."""
+    own = (name for name in files if name.startswith(prefix) and name.endswith(endings))
+    return sorted(name for name in own if not name.startswith(f"{prefix}-kinematics"))
 
 
 def json_text(manifest: Mapping[str, object]) -> str:

@@ -21,7 +21,7 @@ from typing import NamedTuple
 from ..errors import one_line
 from ..system.programs import RunError, first_program, run_program
 from .ctext import comment_text
-from .manifest import MANIFEST, json_text
+from .manifest import MANIFEST, json_text, solver_files
 
 #: Flags of every compiler.
 _FLAGS = ("-std=c99", "-O2")
@@ -105,7 +105,7 @@ def measure(files: Mapping[str, str], prefix: str) -> tuple[Figures, ...]:
         files: text by file name, from :func:`~screwsynth.nlp.generate_c`.
         prefix: prefix of the case's names in C.
     """
-    sources = sorted(name for name in files if name.startswith(prefix) and name.endswith(".c"))
+    sources = solver_files(files, prefix, ".c")
     with tempfile.TemporaryDirectory(prefix="screwsynth.") as root:
         running = [_begin(target, files, sources, Path(root) / target.macro) for target in TARGETS]
         try:
