@@ -91,6 +91,11 @@ def string_literal(text: str) -> str:
     return f'"{"".join(plain)}"'
 
 
+def name_cases(names: Iterable[str]) -> str:
+    """Return the cases of a switch over an index, which return names: a table of pointers would be data to relocate."""
+    return "\n".join(f"        case {k}: return {string_literal(name)};" for k, name in enumerate(names))
+
+
 def index_macros(program: Program, prefix: str) -> str:
     """Return a macro for the index of every entry of x and p, such as ``PREFIX_x_p_z``.
 

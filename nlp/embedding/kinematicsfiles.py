@@ -17,7 +17,7 @@ from ..case.controller import Controller
 from ..errors import InputError
 from ..evidence.inverse import inverse
 from ..system.markdown import markdown_text
-from .ctext import comment_text, identifier, matrix_table, string_literal
+from .ctext import comment_text, identifier, matrix_table, name_cases
 from .kinematics import Kinematics, matrix_of_rpy
 from .kinematicsjoints import LimbCoordinates, coordinate_texts, limb_coordinates
 from .kinematicslimits import KinematicLimit, limit_texts, limits_of
@@ -280,7 +280,7 @@ def _substitutions(robot: Kinematics, functions: _Functions) -> dict[str, str]:
         "size": f"{robot.size!r}",
         "independent": given,
         "tables": "\n".join(tables),
-        "names": ", ".join(string_literal(each.name) for each in drives),
+        "names": name_cases([each.name for each in drives]),
         "sz_arg": str(max(each.sz_arg() for each in functions.all)),
         "sz_res": str(max(each.sz_res() for each in functions.all)),
         "work": str(max(each.sz_w() for each in functions.all)),

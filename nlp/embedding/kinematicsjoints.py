@@ -17,7 +17,7 @@ from ...models import Dimension, FloatArray, Substitution
 from ...models.limbjoints import JointCoordinate, LimbJoint
 from ...models.rotation import matrix_from_axis_angle
 from ..errors import CaseError, listing
-from .ctext import comment_text, string_literal
+from .ctext import comment_text, name_cases
 from .kinematics import Kinematics
 
 #: Joint types with screws that move with their links alone.
@@ -188,7 +188,7 @@ def coordinate_texts(robot: Kinematics, found: LimbCoordinates | None, limb: str
     )
     units = [robot.transform.degrees if each is Dimension.ANGLE else 1.0 for each in found.dimensions]
     unit_row = ", ".join(repr(each) for each in units)
-    names = ", ".join(string_literal(each) for each in found.names)
+    names = name_cases(found.names)
     return {
         "coordinates_rows": (
             f"\nJoint coordinates of limb {comment_text(limb)}, for `{kin}_joint_motors` and the like: "
@@ -225,8 +225,10 @@ int {kin}_joint_forward(const {kin}_real q[{KIN}_ACTUATORS], {kin}_real joints[{
 """,
         "coordinates_bodies": f"""
 const char *{kin}_joint_name(int joint) {{
-    static const char *const names[{KIN}_JOINTS] = {{{names}}};
-    return joint < 0 || joint >= {KIN}_JOINTS ? "" : names[joint];
+    switch (joint) {{
+{names}
+        default: return "";
+    }}
 }}
 
 /* Pose (12) and twists (6, joints) at joint coordinates. */

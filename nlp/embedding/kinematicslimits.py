@@ -91,14 +91,14 @@ def _measured(reading: Reading) -> Callable[[SX], SX]:
 
 def limit_texts(robot: Kinematics, limits: tuple[KinematicLimit, ...], kin: str) -> dict[str, str]:
     """Return the texts for the placeholders about limits."""
-    from .ctext import comment_text, string_literal  # noqa: PLC0415 - short names beside those of the templates
+    from .ctext import comment_text, name_cases  # noqa: PLC0415 - short names beside those of the templates
 
     KIN, u = kin.upper(), "double *u, " if robot.unknowns else ""
     pass_u = "u, " if robot.unknowns else ""
     if not limits:
         return {"nlimits": "0", "limits_declarations": "", "limits_bodies": "", "limits_prototype": ""}
     lines = "\n".join(f" *   {k}: {comment_text(each.name)} ({each.unit or 'number'})" for k, each in enumerate(limits))
-    names = ", ".join(string_literal(each.name) for each in limits)
+    names = name_cases([each.name for each in limits])
     return {
         "nlimits": str(len(limits)),
         "limits_declarations": f"""
@@ -112,8 +112,10 @@ const char *{kin}_limit_name(int limit);
         "limits_prototype": f"int {kin}_CASADI_limits(const real **arg, real **res, int *iw, real *w, int mem);",
         "limits_bodies": f"""
 const char *{kin}_limit_name(int limit) {{
-    static const char *const names[{KIN}_LIMITS] = {{{names}}};
-    return limit < 0 || limit >= {KIN}_LIMITS ? "" : names[limit];
+    switch (limit) {{
+{names}
+        default: return "";
+    }}
 }}
 
 int {kin}_limits(const {kin}_real position[3], const {kin}_real rotation[9], {u}{kin}_real margins[{KIN}_LIMITS], int *violated) {{

@@ -1,0 +1,502 @@
+"""Kinematics in C, held against inverse kinematics in Python, differences, power, and controllers' own numbers."""
+
+import math
+import tomllib
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from builders import Array, Run, output_of, refusal_of, saved, turn_about
+from generated import made, needs_compiler
+from kinematics_library import BAD_INPUT, LOOPS_OPEN, OK, OUT_OF_REACH, SINGULAR, Library, typical_case
+
+from screwsynth.models.catalog import gallery_names
+from screwsynth.nlp import Case, CaseError, case_text, inverse, load_case
+from screwsynth.nlp.case.controller import Controller
+from screwsynth.nlp.case.reader import case_from_tables
+
+pytestmark = needs_compiler
+
+#: A robot with legs, one with cranks in closed form, and one whose coordinates depend on each other.
+SOME = ("stewart-gough", "6-rss", "3-rrs")
+OTHERS = [name for name in ("hexapod", "three-upu", *gallery_names()) if name not in SOME]
+ROBOTS = [*SOME, *(pytest.param(name, marks=pytest.mark.soak) for name in OTHERS)]
+
+ROTARY = """
+[units]
+length = "m"
+[robot]
+model = "delta"
+parameters = { rb = 0.010, rp = 0.006, arm = 0.010, rod = 0.014, w = 0.002, tilt = 20 }
+[pose]
+position = [0, 0, -0.010]
+[[task]]
+sense = "min"
+axis = [0, 0, 1]
+point = [0, 0, 0]
+pitch = inf
+"""
+CONTROLLER = """
+[controller]
+length = "mm"
+angle = "deg"
+zero = 20
+rpy = [0, 0, 90]
+"""
+ANKLE = """
+name = "ankle"
+home = [0, 0, 0]
+[[limb]]
+name = "ankle"
+joints = [
+    { type = "U", name = "ankle", at = [0, 0, 0.02], axes = [[0, 1, 0], [1, 0, 0]] },
+]
+[[limb]]
+name = "right"
+joints = [
+    { type = "R", at = [0, -0.04, 0.2], axis = [0, 1, 0], actuated = true },
+    { type = "S", at = [-0.05, -0.04, 0.2] },
+    { type = "S", at = [-0.05, -0.04, 0.0] },
+]
+[[limb]]
+name = "left"
+joints = [
+    { type = "R", at = [0, 0.04, 0.28], axis = [0, 1, 0], actuated = true },
+    { type = "S", at = [-0.05, 0.04, 0.28] },
+    { type = "S", at = [-0.05, 0.04, 0.0] },
+]
+"""
+
+
+@cache
+def library(name: str) -> Library:
+    return Library(typical_case(name))
+
+
+@cache
+def rotary(text: str = CONTROLLER) -> Library:
+    return Library(case_of(ROTARY + text, "rotary"))
+
+
+def case_of(text: str, name: str = "case") -> Case:
+    return case_from_tables(tomllib.loads(text), name=name, source=f"{name}.toml")
+
+
+def feasible(robot: Library, p: Array, R: Array, seed: int) -> Array:
+    """Return a motion that the platform can make at a closed pose of a robot whose controller is the case's."""
+    found = inverse(robot.case, p[None], R[None])
+    pose = np.concatenate([R.ravel(), p])
+    z = robot.robot.point(pose, found.unknowns[0])
+    step = np.random.default_rng(seed).normal(size=len(robot.robot.step_sizes))
+    return robot.robot.feasible(z, step) * np.repeat([1.0, robot.robot.size], 3)
+
+
+def moved(p: Array, R: Array, twist: Array, step: float) -> tuple[Array, Array]:
+    """Return the pose after a small motion."""
+    size = float(np.linalg.norm(twist[:3]))
+    return p + step * twist[3:], (turn_about(twist[:3], step * size) if size else np.eye(3)) @ R
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_motors_and_rates_are_those_of_inverse_kinematics(name: str) -> None:
+    robot, soak = library(name), name not in SOME
+    p, R = robot.poses(2000 if soak else 200, 0.1)
+    p[::10], R[::10] = (each[::10] for each in robot.poses(len(p), 0.8, seed=1))
+    turned = np.array([turn_about(np.array([0.3, 1.0, 0.2]), 0.2) @ each for each in R[::25]])
+    p, R = np.concatenate([p, p[::25]]), np.concatenate([R, turned])
+    found = inverse(robot.case, p, R)
+    sizes = robot.robot.motor_sizes
+    for k in range(len(p)):
+        robot.start()
+        status, q = robot.motors(found.positions[k], found.rotations[k])
+        assert (status == OK) == found.closed[k]
+        if status != OK:
+            assert (q == -77).all()
+            continue
+        np.testing.assert_allclose(q / sizes, found.coordinates[k] / sizes, rtol=0, atol=1e-12)
+        rates = robot.at("rates", found.positions[k], found.rotations[k], 6 * robot.count).values
+        np.testing.assert_allclose(rates, found.rates[k].ravel(), rtol=1e-11, atol=1e-11 * np.abs(found.rates[k]).max())
+    assert found.closed.sum() >= 0.2 * len(p)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_one_motor_alone_has_the_same_coordinate(name: str) -> None:
+    robot = library(name)
+    if robot.state is not None:
+        assert f"int {robot.kin}_motor(" not in robot.files[next(x for x in robot.files if x.endswith(".h"))]
+        return
+    p, R = robot.poses(20, 0.05)
+    for k in range(len(p)):
+        q = robot.motors(p[k], R[k]).values
+        for i in range(robot.count):
+            found = np.full(1, -77.0)
+            pose = [np.ascontiguousarray(p[k]), np.ascontiguousarray(R[k]).reshape(9)]
+            assert robot._call("motor", i, *pose, found) == OK  # noqa: SLF001
+            assert found[0] == pytest.approx(q[i], abs=1e-13 * robot.robot.motor_sizes[i])
+        assert robot._call("motor", robot.count, *pose, found) == BAD_INPUT  # noqa: SLF001
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_speeds_are_differences_and_powers_balance(name: str) -> None:
+    robot = library(name)
+    p, R = robot.poses(15, 0.06, seed=2)
+    sizes, rng, singular = robot.robot.motor_sizes, np.random.default_rng(5), 0
+    found = inverse(robot.case, p, R)
+    for k in np.flatnonzero(found.closed):
+        at, turn = found.positions[k], found.rotations[k]
+        robot.start()
+        twist = feasible(robot, at, turn, int(k))
+        speeds = robot.at("speeds", at, turn, robot.count, twist)
+        assert speeds.status == OK
+        if not robot.robot.complete:  # the path of a twist closes the loops where all coordinates are independent
+            step = 1e-5
+            ahead, behind = (robot.motors(*moved(at, turn, twist, sign * step)).values for sign in (1, -1))
+            np.testing.assert_allclose((ahead - behind) / (2 * step) / sizes, speeds.values / sizes, atol=1e-6)
+        load = rng.normal(size=6) / np.repeat([1.0, robot.robot.size], 3)
+        torques = robot.at("torques", at, turn, robot.count, load)
+        if robot.robot.no_torques or found.singular[k]:
+            assert torques.status == SINGULAR
+            assert (torques.values == -77).all()
+            singular += 1
+            continue
+        assert torques.status == OK
+        powers = [*(torques.values * speeds.values), *(load * twist)]
+        assert abs(sum(powers)) <= 1e-11 * sum(map(abs, powers))
+    assert singular == 0 or robot.robot.no_torques
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_forward_kinematics_is_the_way_back(name: str) -> None:
+    robot = library(name)
+    p, R = robot.poses(60, 0.05, seed=3)
+    found = inverse(robot.case, p, R)
+    home, reached = robot.home, 0
+    for k in np.flatnonzero(found.closed):
+        at, turn = found.positions[k], found.rotations[k]
+        robot.start()
+        q = robot.motors(at, turn).values
+        z = robot.robot.point(np.concatenate([turn.ravel(), at]), found.unknowns[k])
+        if not robot.robot.forward or found.singular[k]:
+            assert robot.forward(q, at, turn)[0] == SINGULAR
+            continue
+        near = robot.forward(q, at + 1e-4 * robot.robot.size * np.array([1.0, -1.0, 0.5]), turn)
+        robot.start()
+        from_home = robot.forward(q, *home)
+        # Beyond a singularity home's side has no pose with these coordinates, or another one.
+        results = [near] if robot.robot.side(z) < 0.05 else [near, from_home]
+        for status, position, rotation in results:
+            assert status == OK
+            np.testing.assert_allclose(position / robot.robot.size, at / robot.robot.size, atol=1e-8)
+            np.testing.assert_allclose(rotation, turn, atol=1e-8)
+            reached += 1
+    assert reached > 40 or not robot.robot.forward
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_dependent_coordinates_are_completed(name: str) -> None:
+    robot = library(name)
+    p, R = robot.poses(20, 0.05, seed=4)
+    found = inverse(robot.case, p, R)
+    for k in np.flatnonzero(found.closed):
+        robot.start()
+        status, position, rotation = robot.complete(p[k], R[k])
+        assert status == OK
+        if {"x", "y", "z", "roll", "pitch", "yaw"} - set(found.dependent):
+            np.testing.assert_allclose(position / robot.robot.size, found.positions[k] / robot.robot.size, atol=1e-7)
+            np.testing.assert_allclose(rotation, found.rotations[k], atol=1e-7)
+        assert robot.motors(position, rotation).status == OK
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_the_jacobian_in_roll_pitch_and_yaw_is_a_difference(name: str) -> None:
+    robot = library(name)
+    p, R = robot.home
+    p = p + 0.02 * robot.robot.size * np.isin(range(3), robot.robot.coordinates)
+    rpy = 0.05 * np.isin(range(3, 6), robot.robot.coordinates) * np.array([1.0, -0.7, 0.4])
+
+    def motors(given: Array) -> Array:
+        robot.start()
+        pose = given[:3], rotation_of(robot, given[3:])
+        status, position, rotation = robot.complete(*pose)
+        assert status == OK
+        return robot.motors(position, rotation).values
+
+    middle = np.concatenate([p, rpy])
+    robot.start()
+    _, position, rotation = robot.complete(p, rotation_of(robot, rpy))
+    angles = np.zeros(3)
+    robot._call("to_rpy", np.ascontiguousarray(rotation).reshape(9), angles)  # noqa: SLF001
+    at = [np.ascontiguousarray(position), angles, *([robot.state] if robot.state is not None else [])]
+    jacobian = np.full((robot.count, 6), -77.0)
+    assert robot._call("jacobian_rpy", *at, jacobian) == OK  # noqa: SLF001
+    sizes = robot.robot.motor_sizes
+    for k in robot.robot.coordinates:
+        step = np.zeros(6)
+        step[k] = 1e-5 * (robot.robot.size if k < 3 else 1.0)
+        slope = (motors(middle + step) - motors(middle - step)) / (2 * step[k])
+        scale = (robot.robot.size if k < 3 else 1.0) / sizes
+        np.testing.assert_allclose(jacobian[:, k] * scale, slope * scale, atol=2e-7)
+    if robot.robot.complete:
+        others = [k for k in range(6) if k not in robot.robot.coordinates]
+        assert (jacobian[:, others] == 0).all()
+
+
+def rotation_of(robot: Library, rpy: Array) -> Array:
+    """Return the rotation matrix by the function in C, which is that of the words about fixed axes."""
+    found = np.zeros(9)
+    robot._call("from_rpy", np.ascontiguousarray(rpy), found)  # noqa: SLF001
+    x, y, z = (turn_about(np.eye(3)[k], float(rpy[k])) for k in range(3))
+    np.testing.assert_allclose(found.reshape(3, 3), z @ y @ x, atol=1e-15)
+    return found.reshape(3, 3)
+
+
+@pytest.mark.parametrize("name", SOME)
+def test_no_motor_jumps_along_a_line(name: str) -> None:
+    robot, count = library(name), 10_000
+    p, R = robot.home
+    end = 0.06 * robot.robot.size * np.isin(range(3), robot.robot.coordinates) * np.array([1.0, -0.5, 0.8])
+    robot.start()
+    q = robot.motors(p, R).values + 2 * math.pi * (robot.robot.motor_sizes == 1.0)
+    largest = np.zeros(robot.count)
+    for k in range(count):
+        at = p + (k / count) * end
+        status, position, rotation = robot.complete(at, R) if robot.robot.complete else (OK, at, R)
+        found = robot.at("motors_near", position, rotation, robot.count, q)
+        assert status == found.status == OK
+        largest = np.maximum(largest, np.abs(found.values - q))
+        q = found.values.copy()
+    rates = np.abs(robot.at("rates", p, R, 6 * robot.count).values.reshape(-1, 6)) @ np.abs([0, 0, 0, *end]) / count
+    assert (largest <= 4 * rates + 1e-9).all()
+    turning = robot.robot.motor_sizes == 1.0
+    assert (q[turning] > math.pi).all()
+
+
+@pytest.mark.parametrize("name", ["6-rss", "delta", "3-rrs"])
+def test_what_is_no_pose_is_refused_and_changes_nothing(name: str) -> None:
+    robot = library(name)
+    for place in range(12):
+        for value in (math.nan, math.inf, -math.inf):
+            pose = np.concatenate([robot.home[1].ravel(), robot.home[0]])
+            pose[place] = value
+            robot.start()
+            before = None if robot.state is None else robot.state.copy()
+            for function, size, further in (
+                ("motors", robot.count, []),
+                ("rates", 6 * robot.count, []),
+                ("torques", robot.count, [np.ones(6)]),
+                ("motors_near", robot.count, [np.zeros(robot.count)]),
+            ):
+                status, values = robot.at(function, pose[9:], pose[:9], size, *further)
+                assert status == BAD_INPUT
+                assert (values == -77).all()
+            assert before is None or (robot.state == before).all()
+    p, R = robot.home
+    far = robot.motors(p + 50 * robot.robot.size, R)
+    assert far.status in (OUT_OF_REACH, LOOPS_OPEN)
+    assert (far.values == -77).all()
+    q = robot.motors(p, R).values
+    status, position, _ = robot.forward(np.full(robot.count, math.nan), p, R)
+    assert status == BAD_INPUT
+    assert (position == p).all()
+    status, position, rotation = robot.forward(q + 40 * robot.robot.size, p, R) if name == "x" else (1, p, R)
+    assert status != OK
+    assert robot.at("speeds", p, R, robot.count, np.full(6, math.nan)).status == BAD_INPUT
+    if robot.robot.complete:
+        tilted = turn_about(np.array([1.0, 0, 0] if name == "delta" else [0, 0, 1.0]), 0.1) @ R
+        assert robot.motors(p, tilted).status == LOOPS_OPEN
+
+
+def test_coordinates_of_linuxcnc_follow_from_the_table_of_the_controller() -> None:
+    # LinuxCNC's rotarydeltakins with radii 10 and 6, arm 10, rod 14 (its joints are 0 for a horizontal arm).
+    robot = rotary()
+    expected = {(0, 0, -10): [27.128862228231] * 3, (1, 0, -10): [27.396064246355, 21.250539432715, 33.161020614388]}
+    for place, angles in expected.items():
+        status, q = robot.motors(np.array(place, dtype=float), np.eye(3))
+        assert status == OK
+        np.testing.assert_allclose(q, angles, atol=1e-11)
+    # Klipper's rotary delta: up is positive, and radians.
+    klipper = rotary('[controller]\nlength = "mm"\nzero = -20\nsign = -1\n')
+    x, y, z = 0.0, 1.0, -10.0
+    np.testing.assert_allclose(
+        klipper.motors(np.array([x, y, z]), np.eye(3)).values, -np.radians(expected[(1, 0, -10)]), atol=1e-13
+    )
+
+
+def test_a_turned_frame_and_other_units_keep_the_power_balance() -> None:
+    robot = rotary('[controller]\nlength = "mm"\nangle = "deg"\nsign = { "2" = -1 }\norigin = [0.001, 0.002, 0.003]\n'
+                   "rpy = [10, -20, 70]\n")
+    p, R = robot.home
+    rng = np.random.default_rng(0)
+    q = robot.motors(p, R).values
+    np.testing.assert_allclose(q, 0.0, atol=1e-9)  # home
+    twist, load = np.array([0, 0, 0, *rng.normal(size=3)]), rng.normal(size=6)
+    load[:3] = 0
+    dq = robot.at("speeds", p, R, 3, twist).values
+    step = 1e-5
+    ahead, behind = (robot.motors(p + sign * step * twist[3:], R).values for sign in (1, -1))
+    np.testing.assert_allclose((ahead - behind) / (2 * step), dq, atol=1e-6)
+    torques = robot.at("torques", p, R, 3, load).values
+    assert torques @ np.radians(dq) == pytest.approx(-load @ twist, abs=1e-12)
+    status, position, rotation = robot.forward(q + np.array([1.0, -2.0, 0.5]), p, R)
+    assert status == OK
+    np.testing.assert_allclose(robot.motors(position, rotation).values, q + [1.0, -2.0, 0.5], atol=1e-10)
+
+
+def test_joint_coordinates_of_an_ankle_take_the_place_of_the_pose(cli: Run, tmp_path: Path) -> None:
+    file, out = str(saved(tmp_path / "ankle.toml", ANKLE)), tmp_path / "c"
+    assert "compiles and tests" in output_of(cli("codegen", file, "--kinematics", "--coordinates", "ankle", "--out", str(out)))
+    made(out, "test")
+    from screwsynth.nlp.case.robotcase import read_robot_case  # noqa: PLC0415 - after the command line
+
+    robot = Library(read_robot_case(file).case, coordinates="ankle")
+    for k in range(60):
+        c = np.array([0.35 * math.sin(1.3 * k), 0.25 * math.sin(0.7 * k + 1)])
+        q, pose, back = np.zeros(2), [np.zeros(3), np.zeros(9)], np.zeros(2)
+        assert robot._call("joint_motors", c, q) == OK  # noqa: SLF001
+        assert robot._call("pose", c, *pose) == robot._call("joints", *pose, back) == OK  # noqa: SLF001
+        np.testing.assert_allclose(back, c, atol=1e-14)
+        R = turn_about(np.array([0, 1.0, 0]), c[0]) @ turn_about(np.array([1.0, 0, 0]), c[1])
+        np.testing.assert_allclose(pose[1].reshape(3, 3), R, atol=1e-14)
+        # The rods keep their lengths: an equation of its own for each motor.
+        for angle, y, z, rod in zip(q, (-0.04, 0.04), (0.2, 0.28), (0.2, 0.28), strict=True):
+            crank = np.array([-0.05 * math.cos(angle), y, z + 0.05 * math.sin(angle)])
+            foot = np.array([0, 0, 0.02]) + R @ np.array([-0.05, y, -0.02])
+            assert np.linalg.norm(crank - foot) == pytest.approx(rod, abs=1e-14)
+        rates, step = np.zeros((2, 2)), 1e-6
+        assert robot._call("joint_rates", c, rates) == OK  # noqa: SLF001
+        for j in range(2):
+            ends = [np.zeros(2), np.zeros(2)]
+            for sign, end in zip((1, -1), ends, strict=True):
+                robot._call("joint_motors", c + sign * step * np.eye(2)[j], end)  # noqa: SLF001
+            np.testing.assert_allclose((ends[0] - ends[1]) / (2 * step), rates[:, j], atol=1e-8)
+        load, torques, speeds = np.array([0.3, -1.0]), np.zeros(2), np.array([0.7, 0.4])
+        assert robot._call("joint_torques", c, load, torques) == OK  # noqa: SLF001
+        assert torques @ (rates @ speeds) == pytest.approx(-load @ speeds, abs=1e-13)
+        guess = np.zeros(2)
+        assert robot._call("joint_forward", q, guess, np.zeros(1, np.int32)) == OK  # noqa: SLF001
+        np.testing.assert_allclose(guess, c, atol=1e-9)
+    error = refusal_of(cli("codegen", file, "--kinematics", "--coordinates", "foot", "--out", str(tmp_path / "d")))
+    assert "--coordinates" in error
+    assert "ankle" in error
+    error = refusal_of(cli("codegen", file, "--kinematics", "--coordinates", "left", "--out", str(tmp_path / "d")))
+    assert "type S" in error
+    assert not (tmp_path / "d").exists()
+
+
+def test_limits_have_the_margins_that_people_state() -> None:
+    case = load_case("hexapod-linuxcnc")
+    robot = Library(case)
+    names = [line for line in robot.files[next(x for x in robot.files if x.endswith(".c"))].splitlines() if "leg_length" in line]
+    assert names
+    p, R = robot.poses(20, 0.1)
+    count = int(next(line.split()[2] for line in "".join(robot.files.values()).splitlines() if "_LIMITS " in line and "#define" in line))
+    for k in range(len(p)):
+        q = robot.motors(p[k], R[k]).values
+        margins, violated = np.zeros(count), np.zeros(1, np.int32)
+        pose = [np.ascontiguousarray(p[k]), np.ascontiguousarray(R[k]).reshape(9)]
+        assert robot._call("limits", *pose, margins, violated) == OK  # noqa: SLF001
+        limit = next(each for each in case.limits if each.name == "leg_length")
+        expected = np.concatenate([[each - limit.min, limit.max - each] for each in q])
+        np.testing.assert_allclose(np.sort(margins), np.sort(expected), atol=1e-11)
+        assert violated[0] == (expected < 0).sum()
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e5])
+def test_verdicts_do_not_depend_on_the_unit_of_length(scale: float) -> None:
+    small = library("6-rss")
+    model, own = small.case.model, small.case.parameters
+    sizes = {name: values[0] if "half" in name else values[0] * scale for name, values in own.items()}
+    case = Case(model, sizes, [scale * each for each in model.home], small.case.tasks, name="scaled", units=small.case.units)
+    robot = Library(case)
+    p, R = small.poses(60, 0.3, seed=6)
+    for k in range(len(p)):
+        one, other = small.motors(p[k], R[k]), robot.motors(scale * p[k], R[k])
+        assert one.status == other.status
+        if one.status == OK:
+            np.testing.assert_allclose(one.values, other.values, atol=1e-9)
+            here, there = small.forward(one.values, *small.home), robot.forward(one.values, *robot.home)
+            assert here[0] == there[0]
+
+
+def test_single_precision_is_measured_by_the_self_test(cli: Run, tmp_path: Path) -> None:
+    output_of(cli("codegen", "6-rss", "--kinematics", "--single", "--out", str(tmp_path / "c")))
+    shown = made(tmp_path / "c", "test")
+    assert "single precision: motors" in shown
+    assert ", 0 failed" in shown
+    assert float(shown.split("motors ")[1].split()[0]) < 1e-5  # radians
+
+
+def test_a_task_is_not_needed(cli: Run, tmp_path: Path) -> None:
+    text = ROTARY.partition("[[task]]")[0] + CONTROLLER
+    file = str(saved(tmp_path / "rotary.toml", text))
+    output_of(cli("codegen", file, "--kinematics", "--out", str(tmp_path / "c")))
+    assert (tmp_path / "c" / "case.toml").read_text(encoding="utf-8") == text
+    header = (tmp_path / "c" / "screwsynth_rotary-kinematics.h").read_text(encoding="utf-8")
+    assert "turned by roll, pitch and yaw of 0 deg, 0 deg, 90 deg" in header
+    assert "angle in deg, 20 at home" in header
+    # A free dimension, options of the other kind of folder, and a file that is none.
+    freed = ROTARY.replace("rod = 0.014", "rod = { min = 0.01, max = 0.02 }")
+    free = str(saved(tmp_path / "free.toml", freed))
+    assert "robot.parameters.rod" in refusal_of(cli("codegen", free, "--kinematics", "--out", str(tmp_path / "d")))
+    assert "--kinematics" in refusal_of(cli("codegen", file, "--single", "--out", str(tmp_path / "d")))
+    assert not (tmp_path / "d").exists()
+
+
+@pytest.mark.parametrize(
+    ("table", "fault"),
+    [
+        ("sign = 2", "controller.sign = 2.0: must be 1 or -1"),
+        ('sign = { "7" = 1 }', "controller.sign.7: is no actuator"),
+        ('length = "furlong"', "controller.length = \"furlong\": has no known size"),
+        ('angle = "grad"', "controller.angle"),
+        ("rpy = [0, 0]", "controller.rpy"),
+        ("zero = inf", "controller.zero"),
+        ("offset = [0, 0, 0]", "controller.offset"),
+    ],
+)
+def test_conventions_that_mean_nothing_are_refused(table: str, fault: str) -> None:
+    with pytest.raises(CaseError, match=fault.replace(".", r"\.").replace("(", r"\(")):
+        case_of(f"{ROTARY}[controller]\n{table}\n")
+
+
+def test_conventions_are_written_and_read_again() -> None:
+    table = 'length = "mm"\nangle = "deg"\nzero = { "1" = 20, "3" = -5 }\nsign = { "2" = -1 }\norigin = [0.1, 0, 0]\nrpy = [0, 0, 90]\n'
+    case = case_of(f"{ROTARY}[controller]\n{table}")
+    again = case_of(case_text(case))
+    assert again.controller == case.controller
+    assert case.controller.zero_of("1") == math.radians(20)
+    assert (case.controller.sign_of("2"), case.controller.sign_of("1")) == (-1, 1)
+    assert case_of(ROTARY).controller == Controller()
+    assert "controller" not in case_text(case_of(ROTARY))
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("name", ["stewart-gough", "6-rss", "6-rus", "delta", "3-rps", "3-rrs", "tricept", "orthoglide", "planar-3-rrr"])
+def test_forward_kinematics_follows_a_platform_for_100_000_ticks(name: str) -> None:
+    robot = library(name)
+    home, count = robot.home, 100_000
+    free = np.isin(range(6), robot.robot.coordinates)
+    robot.start()
+    position, rotation = home
+    state = None if robot.state is None else robot.state.copy()
+    for k in range(count):
+        wave = 0.05 * free * np.sin(np.array([2.1, 3.3, 1.7, 2.9, 1.3, 3.7]) * k * 1e-3 + np.arange(6)) - 0.05 * free * np.sin(np.arange(6))
+        at = home[0] + robot.robot.size * wave[:3]
+        turn = rotation_of(robot, 2 * wave[3:]) @ home[1]
+        if state is not None:
+            robot.state = state  # that of the true pose
+        if robot.robot.complete:
+            status, at, turn = robot.complete(at, turn)
+            assert status == OK
+        status, q = robot.motors(at, turn)
+        assert status == OK
+        if state is not None:
+            state = robot.state
+            robot.state = state.copy() if k == 0 else follower
+        status, position, rotation = robot.forward(q, position, rotation)
+        assert status == OK
+        if state is not None:
+            follower = robot.state
+        assert np.abs(position - at).max() <= 1e-8 * robot.robot.size
+        assert np.abs(rotation - turn).max() <= 1e-8
