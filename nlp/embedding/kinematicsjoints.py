@@ -93,7 +93,7 @@ def _fault(robot: Kinematics, joints: list[LimbJoint], counts: dict[str, int]) -
     for each in joints:
         if each.type not in _TYPES:
             return f"has the joint {each.label} of type {each.type}, which has no coordinates: allowed are R, P, H, C, U"
-        if each.unknown or len(each.coordinates) != counts[each.label]:
+        if len(each.coordinates) != counts[each.label]:
             return f"has the joint {each.label}, whose coordinates are not known"
     if sum(counts.values()) != robot.freedoms:
         return (

@@ -195,12 +195,13 @@ _EDGE = re.compile(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"')
 _INDIRECT = "__indirect_call"
 
 
-def stack_bound(graphs: Mapping[str, str], prefix: str) -> int | None:
-    """Return the stack bytes of the deepest call path from the solver.
+def stack_bound(graphs: Mapping[str, str], prefix: str, function: str = "") -> int | None:
+    """Return the stack bytes of the deepest call path from a function.
 
     Args:
         graphs: call graph of each source, by its name without suffix.
         prefix: prefix of the case's names in C.
+        function: name of the function in C; the solver if left out.
 
     Returns:
         Stack bound; None if a frame has no constant size, a function may be recursive, or the solver is missing.
@@ -214,10 +215,11 @@ def stack_bound(graphs: Mapping[str, str], prefix: str) -> int | None:
             frames[_name(title, unit)] = int(size)
         for source, target in _EDGE.findall(text):
             calls.setdefault(_name(source, unit), set()).add(_name(target, unit))
-    for function, targets in [*calls.items()]:
+    for each, targets in [*calls.items()]:
         if _INDIRECT in targets:
-            calls[function] = (targets - {_INDIRECT}) | _called_by_pointer(function, frames, prefix)
-    return _deepest(f"{prefix}_solve", frames, calls) if f"{prefix}_solve" in frames else None
+            calls[each] = (targets - {_INDIRECT}) | _called_by_pointer(each, frames, prefix)
+    first = function or f"{prefix}_solve"
+    return _deepest(first, frames, calls) if first in frames else None
 
 
 def _name(title: str, unit: str) -> str:
