@@ -172,7 +172,9 @@ def _functions(
         of_results.append(made("CASADI_pose", [joints.values], [joints.pose, joints.twists]))
         of_results.append(made("CASADI_joints", [z], [joints.measured]))
     chosen = robot.equations[: robot.independent, :]
-    slopes = ca.vertcat(robot.by_step(ca.vertcat(robot.q, chosen)), robot.held)
+    # In closed form the rates are the derivatives wherever the loops are closed, with half of the operations.
+    own = robot.by_step(robot.q) if robot.unknowns else robot.rates
+    slopes = ca.vertcat(own, robot.by_step(chosen), robot.held)
     values = ca.vertcat(chosen, SX(robot.held.shape[0], 1))
     of_newton = [made("NEWTON_check", [z], results), made("NEWTON_step", [z], [robot.q, values, robot.signs, slopes.T])]
     if robot.unknowns:
