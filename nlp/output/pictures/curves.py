@@ -1,4 +1,4 @@
-"""Pictures of curves and clouds of designs: F over a number of the case, and one goal over another."""
+"""Charts of designs: F over a varied limit or parameter, and one goal over another."""
 
 from __future__ import annotations
 
@@ -34,17 +34,17 @@ def draw_frame(axes: Axes, title: str) -> None:
 
 #: Width and height of the picture, inches.
 _SIZE = (7.2, 4.6)
-#: A colour and a mark for each task; more tasks begin again.
+#: Colours and marks of the tasks; further tasks repeat them.
 _LOOKS = (("#08519c", "o"), ("#b34700", "s"), ("#3f86c4", "^"), ("#e08a3c", "D"))
 
 
 def numbers_of(column: Column[Row], rows: Sequence[Row]) -> FloatArray:
-    """Return the numbers (n,) of a column, NaN where there is none."""
+    """Return the numbers (n,) of a column, NaN for missing ones."""
     return np.array([math.nan if (cell := column.cell(row)) is None else float(cell) for row in rows])
 
 
 def lines_figure(found: Designs[Row]) -> Figure:
-    """Return F over the number as a Matplotlib figure; the line of each task carries ``F`` and its name as ``gid``."""
+    """Return F over the varied value as a Matplotlib figure; the line of a task has the ``gid`` "F" and its name."""
     figure = Figure(figsize=_SIZE, facecolor="white", layout="constrained")
     axes = figure.add_subplot()
     (over,), columns = found.of_kind(ColumnKind.VARIED), found.of_kind(ColumnKind.OBJECTIVE)
@@ -71,14 +71,14 @@ def lines_figure(found: Designs[Row]) -> Figure:
 
 
 _FRONT_SIZE = (6.4, 5.0)
-#: Width and height of a panel of a pair of goals, in inches, and panels in a row.
+#: Width and height of the panel of a pair of goals, inches, and number of panels in a row.
 _PANEL, _ACROSS = (4.6, 3.7), 3
 
 
 def goals_figure(found: Designs[Row]) -> Figure:
-    """Return one goal over the other as a Matplotlib figure; a gap of the front has no line.
+    """Return one goal over the other as a Matplotlib figure; the line is interrupted at gaps of the front.
 
-    More than two goals have a panel for each pair of them; of three, the third is the colour.
+    More than two goals have a panel for each pair; with three goals, the colour shows the third.
     """
     goals = found.of_kind(ColumnKind.OBJECTIVE)
     labels, values = [goal.axis for goal in goals], np.stack([numbers_of(goal, found.rows) for goal in goals], axis=1)
@@ -97,7 +97,7 @@ def goals_figure(found: Designs[Row]) -> Figure:
 
 
 def _pairs(labels: list[str], values: FloatArray, title: str) -> Figure:
-    """Return a panel for each pair of goals; the points (n, k) of three goals have the third as their colour."""
+    """Return a panel for each pair of goals; with three goals, the colour of the points (n, k) shows the third."""
     pairs = list(combinations(range(len(labels)), 2))
     across = min(len(pairs), _ACROSS)
     down = -(-len(pairs) // across)

@@ -1,4 +1,4 @@
-"""Charts of F over a number that is varied, on the page about a trade-off and on the page about a case."""
+"""Charts of F over a varied limit or parameter, for pages about trade-offs and solutions."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from .markup import Markup, tag
 
 
 def curve_figures(*found: Designs[Row], here: Mapping[str, float] | None = None) -> Markup:
-    """Return charts of F over a number, one for each table and task, side by side.
+    """Return charts of F over a varied value side by side, one for each table and task.
 
     Args:
-        found: tables of designs along one number.
-        here: value of a number in the case that a page is about, by the number's name; marked in its chart.
+        found: tables of designs over one varied value.
+        here: values of varied names in the case of the page; a mark in the chart.
     """
     charts = [
         _chart(each, column, None if here is None else here.get(_over(each).name))
@@ -32,7 +32,7 @@ def _over(found: Designs[Row]) -> Column[Row]:
 
 
 def _numbers(column: Column[Row], rows: Sequence[Row]) -> list[float]:
-    """Return the numbers of a column, NaN where there is none."""
+    """Return the numbers of a column, NaN for missing ones."""
     return [math.nan if (cell := column.cell(row)) is None else float(cell) for row in rows]
 
 
@@ -41,16 +41,16 @@ def _chart(found: Designs[Row], column: Column[Row], here: float | None) -> Mark
     values, F = _numbers(over, found.rows), _numbers(column, found.rows)
     name = f"{column.series}: " if len(found.of_kind(ColumnKind.OBJECTIVE)) > 1 else ""
     solved = [(value, each) for value, each in zip(values, F, strict=True) if math.isfinite(each)]
-    words = f"{name}no value of {over.label} from {values[0]:.5g} to {values[-1]:.5g}{unit} has an answer."
+    words = f"{name}no optimum for any value of {over.label} from {values[0]:.5g} to {values[-1]:.5g}{unit}."
     if solved:
         (first, F_first), (last, F_last) = solved[0], solved[-1]
         words = f"{name}F is {F_first:.6g} at {over.label} = {first:.5g}{unit} and {F_last:.6g} at {last:.5g}{unit}."
         missing = len(values) - len(solved)
         if missing:
-            words += f" {missing} of {len(values)} values have no answer."
+            words += f" No optimum at {missing} of {len(values)} values."
     middles = _bend_values(found)
     if middles:
-        words += " Vertical lines: other bounds and limits become active there."
+        words += " Vertical lines: changes of the active bounds and limits."
     chart = line_chart(
         [Curve(values, F, "curve")],
         [
@@ -65,7 +65,7 @@ def _chart(found: Designs[Row], column: Column[Row], here: float | None) -> Mark
 
 
 def _bend_values(found: Designs[Row]) -> list[float]:
-    """Return the middles between neighbouring values with an answer at which other bounds and limits are active."""
+    """Return the midpoints between neighbouring values whose optima have different active bounds and limits."""
     (active,) = found.of_kind(ColumnKind.ACTIVE)
     has_answer = [
         any(column.cell(row) is not None for column in found.of_kind(ColumnKind.OBJECTIVE)) for row in found.rows
