@@ -91,8 +91,8 @@ def write_whole(target: str) -> Iterator[Path]:
 def write_folder(target: str, files: Mapping[str, str], *, force: bool = False) -> None:
     """Write texts into the files of a folder, which is made if missing.
 
-    All files are complete before the first gets its name; other files in the folder stay. A manifest in the folder lists
-    the written files. Two runs at the same time write one after the other.
+    All files are complete before the first gets its name; other files in the folder stay. A manifest in the folder has
+    the names of the written files. Two runs at the same time write one after the other.
 
     Args:
         target: path of the folder.
@@ -152,7 +152,7 @@ def _refuse_foreign(folder: Path, target: str, files: Iterable[str]) -> None:
     foreign = [name for name in present if written is None or (name in set(files) and name not in written)]
     if foreign:
         raise InputError(
-            f"{target}: contains {foreign[0]}, which screwsynth did not write: choose an empty or a new folder, or --force"
+            f"{target}: contains {foreign[0]}, which screwsynth did not write: choose an empty or new folder, or --force"
         )
 
 

@@ -101,9 +101,7 @@ def html_of(value: object) -> str | None:
         return _html(case_summary(solution.case, result_of(value)), lambda: drawings_of(solution))
     if isinstance(value, Certificate):
         words = [title_line(value.nlp.case), *certificate_lines(certificate_data(value))]
-        return _html(
-            words, lambda: [] if value.x is None else [_drawing_at(value.nlp, value.x, "best known point")]
-        )
+        return _html(words, lambda: [] if value.x is None else [_drawing_at(value.nlp, value.x, "best known point")])
     return None
 
 

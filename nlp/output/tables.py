@@ -16,7 +16,7 @@ def tables_as_csv(items: Iterable[Line | TextTable], name: str | None = None) ->
 
     Args:
         items: tables of a result; lines are ignored.
-        name: name of the table to write; None for all tables, each under a line with its name, separated by empty lines.
+        name: name of the table to write; None for all tables, each below its name, separated by empty lines.
 
     Raises:
         InputError: no table has this name.

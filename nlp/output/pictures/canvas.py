@@ -86,7 +86,7 @@ class Canvas:
     ) -> None:
         """Draw an arrow between two points (3,), with two heads for a moment.
 
-        Seen from its end, an arrow is a circle, with a dot if it points towards the viewer and a cross if it points away.
+        Seen from its end, an arrow is a circle, with a dot if it points towards the viewer, else with a cross.
         """
         if self.is_end_on(start, end):
             size, is_near = 5.0 + 2.4 * width, self.view.depth(end) > self.view.depth(start)

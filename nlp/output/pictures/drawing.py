@@ -144,8 +144,8 @@ class Drawing:
     def limb_rows(self) -> dict[str, int]:
         """Return the index of the row that colours each limb; empty without a motion.
 
-        It is the row with the largest work rate in an actuator of the limb; without such a row, the row of its force, or
-        else of its couple.
+        It is the row with the largest work rate in an actuator of the limb; without such a row, the row of its force or
+        of its couple.
         """
         order = sorted(enumerate(self.rows), key=lambda each: (each[1].driving, each[1].kind is WrenchKind.FORCE))
         return {row.limb: k for k, row in order}
@@ -165,7 +165,7 @@ class Drawing:
         return [self.rows[k] for k in sorted({k for k in found if k is not None})]
 
     def attachment(self, limb: str) -> int | None:
-        """Return the index of the point that joins a limb to the platform; None where no line of the limb has one."""
+        """Return the index of the point that joins a limb to the platform; None if no line of the limb has one."""
         for start, end, link in self.links:
             if link.limb == limb:
                 for index in (end, start):

@@ -14,17 +14,17 @@ from .solutions import drawings_of
 
 
 def plot(found: Solution | Model | Sequence[Model], file: str | Path, *, pose: int = 1) -> None:
-    """Draw a solution's robot with its tasks, or robots at their typical values, into a file.
+    """Draw the robot of a solution with its tasks, or robots at their typical dimensions, into a file.
 
     Args:
-        found: a solution, a robot, or several robots, which stand side by side.
-        file: name that ends in ``.png``, ``.svg`` or ``.pdf``.
-        pose: number of the pose that is drawn, 1 for the first, where the case has several.
+        found: solution, robot, or several robots for a picture side by side.
+        file: path with the extension ``.png``, ``.svg`` or ``.pdf``.
+        pose: number of the drawn pose of a case with several poses, 1 for the first.
 
     Raises:
-        InputError: the ending is another one, Matplotlib is not installed, the file cannot be written, or the case has
+        InputError: the extension is unknown, Matplotlib is not installed, the file cannot be written, or the case has
             no such pose.
-        EvaluationError: the robot does not exist at the point reached, or at its typical values.
+        EvaluationError: the robot does not exist at the final point of the solve, or at its typical dimensions.
     """
     target = str(file)
     check_picture(target)

@@ -1,4 +1,4 @@
-"""Drawings of a solution: one for a single task, one for each task of a compromise."""
+"""Drawings of a solution: one for each task."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from .posture import pose_index, states_at_poses, worst_pose
 
 
 def drawings_of(found: Solution, pose: int = 1) -> list[Drawing]:
-    """Return the robot with its task, or at the combined point with each of several tasks; at one of its poses.
+    """Return the drawings of the robot at one pose: with its task, or at the combined point with each of several tasks.
 
     Args:
-        found: the solution.
+        found: solution of a case.
         pose: number of the pose, 1 for the first.
 
     Raises:
-        EvaluationError: the robot does not exist at the point reached.
+        EvaluationError: the robot does not exist at the final point of the solve.
         InputError: the case has no such pose.
     """
     index = pose_index(found.outcomes[0].own.nlp, pose)
@@ -43,21 +43,21 @@ def _headline_of(found: Solution, outcome: TaskOutcome) -> str:
     if found.combination is None:
         return _headline(outcome)
     if not found.all_solved:
-        return f"{found.status.value}: this is no answer"
+        return f"{found.status.value}: this is not an optimum"
     method, count = found.combination.method.value, len(found.outcomes)
     return f"{outcome.task.name}: F = {outcome.F:.7g} {_unit(outcome)}, {method} of {count} tasks"
 
 
 def _pose_words(outcome: TaskOutcome, index: int) -> str:
-    """Return how F is combined over several poses, the pose shown and its own F; nothing for a single pose."""
+    """Return the combination of F over several poses, the shown pose and its F; empty for a single pose."""
     states = states_at_poses(outcome)
     if len(states) == 1:
         return ""
     state, case = states[index], outcome.own.nlp.case
     if outcome.task.measure:
         return f" (largest over {len(states)} poses). Shown: pose {index + 1}"
-    own = "" if state is None else f", F = {state.F:.7g} there"
-    worst = ", the worst" if worst_pose(states, outcome.task.sense) == index else ""
+    own = "" if state is None else f", F = {state.F:.7g}"
+    worst = ", worst pose" if worst_pose(states, outcome.task.sense) == index else ""
     return f" ({case.over_poses.value} over {len(states)} poses). Shown: pose {index + 1}{own}{worst}"
 
 

@@ -27,10 +27,10 @@ from .report import Part, Report
 from .slices import Slice, has_loops
 
 _ENCLOSED = (
-    "Optimal F over the active limits with the largest effect. Each point of a curve is a new solve from a few starting "
-    "points and from the neighbouring optima. The coloured dot is this design; the command tradeoff computes curves with "
-    "more points. Slices along single variables are not shown: at this design, most variables cannot change "
-    "independently without violating a limit."
+    "Optimal F over the active limits with the largest effect. Each point of a curve is a new solve from a few "
+    "starting points and from the neighbouring optima. The coloured dot is this design; the command tradeoff computes "
+    "curves with more points. Slices along single variables are not shown: at this design, most variables cannot "
+    "change independently without violating a limit."
 )
 
 
@@ -45,9 +45,7 @@ def optima(report: Report) -> Markup:
     ]
     if report.combined is not None:
         case = report.case
-        solutions.append(
-            ("Combined tasks", objective_label(case), unit_of_objective(case), report.combined, None)
-        )
+        solutions.append(("Combined tasks", objective_label(case), unit_of_objective(case), report.combined, None))
     for name, label, unit, solution, robot in solutions:
         if not solution.starts:
             continue
@@ -120,8 +118,8 @@ def _slices(report: Report) -> Iterator[Markup]:
         yield tag("h3", "Independent variables")
     yield tag(
         "p",
-        "In each slice, one variable changes from bound to bound and the others stay fixed. Solid: all limits satisfied; "
-        "dashed: a limit or an equation of the robot violated. Vertical lines: bounds. Dot: this design."
+        "In each slice, one variable changes from bound to bound and the others stay fixed. Solid: all limits "
+        "satisfied; dashed: a limit or an equation of the robot violated. Vertical lines: bounds. Dot: this design."
         + (
             " If the variable is a component of a unit vector, the other components are scaled to keep its length."
             if report.parts[0].nlp.program.places.directions
@@ -163,7 +161,11 @@ def _slice(part: Part, each: Slice) -> Markup:
         words = f"{variable.name}: no slice, as it cannot change while the other variables are fixed."
     chart = line_chart(
         [Curve(values, each.F.tolist(), "curve outside"), Curve(values, inside.tolist(), "curve")],
-        [Spot(at, here, "spot", f"this design: {variable.name} = {at:.6g} {unit}, F = {here:.7g} {part.unit}".rstrip())],
+        [
+            Spot(
+                at, here, "spot", f"this design: {variable.name} = {at:.6g} {unit}, F = {here:.7g} {part.unit}".rstrip()
+            )
+        ],
         words=words,
         labels=(f"{variable.name}, {unit}" if unit else variable.name, part.label),
         bounds=(values[0], values[-1]),

@@ -168,8 +168,8 @@ class ForceData(TypedDict):
 class FrameData(TypedDict):
     """Robot at one posture.
 
-    ``t`` is the time along the motion, ``lengths`` has the quantity of the limb for each row, ``joints`` has position and
-    axes of each joint, and a rate below ``noise`` is rounding error.
+    ``t`` is the time along the motion, ``lengths`` has the quantity of the limb for each row, ``joints`` has position
+    and axes of each joint, and a rate below ``noise`` is rounding error.
     """
 
     t: float
@@ -361,7 +361,7 @@ def _postures_along_motion(drawing: Drawing, count: int) -> _PostureSequence:
         side: list[_TimedPosture] = []
         last: Posture | None = drawing.posture
         for k in range(1, count + 1):
-            # The nearest posture is the best start for closing loops; without loops, steps from the first add no errors.
+            # The nearest posture is the best start for closing loops; without loops, no errors add up from the first.
             closes = bool(drawing.model.unknowns)
             start, t = (last, sign * step) if closes else (drawing.posture, sign * step * k)
             last = None if start is None else drawing.linkage.posture_after(start, drawing.motion.twist, t)

@@ -130,13 +130,13 @@ def _legend(picture: PathPicture, has_marks: bool) -> Markup:
         entries.append(tag("li", _swatch(_RED), "limit violated"))
     parts = []
     if entries:
-        parts.append(
-            tag("p", "Path of the platform's origin, coloured by the nearest limit:", class_="by-limit")
-        )
+        parts.append(tag("p", "Path of the platform's origin, coloured by the nearest limit:", class_="by-limit"))
         parts.append(tag("ul", *entries, class_="legend by-limit"))
         words = f" 0 % (red) to {MOST_MARGIN} % and more (blue)."
         bar = tag("span", class_="scale margins", aria_hidden="true")
-        parts.append(tag("p", "Path of the platform's origin, coloured by the smallest margin:", words, bar, class_="by-margin"))
+        parts.append(
+            tag("p", "Path of the platform's origin, coloured by the smallest margin:", words, bar, class_="by-margin")
+        )
     words = "Red diamonds: first violation of each limit or rank." if has_marks else ""
     dark = " Dark joints are actuated." if picture.judged.case.model.scene.joints else ""
     return join_markup([*parts, tag("p", f"{words}{dark}".strip())])
@@ -178,11 +178,7 @@ def _panel(picture: PathPicture, panel: PathPanel, shown: list[int]) -> Markup:
         for each in panel.curves
     ]
     every = np.concatenate([each.values[np.isfinite(each.values)] for each in panel.curves])
-    ends = (
-        f" from {every.min():.5g} to {every.max():.5g} {panel.unit}".rstrip()
-        if every.size
-        else ": no known value"
-    )
+    ends = f" from {every.min():.5g} to {every.max():.5g} {panel.unit}".rstrip() if every.size else ": no known value"
     return _chart(picture, curves, f"{panel.title}{ends}", panel.unit, panel.limits)
 
 

@@ -164,7 +164,9 @@ def _frame(picture: PathPicture, k: int, posture: Posture, size: float) -> PathF
     )
     margin, nearest = _margin(picture, k), dict(picture.limits).get(int(samples.nearest[k]))
     if margin is not None and nearest is not None:
-        words += f": {nearest} violated by {percent(-margin)}" if margin < 0 else f": margin {percent(margin)} to {nearest}"
+        words += (
+            f": {nearest} violated by {percent(-margin)}" if margin < 0 else f": margin {percent(margin)} to {nearest}"
+        )
     return {
         "words": words,
         "at": float(picture.at[k]),

@@ -209,9 +209,7 @@ def plane_words(nlp: Nlp, x: FloatArray, plane: Plane) -> str:
 
     if not np.isfinite(plane.F).any():
         return f"{names[i].name} and {names[j].name} cannot change while the other variables are fixed."
-    words = (
-        f"F over {names[i].name} and {names[j].name}: {np.nanmin(plane.F):.5g} to {np.nanmax(plane.F):.5g}. "
-    )
+    words = f"F over {names[i].name} and {names[j].name}: {np.nanmin(plane.F):.5g} to {np.nanmax(plane.F):.5g}. "
     kept = np.where(plane.inside > 0, plane.F, np.nan)
     part = 100 * float(np.mean(plane.inside))
     if np.isfinite(kept).any():
@@ -221,4 +219,8 @@ def plane_words(nlp: Nlp, x: FloatArray, plane: Plane) -> str:
         at = f"{text(i, float(plane.first[column]))}, {text(j, float(plane.second[row]))}"
         words += f"Within all limits, F is {word} at {at} on this grid. "
     words += f"This design: {text(i, float(x[i]))}, {text(j, float(x[j]))}."
-    return words if part == 100 else f"{words} Pale: a limit or an equation of the robot is violated ({100 - part:.3g} % of the map)."
+    return (
+        words
+        if part == 100
+        else f"{words} Pale: a limit or an equation of the robot is violated ({100 - part:.3g} % of the map)."
+    )

@@ -142,7 +142,9 @@ def bound_chart(history: Sequence[Sequence[float]]) -> list[Markup]:
         words=words,
         labels=("time, s", "F"),
     )
-    return [tag("figure", chart, tag("figcaption", f"Proved bound (blue) and best known F (orange) over time. {words}"))]
+    return [
+        tag("figure", chart, tag("figcaption", f"Proved bound (blue) and best known F (orange) over time. {words}"))
+    ]
 
 
 def published_section(report: Report) -> Markup:
@@ -156,8 +158,8 @@ def published_section(report: Report) -> Markup:
 def sections(report: Report) -> list[tuple[str, str, Markup]]:
     """Return anchor, heading and content of every section; some have no content.
 
-    The order answers a reader's questions: the problem, the design, its evidence, its limits, alternatives, and the data
-    to repeat the solve.
+    The order answers a reader's questions: the problem, the design, its evidence, its limits, alternatives, and the
+    data to repeat the solve.
     """
     return [
         ("case", "Problem", _case(report)),
@@ -214,9 +216,7 @@ def _poses_line(case: Case) -> str:
     is_measured = bool(case.tasks[0].measure)
     over = "largest" if is_measured else case.over_poses.value
     shown = "The picture begins" if is_measured else "The picture and its rates begin"
-    return (
-        f"Poses: {case.pose_count}; F is their {over}. {shown} with the first pose; a slider selects the others."
-    )
+    return f"Poses: {case.pose_count}; F is their {over}. {shown} with the first pose; a slider selects the others."
 
 
 def _case(report: Report) -> Markup:
@@ -300,9 +300,7 @@ def _task_tables(case: Case, result: SolveResult, anchor: str) -> list[Markup]:
         parts.append(tag("details", tag("summary", caption), html_table(table, caption, id=f"{anchor}-{table.name}")))
     parts_by_limb = limb_part_table(case, robot)
     if parts_by_limb is not None:
-        parts.append(
-            html_table(parts_by_limb, "Actuation and constraint parts of F by limb", id=f"{anchor}-actuation")
-        )
+        parts.append(html_table(parts_by_limb, "Actuation and constraint parts of F by limb", id=f"{anchor}-actuation"))
     if not reached:
         parts.append(paragraphs(singularity_lines(robot, case.units)))
     return parts
