@@ -152,7 +152,7 @@ def _refuse_foreign(folder: Path, target: str, files: Iterable[str]) -> None:
     foreign = [name for name in present if written is None or (name in set(files) and name not in written)]
     if foreign:
         raise InputError(
-            f"{target}: contains {foreign[0]}, which screwsynth did not write: choose an empty or new folder, or --force"
+            f"{target}: contains {foreign[0]}, not written by screwsynth: choose an empty or a new folder, or --force"
         )
 
 

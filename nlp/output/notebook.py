@@ -57,31 +57,31 @@ class Picture:
         return self.svg
 
 
-def text_of(found: Solution | Certified, width: int = _WIDTH) -> str:
+def text_of(solution: Solution | Certified, width: int = _WIDTH) -> str:
     """Return the tables of a solution as text, as ``solve --all`` prints them.
 
     Args:
-        found: solution, or solution with certificates.
+        solution: solution, or solution with certificates.
         width: width of the text in columns.
     """
     out = io.StringIO()
-    case = (found if isinstance(found, Solution) else found.solution).case
+    case = (solution if isinstance(solution, Solution) else solution.solution).case
     # In a notebook, rich would show its lines at once instead of writing them to the file.
     plain = Console(
         file=out, width=width, color_system=None, force_jupyter=False, highlight=False, markup=False, emoji=False
     )
-    show(plain, case_summary(case, result_of(found)))
+    show(plain, case_summary(case, result_of(solution)))
     return "".join(f"{line.rstrip()}\n" for line in out.getvalue().splitlines())
 
 
-def picture_of(found: Solution | Model) -> Picture:
+def picture_of(subject: Solution | Model) -> Picture:
     """Return the drawing of the robot of a solution with its tasks, or of a robot at its typical dimensions.
 
     Raises:
         InputError: Matplotlib is not installed.
         EvaluationError: the robot does not exist at the final point of the solve, or at its typical dimensions.
     """
-    return _picture([drawing_of_model(found)] if isinstance(found, Model) else drawings_of(found))
+    return _picture([drawing_of_model(subject)] if isinstance(subject, Model) else drawings_of(subject))
 
 
 def html_of(value: object) -> str | None:

@@ -42,10 +42,10 @@ def _cell(cell: str | Line) -> str:
     return cell.words if isinstance(cell, Line) else cell
 
 
-def designs_markdown(found: Designs[Row]) -> str:
+def designs_markdown(designs: Designs[Row]) -> str:
     """Return a table of designs in Markdown, with the lines above and below it."""
-    lines = [f"{line.label}: {line.words}" if line.label else line.words for line in found.before]
-    return "\n".join([*(f"{markdown_text(line)}\n" for line in lines), markdown(designs_table(found))])
+    lines = [f"{line.label}: {line.words}" if line.label else line.words for line in designs.before]
+    return "\n".join([*(f"{markdown_text(line)}\n" for line in lines), markdown(designs_table(designs))])
 
 
 def markdown(table: TextTable) -> str:

@@ -51,10 +51,10 @@ class SweepColumns:
         converged: (N,) number of converged searches.
         engine: engine that found each point, ``compiled`` or ``ipopt``.
         seconds: (N,) wall time.
-        note: reason of a refusal, or a note that limits over a workspace are only checked at the stated pose, or not proved.
+        note: reason of a refusal, or note on limits over a workspace that are only checked at the stated pose.
         certificate: status of each certificate; empty texts without ``certified``.
         bound: (N,) proved bound of F.
-        gap: (N,) relative difference of F and the bound.
+        gap: (N,) absolute difference of F and the bound.
     """
 
     numbers: Mapping[str, FloatArray]
@@ -296,36 +296,36 @@ def stated_pose_note(case: Case, notes: Iterable[str]) -> str | None:
     return notice if notice is not None and notice in notes else None
 
 
-def sweep_result(case: Case, found: SweepColumns) -> SweepResult:
+def sweep_result(case: Case, columns: SweepColumns) -> SweepResult:
     """Return the columns of a sweep as a result.
 
     Args:
         case: case at one of the points.
-        found: columns of the sweep.
+        columns: columns of the sweep.
     """
-    is_proved = any(found.certificate)
+    is_proved = any(columns.certificate)
     return SweepResult.of(
-        found,
+        columns,
         head=head_data(case),
-        notice=stated_pose_note(case, found.note),
+        notice=stated_pose_note(case, columns.note),
         unit=unit_of_objective(case),
-        numbers=MappingProxyType({name: vector(values) for name, values in found.numbers.items()}),
-        statuses=found.status,
-        F=_numbers(found.F),
-        design=MappingProxyType({name: _numbers(values) for name, values in found.design.items()}),
-        actives=found.active,
-        verdicts=found.verdict,
-        stationarity=_numbers(found.stationarity),
-        feasibility=_numbers(found.feasibility),
-        curvature=_numbers(found.curvature),
-        starts=tuple(found.starts.tolist()),
-        converged=tuple(found.converged.tolist()),
-        engines=found.engine,
-        times=_numbers(found.seconds),
-        notes=found.note,
-        certificates=found.certificate if is_proved else None,
-        bounds=_numbers(found.bound) if is_proved else None,
-        gaps=_numbers(found.gap) if is_proved else None,
+        numbers=MappingProxyType({name: vector(values) for name, values in columns.numbers.items()}),
+        statuses=columns.status,
+        F=_numbers(columns.F),
+        design=MappingProxyType({name: _numbers(values) for name, values in columns.design.items()}),
+        actives=columns.active,
+        verdicts=columns.verdict,
+        stationarity=_numbers(columns.stationarity),
+        feasibility=_numbers(columns.feasibility),
+        curvature=_numbers(columns.curvature),
+        starts=tuple(columns.starts.tolist()),
+        converged=tuple(columns.converged.tolist()),
+        engines=columns.engine,
+        times=_numbers(columns.seconds),
+        notes=columns.note,
+        certificates=columns.certificate if is_proved else None,
+        bounds=_numbers(columns.bound) if is_proved else None,
+        gaps=_numbers(columns.gap) if is_proved else None,
         versions=versions(),
     )
 

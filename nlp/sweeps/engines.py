@@ -76,9 +76,9 @@ def solve_point(
     return _with_certificate(row, found)
 
 
-def _with_certificate(row: Row, found: Certified) -> Row:
+def _with_certificate(row: Row, certified: Certified) -> Row:
     """Return a row with the certificate of the final nonlinear program."""
-    certificate = found.certificate
+    certificate = certified.certificate
     if certificate is None:
         note = "no certificate: averaged tasks are not one nonlinear program"
         return row._replace(note=note)

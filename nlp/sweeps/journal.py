@@ -43,7 +43,7 @@ class Row(NamedTuple):
             stated pose, or not proved; empty otherwise.
         certificate: status of the certificate; empty without a certificate.
         bound: proved bound of F, which no feasible design exceeds; None without a certificate.
-        gap: relative difference of F and the bound; None without a certificate.
+        gap: absolute difference of F and the bound; None without a certificate.
     """
 
     point: int
@@ -91,7 +91,7 @@ class Journal(JournalFile):
         count: number of points of the sweep.
 
     Raises:
-        InputError: the file cannot be written, belongs to another sweep, or is held by another process.
+        InputError: the file cannot be written, belongs to another sweep, or is locked by another process.
     """
 
     def __init__(self, path: Path, fingerprint: str, count: int) -> None:

@@ -234,14 +234,14 @@ def _program(case: Case) -> Nlp:
     return with_all_pairs(nlp)
 
 
-def _compare(found: Places, other: Nlp, values: FloatArray) -> None:
+def _compare(places: Places, other: Nlp, values: FloatArray) -> None:
     """Compare data and function values with a program that is formulated at one point with values (1, m).
 
     Raises:
         NotPlacedError: data or function values differ.
     """
-    block = found.block(values)
-    placed = block.numbers.put_into(found.nlp, 0)
+    block = places.block(values)
+    placed = block.numbers.put_into(places.nlp, 0)
     names = [
         [*(each.name for each in nlp.program.variables), *(each.name for each in nlp.program.constraints)]
         + [each.name for each in nlp.program.arguments]

@@ -31,8 +31,8 @@ PROOF_SECONDS = 60.0
 #: Number of searches per point without ``--starts``.
 STARTS = 8
 
-#: Function called after each block with the numbers of points solved before this run, solved now and in total, and the
-#: seconds of this run.
+#: Function called after each block with the number of points solved before this run, the number solved in this run, the
+#: number missing at its beginning, and its seconds.
 SweepProgress = Callable[[int, int, int, float], None]
 
 

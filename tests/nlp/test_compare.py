@@ -119,7 +119,7 @@ def test_pictures_have_units_sizes_and_one_scale(path: str) -> None:
 
 def test_dimensions_ranges_and_certificates() -> None:
     found = sn.compare(case(), ["6-sps", "case"], part=0.1, starts=2, certified=True)
-    sps, own = sorted(found.entries, key=lambda each: each.contender.is_own)
+    sps, own = sorted(found.entries, key=lambda each: each.contender.is_of_case)
     assert own.solution is not None
     assert sps.solution is not None
     # Each number but the pose is free by a tenth, around the typical ones that are scaled.

@@ -22,30 +22,30 @@ from .view import View, clearest_view
 _SIZE = (2.9, 2.6)
 
 
-def designs_figure(found: Designs[Row], *, is_on_page: bool = False) -> Figure:
+def designs_figure(designs: Designs[Row], *, is_on_page: bool = False) -> Figure:
     """Return the picture of a table of designs as a Matplotlib figure.
 
     Args:
-        found: table of designs.
+        designs: table of designs.
         is_on_page: If true, the page has the sentences of :func:`legend_of`, so the picture has none.
 
     Raises:
         EvaluationError: no design can be drawn.
     """
-    if found.join is Join.LIST:
-        return robots_figure(found)
-    if found.join is Join.GRID:
-        return regions_figure(found, () if is_on_page else legend_of(found))
-    if not found.of_kind(ColumnKind.VARIED):
-        return goals_figure(found)
-    if found.join is Join.CLOUD:
+    if designs.join is Join.LIST:
+        return robots_figure(designs)
+    if designs.join is Join.GRID:
+        return regions_figure(designs, () if is_on_page else legend_of(designs))
+    if not designs.of_kind(ColumnKind.VARIED):
+        return goals_figure(designs)
+    if designs.join is Join.CLOUD:
         raise EvaluationError("A picture needs a grid over one or two varied names")
-    return lines_figure(found)
+    return lines_figure(designs)
 
 
-def legend_of(found: Designs[Row]) -> list[str]:
+def legend_of(designs: Designs[Row]) -> list[str]:
     """Return the legend of the numbered regions in a picture; empty without numbered regions."""
-    return regions_legend(found) if found.join is Join.GRID else []
+    return regions_legend(designs) if designs.join is Join.GRID else []
 
 
 def design_pictures(drawings: Sequence[Drawing]) -> list[bytes]:

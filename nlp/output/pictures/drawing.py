@@ -159,7 +159,7 @@ class Drawing:
         own = [k for k, row in enumerate(self.rows) if row.limb == link.limb]
         return None if link.row is None or link.row >= len(own) else own[link.row]
 
-    def own_rows(self, limb: str) -> list[LimbRate]:
+    def link_rows(self, limb: str) -> list[LimbRate]:
         """Return the rows of those links of a limb, such as rods, that have only one row, in order."""
         found = (self.link_row(link) for _, _, link in self.links if link.limb == limb)
         return [self.rows[k] for k in sorted({k for k in found if k is not None})]

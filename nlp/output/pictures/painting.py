@@ -375,17 +375,17 @@ class Panel:
         """Return the colour of a link, from its rate or else from its limb's rate."""
         if link.limb is None or link.limb not in rates:
             return PLAIN
-        own = self._own_rate(link)
+        own = self._link_rate(link)
         return self._colour(rates[link.limb] if own is None else own)
 
-    def _own_rate(self, link: Link) -> float | None:
+    def _link_rate(self, link: Link) -> float | None:
         """Return the rate of the only row of a link; None for a link with several rows."""
         row = self.drawing.link_row(link)
         return None if row is None else self.drawing.rows[row].rate
 
     def _rates_text(self, limb: str) -> str:
         """Return the rates of a limb's rods as text with the unit; empty for a limb without rods."""
-        unit, rows = self._rate_unit(), self.drawing.own_rows(limb)
+        unit, rows = self._rate_unit(), self.drawing.link_rows(limb)
         texts = [f"{row.member}: {self._rate_text(row.rate).removesuffix(unit).strip()}" for row in rows]
         return " and ".join(texts) + f" {unit}".rstrip() if texts else ""
 

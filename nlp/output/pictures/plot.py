@@ -13,11 +13,11 @@ from .requirements import check_picture, ending_of
 from .solutions import drawings_of
 
 
-def plot(found: Solution | Model | Sequence[Model], file: str | Path, *, pose: int = 1) -> None:
+def plot(subject: Solution | Model | Sequence[Model], file: str | Path, *, pose: int = 1) -> None:
     """Draw the robot of a solution with its tasks, or robots at their typical dimensions, into a file.
 
     Args:
-        found: solution, robot, or several robots for a picture side by side.
+        subject: solution, robot, or several robots for a picture side by side.
         file: path with the extension ``.png``, ``.svg`` or ``.pdf``.
         pose: number of the drawn pose of a case with several poses, 1 for the first.
 
@@ -31,8 +31,8 @@ def plot(found: Solution | Model | Sequence[Model], file: str | Path, *, pose: i
     check_target(target)
     from .figures import picture  # noqa: PLC0415 - needs Matplotlib, whose absence is reported above
 
-    if isinstance(found, Solution):
-        drawings = drawings_of(found, pose)
+    if isinstance(subject, Solution):
+        drawings = drawings_of(subject, pose)
     else:
-        drawings = [drawing_of_model(model) for model in ([found] if isinstance(found, Model) else found)]
+        drawings = [drawing_of_model(model) for model in ([subject] if isinstance(subject, Model) else subject)]
     write_bytes(target, picture(drawings, ending_of(target)))

@@ -33,9 +33,9 @@ _ROWS = (0.95, 0.88)
 _ROOM, _APART = (0.045, 0.06), 0.115
 
 
-def regions_legend(found: Designs[Row]) -> list[str]:
+def regions_legend(designs: Designs[Row]) -> list[str]:
     """Return the legend: the meaning of the lines, and the active limits of each numbered region."""
-    F, active = _answers(found)
+    F, active = _answers(designs)
     has_gaps = not np.isfinite(F).all()
     names = [name for name, _ in _counted(F, active)]
     lines = [
@@ -55,10 +55,10 @@ def regions_legend(found: Designs[Row]) -> list[str]:
     return lines
 
 
-def _answers(found: Designs[Row]) -> tuple[FloatArray, list[str]]:
+def _answers(designs: Designs[Row]) -> tuple[FloatArray, list[str]]:
     """Return F (n,), NaN without an optimum, and the active sides of each row as one text."""
-    ((objective,), (active,)) = (found.of_kind(kind) for kind in (ColumnKind.OBJECTIVE, ColumnKind.ACTIVE))
-    return numbers_of(objective, found.rows), [str(active.cell(row) or "") for row in found.rows]
+    ((objective,), (active,)) = (designs.of_kind(kind) for kind in (ColumnKind.OBJECTIVE, ColumnKind.ACTIVE))
+    return numbers_of(objective, designs.rows), [str(active.cell(row) or "") for row in designs.rows]
 
 
 def _counted(F: FloatArray, active: Sequence[str]) -> list[tuple[str, int]]:
@@ -66,20 +66,20 @@ def _counted(F: FloatArray, active: Sequence[str]) -> list[tuple[str, int]]:
     return Counter(sorted(each for value, each in zip(F, active, strict=True) if np.isfinite(value))).most_common()
 
 
-def regions_figure(found: Designs[Row], legend: Sequence[str]) -> Figure:
+def regions_figure(designs: Designs[Row], legend: Sequence[str]) -> Figure:
     """Return F over one or two varied names as a Matplotlib figure, with sentences below it.
 
     Args:
-        found: table of designs on a grid.
+        designs: table of designs on a grid.
         legend: sentences below the chart, such as those of :func:`regions_legend`.
     """
     axis_of = {
-        column: np.array(list(dict.fromkeys(numbers_of(column, found.rows))))
-        for column in found.of_kind(ColumnKind.VARIED)
+        column: np.array(list(dict.fromkeys(numbers_of(column, designs.rows))))
+        for column in designs.of_kind(ColumnKind.VARIED)
     }
     changing = [(column.axis, axis) for column, axis in axis_of.items() if len(axis) > 1]
     shape = tuple(len(axis) for _, axis in changing)
-    values, active = _answers(found)
+    values, active = _answers(designs)
     names = [name for name, _ in _counted(values, active)]
     F = values.reshape(shape)
     sets = np.array(
@@ -93,7 +93,7 @@ def regions_figure(found: Designs[Row], legend: Sequence[str]) -> Figure:
     ]
     size = (_SIZE[0], _SIZE[1] + _LINE * len(lines))
     figure = Figure(figsize=size, facecolor="white", layout="constrained")
-    axes, label = figure.add_subplot(), objective_label(found.case)
+    axes, label = figure.add_subplot(), objective_label(designs.case)
     if len(changing) == 1:
         _draw_curve(axes, changing[0][1], F, sets, label)
     else:
@@ -101,7 +101,7 @@ def regions_figure(found: Designs[Row], legend: Sequence[str]) -> Figure:
         axes.set_ylabel(legible(changing[1][0]), color=INK, parse_math=False)
     axes.set_xlabel(legible(changing[0][0]), color=INK, parse_math=False)
     draw_edges(axes)
-    title = "\n".join(textwrap.wrap(found.title, 70, max_lines=2, placeholder=" …"))
+    title = "\n".join(textwrap.wrap(designs.title, 70, max_lines=2, placeholder=" …"))
     axes.set_title(title, loc="left", fontsize=11, fontweight="bold", color=INK, parse_math=False)
     if lines:
         figure.supxlabel(legible("\n".join(lines)), fontsize=8.5, color=INK, x=0.01, ha="left", parse_math=False)

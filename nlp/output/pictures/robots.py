@@ -49,39 +49,39 @@ class _Scale(NamedTuple):
     half: float
 
 
-def robots_figure(found: Designs[Row]) -> Figure:
+def robots_figure(designs: Designs[Row]) -> Figure:
     """Return robots at their designs as a Matplotlib figure, with one scale and a scale bar.
 
     Raises:
         EvaluationError: no robot has an optimum at which it exists.
     """
-    pairs = _pairs(found)
+    pairs = _pairs(designs)
     across = min(len(pairs), _ACROSS)
     width, height = max(across * _WIDTH, _LEAST), -(-len(pairs) // across) * _ROW + _TITLE + _FOOT
     figure = _empty(width, height)
     scale = _scale_of(pairs)
     for k, pair in enumerate(pairs):
         _draw_panel(figure, k % across * _WIDTH, height - _TITLE - k // across * _ROW, pair, scale)
-    title = "".join(textwrap.wrap(legible(found.title), int(width / 0.11), max_lines=1, placeholder=" …"))
+    title = "".join(textwrap.wrap(legible(designs.title), int(width / 0.11), max_lines=1, placeholder=" …"))
     figure.text(0.15 / width, 1 - 0.15 / height, title, fontsize=12, color=INK, va="top", parse_math=False)
-    _draw_length(figure, _FOOT - 0.28, found, scale)
+    _draw_length(figure, _FOOT - 0.28, designs, scale)
     _draw_legend(figure, pairs, scale)
     return figure
 
 
-def robot_pictures(found: Designs[Row]) -> list[bytes]:
+def robot_pictures(designs: Designs[Row]) -> list[bytes]:
     """Return an SVG picture of each robot with a scale bar, and last a picture of the common legend.
 
     Raises:
         EvaluationError: no robot has an optimum at which it exists.
     """
-    pairs = _pairs(found)
+    pairs = _pairs(designs)
     scale = _scale_of(pairs)
 
     def panel(pair: _Pair) -> Figure:
         figure = _empty(_WIDTH, _ROW + 0.3)
         _draw_panel(figure, 0.0, _ROW + 0.3, pair, scale)
-        _draw_length(figure, 0.15, found, scale)
+        _draw_length(figure, 0.15, designs, scale)
         return figure
 
     def legend() -> Figure:
@@ -92,20 +92,20 @@ def robot_pictures(found: Designs[Row]) -> list[bytes]:
     return [*(picture_of(".svg", panel, pair) for pair in pairs), picture_of(".svg", legend)]
 
 
-def _pairs(found: Designs[Row]) -> list[_Pair]:
+def _pairs(designs: Designs[Row]) -> list[_Pair]:
     """Return the designs that can be drawn; the drawing of a feasible design may have points that are not finite.
 
     Raises:
         EvaluationError: no design can be drawn.
     """
     pairs = []
-    for each in found.drawn():
+    for each in designs.drawn():
         with suppress(EvaluationError):
             drawing = drawing_of(each.nlp, each.x, each.state, each.task)
             # Starting point, free motions and forces have scales of a single robot.
             pairs.append(_Pair(each, replace(drawing, reference=None, free=(), forces=None)))
     if not pairs:
-        raise EvaluationError(f"{found.case.source or found.case.name}: no robot has a design to draw")
+        raise EvaluationError(f"{designs.case.source or designs.case.name}: no robot has a design to draw")
     return pairs
 
 
@@ -165,7 +165,7 @@ def _write_heading(figure: Figure, left: float, top: float, design: DrawnDesign)
     figure.text(left, lower, design.words, fontsize=9.5, color=MUTED, va="top", parse_math=False)
 
 
-def _draw_length(figure: Figure, bottom: float, found: Designs[Row], scale: _Scale) -> None:
+def _draw_length(figure: Figure, bottom: float, designs: Designs[Row], scale: _Scale) -> None:
     """Draw a scale bar with a round length for all panels; its position is in inches."""
     longest = 2 * scale.half * _BAR
     power = 10.0 ** np.floor(np.log10(longest))
@@ -174,5 +174,5 @@ def _draw_length(figure: Figure, bottom: float, found: Designs[Row], scale: _Sca
     left, part, at = 0.15 / width, length / (2 * scale.half) * _WIDTH / width, bottom / height
     bar = Line2D([left, left + part], [at, at], color=INK, linewidth=2.0, solid_capstyle="butt", gid="scale")
     figure.add_artist(bar)
-    text = f"{found.case.units.text(float(length), Dimension.LENGTH)}in all panels"
+    text = f"{designs.case.units.text(float(length), Dimension.LENGTH)}in all panels"
     figure.text(left + part + 0.1 / width, at, text, fontsize=9, color=MUTED, va="center", parse_math=False)

@@ -12,18 +12,18 @@ from .drawing import Drawing, drawing_of
 from .posture import pose_index, states_at_poses, worst_pose
 
 
-def drawings_of(found: Solution, pose: int = 1) -> list[Drawing]:
+def drawings_of(solution: Solution, pose: int = 1) -> list[Drawing]:
     """Return the drawings of the robot at one pose: with its task, or at the combined point with each of several tasks.
 
     Args:
-        found: solution of a case.
+        solution: solution of a case.
         pose: number of the pose, 1 for the first.
 
     Raises:
         EvaluationError: the robot does not exist at the final point of the solve.
         InputError: the case has no such pose.
     """
-    index = pose_index(found.outcomes[0].own.nlp, pose)
+    index = pose_index(solution.outcomes[0].own.nlp, pose)
     return [
         drawing_of(
             outcome.own.nlp,
@@ -31,20 +31,20 @@ def drawings_of(found: Solution, pose: int = 1) -> list[Drawing]:
             states_at_poses(outcome)[index],
             task,
             pose=index,
-            headline=_headline_of(found, outcome) + _pose_words(outcome, index),
-            is_answer=found.status.is_answer,
+            headline=_headline_of(solution, outcome) + _pose_words(outcome, index),
+            is_answer=solution.status.is_answer,
         )
-        for task, outcome in enumerate(found.outcomes)
+        for task, outcome in enumerate(solution.outcomes)
     ]
 
 
-def _headline_of(found: Solution, outcome: TaskOutcome) -> str:
+def _headline_of(solution: Solution, outcome: TaskOutcome) -> str:
     """Return the result for one task in one line."""
-    if found.combination is None:
+    if solution.combination is None:
         return _headline(outcome)
-    if not found.all_solved:
-        return f"{found.status.value}: this is not an optimum"
-    method, count = found.combination.method.value, len(found.outcomes)
+    if not solution.all_solved:
+        return f"{solution.status.value}: this is not an optimum"
+    method, count = solution.combination.method.value, len(solution.outcomes)
     return f"{outcome.task.name}: F = {outcome.F:.7g} {_unit(outcome)}, {method} of {count} tasks"
 
 

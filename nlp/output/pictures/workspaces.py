@@ -45,7 +45,7 @@ def drawing_at(case: Case, claim: PosedClaim) -> Drawing:
         claim: claim with its pose, in the case's units.
 
     Raises:
-        EvaluationError: the robot does not exist at the pose, or the pose is that of another robot within the tolerance.
+        EvaluationError: the robot does not exist at the pose, or it is a pose of another robot within the tolerance.
     """
     pose = claim.pose
     angle = case.units.to_internal(pose.angle, Dimension.ANGLE)

@@ -35,72 +35,74 @@ _WORDS = (
 )
 
 
-def designs_page(found: Designs[Row]) -> str:
+def designs_page(designs: Designs[Row]) -> str:
     """Return a page about a table of designs, which opens without a network.
 
     The script only marks tables that scroll: all texts, charts, pictures and tables are complete without it.
     """
-    page = found.page
-    sections = list(_list_sections(found) if found.join is Join.LIST else _sections(found))
+    page = designs.page
+    sections = list(_list_sections(designs) if designs.join is Join.LIST else _sections(designs))
     contents, body = contents_and_body(sections)
     return whole_page(
-        f"{found.title} - {found.word}",
+        f"{designs.title} - {designs.word}",
         page.subtitle,
         answer_box([page.answer], is_answer=page.is_answer),
         body,
-        heading=found.title,
+        heading=designs.title,
         contents=contents,
     )
 
 
-def _sections(found: Designs[Row]) -> Iterator[tuple[str, str, Markup]]:
+def _sections(table: Designs[Row]) -> Iterator[tuple[str, str, Markup]]:
     """Yield anchor, heading and content of the sections of a page about designs of one robot."""
-    page, designs = found.page, found.drawn()
+    page, designs = table.page, table.drawn()
     aside = bend_lines(designs, page.bends) if page.bends else Markup("")
-    if page.is_answer and (legend := legend_of(found)):
+    if page.is_answer and (legend := legend_of(table)):
         aside = tag("ul", *(tag("li", line) for line in legend), class_="plain")
-    beside = tag("div", tag("div", _picture(found), class_="wide"), aside, class_="beside")
+    beside = tag("div", tag("div", _picture(table), class_="wide"), aside, class_="beside")
     yield (*page.picture, join_markup([paragraphs(page.rules), beside, paragraphs(page.cautions)]))
     yield "designs", page.designs, design_figures(designs)
-    yield (*page.table, designs_rows(found))
+    yield (*page.table, designs_rows(table))
 
 
-def _picture(found: Designs[Row]) -> Markup:
+def _picture(designs: Designs[Row]) -> Markup:
     """Return the picture of a page, or a sentence with the reason why there is none."""
-    page = found.page
-    if found.join is Join.CURVE and found.of_kind(ColumnKind.VARIED):
-        return curve_figures(found)
+    page = designs.page
+    if designs.join is Join.CURVE and designs.of_kind(ColumnKind.VARIED):
+        return curve_figures(designs)
     if not page.is_answer:
         return Markup("")
     try:
-        picture = picture_of(".svg", designs_figure, found, is_on_page=True)
+        picture = picture_of(".svg", designs_figure, designs, is_on_page=True)
     except EvaluationError as error:
         return paragraphs([f"{error}."])
     return picture_figure(picture, page.below)
 
 
-def _list_sections(found: Designs[Row]) -> Iterator[tuple[str, str, Markup]]:
+def _list_sections(designs: Designs[Row]) -> Iterator[tuple[str, str, Markup]]:
     """Yield anchor, heading and content of the sections of a page about several robots."""
-    page = found.page
-    yield (*page.table, join_markup([paragraphs(page.rules), designs_rows(found)]))
+    page = designs.page
+    yield (*page.table, join_markup([paragraphs(page.rules), designs_rows(designs)]))
     with suppress(EvaluationError):  # if no robot has an optimum
-        *robots, legend = map(image_source, robot_pictures(found))
+        *robots, legend = map(image_source, robot_pictures(designs))
         alt = "Robot at its design; the values are in the table."
         images = [tag("img", src=source, alt=alt) for source in robots]
         shown = [tag("div", *images, class_="designs"), tag("img", src=legend, alt="Colour scale of the limb rates.")]
         yield (*page.picture, tag("figure", *shown, tag("figcaption", page.below)))
     details = []
-    for each in found.details:
+    for each in designs.details:
         details += [tag("h3", each.name), paragraphs(each.sentences)]
         details += [] if each.table is None else [html_table(each.table, f"dimensions of {each.name}")]
     yield "details", "Robots in detail", join_markup(details)
 
 
-def designs_rows(found: Designs[Row]) -> Markup:
+def designs_rows(designs: Designs[Row]) -> Markup:
     """Return the table, and below it the bounds and limits that are active in all rows."""
-    few = "" if len(found.rows) <= _ROWS else f"The first {_ROWS} of {len(found.rows):,} rows; CSV and JSON have all."
-    below = tag("p", f"Active in all rows: {found.throughout}.") if found.throughout else None
-    rows = html_table(designs_table(found, _ROWS), found.caption, id="swept" if found.join is Join.GRID else None)
+    few = (
+        "" if len(designs.rows) <= _ROWS else f"The first {_ROWS} of {len(designs.rows):,} rows; CSV and JSON have all."
+    )
+    below = tag("p", f"Active in all rows: {designs.throughout}.") if designs.throughout else None
+    rows = html_table(designs_table(designs, _ROWS), designs.caption, id="swept" if designs.join is Join.GRID else None)
     return join_markup([tag("p", few) if few else None, rows, below])
 
 

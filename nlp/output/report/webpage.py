@@ -44,7 +44,7 @@ _NO_CASE_FILE = "No case file can represent this case: "
 
 
 def report(
-    found: Solution | Certified,
+    solved: Solution | Certified,
     *,
     text: str | None = None,
     check: CaseCheck | None = None,
@@ -54,7 +54,7 @@ def report(
     """Return a page about a solved case as one HTML text, which opens without a network.
 
     Args:
-        found: solution, or solution with certificates.
+        solved: solution, or solution with certificates.
         text: text of the case file; by default the text of :meth:`.Case.to_toml`.
         check: published and expected values with the computed ones, for a section of the page.
         curves: results of trade-offs, shown instead of slices.
@@ -65,11 +65,11 @@ def report(
     """
     check_library("plotly", "reports")
     check_library("matplotlib", "reports")
-    solution = found if isinstance(found, Solution) else found.solution
+    solution = solved if isinstance(solved, Solution) else solved.solution
     if file is not None:
         check_target(str(file))
     shown = _written(solution.case) if text is None else text
-    page = page_of(replace(report_of(shown, solution, result_of(found), check), curves=tuple(curves)))
+    page = page_of(replace(report_of(shown, solution, result_of(solved), check), curves=tuple(curves)))
     if file is not None:
         write_bytes(str(file), page.encode("utf-8"))
     return page
