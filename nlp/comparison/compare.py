@@ -180,7 +180,7 @@ def _solved(
     factor, own = 1.0, size_at_start(case) if contender.is_of_case else size_of_home(contender.model)
     if common is not None and not contender.is_of_case:
         factor = common / own
-    entry = Entry(contender, factor, own * factor, degrees_of_freedom=generic_degrees_of_freedom(contender))
+    entry = Entry(contender, factor, own * factor, freedoms=generic_degrees_of_freedom(contender))
     starts, seed, jobs = search
     try:
         place = placed(case, contender, factor, part, length)
@@ -197,7 +197,7 @@ def _with_fits(entry: Entry) -> Entry:
     contender, solution = entry.contender, entry.solution
     if solution is None:
         return entry
-    fits, singularities, degrees_of_freedom = [], [], entry.degrees_of_freedom
+    fits, singularities, degrees_of_freedom = [], [], entry.freedoms
     for outcome in solution.outcomes:
         fit, mobility = task_fit(contender, outcome)
         fits.append(fit)
@@ -211,7 +211,7 @@ def _with_fits(entry: Entry) -> Entry:
     return replace(
         entry,
         tasks=tuple(fits),
-        degrees_of_freedom=degrees_of_freedom,
+        freedoms=degrees_of_freedom,
         singularities=tuple(dict.fromkeys(singularities)),
         final_size=size_at(nlp, solution.outcomes[0].x),
         strokes=strokes_over_poses(contender, solution.outcomes[0], _measures(contender)),

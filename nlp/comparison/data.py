@@ -79,7 +79,7 @@ def _fit_sentences(entry: Entry, fit: TaskFit) -> list[str]:
     """Return sentences on a robot's degrees of freedom for a task, and on actuators that do not drive it."""
     found = []
     if fit.can_move is False:
-        mobility = "" if entry.degrees_of_freedom is None else f" with {entry.degrees_of_freedom} degrees of freedom"
+        mobility = "" if entry.freedoms is None else f" with {entry.freedoms} degrees of freedom"
         found.append(
             f"The platform{mobility} cannot follow the motion of {fit.name}: "
             f"{_PERCENT * (fit.constraint or 0.0):.3g} % of its F is constraint wrenches, not actuation."
@@ -118,8 +118,8 @@ def _no_answer(entry: Entry) -> str:
     closure = {equation.name for equation in (*entry.contender.model.closure, *entry.contender.model.loops)}
     names = [row.name for row in violations(own.nlp, own.x)]
     if any(name.split(" at ")[0] in closure for name in names):
-        few = entry.degrees_of_freedom is not None and entry.degrees_of_freedom < 6
-        reason = f"; its platform has {entry.degrees_of_freedom} degrees of freedom" if few else ""
+        few = entry.freedoms is not None and entry.freedoms < 6
+        reason = f"; its platform has {entry.freedoms} degrees of freedom" if few else ""
         return f"No optimum ({status}): its joints cannot be assembled at the poses of the case{reason}."
     keys = ", ".join(f"limits.{each.key}" for each in own.relaxation) or ", ".join(names[:3])
     return f"No optimum ({status}): no design within the ranges satisfies {keys or 'the limits'}."

@@ -79,7 +79,7 @@ class Entry:
         final_size: size at the design, length; None without an optimum.
         placed: case with this robot; None if the case contradicts itself with the robot.
         solution: solution of the case with this robot; None if the case contradicts itself.
-        degrees_of_freedom: degrees of freedom of the platform at the first pose, or at almost all poses without an
+        freedoms: degrees of freedom of the platform at the first pose, or at almost all poses without an
             optimum; None if unknown.
         tasks: tasks at the design; empty without an optimum.
         singularities: descriptions of singularities of the design.
@@ -99,7 +99,7 @@ class Entry:
     final_size: float | None = None
     placed: Placed | None = None
     solution: Solution | None = None
-    degrees_of_freedom: int | None = None
+    freedoms: int | None = None
     tasks: tuple[TaskFit, ...] = ()
     singularities: tuple[str, ...] = ()
     fault: str = ""

@@ -67,7 +67,7 @@ def test_refusals_are_one_sentence_and_write_nothing(tmp_path: Path, cli: Run, m
     case = "paper-4.1-helical"
     for words, fault in {
         ("--format", "stl", "--out", str(out)): "--format stl: is no format; allowed: mjcf, urdf, csv, dxf, all",
-        ("--format", "mjcf", "--out", str(tmp_path / "full")): "holds mine.txt, which screwsynth did not write",
+        ("--format", "mjcf", "--out", str(tmp_path / "full")): "contains mine.txt, not written by screwsynth",
         ("--format", "mjcf", "--out", str(out), "--pose", "2"): "--pose 2: the case has 1 pose",
     }.items():
         refusal_of(cli("export", case, *words), fault)

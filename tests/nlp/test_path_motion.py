@@ -490,7 +490,7 @@ def test_the_picture_has_its_panels(spindle: PathPicture) -> None:
     # Of faults that are near to each other there is one label.
     assert words[0] == "lines 4, 5"
     assert set(words[1:]) == {"line 5"}
-    assert "Sampled for the picture; the verdicts are proved." in figure.legends[0].get_title().get_text()
+    assert "The curves are sampled; the verdicts are proved." in figure.legends[0].get_title().get_text()
 
 
 def test_without_times_the_axis_is_the_length_or_the_segment(spindle: PathPicture) -> None:
@@ -559,7 +559,7 @@ def test_the_page_has_the_postures_of_the_path(spindle: PathPicture) -> None:
     np.testing.assert_allclose(places, poses_at(np.array([each.at for each in spindle.marks]))[0], atol=1e-5)
     # Words, tables and charts need no script.
     words = re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
-    for text in ("First fault: line 4", "leg_length limb 1-", "Leg lengths from", "the text of the case", "command at"):
+    for text in ("First violation: line 4", "leg_length limb 1-", "Leg lengths from", "the text of the case", "command at"):
         assert text in words
     assert words.count('class="chart"') == 4
     assert words.count('class="cursor"') == 4

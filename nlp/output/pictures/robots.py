@@ -174,5 +174,5 @@ def _draw_length(figure: Figure, bottom: float, designs: Designs[Row], scale: _S
     left, part, at = 0.15 / width, length / (2 * scale.half) * _WIDTH / width, bottom / height
     bar = Line2D([left, left + part], [at, at], color=INK, linewidth=2.0, solid_capstyle="butt", gid="scale")
     figure.add_artist(bar)
-    text = f"{designs.case.units.text(float(length), Dimension.LENGTH)}in all panels"
+    text = f"{designs.case.units.text(float(length), Dimension.LENGTH)}, in all panels"
     figure.text(left + part + 0.1 / width, at, text, fontsize=9, color=MUTED, va="center", parse_math=False)
