@@ -1,19 +1,24 @@
 """Optimal geometry and pose of parallel robots for a motion, with evidence and proofs.
 
-The first steps, with every number in the units of the case, here centimetres and degrees::
+A platform of fixed size that must drive a screw, and its pose is free::
 
+    from math import radians
     import screwsynth as ss
 
-    case = ss.load_case("hexapod-machining")  # of the package; a path reads a case file of your own
-    state = ss.evaluate(case)  # nothing is optimised: free numbers are at their starts
-    print(f"F = {state.F:.1f} (cm/rad)^2 at the start")
+    dimensions = {"x1": 12, "x2": 8, "x3": radians(30), "x4": radians(8)}  # radii in cm; angles are radians in Python
+    position = [ss.Free(-10, 10), ss.Free(-10, 10), ss.Free(20, 50)]  # cm, free between bounds
+    rotation = ss.Rotation(axis=None, angle=ss.Free(-radians(30), radians(30)))
+    task = ss.Task.screw("max", axis=[2, 2, 1], point=[2, 3, 6], pitch=1)  # point in cm, pitch in cm/rad
+    limits, units = ss.Limits(leg_length=(None, 60)), ss.Units("cm", "deg")
+    case = ss.Case(ss.stewart_gough(), dimensions, position, [task], rotation, limits=limits, units=units)
     solution = ss.solve(case)
-    print(f"F = {solution.F:.1f} (cm/rad)^2, height = {solution['p_z']:.2f} cm")
-    shorter = case.replace({"limits.leg_length.max": 32, "limits.base_joint_angle": 40})  # cm, deg
-    print(f"F = {ss.solve(shorter).F:.1f} (cm/rad)^2 with legs of at most 32 cm")
+    print(f"F = {solution.F:.1f} (cm/rad)² at p_z = {solution['p_z']:.1f} cm, turned by {solution['angle']:.1f} deg")
 
-Names are imported when they are first used. :mod:`screwsynth.nlp` and :mod:`screwsynth.models` have the same names, and
-``screwsynth.models`` those of the screw algebra beside them.
+``solution["p_z"]`` and ``case.replace(x2=7)`` take numbers by the names of ``--set``, in the units of the case;
+arguments of types such as :class:`Free` and :class:`Rotation` are radians.
+
+Names are imported when they are first used. :mod:`screwsynth.nlp` has the same names but for those of robots, which
+are in :mod:`screwsynth.models` with the rest of the screw algebra.
 """
 
 # Absolute: pytest imports this file a second time, under the name of the folder that the repository is in.

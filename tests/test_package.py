@@ -2,10 +2,12 @@
 
 import ast
 import html
+import inspect
 import pkgutil
 import re
 import subprocess
 import sys
+import textwrap
 import tomllib
 from importlib import import_module
 from importlib.metadata import version
@@ -200,6 +202,18 @@ def test_the_python_of_the_first_steps_runs() -> None:
     space: dict[str, object] = {}
     exec(compile(code, "start.md", "exec"), space)  # noqa: S102 - our own page
     assert pytest.approx(407.2107, abs=5e-5) == space["solution"].F  # type: ignore[attr-defined]
+
+
+def test_the_python_of_the_reference_runs_and_begins_the_package(capsys: pytest.CaptureFixture[str]) -> None:
+    blocks = re.findall(r"```python\n(.*?)```", text_of("api.md"), flags=re.DOTALL)
+    assert inspect.cleandoc(screwsynth.__doc__ or "").find(textwrap.indent(blocks[0], "    ").rstrip()) > 0
+    space: dict[str, object] = {}
+    exec(compile("\n".join(blocks), "api.md", "exec"), space)  # noqa: S102 - our own page
+    first, start, height, curve = capsys.readouterr().out.splitlines()
+    assert re.fullmatch(r"F = 407\.2 \(cm/rad\)² at p_z = 50\.0 cm, turned by -?\d+\.\d deg", first)
+    assert float(start) == pytest.approx(338.84944, abs=5e-6)
+    assert 25 <= float(height) <= 50
+    assert "407.21" in curve
 
 
 @pytest.mark.parametrize(
