@@ -12,17 +12,19 @@ from ..case.limits.limits import Limits
 from ..program.epigraph import with_exact_level
 from ..program.formulation import formulate
 from ..program.nlp import Nlp
+from ..system.deprecated import renamed_argument
 from ..system.jsonvalues import Vector
 from . import state as states
 from .closing import closed_start
 from .state import RobotState, stated_poses
 
 
-def evaluate(of: Case | Nlp, x: FloatArray | None = None, pose: int = 0) -> RobotState:
+@renamed_argument("nlp", "case")
+def evaluate(case: Case | Nlp, x: FloatArray | None = None, pose: int = 0) -> RobotState:
     """Return the robot of a case at a point, as the command ``evaluate`` does.
 
     Args:
-        of: the case, with its first task; or a program.
+        case: the case, with its first task; or a program.
         x: (n,) values of the free variables of the program. Left out, they are at their starts, or in the middle of
             their ranges, with the robot's loops closed in the home assembly mode.
         pose: index of the pose, in a case with several poses.
@@ -34,7 +36,7 @@ def evaluate(of: Case | Nlp, x: FloatArray | None = None, pose: int = 0) -> Robo
         CaseError: the fixed numbers of the case contradict each other.
         EvaluationError: a number is not finite at this point, as where a limb has zero length.
     """
-    nlp = formulate(without_speeds(of)) if isinstance(of, Case) else of
+    nlp = formulate(without_speeds(case)) if isinstance(case, Case) else case
     return states.evaluate(nlp, starting_point(nlp) if x is None else x, pose)
 
 

@@ -8,7 +8,6 @@ followed to the others.
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial, wraps
@@ -23,6 +22,7 @@ from ..errors import InputError, listing
 from ..interruption import Milestone, is_requested, reached, seconds_left, why_stopped, within
 from ..program.formulation import formulate_each
 from ..proof.enclosure.engine import kernel
+from ..system.deprecated import warn_deprecated
 from .certified import Certified, certify
 from .compromise import solution_of_one_task
 from .multistart import ProgramSolution, solve_program
@@ -78,7 +78,7 @@ def _with_earlier_form(tradeoff: Callable[Given, Tradeoff]) -> Callable[Given, T
             return tradeoff(*args, **given)
         options |= zip(("case_at", "values"), args, strict=False)
         now = "tradeoff(case, {name: values}), where case is a case or a function from a value to one"
-        warnings.warn(f"tradeoff(case_at, values, name=...): deprecated; use {now}", DeprecationWarning, stacklevel=2)
+        warn_deprecated("tradeoff(case_at, values, name=...)", now)
         return solve_along(**options)
 
     return with_both

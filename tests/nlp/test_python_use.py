@@ -77,6 +77,9 @@ def test_a_program_is_evaluated_at_a_point_and_a_pose_as_before(solution: ss.Sol
     assert pytest.approx(solution.F, rel=1e-12) == ss.evaluate(solution.nlp, solution.x).F
     assert pytest.approx(solution.F, rel=1e-12) == ss.evaluate(solution.case, solution.x).F
     assert ss.evaluate(solution.nlp).F == ss.evaluate(solution.case).F
+    with pytest.warns(DeprecationWarning, match=r"^evaluate\(nlp=\.\.\.\): deprecated; use case=\.\.\.$") as warned:
+        assert ss.evaluate(nlp=solution.nlp, x=solution.x).F == solution.F  # type: ignore[call-arg]
+    assert warned[0].filename == __file__
     several = ss.load_case("flight-simulator")
     assert [ss.evaluate(several, pose=k).position.tolist() for k in (0, 1)] == [
         [float(value) for value in several.poses[k].position] for k in (0, 1)
