@@ -1,6 +1,6 @@
 """Optimal geometry and pose of parallel robots for a motion, with evidence and proofs.
 
-A platform of fixed size that must drive a screw, and its pose is free::
+A platform of fixed dimensions drives a screw; its pose is free::
 
     from math import radians
     import screwsynth as ss
@@ -21,12 +21,13 @@ Names are imported when they are first used. :mod:`screwsynth.nlp` has the same 
 are in :mod:`screwsynth.models` with the rest of the screw algebra.
 """
 
-# Absolute: pytest imports this file a second time, under the name of the folder that the repository is in.
+# By its name, not by __name__ or a relative import: the folder of the package is that of the repository, and pytest
+# imports this file once more under the name of that folder, whatever it is.
 from screwsynth.nlp import __version__ as __version__
 from screwsynth.nlp.system.lazynames import lazy_names
 
 # The public names stand in ``__init__.pyi``.
-__all__, __getattr__ = lazy_names(__name__, __name__, __file__)
+__all__, __getattr__ = lazy_names("screwsynth", "screwsynth", __file__)
 
 
 def __dir__() -> list[str]:
