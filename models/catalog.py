@@ -84,7 +84,7 @@ def gallery_robot(name: str) -> Model:
         name: one of :func:`gallery_names`.
 
     Raises:
-        UnknownModelError: there is no such robot.
+        UnknownModelError: the name is unknown.
     """
     from .joints.model.robot import robot  # noqa: PLC0415 - most runs do not need it
 

@@ -66,7 +66,7 @@ def hexapod(*, symmetry: Symmetry = "none") -> Model:
             240 degrees about z. ``threefold-mirror``: leg 1 is given, leg 2 is its reflection, and both are rotated.
 
     Raises:
-        ModelError: there is no such symmetry.
+        ModelError: the symmetry is unknown.
     """
     if symmetry not in _IMAGES:
         raise ModelError(f"model 'hexapod': symmetry must be one of {', '.join(_IMAGES)}, got {symmetry!r}")

@@ -116,7 +116,7 @@ def scaled_twists(twists: SX, centre: SX, length: SX, size: int) -> SX:
         twists: (6, n) angular velocity, then velocity at the world origin.
         centre: (3, 1) reference point, length.
         length: (1, 1) characteristic length.
-        size: 6, or 3 for the velocity of the centre alone.
+        size: 6, or 3 for only the velocity of the centre.
     """
     columns = []
     for k in range(twists.shape[1]):

@@ -5,7 +5,7 @@ a pair, on the base and on the platform. Pair ``k = 1, 2, 3`` of the base is cen
 Half angle 0 gives a triangle (the joints of a pair coincide), 30 degrees a regular hexagon.
 
 The paper draws the platform pairs above the base pairs (``aligned``): leg ``k+`` joins base joint ``k+`` at azimuth
-``120 (k - 1) + x3`` to platform joint ``k+`` at ``120 (k - 1) + x4``, and leg ``k-`` likewise with minus signs. In the
+``120 (k - 1) + x3`` to platform joint ``k+`` at ``120 (k - 1) + x4``, and leg ``k-`` with minus signs. In the
 ``octahedral`` layout, usual in built robots, the platform pairs are rotated by 60 degrees and each leg goes to the
 nearer pair: leg ``k+`` ends at platform azimuth ``120 (k - 1) + 60 - x4``.
 """

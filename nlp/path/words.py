@@ -157,7 +157,7 @@ def _put(letter: str, number: str, codes: dict[str, float], groups: Mapping[floa
     if code == 80 and group in codes:
         return  # a motion on the same line comes before the end of the program
     if codes.get(group, 80) != 80:
-        raise WordError(name, f"conflicts with {letter}{codes[group]:g}; both set the same mode")
+        raise WordError(name, f"conflicts with {letter}{codes[group]:g}; they exclude each other")
     codes[group] = code
 
 

@@ -419,7 +419,7 @@ def _check_limbs(nlp: Nlp) -> None:
     """Refuse a limb with zero or undefined direction at every point of the box.
 
     Raises:
-        CaseError: there is such a limb.
+        CaseError: the robot has such a limb.
     """
     program = nlp.program
     for robot, kernel in zip(program.robots, program.kernels.robot_states, strict=True):

@@ -62,7 +62,7 @@ class JournalFile:
         other: advice for a journal of other work.
 
     Raises:
-        InputError: the file cannot be written, belongs to other work, or is held by another process.
+        InputError: the file cannot be written, belongs to other work, or another process holds it.
     """
 
     def __init__(self, path: Path, head: Mapping[str, object], work: str, other: str) -> None:

@@ -65,7 +65,7 @@ def shared_library(files: Mapping[str, str]) -> Path:
         files: texts by file name; files ``*.c`` are compiled, the others are included.
 
     Raises:
-        InputError: there is no C compiler, or it fails.
+        InputError: no C compiler is installed, or it fails.
     """
     import hashlib  # noqa: PLC0415 - few solves are compiled
     import tempfile  # noqa: PLC0415 - few solves are compiled

@@ -393,7 +393,7 @@ def test_members_of_which_f_says_little_are_named() -> None:
         {"type": "R", "at": [1, 0, 1], "axis": "y"},
         {"type": "S", "at": [2, 0, 1]},
     ]
-    (arm,) = [note for note in robot(name="arm", home=(2, 0, 1), limb=[{"joints": joints}]).remarks if "little" in note]
+    (arm,) = [note for note in robot(name="arm", home=(2, 0, 1), limb=[{"joints": joints}]).remarks if "not informative" in note]
     assert arm.startswith("the robot has one member only")
 
 

@@ -137,7 +137,7 @@ def test_wrong_arguments_are_refused_in_a_sentence(compiled: CompiledCase) -> No
         ({"limits": {"angel.max": 0.1}}, "did you mean 'angle.max'"),
         ({"limits": {"angle.max": -0.1}}, r"limits\['angle.max'\] = -0.1 rad: must be above 0 and at most 3.12"),
         ({"limits": {"angle.max": np.nan}}, "must be finite"),
-        ({"limits": {"angle.max": [[0.1]]}}, "must be a number or one for each problem"),
+        ({"limits": {"angle.max": [[0.1]]}}, "must be one number, or one for each problem"),
         ({"seeds": 17}, "from 0 to 16"),
         ({"seeds": True}, "whole number"),
         ({"seeds": 0}, "without x0"),

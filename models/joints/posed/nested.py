@@ -350,7 +350,7 @@ def add_resisting(
         parts: members and actuators to extend.
         network: network at any pose.
         frame: common data of all parts of the robot.
-        symbols: of dimensions, unknowns, rotation and position.
+        symbols: symbols of dimensions, unknowns, rotation and position.
         points: closed configurations.
     """
     robot, limb = frame.robot, network.name
