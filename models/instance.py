@@ -158,11 +158,11 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
     found, (signs, quantities, joints, links), ends, size = replaced
     rows, members, actuators, *equations = found
 
-    def left_sides(own: Sequence[Closure], replaced: Sequence[Closure]) -> SX:
+    def left_sides(parts: Sequence[Closure], replaced: Sequence[Closure]) -> SX:
         """Return the left sides (k, 1) of equations, scaled to order 1."""
         sizes = ca.vertcat(SX(0, 1), *[each.size for each in replaced])
         sides = ca.vertcat(SX(0, 1), *[each.expression for each in replaced])
-        return sides / sizes_at(model, own, substitution.reference, sizes)
+        return sides / sizes_at(model, parts, substitution.reference, sizes)
 
     closure, loops, distances = map(left_sides, (model.closure, model.loops, model.distances), equations)
     return RobotInstance(

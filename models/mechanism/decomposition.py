@@ -121,10 +121,10 @@ def _joined(
 
 
 def without_dangling(
-    ends: Sequence[tuple[str, str]], own: Sequence[int], roots: tuple[str, str], coupled: Collection[int]
+    ends: Sequence[tuple[str, str]], joints: Sequence[int], roots: tuple[str, str], coupled: Collection[int]
 ) -> list[int]:
     """Return joints without those of dangling links, which have a single joint, removed repeatedly."""
-    kept = list(own)
+    kept = list(joints)
     while True:
         count: dict[str, int] = {}
         for k in kept:
@@ -139,14 +139,14 @@ def without_dangling(
 
 
 def _limb(
-    ends: Sequence[tuple[str, str]], own: Sequence[int], joints: Sequence[GraphJoint], roots: tuple[str, str]
+    ends: Sequence[tuple[str, str]], part: Sequence[int], joints: Sequence[GraphJoint], roots: tuple[str, str]
 ) -> LimbPaths | str:
     """Return the limb of a connected part, or the reason why it is not a limb."""
     root, top = roots
-    first = [k for k in own if root in ends[k]]
+    first = [k for k in part if root in ends[k]]
     if len(first) > 1:
         return f"{len(first)} of its joints are on the base and share links before the platform"
-    left = list(own)
+    left = list(part)
 
     def walk(node: str, steps: list[Step]) -> tuple[str, list[int]]:
         """Follow a chain from a node; return its last node, where it ends or splits, and the next joints."""

@@ -98,15 +98,15 @@ class Mobility:
         basis = column_space(platform, 1.0) if count else np.zeros((6, 0))
         return AllowedTwists(self.unscaled(basis), self.unscaled(platform), units[:, None] * motions, columns)
 
-    def _couplings(self, own: Sequence[int], free: Collection[int], widths: Sequence[int]) -> FloatArray:
+    def _couplings(self, used: Sequence[int], free: Collection[int], widths: Sequence[int]) -> FloatArray:
         """Return the equations (c, n) of the couplings with all moving joints in use."""
         ends = np.cumsum([0, *widths])
-        place = {k: int(ends[i]) for i, k in enumerate(own) if widths[i]}
+        place = {k: int(ends[i]) for i, k in enumerate(used) if widths[i]}
         rows = [np.zeros((0, int(ends[-1])))]
         for coupling in self.mechanism.couplings:
             factors = {self._index[name]: factor for name, factor in coupling.factors}
             moving = {k: factor * self._units[k] for k, factor in factors.items() if k in free}
-            if not moving or not set(factors) <= set(own):
+            if not moving or not set(factors) <= set(used):
                 continue
             row = np.zeros((1, int(ends[-1])))
             for k, factor in moving.items():

@@ -194,9 +194,9 @@ def _limit(key: str, reading: Reading, value: float) -> RunTimeLimit:
     return RunTimeLimit(key, "", reading.dimension, value, above, max(reading.most, value))
 
 
-def limit_texts(found: RunTimeLimits, prefix: str, columns: Mapping[str, list[Any]]) -> dict[str, str]:
+def limit_texts(given: RunTimeLimits, prefix: str, columns: Mapping[str, list[Any]]) -> dict[str, str]:
     """Return the texts of the placeholders for limits; columns contain names, units and values."""
-    L, limits, sides, widenings = f"{prefix.upper()}_LIMITS", found.limits, found.sides, found.widenings
+    L, limits, sides, widenings = f"{prefix.upper()}_LIMITS", given.limits, given.sides, given.widenings
     named = zip(columns["c_name"], limits, columns["unit"], strict=True)
     members = [f"    {name} = {k}, /* {_description(each, unit)} */\n" for k, (name, each, unit) in enumerate(named)]
     tables = [
@@ -211,7 +211,7 @@ def limit_texts(found: RunTimeLimits, prefix: str, columns: Mapping[str, list[An
         integer_table("side_constraints", "SIDES", [each.constraint for each in sides]),
         integer_table("side_is_upper", "SIDES", [int(each.is_upper) for each in sides]),
         integer_table("side_converted", "SIDES", [each.converted for each in sides]),
-        integer_table("converted_limits", "CONVERTED", found.owners),
+        integer_table("converted_limits", "CONVERTED", given.owners),
         integer_table("widened", "WIDENED", [each.variable for each in widenings]),
         integer_table("widened_converted", "WIDENED", [each.converted for each in widenings]),
     ]
@@ -219,8 +219,8 @@ def limit_texts(found: RunTimeLimits, prefix: str, columns: Mapping[str, list[An
         "nlimits": str(len(limits)),
         "limit_members": "".join(members),
         "limit_tables": "\n".join(tables),
-        "nconverted": str(found.converted),
-        "limit_work": str(max((int(each.sz_w()) for each in found.functions), default=0)),
+        "nconverted": str(given.converted),
+        "limit_work": str(max((int(each.sz_w()) for each in given.functions), default=0)),
         "nsides": str(len(sides)),
         "nwidened": str(len(widenings)),
         "widening": repr(WIDENING),

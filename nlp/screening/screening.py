@@ -122,7 +122,7 @@ def screen(nlp: Nlp, points: FloatArray, sizes: FloatArray, max_iterations: int,
     A request to stop ends a search at once, as not converged.
 
     Args:
-        nlp: the program, for which :func:`can_screen` holds.
+        nlp: program for which :func:`can_screen` returns True.
         points: (k, n) starting points, in the program's units.
         sizes: (c,) typical lengths of the constraints' gradients in scaled variables, used as divisors.
         max_iterations: largest number of iterations of each search.

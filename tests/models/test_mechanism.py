@@ -265,7 +265,7 @@ def test_a_mechanism_that_contradicts_itself_is_refused_in_one_sentence() -> Non
     good = broken()
     first, *rest = good.joints
     cases = [
-        (broken(base="ground"), "base: is 'ground', which is no link"),
+        (broken(base="ground"), "base: is 'ground', which is not a link"),
         (broken(platform="base"), "platform: is 'base', which is the base"),
         (broken(joints=tuple(replace(j, actuated=False) for j in good.joints)), "actuated: is given at no joint"),
         (broken(joints=(replace(first, axis=np.zeros(3)), *rest)), "joint 1:1, axis: is zero; a direction is needed"),

@@ -180,8 +180,8 @@ def test_no_wrenches_and_a_drawing_of_what_does_not_exist_are_refused() -> None:
     with pytest.raises(ModelError, match="model 'toy': it has no wrenches"):
         toy.model(wrenches=())
     for link, fault in (
-        (Link("C", "A", Body.BASE), "a link ends at 'C', which is no point"),
-        (Link("A", "leg", Body.BASE), "a link ends at 'leg', which is no point"),
+        (Link("C", "A", Body.BASE), "a link ends at 'C', which is not a point"),
+        (Link("A", "leg", Body.BASE), "a link ends at 'leg', which is not a point"),
         (Link("A", "B", Body.LIMB, "arm"), "a link belongs to limb 'arm', which has no wrench"),
     ):
         with pytest.raises(ModelError, match=fault):
@@ -314,7 +314,7 @@ def test_rows_of_a_machine_built_exactly_are_those_of_the_design(model: Model) -
 
 def test_legs_and_built_rows_that_fit_no_limb_are_refused() -> None:
     sound = models.stewart_gough()
-    with pytest.raises(ModelError, match="leg 'x' is no limb"):
+    with pytest.raises(ModelError, match="leg 'x' is not a limb"):
         replace(sound, legs=(*sound.legs, models.Leg("x", SX.zeros(3), SX.zeros(3))))
     with pytest.raises(ModelError, match=r"legs .* are not in the order of their forces"):
         replace(sound, legs=sound.legs[::-1])

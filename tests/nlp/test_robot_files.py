@@ -64,7 +64,7 @@ LIMB = ROBOT[ROBOT.index("[[limb]]") :]
 JOINTS = ROBOT[ROBOT.index("joints = ") :]
 AXIS, SECOND, LAST = '"A - B"', "limb 1, joint 2 (P), axis: is", 'at = "A" }'
 GRAMMAR = "which may have only numbers, names, + - * / ^, brackets and functions"
-NOT_A_NAME = "is no name for a dimension: letters, digits and _ are allowed, a letter first"
+NOT_A_NAME = "is not a name for a dimension: letters, digits and _ are allowed, a letter first"
 DRIVEN = '{ type = "R", at = "B", axis = "y", actuated = true }'
 
 #: Text that is replaced, its replacement, and the sentence behind the name of the file.
@@ -119,14 +119,14 @@ FAULTS: list[tuple[str, str | bytes, str]] = [
     ("[derived]", '"d\\u0001" = { typical = 1 }\n[derived]', f"d\\x01: {NOT_A_NAME}"),
     ("[derived]", '"a-b" = { typical = 1 }\n[derived]', f"a-b: {NOT_A_NAME}"),
     ("[derived]", '"\u03b1" = { typical = 1 }\n[derived]', f"\u03b1: {NOT_A_NAME}"),
-    ("[derived]", "sin = { typical = 1 }\n[derived]", "sin: is no name for a dimension: expressions use it for something else"),
+    ("[derived]", "sin = { typical = 1 }\n[derived]", "sin: is not a name for a dimension: expressions use it for something else"),
     ('name = "rps"', "name = 3", "name = 3: must be text in quotes"),
     ('name = "rps"', 'name = "  "', 'name = "  ": must not be empty'),
     ("rp = {", "rb = {", "the file: is not valid TOML: Cannot overwrite a value (at line 5, column 23)"),
     ("half =", "rb =", "rb: is given twice"),
     ("[[limb]]", '[[limb]]\nname = "111"\njoints = [{ type = "S", at = "x" }]\n[[limb]]\nname = "11"', "limb: has two limbs with the name '111'"),
     ("B = [", "h = [", "limb 1, point h: has the name of a dimension"),
-    ("B = [", "x = [", "limb 1, x: is no name for a point: expressions use it for something else"),
+    ("B = [", "x = [", "limb 1, x: is not a name for a point: expressions use it for something else"),
     ('half = "rb/2"', 'a = "b"\nb = "a"', "derived, a: is 'b', which needs 'b' before it is given; allowed are names given above"),
     ('half = "rb/2"', 'a = "a + 1"', "derived, a: is 'a + 1', which needs 'a' before it is given"),
     ("points = {", 'points = { D = "E", E = "D",', "limb 1, point D: is 'E', which needs 'E' before it is given"),
@@ -213,15 +213,15 @@ FAULTS: list[tuple[str, str | bytes, str]] = [
 
 #: Of a robot of links and joints.
 LINK_FAULTS: list[tuple[str, str, str]] = [
-    ('links = ["base",', '[[limb]]\njoints = []\n#', "joint: conflicts with limb: give the robot by limbs, or by links and joints"),
+    ('links = ["base",', '[[limb]]\njoints = []\n#', "joint: cannot stand beside limb: give the robot by limbs, or by links and joints"),
     ('links = ["base", "crank", "coupler", "rocker", "rod", "bar", "platform"]', "", "links: is missing; it must be a list of the names of all links"),
     ('"bar", "platform"]', '"bar"]', "platform: is 'platform', which is not a link; links are base, crank, coupler, rocker, rod"),
-    ("points =", 'base = "ground"\npoints =', "base: is 'ground', which is no link"),
+    ("points =", 'base = "ground"\npoints =', "base: is 'ground', which is not a link"),
     ("points =", 'platform = "base"\npoints =', "platform: is 'base', which is the base; two links are needed"),
     ('"bar", "platform"]', '"bar", "rod", "platform"]', "links, rod: is given twice"),
     ('"bar", "platform"]', '"bar", "9x", "platform"]', "links, 9x: is '9x'; letters, digits and _ are allowed, a letter first"),
     ('"bar", "platform"]', '"bar", "extra", "platform"]', "links, extra: has no joint"),
-    ('["base", "crank"]', '["base", "cranc"]', "joint motor, between: has 'cranc', which is no link"),
+    ('["base", "crank"]', '["base", "cranc"]', "joint motor, between: has 'cranc', which is not a link"),
     ('["base", "crank"]', '["crank", "crank"]', "joint motor, between: has the link 'crank' twice"),
     ('["base", "crank"]', '["crank"]', "joint motor, between: must have 2 entries, got 1"),
     ('between = ["base", "crank"]\n', "", "joint motor, between: is missing; it must be a list of two links, the base's side first"),
@@ -238,7 +238,7 @@ LINK_FAULTS: list[tuple[str, str, str]] = [
     ('axis = "z"', 'axis = "z"\npitch = 1', "joint motor (R), pitch: no such key"),
     ("actuated = true", "actuated = 1", "joint motor, actuated = 1: must be true or false"),
     ("points = {", "points = { s = [0, 0, 0],", "point s: has the name of a dimension"),
-    ("points = {", "points = { sin = [0, 0, 0],", "sin: is no name for a point: expressions use it for something else"),
+    ("points = {", "points = { sin = [0, 0, 0],", "sin: is not a name for a point: expressions use it for something else"),
     ("name = ", "colour = 1\nname = ", "colour: no such key; allowed: schema, name, description, length_unit, home"),
     (LINKS[LINKS.index("[[joint]]") :], "", "joint: is missing; it must be one or more tables [[joint]]"),
     (LINKS, LINKS.replace("actuated = true", ""), "actuated: is given at no joint of the robot; write actuated = true"),

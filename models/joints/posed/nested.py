@@ -148,12 +148,12 @@ def is_slide(network: OpenNetwork, k: int) -> bool:
 
 
 def _coupling_rows(
-    network: OpenNetwork, frame: PathFrame, own: Sequence[int], start: dict[int, int], count: int
+    network: OpenNetwork, frame: PathFrame, used: Sequence[int], start: dict[int, int], count: int
 ) -> list[SX]:
     """Return the equation (1, n) of each coupling with all joints in a given set."""
     rows = []
     for coupling in network.graph.couplings:
-        if all(k in own for k, _ in coupling):
+        if all(k in used for k, _ in coupling):
             row = SX(1, count)
             first, scale = coupling[0]
             scale = scale * frame.size if is_slide(network, first) else scale
