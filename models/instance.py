@@ -37,7 +37,7 @@ class Substitution:
 
     Attributes:
         parameters: (n, 1) components of all parameters, in the model's order.
-        unknowns: (u, 1) passive joint coordinates, in the model's order.
+        unknowns: (u, 1) unknowns of the closure equations, in the model's order.
         rotation: (3, 3) ``R``, platform to world coordinates.
         position: (3, 1) ``p``, origin of the platform frame in the world frame, length.
         reference: (n,) values of the parameters that determine the sizes of loop equations; None for the values of

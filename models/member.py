@@ -1,4 +1,4 @@
-"""Constraint-wrench space of a limb member, and the projector onto it.
+"""Wrench space of a limb member with locked actuators, and the projector onto it.
 
 With all actuators locked, a member allows platform motions in the span of its passive joint screws. It resists all
 others with the wrenches reciprocal to these screws. In *scaled coordinates* about the member's centre ``c``, with a

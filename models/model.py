@@ -57,7 +57,7 @@ class Model(Whole, Shown):
         pose: symbols of the pose.
         home: (3,) platform position for a starter case with the typical parameters, length.
         wrenches: rows of single wrenches, any number of them.
-        members: limb members with a space of constraint wrenches; their rows follow those of ``wrenches``.
+        members: limb members, which resist with a space of wrenches; their rows follow those of ``wrenches``.
         quantities: named quantities for results and limits.
         scene: drawing of the robot.
         unknowns: unknowns of the closure equations; empty for robots with rows that follow from parameters and pose.

@@ -61,7 +61,7 @@ def newton(
         at: first point.
         steps: largest number of steps.
         zeros: relative sizes below which singular values count as zero, one for each trial; None for rounding.
-        parts: step lengths, one for each further trial with the same singular values.
+        parts: fractions of the step, one for each further trial with the same singular values.
     """
     for _ in range(steps):
         linear = equations.linear(at)

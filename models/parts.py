@@ -260,8 +260,8 @@ class JointScrews:
         joints: label of the joint of each column, such as ``2:3``.
         all: (6, k) screws of all joints from base to platform, as twists about the world origin.
         driven: indices of the columns of actuated joints.
-        passive_rank: rank of the passive columns, at almost all dimensions and poses.
-        all_rank: rank of all columns, at almost all dimensions and poses.
+        passive_rank: rank of the platform motions by passive joints, at almost all dimensions and poses.
+        all_rank: rank of the platform motions by all joints, at almost all dimensions and poses.
         member: name of the member of nested loops; empty for a path of joints.
         loops: (m, k) matrix ``L`` of nested loops, dimensionless for rates of order 1.
         loop_rank: rank of the passive columns of ``L``, at almost all dimensions and poses.

@@ -26,7 +26,7 @@ _STEPS = 40
 _PARTS = [0.5**k for k in range(12)]
 #: Ratio of residuals above which the iteration stops: no solution is near.
 _STUCK = 0.999
-#: Residual below which Newton's method stops, unless the residual still falls.
+#: Residual below which Newton's method stops; it also stops when the residual no longer falls.
 _EXACT = 2e-16
 #: Relative size below which singular values of the derivatives are zero: those of dependent loops, and of rods that
 #: spin freely, are rounding errors.

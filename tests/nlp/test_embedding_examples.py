@@ -94,7 +94,7 @@ int main() {
 def test_the_real_time_loop_compiles_and_keeps_within_its_steps(folder: Path) -> None:
     source = (folder / "realtime.c").read_text(encoding="utf-8")
     # The same loop, which checks each step.
-    hook = "/* Here x goes to the machine. */"
+    hook = "/* Send x to the robot here. */"
     assert source.count(hook) == 1
     check = """
         {
