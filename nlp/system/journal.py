@@ -53,7 +53,7 @@ def row_of(kind: type[Kind], line: str | bytes) -> Kind:
 
 
 class JournalFile:
-    """File of JSON lines, held by this process.
+    """File of JSON lines, locked by this process.
 
     Args:
         path: name of the file, created if missing.

@@ -193,7 +193,7 @@ OF_ROBOTS = [
         "limits.actuator_force.4: is no actuator of 'mixed'; allowed: 1, 2, 3\n",
     ),
     (MORE, LOAD, f"load: {REDUNDANT}"),
-    (MORE, MOVED, "motion: is not for 'mixed': it has 5 actuators for 3 freedoms"),
+    (MORE, MOVED, "motion: is not for 'mixed': it has 5 actuators for 3 degrees of freedom"),
     (
         MIXED,
         '[[load]]\nname = "tool"\nmass = 2\ncentre = [1, 0, 0]',

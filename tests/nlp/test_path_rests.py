@@ -106,7 +106,7 @@ def test_programs_stand_as_tables_do() -> None:
     assert path.lines.tolist() == [4, 5, 6]
     # Angles that change linearly turn all the way.
     assert motion("G21 G90\nG1 C90 F360\nG1 C0").durations.tolist() == pytest.approx([15, 15])
-    with pytest.raises(InputError, match="one pose"):
+    with pytest.raises(InputError, match="the same pose"):
         motion("G21 G90\nG1 C360 F360", Between.SLERP)
 
 
