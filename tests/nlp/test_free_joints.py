@@ -293,7 +293,7 @@ def test_what_is_judged_over_poses_is_refused(tmp_path: Path, cli: Run) -> None:
     over = ("[limits.joint]", '[limits]\nover = "workspace"\n[limits.joint]')
     refusal_of(cli("solve", planar(tmp_path, workspace, over)), "limits.over", words)
     load = planar(tmp_path, ("[solve]", "load = [{ force = [10, 0, 0] }]\n[solve]"))
-    refusal_of(cli("solve", load), "6 actuators for 3 freedoms", "can move while its platform stands still")
+    refusal_of(cli("solve", load), "6 actuators for 3 degrees of freedom", "can move while the platform stands still")
 
 
 def test_inverse_holds_the_rails_at_home(tmp_path: Path, cli: Run) -> None:

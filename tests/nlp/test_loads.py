@@ -179,8 +179,8 @@ task = [{ sense = "max", axis = [0, 0, 1], point = [0, 0, 0], pitch = 0 }]
 """
 KINDS = "means actuators that turn and actuators that slide; give one table for each, by its name: 1, 2, 3\n"
 REDUNDANT = (
-    "is not for 'mixed': it has 5 actuators for 3 freedoms, so that they can load each other with forces that no load "
-    "determines\n"
+    "is not for 'mixed': it has 5 actuators for 3 degrees of freedom, so internal forces between actuators are not "
+    "determined by the load\n"
 )
 IDLE = "does no work in any motion of 'mixed': its actuators do not hold it; allowed is a load"
 #: Robot, tables and sentence.
@@ -193,7 +193,7 @@ OF_ROBOTS = [
         "limits.actuator_force.4: is no actuator of 'mixed'; allowed: 1, 2, 3\n",
     ),
     (MORE, LOAD, f"load: {REDUNDANT}"),
-    (MORE, MOVED, "motion: is not for 'mixed': it has 5 actuators for 3 freedoms"),
+    (MORE, MOVED, "motion: is not for 'mixed': it has 5 actuators for 3 degrees of freedom"),
     (
         MIXED,
         '[[load]]\nname = "tool"\nmass = 2\ncentre = [1, 0, 0]',

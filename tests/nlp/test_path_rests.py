@@ -93,7 +93,7 @@ def test_what_stands_does_not_depend_on_the_unit(scale: float) -> None:
     steps = (0.0, 1e-10, 1e-7)  # of a thousand: rounding, and a motion
     rows = "\n".join(f"0,0,{scale * (1000 + step)!r},0,0,0,{scale!r}" for step in steps)
     assert [Kind(each) for each in table(rows).kinds] == [Kind.LINE]
-    with pytest.raises(InputError, match="there is no path: all of its points are one pose"):
+    with pytest.raises(InputError, match="there is no path: all points are the same pose"):
         table("\n".join(rows.split("\n")[:2]))
 
 
@@ -106,7 +106,7 @@ def test_programs_stand_as_tables_do() -> None:
     assert path.lines.tolist() == [4, 5, 6]
     # Angles that change linearly turn all the way.
     assert motion("G21 G90\nG1 C90 F360\nG1 C0").durations.tolist() == pytest.approx([15, 15])
-    with pytest.raises(InputError, match="one pose"):
+    with pytest.raises(InputError, match="the same pose"):
         motion("G21 G90\nG1 C360 F360", Between.SLERP)
 
 

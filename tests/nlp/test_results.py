@@ -393,7 +393,7 @@ DELTA = (Path(screwsynth.models.__file__).parent / "robots" / "delta.toml").read
 #: A value of the key as TOML and JSON write it, and words about it.
 OTHERS = [
     ("2", "schema = 2: this screwsynth reads {kind} of schema 1; a later version of it reads this one"),
-    ("0", "schema = 0: must be a version, which is a whole number from 1; this screwsynth reads {kind} of schema 1"),
+    ("0", "schema = 0: must be a version number, a whole number from 1; this screwsynth reads {kind} of schema 1"),
     ("true", "schema = true: must be a version"),
     ("1.0", "schema = 1.0: must be a version"),
     ('"1"', 'schema = "1": must be a version'),

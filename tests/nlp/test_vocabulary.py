@@ -122,7 +122,7 @@ ROBOT = (ROBOTS / "reachy-mini-head.toml").read_text(encoding="utf-8")
         (("delta",), "this is a robot: screwsynth models delta shows it, screwsynth new delta writes a case of it"),
         (("slove",), "did you mean 'solve'?"),
         (("solve", "paper-4.2", "--set", "x1=12,5"), "must be NAME=NUMBER, or axis=X,Y,Z; write 12.5: a decimal"),
-        (("solve", "paper-4.2", "--set", "x1=12 cm"), "; write 12: a number stands without its unit"),
+        (("solve", "paper-4.2", "--set", "x1=12 cm"), "; write 12: a number is written without its unit"),
         (("solve", "paper-4.2", "--time", "10s"), "--time 10s: must be a number; write 10: a number stands"),
     ],
     ids=lambda given: " ".join(given) if isinstance(given, tuple) else "",
@@ -155,7 +155,7 @@ def test_units_and_decimal_commas_in_toml_are_named_with_their_lines(tmp_path: P
     table = saved(tmp_path / "points.csv", "x1\n12\n13 mm\n")
     arguments = ("sweep", "paper-4.2", "--over", str(table), "--out", str(tmp_path / "out.csv"))
     refusal_of(
-        cli(*arguments), 'row 3, column x1 = "13 mm": must be a number; write 13: a number stands without its unit'
+        cli(*arguments), 'row 3, column x1 = "13 mm": must be a number; write 13: a number is written without its unit'
     )
     table = saved(tmp_path / "poses.csv", 'x,y,z\n1,2,"3,5"\n')
     fault = "must be a number; write 3.5: a decimal number has a point"
