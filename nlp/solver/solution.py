@@ -308,7 +308,7 @@ class Solution(Whole, Shown, Answer):
             EvaluationError: there is no single program, as for an average.
         """
         if self.decided_by is None:
-            raise EvaluationError("an average of tasks has no program: outcomes has the separate program of each task")
+            raise EvaluationError("an average of tasks has no combined program: outcomes has the separate programs")
         return self.decided_by
 
 

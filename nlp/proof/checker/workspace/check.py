@@ -160,7 +160,7 @@ def _check(proof: Proof, begun: Callable[[], _Checker]) -> VerifiedWorkspace:
     if sorted(named) != sorted(expected) or len(given) != len(proof.claims):
         wrong = [*(set(expected) - set(named)), *(set(given) - set(expected))]
         name = " ".join(min(wrong)).strip() if wrong else "one of them"
-        raise ProofError(f"the claims are not those of the case, each once: see {name}")
+        raise ProofError(f"the proof must have each claim of the case exactly once: see {name}")
     refuse_other_lemmas(proof.lemmas, checker.expected)
     claims = []
     for key in (each for each in expected if each in given):
@@ -316,7 +316,7 @@ class _Checker:
     def _of_legs(self) -> tuple[Legs, float]:
         """Return the joint centres of six straight legs, and a lower bound of their lengths within the tolerance."""
         if self.robot.legs is None:
-            raise ProofError("the robot of the case has not six straight legs")
+            raise ProofError("the robot of the case does not have six straight legs")
         return self.robot.legs, min(self._length(leg.name, Sense.MIN) for leg in self._case.model.legs)
 
     def _lengths(self, each: Claim, given: ProofClaim) -> float:
