@@ -30,7 +30,7 @@ _OUTSIDE, _ZERO = 1e-7, 1e-12
 class Hindrance(enum.Enum):
     """Reason why the optimal F has no derivative with respect to a fixed parameter."""
 
-    NO_CHOICE = "the loops close only at this value"
+    NO_CHOICE = "loops close at no other value"
     CORNER = "F has a kink at this value"
 
 
