@@ -53,8 +53,8 @@ from .statement import (
     case_along_path,
     expected_along_path,
     expected_claims,
-    hold_premises,
-    hold_robot,
+    refuse_other_premises,
+    refuse_other_robot,
     leg_error_of,
     refuse_other_lemmas,
     robot_along_path,
@@ -179,7 +179,7 @@ class _Checker:
         if not isinstance(premises, Premises):
             raise ProofError("the proof is not about a workspace")
         robot = robot_claims(case, workspace, {each.name for each in proof.claims})
-        hold_premises(case, workspace, robot.legs, leg_error, premises)
+        refuse_other_premises(case, workspace, robot.legs, leg_error, premises)
         self._begin(proof, case, pose_root(workspace), robot, workspace)
         self._eps = leg_error_of(case, leg_error)
         try:
@@ -423,7 +423,7 @@ class _PathChecker(_Checker):
         case = case_along_path(case, path)
         root = PathRoot(case, path)
         robot = robot_along_path(case, root, with_angles=premises.with_angles)
-        hold_robot(case, robot.legs, premises)
+        refuse_other_robot(case, robot.legs, premises)
         self._is_timed = path.is_timed
         self._begin(proof, case, root, robot, root.workspace)
         self.expected = expected_along_path(case, robot, is_timed=path.is_timed)
