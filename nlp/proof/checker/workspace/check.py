@@ -53,10 +53,10 @@ from .statement import (
     case_along_path,
     expected_along_path,
     expected_claims,
-    refuse_other_premises,
-    refuse_other_robot,
     leg_error_of,
     refuse_other_lemmas,
+    refuse_other_premises,
+    refuse_other_robot,
     robot_along_path,
     robot_claims,
 )
