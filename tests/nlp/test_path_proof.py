@@ -323,7 +323,7 @@ def test_other_paths_are_rejected(proof: Proof) -> None:
     assert "segment 1 from" in rejected(carrying(speeds, text=swapped), machine())
     assert "goes on after every box" in rejected(carrying(lengths, text="\n".join(rows[:-1])), machine())
     assert "other joint centres" in rejected(carrying(lengths, legs=()), machine())
-    assert "another tolerance" in rejected(carrying(lengths, joint_centre=0.1), machine())
+    assert "another joint-centre tolerance" in rejected(carrying(lengths, joint_centre=0.1), machine())
     assert "cannot be read" in rejected(carrying(lengths, text="x,y\n1,2"), machine())
     assert "this case has none" in rejected(carrying(lengths, of_case=True), machine())
     slower = edited(TIMED, ("3,2\n", "3,1.5\n"))

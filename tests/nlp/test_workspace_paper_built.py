@@ -126,7 +126,7 @@ def test_another_tolerance_is_rejected(proof: Proof) -> None:
     larger = TEXT.replace("joint_centre = 0.02", "joint_centre = 0.06")
     without = TEXT.replace("[tolerance]\njoint_centre = 0.02\n", "")
     for text in (larger, TEXT.replace("joint_centre = 0.02", "joint_centre = 0.01"), without):
-        assert "within another tolerance" in rejected(proof, case_of(text))
+        assert "another joint-centre tolerance" in rejected(proof, case_of(text))
     # Another number in the file is no way around: bounds are those of the machines of the case.
     longest = claim(proof, "leg_length limb 2-", "max").bound
     reject = rejections(stating(proof, joint_centre=0.06), larger)
