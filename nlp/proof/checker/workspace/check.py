@@ -159,7 +159,7 @@ def _check(proof: Proof, begun: Callable[[], _Checker]) -> VerifiedWorkspace:
     named = [*given, *(key for each in proof.unproved if (key := (each.name, each.sense)) in expected)]
     if sorted(named) != sorted(expected) or len(given) != len(proof.claims):
         wrong = [*(set(expected) - set(named)), *(set(given) - set(expected))]
-        name = " ".join(min(wrong)).strip() if wrong else "one of them"
+        name = " ".join(min(wrong)).strip() if wrong else "a claim that occurs twice"
         raise ProofError(f"the proof must have each claim of the case exactly once: see {name}")
     refuse_other_lemmas(proof.lemmas, checker.expected)
     claims = []
