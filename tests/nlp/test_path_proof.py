@@ -333,8 +333,8 @@ def test_other_paths_are_rejected(proof: Proof) -> None:
 def test_claims_of_another_case_or_left_out_are_rejected(proof: Proof) -> None:
     fewer = hexapod(limits=LIMITS | {"leg_length": {"max": 43}}, load=LOAD)
     assert "does not keep" in rejected(proof, hexapod(limits=LIMITS | {"leg_length": {"max": 30}}, load=LOAD))
-    assert "not those of the case, each once" in rejected(proof, hexapod(limits=LIMITS))
-    assert "not those of the case, each once" in rejected(replace(proof, unproved=proof.unproved[1:]), machine())
+    assert "each claim of the case exactly once" in rejected(proof, hexapod(limits=LIMITS))
+    assert "each claim of the case exactly once" in rejected(replace(proof, unproved=proof.unproved[1:]), machine())
     assert verified(alone(proof, "leg_length limb 1-", "max"), fewer).claims
     assert "claims nothing" in rejected(replace(proof, claims=()), machine())
 
