@@ -321,7 +321,7 @@ def test_errors_of_legs_are_those_of_the_command(cli: Run, folder: Path) -> None
     case, proof = str(folder / "machines.toml"), str(folder / "machines.json")
     code, out, err = cli("verify-proof", proof, case)
     assert (code, out) == (1, "")
-    assert "by at most 0.01 in, and not 0: see --leg-error" in err
+    assert "leg errors of at most 0.01 in, but 0 was given: see --leg-error" in err
     assert cli("verify-proof", proof, case, "--leg-error", "-0.019999999999")[0] == 2
     out = output_of(cli("verify-proof", proof, case, "--leg-error", "0.01", "--all"))
     assert "for every machine whose joint centres are off by at most 0.01 in" in out

@@ -308,7 +308,7 @@ def test_none_is_found_and_refusals_are_one_sentence(tmp_path: Path, cli: Run) -
     assert status == 1
     none = "rounded  to multiples of 1 cm: no multiples within 4 steps were found that keep all limits"
     assert none in unbroken(said)
-    sentence = "--round 20: robot.parameters.x1 has no multiple of it between 6 and 14 cm"
+    sentence = "--round 20: robot.parameters.x1 has no multiple of the step between 6 and 14 cm"
     refusal_of(cli("solve", str(path), "--round", "20"), sentence)
     refusal_of(cli("solve", str(path), "--round", "-1"), "--round -1: must be positive and finite")
     refusal_of(cli("solve", str(path), "--round", "x"), "--round x: must be a number")

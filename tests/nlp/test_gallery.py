@@ -233,8 +233,8 @@ def test_a_number_that_the_robot_has_no_choice_of_has_no_sensitivity() -> None:
         rows = {row.name: row for row in sn.sensitivities(solution.nlp, solution.x)}
         if name == "delta":
             assert {name for name, row in rows.items() if row.derivative is None} == {"angle"}
-            assert rows["angle"].hindrance is Hindrance.NO_CHOICE
-            assert "fixed: the robot has no choice of it" in solution.table(width=120)
+            assert rows["angle"].hindrance is Hindrance.LOOPS
+            assert "fixed: loops close at no other value" in solution.table(width=120)
         else:
             assert rows["angle"].derivative
 

@@ -158,7 +158,7 @@ def test_a_robot_of_another_size_has_the_same_joints() -> None:
 
 def test_input_that_is_none_is_refused() -> None:
     case = typical_case("delta")
-    with pytest.raises(InputError, match=r"must be arrays \(N, 3\) and \(N, 3, 3\), got \(3, 2\)"):
+    with pytest.raises(InputError, match=r"expected arrays \(N, 3\) and \(N, 3, 3\), got \(3, 2\)"):
         inverse(case, np.zeros((3, 2)))
     with pytest.raises(InputError, match=r"got \(\) and"):
         inverse(case, 1.0)

@@ -468,7 +468,7 @@ def test_what_a_case_does_not_claim_is_refused_packed(workspace: Proved, monkeyp
     with pytest.raises(AssertionError):
         check_workspace_proof(given, case)
     other = replace(given.claims[0], name="other")
-    with pytest.raises(ProofError, match="the claims are not those of the case, each once: see other"):
+    with pytest.raises(ProofError, match="the proof must have each claim of the case exactly once: see other"):
         check_workspace_proof(replace(given, claims=(*given.claims, other)), case)
     with pytest.raises(ProofError, match="no claim rests on the lemma other"):
         check_workspace_proof(replace(given, lemmas=(other,)), case)

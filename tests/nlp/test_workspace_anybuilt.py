@@ -28,10 +28,10 @@ from screwsynth.nlp.proof.enclosure.forms import Forms
 from screwsynth.nlp.proof.statement.machine import Legs, joint_centres
 from screwsynth.nlp.proof.statement.tolerance import built_model, is_smooth
 from screwsynth.nlp.proof.workspace.numbers import expressions
-from screwsynth.nlp.proof.workspace.numbers import machines as tolerance
+from screwsynth.nlp.proof.workspace.numbers import within_tolerance as tolerance
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal, smallest_values
 from screwsynth.nlp.proof.workspace.numbers.extremes import NumberSearch
-from screwsynth.nlp.proof.workspace.numbers.machines import Machines
+from screwsynth.nlp.proof.workspace.numbers.within_tolerance import RobotsWithinTolerance
 from screwsynth.nlp.proof.workspace.ranks import rank_rule as rank
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularPose
@@ -44,9 +44,9 @@ TWIST_AXIS, TWIST_POINT, PITCH = np.array([1.0, 2.0, 6.0]), np.array([0.3, 0.1, 
 COUNT, STEEP = 20_000, 256
 
 
-def machines(case: Case) -> Machines:
+def machines(case: Case) -> RobotsWithinTolerance:
     closed = closed_form(case.model)
-    return Machines(case, closed, problem_of(case))
+    return RobotsWithinTolerance(case, closed, problem_of(case))
 
 
 def turned(a: FloatArray, angles: FloatArray) -> FloatArray:

@@ -27,9 +27,9 @@ from screwsynth.nlp.proof.statement.posed_layout import posed_layout
 from screwsynth.nlp.proof.statement.tolerance import built_model
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal, Number
 from screwsynth.nlp.proof.workspace.numbers.extremes import NumberSearch, prove_extreme
-from screwsynth.nlp.proof.workspace.numbers.machines import Machines as EveryMachine
 from screwsynth.nlp.proof.workspace.numbers.pose_error import pose_errors
 from screwsynth.nlp.proof.workspace.numbers.strokes import _better
+from screwsynth.nlp.proof.workspace.numbers.within_tolerance import RobotsWithinTolerance
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examined, Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.rank_rule import RankTest
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
@@ -151,7 +151,7 @@ def machines(case: Case) -> Machines:
 
 def test_no_machine_within_the_tolerance_is_outside_of_a_proven_bound(case: Case, machines: Machines) -> None:
     sampled, seen = dict(numbers(case, legs_of(case), machines)), set()
-    every = EveryMachine(case, closed_form(case.model), problem_of(case))
+    every = RobotsWithinTolerance(case, closed_form(case.model), problem_of(case))
     picked = [name for name in sampled if " 1-" in name or " 2+" in name or " " not in name]
     claims = [each for each in every.symbols.claims(["base_joint_angle"])[1] if each.name in picked]
     for each in (every.extreme(claim, NumberSearch(jobs=1)) for claim in claims):

@@ -178,7 +178,7 @@ def test_a_proof_is_for_its_case_only(proof: Proof) -> None:
     assert "other joint centres" in refused(proof, ("11.543", "11.544"))
     assert "other expressions" in refused(alone(proof, "F"), ("axis = [0, 0, 1]", "axis = [0, 1, 1]"))
     assert "see regular" in refused(replace(proof, claims=proof.claims[1:]))
-    assert "each once" in refused(replace(proof, claims=(*proof.claims, proof.claims[0])))
+    assert "exactly once" in refused(replace(proof, claims=(*proof.claims, proof.claims[0])))
     assert "leg_clearance" in refused(proof, ("leg_clearance = { min = 0.5 }", ""))
     assert "no reason" in refused(changed(alone(proof, "condition_number"), "condition_number", reason="lengths"))
     assert "measure" in refused(stating(proof, quantities=("none",)))

@@ -500,7 +500,7 @@ def test_the_check_begins_in_the_working_mode_of_home() -> None:
         try:
             problem_of(case)
         except NotJudgedError:
-            with pytest.raises(ProofError, match="in the assembly of home"):
+            with pytest.raises(ProofError, match="in the home assembly mode"):
                 start_of(robot)
             tried += 1
         else:

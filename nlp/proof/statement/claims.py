@@ -103,7 +103,7 @@ ERRORS = (
 )
 
 
-def one_machine_name(claim: str) -> str:
+def one_robot_name(claim: str) -> str:
     """Return the name of the lengths from which a claim about one machine at two poses follows."""
     return f"{claim}, lengths of one machine"
 

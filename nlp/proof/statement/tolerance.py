@@ -29,7 +29,7 @@ from ...case.pose import HERE, Free, Pose, Rotation, Value
 from ...case.task import Sense
 from ...program.layout import Layout, StatedPoseSymbols, lay_out
 from ...program.places import SymbolTable
-from .claims import Claim, claims_of, one_machine_name
+from .claims import Claim, claims_of, one_robot_name
 from .machine import joint_centres
 from .posed_layout import at_one_pose, reach_claims_on, without_loops
 
@@ -130,7 +130,7 @@ def coordinate_layout(case: Case, at: PoseCoordinates) -> Layout:
     return lay_out(one, one.tasks, add_pose)
 
 
-class MachineLayout(NamedTuple):
+class ToleranceLayout(NamedTuple):
     """Every machine of a case as symbols of one pose.
 
     Attributes:
@@ -181,15 +181,15 @@ class MachineLayout(NamedTuple):
         return list(reaches), claims_of(self.layout, quantities, with_objective=with_objective)
 
 
-def machine_layout(case: Case, built: BuiltModel, tolerance: float, at: PoseCoordinates) -> MachineLayout:
+def tolerance_layout(case: Case, built: BuiltModel, tolerance: float, at: PoseCoordinates) -> ToleranceLayout:
     """Return every machine within a tolerance of a case with fixed dimensions as symbols of one pose."""
     parameters = {name: case.parameters[name] for name in case.parameters}
     size = Free(-tolerance, tolerance)
     own = {item.name: (size, size, size) for item in built.model.parameters if item.name not in parameters}
     # The mounting axes of joints are those of the design.
     limits = Limits(*(_mounted(case, each) for each in case.limits))
-    machines = replace(case, model=built.model, parameters=parameters | own, limits=limits, joint_centre_tolerance=None)
-    return MachineLayout(coordinate_layout(machines, at), built, tolerance)
+    robots = replace(case, model=built.model, parameters=parameters | own, limits=limits, joint_centre_tolerance=None)
+    return ToleranceLayout(coordinate_layout(robots, at), built, tolerance)
 
 
 def _mounted(case: Case, limit: Limit[Any]) -> Limit[Any]:
@@ -247,20 +247,20 @@ class Directions(NamedTuple):
     platform: FloatArray
 
 
-def length_of_one_machine(machines: MachineLayout, leg: int, sense: Sense, about: Directions) -> Claim:
+def length_of_one_robot(robots: ToleranceLayout, leg: int, sense: Sense, about: Directions) -> Claim:
     """Return the claim about the length of a leg less ``f.c_p - e.c_b``, which is the same at every pose.
 
     In the difference of two lengths of one machine, with errors e and f of the leg's joints on base and platform, the
     part with the fixed vectors c_p and c_b cancels; little is left of it where the leg's direction changes little.
 
     Args:
-        machines: among whose errors are two for each leg.
+        robots: robots within the tolerance, with two joint-centre errors for each leg.
         leg: index of the leg.
         sense: whether the smallest or the largest value is meant.
         about: c_b and c_p.
     """
-    places = (3 * machines.built.names.index(each) for each in machines.built.model.legs[leg].centres)
-    e, f = (machines.errors[k : k + 3] for k in places)
+    places = (3 * robots.built.names.index(each) for each in robots.built.model.legs[leg].centres)
+    e, f = (robots.errors[k : k + 3] for k in places)
     same = ca.dot(f, SX(about.platform.tolist())) - ca.dot(e, SX(about.base.tolist()))
-    length = ca.norm_2(machines.layout.robots[0].legs[leg].span)
-    return Claim(one_machine_name(about.claim), sense, length - same, LENGTH, legs=(leg,))
+    length = ca.norm_2(robots.layout.robots[0].legs[leg].span)
+    return Claim(one_robot_name(about.claim), sense, length - same, LENGTH, legs=(leg,))

@@ -29,10 +29,10 @@ from ...interruption import is_requested, one_call, one_search, why_stopped, wit
 from ...path.options import Between
 from ...path.orientation import ORDERS, roll_pitch_yaw
 from ...path.path import Kind, ProgrammedPath
-from .alone import AXES, box_about, coordinates_alone
 from .edge_samples import EdgeSamples
 from .judge import judge_workspace
 from .judgement import Judgement
+from .local_coordinates import AXES, box_about, local_coordinates
 from .path_judge import judge_path
 from .range_values import AxisRange, PairRange, RangeEnd, RangeStop
 from .robot.pose_box import pose_box
@@ -136,7 +136,7 @@ def axis_ranges(
     report = progress or (lambda _: None)
     with within(time_limit, _EACH):
         report("the pose")
-        alone, others = coordinates_alone(case, here, most[0])
+        alone, others = local_coordinates(case, here, most[0])
         nothing = AxisRanges(case, here, most, (), others=tuple(AXES[k] for k in others))
         if not alone:
             return nothing
@@ -325,7 +325,7 @@ def _judged(case: Case, start: FloatArray, *ends: FloatArray) -> Judgement:
         np.zeros(0, dtype=np.uint8), ORDERS["rpy"], Between.ANGLES,
     )  # fmt: skip
     with one_search():
-        return judge_path(case, path, gap=_GAP, time_limit=None, limits_alone=True)
+        return judge_path(case, path, gap=_GAP, time_limit=None, limits_only=True)
 
 
 def _failures(judged: Judgement) -> Iterator[_Failed]:

@@ -12,7 +12,7 @@ from ....models.joints.model.closedform import closed_form
 from ...case.case import Case
 from .numbers.expressions import Expressions
 from .numbers.extremes import goal_of
-from .numbers.machines import Machines
+from .numbers.within_tolerance import RobotsWithinTolerance
 from .ranks.singular_pose import DeterminantSigns
 from .robot.posed_robot import Problem
 
@@ -33,11 +33,11 @@ class EdgeSamples:
     """
 
     def __init__(self, case: Case, start: FloatArray, problem: Problem) -> None:
-        machines = Machines(case, closed_form(case.model), problem)
-        reaches, claims = machines.symbols.claims([], with_objective=False)
+        robots = RobotsWithinTolerance(case, closed_form(case.model), problem)
+        reaches, claims = robots.symbols.claims([], with_objective=False)
         limited = [each for each in (*reaches, *claims) if each.limit is not None]
-        numbers = ca.vertcat(*map(machines.number, limited)) if limited else ca.SX(0, 1)
-        self._problem, self._start, self._values = machines.family, start, Expressions(machines.family, numbers)
+        numbers = ca.vertcat(*map(robots.number, limited)) if limited else ca.SX(0, 1)
+        self._problem, self._start, self._values = robots.family, start, Expressions(robots.family, numbers)
         goals = [goal_of(each) for each in limited]
         self._least = np.array([(goal.limit or 0.0) - goal.slack for goal in goals])
         matrix = problem.locked

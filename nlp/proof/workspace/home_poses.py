@@ -28,7 +28,7 @@ from ..statement.claims import REACH, Claim, claims_of
 from ..statement.machine import JointErrors
 from ..statement.posed_layout import extreme_program
 from ..statement.tolerance import coordinate_layout
-from .numbers.machines import Machines
+from .numbers.within_tolerance import RobotsWithinTolerance
 from .robot.pose_box import PoseBox, pose_coordinates
 from .verdict import Outcome, Verdict, slack_of
 
@@ -46,20 +46,22 @@ class Homes:
         case: with fixed dimensions.
         box: the poses.
         quantities: names of measures of the robot.
-        machines: every machine within the tolerance; None where only the design is meant.
+        robots: robots within the tolerance; None if only the design is judged.
 
     Attributes:
-        case, box, machines: as given.
+        case, box, robots: arguments of the constructor.
     """
 
-    def __init__(self, case: Case, box: PoseBox, quantities: Sequence[str], machines: Machines | None) -> None:
-        self.case, self.box, self.machines, self._quantities = case, box, machines, quantities
+    def __init__(
+        self, case: Case, box: PoseBox, quantities: Sequence[str], robots: RobotsWithinTolerance | None
+    ) -> None:
+        self.case, self.box, self.robots, self._quantities = case, box, robots, quantities
 
     @cached_property
     def _layout(self) -> Layout:
         """The case as symbols of errors of joint centres, and of the numbers of a pose."""
-        if self.machines is not None:
-            return self.machines.symbols.layout
+        if self.robots is not None:
+            return self.robots.symbols.layout
         return coordinate_layout(self.case, pose_coordinates(self.box))
 
     @cached_property
@@ -135,8 +137,8 @@ class Homes:
         nlp = self._nlp
         x, inner = nlp.start.copy(), set(nlp.program.places.inner)
         given = y[list(self.box.free)]
-        if self.machines is not None:
-            family = self.machines.family
+        if self.robots is not None:
+            family = self.robots.family
             own = np.zeros(family.errors.numel()) if errors is None else errors.vectors.ravel()
             given = np.concatenate([own, given])
         x[[k for k in range(nlp.n) if k not in inner]] = given

@@ -18,15 +18,15 @@ from ..enclosure.engine import kernel
 from ..statement.claims import REACH, REGULAR, SPECTRAL, Claim, claims_of, dependent_claims
 from ..statement.machine import check_leg_error, has_straight_legs, workspace_of_case
 from ..statement.posed_layout import closed_layout, posed_layout, reach_claims
-from ..statement.tolerance import Directions, coordinate_layout, length_of_one_machine
+from ..statement.tolerance import Directions, coordinate_layout, length_of_one_robot
 from .home_poses import Homes
 from .judgement import Judgement
 from .judging import Judging
 from .numbers.bound_search import Minimum
 from .numbers.extremes import GAP, NumberSearch, prove_extreme, verdict_of
-from .numbers.machines import Machines
 from .numbers.pose_error import pose_errors
 from .numbers.searched import Subject, motor_extremes
+from .numbers.within_tolerance import RobotsWithinTolerance
 from .ranks.ranks import RankProgress, prove_ranks
 from .robot.pose_box import pose_box, pose_coordinates
 from .robot.posed_robot import NotJudgedError, Problem, build_problem
@@ -116,17 +116,17 @@ class _OverBox(Judging):
         self._box, self._closed = pose_box(workspace), closed_form(case.model)
         self._names = [name for name in measures if name not in SPECTRAL]
         # All robots within the tolerance; None without one. The design, or these, over the box; None where not judged.
-        self._machines: Machines | None = None
+        self._robots: RobotsWithinTolerance | None = None
         self._problem: Problem | None = None
         self._reason = ""
         try:
             design = build_problem(case, self._closed.model, self._box)
             if case.joint_centre_tolerance:
-                self._machines = Machines(case, self._closed, design)
-            self._problem = design if self._machines is None else self._machines.family
+                self._robots = RobotsWithinTolerance(case, self._closed, design)
+            self._problem = design if self._robots is None else self._robots.family
         except NotJudgedError as error:
             self._reason = str(error)
-        self._homes = Homes(case, self._box, self._names, self._machines)
+        self._homes = Homes(case, self._box, self._names, self._robots)
         # Proves a claim about a leg length more finely: the last one that proved claims.
         self._prove: Callable[[Claim, NumberSearch], Verdict] | None = None
 
@@ -156,22 +156,22 @@ class _OverBox(Judging):
 
     def expressions(self) -> Iterator[Verdict]:
         """Yield the verdicts on expressions of the pose."""
-        if self._machines is not None:
-            yield from self._within_tolerance(self._machines)
+        if self._robots is not None:
+            yield from self._within_tolerance(self._robots)
         elif self.workspace.dependent:
             yield from self._followed(self._problem)
         else:
             yield from self._of_design()
 
-    def _within_tolerance(self, machines: Machines) -> Iterator[Verdict]:
+    def _within_tolerance(self, robots: RobotsWithinTolerance) -> Iterator[Verdict]:
         """Yield the verdicts on expressions of all robots within the tolerance."""
-        reaches, claims = machines.symbols.claims(self._names, with_objective=self.with_objective)
-        dependent = dependent_claims(machines.symbols.layout.robots[0], self.workspace)
-        yield from self._proved([*reaches, *dependent], machines.extreme)
+        reaches, claims = robots.symbols.claims(self._names, with_objective=self.with_objective)
+        dependent = dependent_claims(robots.symbols.layout.robots[0], self.workspace)
+        yield from self._proved([*reaches, *dependent], robots.extreme)
         if any(each.fails and each.key == REACH for each in self.verdicts.values()):
             yield from (verdict_of(claim, Minimum(reason=_OUT_OF_REACH)) for claim in claims)
         else:
-            yield from self._proved(claims, machines.extreme)
+            yield from self._proved(claims, robots.extreme)
 
     def _of_design(self) -> Iterator[Verdict]:
         """Yield the verdicts on expressions of the design."""
@@ -201,13 +201,13 @@ class _OverBox(Judging):
             ]
             yield from (verdict_of(claim, Minimum(reason=self._reason)) for claim in claims)
             return
-        machines = Machines(self.case, self._closed, design)
-        reaches, claims = machines.symbols.claims(self._names, with_objective=self.with_objective)
+        robots = RobotsWithinTolerance(self.case, self._closed, design)
+        reaches, claims = robots.symbols.claims(self._names, with_objective=self.with_objective)
         # The range of a dependent coordinate is part of the answer, however wide its limits are.
-        every = [*reaches, *dependent_claims(machines.symbols.layout.robots[0], self.workspace), *claims]
+        every = [*reaches, *dependent_claims(robots.symbols.layout.robots[0], self.workspace), *claims]
         limited = [claim for claim in (*reaches, *claims) if claim.limit is not None]
-        decided = (each for each in machines.followed(limited, self.search.gap) if each.outcome is not Outcome.OPEN)
-        yield from self._proved(every, machines.extreme, decided)
+        decided = (each for each in robots.followed(limited, self.search.gap) if each.outcome is not Outcome.OPEN)
+        yield from self._proved(every, robots.extreme, decided)
 
     def _in_home(self, design: Problem, *, is_reached: bool) -> Iterator[Verdict]:
         """Yield the verdicts on expressions of a design with loops that are decided in the home assembly mode.
@@ -215,13 +215,13 @@ class _OverBox(Judging):
         Loop equations as conditions of a program hold in every assembly mode, and F has no bound where one of these is
         singular. The loops are followed here, and the design is the only robot within no tolerance.
         """
-        machines = Machines(self.case, self._closed, design)
-        claims = machines.symbols.claims(self._names, with_objective=self.with_objective)[1]
-        limited = machines.followed([claim for claim in claims if claim.limit is not None], self.search.gap)
+        robots = RobotsWithinTolerance(self.case, self._closed, design)
+        claims = robots.symbols.claims(self._names, with_objective=self.with_objective)[1]
+        limited = robots.followed([claim for claim in claims if claim.limit is not None], self.search.gap)
         yield from (each for each in limited if each.outcome is not Outcome.OPEN)
         for claim in claims if is_reached and self._closed.model.unknowns else ():
             if claim.limit is None:
-                yield machines.extreme(claim, replace(self.search, record=None))
+                yield robots.extreme(claim, replace(self.search, record=None))
 
     def _proved(
         self, claims: Sequence[Claim], prove: Callable[[Claim, NumberSearch], Verdict], decided: Iterable[Verdict] = ()
@@ -244,13 +244,13 @@ class _OverBox(Judging):
 
     def finer(self, claim: Claim, gap: float, about: Directions | None) -> Verdict | None:
         """Return the verdict on a leg length with a finer gap."""
-        search, machines = replace(self.search, gap=gap), self._machines
-        if self._prove is None or (about is not None and machines is None):
+        search, robots = replace(self.search, gap=gap), self._robots
+        if self._prove is None or (about is not None and robots is None):
             return None
-        if about is None or machines is None:
+        if about is None or robots is None:
             return self._prove(claim, search)
         (leg,), record = claim.legs, search.record
-        of_one = length_of_one_machine(machines.symbols, leg, claim.sense, about)
+        of_one = length_of_one_robot(robots.symbols, leg, claim.sense, about)
         if record is not None:
             record.directions[of_one.name] = about
         return self._prove(of_one, search)

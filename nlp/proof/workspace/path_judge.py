@@ -30,9 +30,9 @@ from .judging import Judging
 from .numbers.bound_search import Minimum, Number
 from .numbers.expressions import Expressions
 from .numbers.extremes import NumberSearch, verdict_of
-from .numbers.machines import Machines
 from .numbers.motors import Motors
 from .numbers.searched import Subject, motor_extremes
+from .numbers.within_tolerance import RobotsWithinTolerance
 from .path_closing import closed_form_along
 from .path_domain import covered, design_along, with_dependent
 from .path_faults import first_faults, refuted
@@ -60,7 +60,7 @@ def judge_path(
     gap: float = GAP,
     time_limit: float | None = TIME_LIMIT,
     sampling: Sampling | None = None,
-    limits_alone: bool = False,
+    limits_only: bool = False,
     progress: Callable[[str], None] | None = None,
     record: ProofRecord | None = None,
 ) -> Judgement:
@@ -72,7 +72,7 @@ def judge_path(
         gap: largest relative gap of a number without a limit.
         time_limit: seconds of all searches; None for no limit.
         sampling: distance that knots of the path keep; None for no knots.
-        limits_alone: whether numbers of actuators without a limit are left out.
+        limits_only: whether numbers of actuators without a limit are left out.
         progress: called with the name of the next step.
         record: record of the searches for a proof.
 
@@ -95,17 +95,17 @@ def judge_path(
         if sampling is not None:
             report("knots")
             knots = knots_of(moving, path, cover, workspace, sampling)
-        closed, machines, reason = closed_form_along(moving, path), None, ""
+        closed, robots, reason = closed_form_along(moving, path), None, ""
         try:
             box, workspace = with_dependent(moving, box, workspace)
             moving = replace(moving, workspace=workspace)
-            machines = Machines(moving, closed, design_along(moving, closed, box, cover))
+            robots = RobotsWithinTolerance(moving, closed, design_along(moving, closed, box, cover))
         except NotJudgedError as error:
             reason = str(error)
-        judging = _AlongPath(moving, workspace, machines, cover, NumberSearch(gap, record=record))
+        judging = _AlongPath(moving, workspace, robots, cover, NumberSearch(gap, record=record))
         judging.is_timed, judging.with_all, judging.reason, judging.report = (
             path.is_timed,
-            not limits_alone,
+            not limits_only,
             reason,
             report,
         )
@@ -119,7 +119,7 @@ class _AlongPath(Judging):
     Args:
         case: the case, in a motion.
         workspace: box that holds the path.
-        machines: all robots within the tolerance; None where they are not judged.
+        robots: all robots within the tolerance; None where they are not judged.
         cover: boxes of the path.
         search: gap of numbers without a limit.
 
@@ -134,32 +134,37 @@ class _AlongPath(Judging):
     report: Callable[[str], None]
 
     def __init__(
-        self, case: Case, workspace: Workspace, machines: Machines | None, cover: PathCover, search: NumberSearch
+        self,
+        case: Case,
+        workspace: Workspace,
+        robots: RobotsWithinTolerance | None,
+        cover: PathCover,
+        search: NumberSearch,
     ) -> None:
         super().__init__(case, workspace, search=search)
-        self._machines, self._cover = machines, cover
+        self._within_tolerance, self._cover = robots, cover
         self._faults: dict[Claim, Fault] = {}
         if search.record is not None:
             search.record.pieces = cover.pieces
-        self.has_numbers = machines is not None
+        self.has_numbers = robots is not None
 
     @property
-    def _robots(self) -> Machines:
+    def _robots(self) -> RobotsWithinTolerance:
         """All robots within the tolerance.
 
         Raises:
             NotJudgedError: they are not judged.
         """
-        if self._machines is None:
+        if self._within_tolerance is None:
             raise NotJudgedError(self.reason)
-        return self._machines
+        return self._within_tolerance
 
     def ranks(self) -> Iterator[Verdict]:
         """Yield the verdicts on ranks."""
-        if self._machines is None:
+        if self._within_tolerance is None:
             yield not_judged(REGULAR, self.reason)
             return
-        family, cover = self._machines.family, self._cover
+        family, cover = self._within_tolerance.family, self._cover
         for name, matrix in ((REGULAR, family.locked), (CONSTRAINTS, family.unactuated)):
             if matrix is not None:
                 self.report(name)
@@ -172,23 +177,23 @@ class _AlongPath(Judging):
     def expressions(self) -> Iterator[Verdict]:
         """Yield the verdicts on expressions of the pose."""
         self.report("limits")
-        machines = self._robots
+        robots = self._robots
         measures = (*ACTUATED, "leg_length") if self.with_all else ()
         names = [item.name for item in self.case.model.quantities if item.name in measures]
-        reaches, claims = machines.symbols.claims(names, with_objective=False)
-        claims += dependent_claims(machines.symbols.layout.robots[0], self.workspace)
+        reaches, claims = robots.symbols.claims(names, with_objective=False)
+        claims += dependent_claims(robots.symbols.layout.robots[0], self.workspace)
         for group in (reaches, claims):
             found = self._searched(group)
             wrong = list(refuted(found).values())
             if wrong:
-                numbers = Expressions(machines.family, ca.vertcat(*[machines.number(each.claim) for each in wrong]))
+                numbers = Expressions(robots.family, ca.vertcat(*[robots.number(each.claim) for each in wrong]))
                 self._keep_faults(numbers, dict(enumerate(wrong)))
             yield from found
 
     def subject(self, shortest: float) -> Subject:
         """Return the robot of which the other numbers are."""
-        machines = self._robots
-        return Subject(self.case, machines.model, machines.family, "", shortest)
+        robots = self._robots
+        return Subject(self.case, robots.model, robots.family, "", shortest)
 
     def actuators(self, subject: Subject) -> Iterator[Verdict]:
         """Yield the numbers of actuators, in the path's own motion where its times are stated."""
@@ -205,7 +210,7 @@ class _AlongPath(Judging):
         moving = in_path_motion(case)
         if speeds.number is not None:
             self._keep_faults(speeds.number, refuted(speeds.verdicts))
-            subject = replace(subject, case=moving, machines=speeds.number.problem)
+            subject = replace(subject, case=moving, family=speeds.number.problem)
         else:
             subject = replace(subject, case=replace(moving, loading=moving.loading._replace(motion=None)))
         yield from self._motors(subject, {each.motor.actuator: each.bound for each in speeds.verdicts if each.motor})
@@ -233,21 +238,21 @@ class _AlongPath(Judging):
         yield from found
         for _, group in itertools.groupby(refuted(found).values(), lambda each: each.motor and each.motor.place):
             wrong = list(group)
-            if subject.machines is not None:
-                numbers = Motors(subject.machines, subject.case, [each.claim for each in wrong])
+            if subject.family is not None:
+                numbers = Motors(subject.family, subject.case, [each.claim for each in wrong])
                 self._keep_faults(numbers, dict(enumerate(wrong)))
 
     def _searched(self, claims: Sequence[Claim]) -> list[Verdict]:
         """Return the verdicts on numbers by one search; those without rules are open."""
-        machines, search, reason = self._robots, self.search, _NO_RULE
-        covered = [claim for claim in claims if machines.is_covered(claim)]
+        robots, search, reason = self._robots, self.search, _NO_RULE
+        covered = [claim for claim in claims if robots.is_covered(claim)]
         found = dict[Claim, Verdict]()
         try:
-            found = dict(zip(covered, machines.searched(covered, search) if covered else [], strict=True))
+            found = dict(zip(covered, robots.searched(covered, search) if covered else [], strict=True))
             # A number that cannot be decided ends the search of all.
             limited = [each for each in covered if each.limit is not None and len(covered) > 1]
             for claim in (each for each in limited if found[each].reason == TOO_SMALL):
-                (found[claim],) = machines.searched([claim], search)
+                (found[claim],) = robots.searched([claim], search)
         except UncoveredError as error:  # of an equation of loops
             reason = str(error)
         return [found.get(claim) or verdict_of(claim, Minimum(reason=reason)) for claim in claims]

@@ -24,7 +24,7 @@ from ...evidence.inverse import InversePoses, inverse
 from ...interruption import is_requested, one_search, why_stopped
 from ...path.path import ProgrammedPath
 from ..boxes.search import joined, some
-from .numbers.machines import Machines
+from .numbers.within_tolerance import RobotsWithinTolerance
 from .path_motion import coordinates_of
 from .path_tubes import Tubes
 from .ranks.krawczyk import ROUNDING
@@ -170,7 +170,7 @@ def knots_within(case: Case, path: ProgrammedPath, cover: PathCover, workspace: 
     every, pieces, reason = cover.pieces, None, ""
     try:
         with one_search():
-            division = _Division(*_machine(case, cover, workspace), cover, within, path.lines, _are_turning(case))
+            division = _Division(*_robot_about(case, cover, workspace), cover, within, path.lines, _are_turning(case))
             pieces, reason = division.run()
     except (NotJudgedError, UncoveredError) as error:
         reason = str(error)
@@ -183,7 +183,7 @@ def knots_within(case: Case, path: ProgrammedPath, cover: PathCover, workspace: 
     return knots._replace(deviation=float(pieces.far.max()))
 
 
-def _machine(case: Case, cover: PathCover, workspace: Workspace) -> tuple[Problem, SX]:
+def _robot_about(case: Case, cover: PathCover, workspace: Workspace) -> tuple[Problem, SX]:
     """Return the design about a path, whose pose may leave it in every direction, and its actuators' coordinates.
 
     Raises:
@@ -203,8 +203,8 @@ def _machine(case: Case, cover: PathCover, workspace: Workspace) -> tuple[Proble
     case = replace(case, workspace=opened, joint_centre_tolerance=None)
     closed, first = closed_form(case.model), cover.points(cover.pieces[:1], 0.0)[0]
     problem = replace(build_problem(case, closed.model, pose_box(opened), first), cover=cover)
-    machines = Machines(case, closed, problem)
-    coordinates = coordinates_of(machines)
+    robots = RobotsWithinTolerance(case, closed, problem)
+    coordinates = coordinates_of(robots)
     if coordinates.numel() != len(problem.independent):
         freedoms = len(problem.independent)
         raise NotJudgedError(

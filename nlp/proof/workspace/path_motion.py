@@ -18,8 +18,8 @@ from ..statement.claims import Claim
 from ..statement.motors import actuator_coordinates, speed_claims
 from .numbers.bound_search import Minimum, smallest_values
 from .numbers.extremes import goal_of, verdict_of
-from .numbers.machines import Machines
 from .numbers.path_speeds import PathSpeeds, with_rates
+from .numbers.within_tolerance import RobotsWithinTolerance
 from .proof_record import ProofRecord
 from .robot.path_cover import PathCover
 from .robot.posed_robot import NotJudgedError
@@ -37,19 +37,21 @@ class SpeedsOnPath(NamedTuple):
     number: PathSpeeds | None
 
 
-def speeds_on_path(machines: Machines, cover: PathCover, gap: float, record: ProofRecord | None = None) -> SpeedsOnPath:
+def speeds_on_path(
+    robots: RobotsWithinTolerance, cover: PathCover, gap: float, record: ProofRecord | None = None
+) -> SpeedsOnPath:
     """Return the largest speed of each actuator of all machines along a path with times.
 
     Args:
-        machines: all machines that are meant.
+        robots: robots within the tolerance.
         cover: of the path.
         gap: as a part of a speed.
         record: record of the search for a proof.
     """
-    claims, number = list(speed_claims(machines.case)), None
+    claims, number = list(speed_claims(robots.case)), None
     recorder = None if record is None else TreeRecord()
     try:
-        number = PathSpeeds(with_rates(machines.family, cover), coordinates_of(machines))
+        number = PathSpeeds(with_rates(robots.family, cover), coordinates_of(robots))
         goals = [
             goal_of(claim, wider, gap, is_enough=False)
             for claim, wider in zip(claims, _wider(number, cover).tolist(), strict=True)
@@ -61,7 +63,7 @@ def speeds_on_path(machines: Machines, cover: PathCover, gap: float, record: Pro
         every = [Minimum(reason=str(error))] * len(claims)
     found = []
     for claim, each in zip(claims, every, strict=True):
-        problem = machines.family.problem
+        problem = robots.family.problem
         pose = problem.box.pose(problem.pose_of(each.at)) if math.isfinite(each.value) else None
         found.append(verdict_of(claim, each, pose))
     return SpeedsOnPath(claims, found, number)
@@ -80,14 +82,14 @@ def _wider(number: PathSpeeds, cover: PathCover) -> FloatArray:
     return np.asarray(np.nan_to_num(beyond, posinf=0.0).max(axis=0))
 
 
-def coordinates_of(machines: Machines) -> SX:
+def coordinates_of(robots: RobotsWithinTolerance) -> SX:
     """Return the coordinates (a, 1) of all actuators in those of machines: lengths of legs, or from home.
 
     Raises:
         NotJudgedError: they are not known.
     """
-    layout, family = machines.symbols.layout, machines.family
+    layout, family = robots.symbols.layout, robots.family
     found = actuator_coordinates(layout)
     if not found or len(found) < len(driven_joints(layout.case.model)):
         raise NotJudgedError("the positions of its actuators are not known")
-    return machines.symbols.of(ca.vertcat(*found.values()), family.errors, family.problem.z)
+    return robots.symbols.of(ca.vertcat(*found.values()), family.errors, family.problem.z)

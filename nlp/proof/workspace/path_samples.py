@@ -30,9 +30,9 @@ from ..statement.claims import Claim, searched_claims
 from ..statement.motors import in_motion, motor_claims, speed_claims
 from .judgement import Judgement
 from .numbers.expressions import Expressions
-from .numbers.machines import Machines
 from .numbers.motors import Motors
 from .numbers.searched import Subject
+from .numbers.within_tolerance import RobotsWithinTolerance
 from .path_closing import closed_form_along
 from .path_domain import covered
 from .robot.path_cover import Place
@@ -170,16 +170,16 @@ def _numbers(
     at = np.array([box.coordinates(PoseNumbers(p, R, *turn)) for p, R, turn in pairs])
     try:
         problem = build_problem(case, closed.model, box, at[0])
-        machines = Machines(case, closed, problem)
+        robots = RobotsWithinTolerance(case, closed, problem)
     except NotJudgedError:
         return (), tuple(dict.fromkeys(keys))
     z = np.hstack([at[:, list(problem.free)], _unknowns(closed, joints, len(at))])
     if joints is not None:
         z[~joints.closed] = np.nan
     found, left_out = [], [each.key for each in lost if each.limit is not None]
-    posed = [each for each in machines.symbols.claims((), with_objective=False)[1] if each.limit is not None]
+    posed = [each for each in robots.symbols.claims((), with_objective=False)[1] if each.limit is not None]
     if posed:
-        numbers = Expressions(problem, ca.vertcat(*map(machines.number, posed)))
+        numbers = Expressions(problem, ca.vertcat(*map(robots.number, posed)))
         found += list(_read(posed, numbers.values(z)))
     subject = Subject(case, closed.model, problem)
     for group in _groups(claims):

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..checker.proof_file import Premises, Proof, ProofClaim, ProofError, Unproved, workspace_numbers
 from ..checker.workspace.statement import expected_claims, legs_numbers, robot_claims
-from ..statement.claims import ERRORS, REACH, REGULAR, Claim, ClaimKind, one_machine_name
+from ..statement.claims import ERRORS, REACH, REGULAR, Claim, ClaimKind, one_robot_name
 from ..statement.machine import INSIDE, legs_of, workspace_of_case
 from ..statement.tolerance import second_order_name
 from .judgement import Judgement
@@ -25,7 +25,7 @@ _ROOM = 0.25
 #: Reason of claims about machines within a tolerance that are not known.
 _AS_BUILT = "the robot cannot be assembled with errors of its joint centres"
 #: Reason of numbers of machines whose coordinates follow from others, or that have kinks.
-_BY_MACHINES = "it is proved by a search of boxes for all machines together, which has no proof on paper"
+_BY_BOXES = "it is proved by a search of boxes for all machines together, which has no proof on paper"
 #: Reason of claims of kinds that the checker does not know.
 _NO_RULES = "claims of this kind have no proof on paper"
 NOT_JUDGED = "it was not judged"
@@ -129,7 +129,7 @@ class _Writer:
         Raises:
             ProofError: it has none, with the reason.
         """
-        if self._case.joint_centre_tolerance and self.robot.machines is None:
+        if self._case.joint_centre_tolerance and self.robot.within_tolerance is None:
             raise ProofError(_AS_BUILT)
         if each.kind is ClaimKind.RANK:
             return self._rank(each.name)
@@ -159,14 +159,14 @@ class _Writer:
         """Return the opposite of a claim about a rank, which is refuted at a pose."""
         if found.sides is not None:
             return ProofClaim(name, "", "singular", sides=tuple(map(tuple, found.sides.tolist())))
-        machines = self.robot.machines
-        if machines is None or found.reason:
+        robots = self.robot.within_tolerance
+        if robots is None or found.reason:
             raise ProofError(f"{words_of(found)}; a computed pose has no proof")
         # The determinant has the other sign for the largest errors in these directions too, and is farther from 0.
         if found.errors is None:
             raise ProofError(words_of(found))
         errors = found.errors.vectors.copy()
-        errors *= INSIDE * machines.symbols.tolerance / np.linalg.norm(errors, axis=1).max()
+        errors *= INSIDE * robots.symbols.tolerance / np.linalg.norm(errors, axis=1).max()
         y = pose_box(self._judged.workspace).coordinates(pose)
         sides = [np.concatenate([y, each.ravel()]) for each in (np.zeros_like(errors), errors)]
         return ProofClaim(name, "", "singular", sides=tuple(tuple(side.tolist()) for side in sides))
@@ -179,19 +179,19 @@ class _Writer:
             raise ProofError(_NO_REACH)
         program = self._record.programs.get((found.name, found.sense.value))
         if program is None:
-            raise ProofError(_BY_MACHINES if self._case.joint_centre_tolerance else _ONE_ASSEMBLY)
+            raise ProofError(_BY_BOXES if self._case.joint_centre_tolerance else _ONE_ASSEMBLY)
         return program
 
     def _of_lengths(self, found: Verdict) -> ProofClaim:
         """Return a claim about a telescoping leg, from its lengths or from those of one machine."""
-        directions = self._record.directions.get(one_machine_name(found.name))
+        directions = self._record.directions.get(one_robot_name(found.name))
         if directions is None and self._case.model.unknowns:
             raise ProofError(_ONE_ASSEMBLY)
         if directions is None:
             self._need_lengths([found.name.partition(" limb ")[2]], ("min", "max"))
             return ProofClaim(found.name, found.sense.value, "lengths", found.bound)
-        if any((one_machine_name(found.name), sense) not in self._record.programs for sense in ("min", "max")):
-            raise ProofError(_BY_MACHINES)
+        if any((one_robot_name(found.name), sense) not in self._record.programs for sense in ("min", "max")):
+            raise ProofError(_BY_BOXES)
         sides = tuple(directions.base.tolist()), tuple(directions.platform.tolist())
         return ProofClaim(found.name, found.sense.value, "one machine", found.bound, sides=sides)
 
@@ -220,8 +220,8 @@ class _Writer:
 
     def lemmas(self) -> Iterator[ProofClaim]:
         """Yield the claims that those about every machine rest on."""
-        machines = dict.fromkeys(name for (name, _), each in self.proved.items() if each.reason == "one machine")
-        lengths = [(one_machine_name(name), sense) for name in machines for sense in ("min", "max")]
+        robots = dict.fromkeys(name for (name, _), each in self.proved.items() if each.reason == "one machine")
+        lengths = [(one_robot_name(name), sense) for name in robots for sense in ("min", "max")]
         yield from (self._record.programs[key] for key in lengths if key in self._record.programs)
         for name, sense in [key for key, each in self.proved.items() if each.reason == "program"] + lengths:
             rest = self._record.rests.get((second_order_name(name), sense))

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from ..proof_record import ProofRecord
 
 #: Returns the errors of the machine that is worst at a pose, to first order, and the value of its expression.
-WorstMachine = Callable[[PoseNumbers], tuple[JointErrors, float]]
+WorstRobot = Callable[[PoseNumbers], tuple[JointErrors, float]]
 #: Gap of a bound as a part of the value, where none is asked for.
 GAP = 1e-3
 #: Finest gap that is tried where a limit lies between a bound and the best value known: that of rounding.
@@ -116,7 +116,7 @@ def prove_extreme(
     search: NumberSearch = DEFAULT,
     *,
     time_limit: float | None = None,
-    machine: WorstMachine | None = None,
+    worst: WorstRobot | None = None,
 ) -> Verdict:
     """Prove the smallest or the largest value of a number over a workspace.
 
@@ -127,7 +127,7 @@ def prove_extreme(
         claim: the number.
         search: gap, threads and record.
         time_limit: seconds after which the search stops with the bound reached.
-        machine: returns the machine that is worst at a pose, for a claim about every machine within a tolerance.
+        worst: function that returns the worst robot within the tolerance at a pose; None for a claim about the design.
     """
     sign = claim.sense.sign
     if is_requested():
@@ -146,9 +146,9 @@ def prove_extreme(
         except UncoveredError as error:
             return verdict_of(claim, Minimum(reason=str(error)))
     pose = None if x is None else _pose(nlp, x)
-    if pose is None or machine is None:
+    if pose is None or worst is None:
         return verdict_of(claim, found, pose)
-    errors, value = machine(pose)
+    errors, value = worst(pose)
     return verdict_of(claim, found._replace(value=-sign * value), pose, errors=errors)
 
 

@@ -83,11 +83,11 @@ class _RowsNumber(Number):
     Args:
         problem: the design, or all machines that are meant.
         length: by which moments about the platform's origin are divided.
-        machines: those of which values are; of the problem if left out.
+        family: robots whose values are taken; those of the problem if None.
     """
 
-    def __init__(self, problem: Problem, length: float, machines: Problem | None = None) -> None:
-        scaled, of = problem.posed.scaled, machines or problem
+    def __init__(self, problem: Problem, length: float, family: Problem | None = None) -> None:
+        scaled, of = problem.posed.scaled, family or problem
         super().__init__(problem, ca.vertcat(ca.vec(ca.densify(scaled.rows)), scaled.sizes))
         self._scale = np.array([1.0, 1.0, 1.0, *[problem.length / length] * 3])
         self._jacobian = ca.Function("J", [of.z], [ca.densify(of.posed.scaled.jacobian)])
@@ -121,7 +121,7 @@ class SingularValues(_RowsNumber):
         problem: the design, or all machines that are meant, whose errors count entry by entry.
         length: by which moments about the platform's origin are divided.
         is_condition: whether minus the condition number is meant, whose smallest value is that of the worst pose.
-        machines: all that are meant, where the problem is the design alone.
+        family: all robots within the tolerance, if the problem is only the design.
         change: by which every singular value of theirs differs from the design's at most.
     """
 
@@ -131,11 +131,11 @@ class SingularValues(_RowsNumber):
         length: float,
         *,
         is_condition: bool,
-        machines: Problem | None = None,
+        family: Problem | None = None,
         change: float = 0.0,
     ) -> None:
-        super().__init__(problem, length, machines)
-        self._is_condition, self._change, self._machines = is_condition, change, machines
+        super().__init__(problem, length, family)
+        self._is_condition, self._change, self._family = is_condition, change, family
         self._has_six = problem.posed.scaled.rows.shape[0] >= 6
         if is_condition:
             self.entries = ca.vertcat(self.entries, ca.vec(ca.densify(problem.posed.scaled.jacobian)))
@@ -143,26 +143,26 @@ class SingularValues(_RowsNumber):
     @cached_property
     def _slopes(self) -> ca.Function:
         """The derivatives of u . J v by the errors of machines."""
-        of = self._machines or self.problem
+        of = self._family or self.problem
         J = of.posed.scaled.jacobian * ca.repmat(SX(self._scale.tolist()).T, of.posed.scaled.rows.shape[0], 1)
         u, v = SX.sym("u", J.shape[0]), SX.sym("v", J.shape[1])
         return ca.Function("slopes", [of.z, u, v], [ca.densify(ca.gradient(ca.dot(u, J @ v), of.errors))])
 
-    def _worst(self, machines: Problem, z: FloatArray) -> FloatArray:
+    def _worst(self, family: Problem, z: FloatArray) -> FloatArray:
         """Return the machines that are worst to first order at points (P, n) of the design."""
-        z = machines.exact(z)
+        z = family.exact(z)
         if not self._has_six:
             return z
         u, s, v = np.linalg.svd(np.nan_to_num(self.jacobian(z)))
-        slopes = np.zeros((len(z), len(machines.of_errors)))
+        slopes = np.zeros((len(z), len(family.of_errors)))
         # The logarithm of the condition number falls with that of the smallest one, and grows with that of the largest.
         for k, weight in ((5, -1.0), (0, 1.0)) if self._is_condition else ((5, -1.0),):
             slopes += weight / s[:, k, None] * values_at(self._slopes, z, u[:, :, k], v[:, k])[0][:, :, 0]
-        return machines.with_errors(z, slopes)
+        return family.with_errors(z, slopes)
 
     def values(self, z: FloatArray) -> FloatArray:
         """Return the values (P, 1) at points (P, n)."""
-        J = self.jacobian(z if self._machines is None else self._worst(self._machines, z))
+        J = self.jacobian(z if self._family is None else self._worst(self._family, z))
         known = np.asarray(np.isfinite(J).all(axis=(1, 2)))
         values = np.linalg.svd(np.where(known[:, None, None], J, 0.0), compute_uv=False)
         least = values[:, 5] if self._has_six else np.zeros(len(values))
@@ -173,10 +173,10 @@ class SingularValues(_RowsNumber):
 
     def worst(self, y: FloatArray) -> FloatArray | None:
         """Return the errors (m, 3) that are worst at a pose (6,) to first order; None for the design."""
-        if self._machines is None:
+        if self._family is None:
             return None
-        machine = self._worst(self._machines, y[None, list(self.problem.free)])[0]
-        return self._machines.errors_of(machine).vectors
+        robot = self._worst(self._family, y[None, list(self.problem.free)])[0]
+        return self._family.errors_of(robot).vectors
 
     def over(self, forms: Forms, count: int) -> Bounds:
         """Return lower bounds over boxes; see :meth:`.bound_search.Number.over`."""

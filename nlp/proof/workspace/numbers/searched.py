@@ -52,22 +52,22 @@ class Subject:
     Attributes:
         case: with fixed dimensions.
         model: its robot, without unknowns that follow in closed form.
-        machines: the design, or all machines within its tolerance, over the workspace; None where they are not judged.
+        family: the design, or all robots within the tolerance, over the workspace; None if they are not judged.
         reason: why they are not; else empty.
         shortest: no leg of any machine is shorter over the workspace.
     """
 
     case: Case
     model: Model
-    machines: Problem | None
+    family: Problem | None
     reason: str = ""
     shortest: float = 0.0
 
     def errors(self, vectors: FloatArray | None, *, of_legs: bool = False) -> JointErrors | None:
         """Return errors (m, 3) of joint centres, or of those of legs alone, with their names; None for the design."""
-        if vectors is None or self.machines is None:
+        if vectors is None or self.family is None:
             return None
-        names, found = self.machines.names, np.zeros((len(self.machines.names), 3))
+        names, found = self.family.names, np.zeros((len(self.family.names), 3))
         of = [names.index(each) for leg in self.case.model.legs for each in leg.centres] if of_legs else slice(None)
         found[of] = vectors
         return JointErrors(names, found)
@@ -84,9 +84,9 @@ class Subject:
         Raises:
             NotJudgedError: the machines that are meant are not judged.
         """
-        if self.machines is None:
+        if self.family is None:
             raise NotJudgedError(self.reason)
-        return self.machines.problem
+        return self.family.problem
 
     def number(self, claim: Claim) -> SingularValues | Clearance:
         """Return what has bounds of the number of a claim about a clearance or a spectrum, or of minus it."""
@@ -100,10 +100,10 @@ class Subject:
         """Return the smallest singular value of J, or minus its condition number."""
         problem = self.problem
         if not (self.legs.tolerance and has_straight_legs(self.case.model)):
-            return SingularValues(self.machines or problem, length, is_condition=is_condition)
+            return SingularValues(self.family or problem, length, is_condition=is_condition)
         # The change of J by errors of six straight legs has a bound of its own.
         change = change_of_rows(self.legs, length, self.shortest)
-        return SingularValues(problem, length, is_condition=is_condition, machines=self.machines, change=change)
+        return SingularValues(problem, length, is_condition=is_condition, family=self.family, change=change)
 
 
 def searched_extremes(subject: Subject, names: Sequence[str], search: NumberSearch) -> Iterator[Verdict]:
@@ -186,10 +186,10 @@ def _motor_answers(
         record: record of the search for a proof.
     """
     try:
-        if subject.machines is None:
+        if subject.family is None:
             raise NotJudgedError(subject.reason)
-        number, problem = Motors(subject.machines, subject.case, claims), subject.machines.problem
-        z = np.tile(subject.machines.start, (2 * _POINTS, 1))
+        number, problem = Motors(subject.family, subject.case, claims), subject.family.problem
+        z = np.tile(subject.family.start, (2 * _POINTS, 1))
         if problem.cover:
             z[:, problem.of_path] = _points_of_path(problem, problem.cover)
         else:
@@ -201,7 +201,7 @@ def _motor_answers(
         products = np.nan_to_num(number.products(closed), posinf=0.0)
         sizes = np.maximum(sizes, _SMALL * np.median(products, axis=0))
         allowed = MOTOR_GAP * sizes
-        if subject.machines.names and not problem.dependent:
+        if subject.family.names and not problem.dependent:
             z = z[:, : len(problem.start)]
             allowed = allowed + np.nan_to_num(values - number.bounds(z, z), posinf=0.0).max(axis=0)
         goals = [goal_of(claim, gap, is_enough=False) for claim, gap in zip(claims, allowed.tolist(), strict=True)]

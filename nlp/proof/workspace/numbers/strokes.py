@@ -79,7 +79,7 @@ class _Combined:
             tighter, nearer = before.bound - extreme.bound, extreme.reached - before.reached
             if not (self._sign * tighter > 0 or self._sign * nearer > 0):
                 break
-        return ends, self.of_one_machine(extreme, ends)
+        return ends, self.of_one_robot(extreme, ends)
 
     def lengths(self, gap: float, about: Directions | None) -> list[Verdict] | None:
         """Return the shortest and the longest length, proved to a gap; None where one cannot."""
@@ -103,7 +103,7 @@ class _Combined:
         poses = [each.pose for each in ends if each.pose is not None]
         if not self._legs.tolerance or len(poses) < len(ends):
             return float(self._factors @ [each.reached for each in ends]), None
-        if self._subject.machines is None or self._subject.machines.has_following:
+        if self._subject.family is None or self._subject.family.has_following:
             # Both poses are of different machines.
             return math.nan, None
         # The errors are along the change of the number, to first order.
@@ -124,7 +124,7 @@ class _Combined:
         d /= np.linalg.norm(d, axis=1, keepdims=True)
         return d, np.array([n @ pose.rotation for n, pose in zip(d, poses, strict=True)])
 
-    def of_one_machine(self, extreme: Verdict, ends: Sequence[Verdict]) -> Verdict:
+    def of_one_robot(self, extreme: Verdict, ends: Sequence[Verdict]) -> Verdict:
         """Return an extreme that is open with a bound for machines whose errors are the same at both poses."""
         poses = [each.pose for each in ends if each.pose is not None]
         if not self._legs.tolerance or extreme.outcome is not Outcome.OPEN or len(poses) < len(ends):

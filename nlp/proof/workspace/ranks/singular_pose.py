@@ -175,17 +175,17 @@ class SingularPose:
         closed = np.abs(problem.loops.values(z[:, None])).max(initial=0.0) <= _CLOSED
         return bool(closed and problem.box.holds(problem.pose_of(z))) and self.smallest(z) <= SINGULAR
 
-    def machines(self, z: FloatArray) -> Iterator[FloatArray]:
+    def robots(self, z: FloatArray) -> Iterator[FloatArray]:
         """Yield points (n,) of machines with smaller and smaller singular values, from a point of the design."""
-        problem, machine = self.problem, z
+        problem, robot = self.problem, z
         for step in range(_MACHINES):
-            closed = problem.loops.all_closed(machine[:, None], problem.dependent)[:, 0]
+            closed = problem.loops.all_closed(robot[:, None], problem.dependent)[:, 0]
             slopes = self.slopes(closed)
             if slopes is None:
                 return
             end = problem.with_errors(closed[None], -slopes[None, problem.of_errors])[0]
-            machine = closed + 2 / (step + 2) * (end - closed)
-            yield machine
+            robot = closed + 2 / (step + 2) * (end - closed)
+            yield robot
 
 
 class _NullVector:
@@ -393,7 +393,7 @@ class SingularSearch:
         if singular is not None or not self._problem.names or boxes < self._due or found.is_regular.all():
             return singular
         self._due = 2 * boxes
-        return self._machine(self._middle(found, worst[0]))
+        return self._singular_robot(self._middle(found, worst[0]))
 
     def everywhere(self) -> Singular | None:
         """Return the pose of the start, of a structure that is singular at every pose."""
@@ -408,8 +408,8 @@ class SingularSearch:
         values = np.array([self._newton.smallest(each) for each in points])
         worst = [points[k] for k in np.argsort(values)[:_TRIED] if np.isfinite(values[k])]
         found = (self._pose(point) for point in worst)
-        machines = (self._machine(point) for point in worst if problem.names)
-        return next((each for each in itertools.chain(found, machines) if each is not None), None)
+        robots = (self._singular_robot(point) for point in worst if problem.names)
+        return next((each for each in itertools.chain(found, robots) if each is not None), None)
 
     def _by_signs(self, signs: DeterminantSigns, found: Examined) -> Singular | None:
         """Return a singular pose between two with opposite signs: random ones, and the centres of boxes."""
@@ -422,7 +422,7 @@ class SingularSearch:
         if between is not None or not self._problem.names:
             return between
         nearest = first_largest(1 / np.where(values, np.abs(values), np.inf))
-        return self._machine(points[nearest])
+        return self._singular_robot(points[nearest])
 
     def _between(
         self, signs: DeterminantSigns, points: FloatArray, values: FloatArray | NDArray[np.int32]
@@ -465,14 +465,14 @@ class SingularSearch:
             between = self._between(self._signs, points, self._signs.computed(points))
         return between or self._shown(near, BY_NEWTON)
 
-    def _machine(self, z: FloatArray) -> Singular | None:
+    def _singular_robot(self, z: FloatArray) -> Singular | None:
         """Return a singular machine at a point of the design, or near it."""
         signs, is_held = self._signs, self._problem.box.holds(self._problem.pose_of(z))
-        for machine in self._newton.machines(z):
+        for robot in self._newton.robots(z):
             if signs is None:
-                found = self._shown(self._newton.search(machine), BY_NEWTON)
+                found = self._shown(self._newton.search(robot), BY_NEWTON)
             else:
-                found = self._shown(signs.change(z, machine) if is_held else None, "")
+                found = self._shown(signs.change(z, robot) if is_held else None, "")
             if found is not None:
                 return found
         return None

@@ -32,9 +32,9 @@ from ...statement.motors import motor_claims
 from ..numbers.bound_search import Number
 from ..numbers.clearance import Clearance
 from ..numbers.expressions import ranges
-from ..numbers.machines import Machines
 from ..numbers.motors import Motors
 from ..numbers.searched import Subject
+from ..numbers.within_tolerance import RobotsWithinTolerance
 from ..ranks.krawczyk import Coordinates, Relation, relation_of, with_relation
 from ..ranks.loop_boxes import LoopBoxes
 from ..robot.pose_box import pose_box
@@ -96,7 +96,7 @@ class SliceLimits:
     def __init__(self, case: Case, closed: ClosedForm, workspace: Workspace) -> None:
         case = replace(case, joint_centre_tolerance=None)
         self.problem = problem = build_problem(case, closed.model, pose_box(workspace))
-        alone = Machines(case, closed, problem)
+        alone = RobotsWithinTolerance(case, closed, problem)
         reaches, claims = alone.symbols.claims((), with_objective=False)
         claims += dependent_claims(alone.symbols.layout.robots[0], workspace)
         known = [claim for claim in claims if claim.limit is not None and alone.is_covered(claim)]

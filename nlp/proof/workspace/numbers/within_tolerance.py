@@ -35,12 +35,12 @@ from ...statement.claims import Claim
 from ...statement.machine import JointErrors
 from ...statement.tolerance import (
     BuiltModel,
-    MachineLayout,
+    ToleranceLayout,
     built_model,
     design_layout,
     is_smooth,
-    machine_layout,
     second_order_name,
+    tolerance_layout,
 )
 from ..proof_record import ProofRecord
 from ..robot.pose_box import PoseNumbers, pose_coordinates
@@ -61,7 +61,7 @@ _SMALL_TURN = 0.03
 _POSES, _SEED = 32, 0
 
 
-class Machines:
+class RobotsWithinTolerance:
     """Every machine within a tolerance; the design alone without one.
 
     Args:
@@ -89,7 +89,7 @@ class Machines:
         except RobotError as error:
             raise NotJudgedError(str(error)) from None
         self.family: Problem = family_of(case, self.built, design, tolerance)
-        self.symbols: MachineLayout = machine_layout(case, self.built, tolerance, self._at)
+        self.symbols: ToleranceLayout = tolerance_layout(case, self.built, tolerance, self._at)
         self._rests: dict[tuple[str, str], float] = {}
 
     @cached_property
@@ -157,7 +157,7 @@ class Machines:
             UncoveredError: the expression holds an operation without a rule.
         """
         family, symbols, design, sign = self.family, self.symbols, self._design, claim.sense.sign
-        whole, machine = claim.expression, None
+        whole, worst = claim.expression, None
         if any(ca.which_depends(number, family.errors, 1, True)):
             values = Expressions(family, number)
             rest = self._rest(claim, number, values)
@@ -167,12 +167,12 @@ class Machines:
             sizes = enumerate(symbols.near_zero(whole, design).tolist())
             change = sum((ca.norm_2(ca.vertcat(gradient[3 * j : 3 * j + 3], size)) for j, size in sizes), SX(0))
             whole += sign * (family.tolerance * change * _OUTWARDS + rest)
-            machine = partial(self._worst, values, sign)
+            worst = partial(self._worst, values, sign)
             if search.record is not None:
                 search.record.rests[second_order_name(claim.name), claim.sense.value] = rest
         pose = design.table.variables_vector
         of_design = replace(claim, expression=symbols.of(whole, SX.zeros(symbols.errors.numel()), pose))
-        return replace(prove_extreme(design, of_design, search, machine=machine), claim=claim)
+        return replace(prove_extreme(design, of_design, search, worst=worst), claim=claim)
 
     def _worst(self, values: Expressions, sign: float, pose: PoseNumbers) -> tuple[JointErrors, float]:
         """Return the errors that are worst at a pose to first order, and the number with them."""

@@ -23,16 +23,16 @@ AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 _NEAR, _ZERO = 1e-3, 1e-9
 
 
-class Coordinates(NamedTuple):
-    """Indices of the independent coordinates of a pose.
+class LocalCoordinates(NamedTuple):
+    """Indices of the independent and of the dependent coordinates of a pose, in the order of ``AXES``.
 
     Attributes:
-        alone: those that the robot chooses.
-        others: those that follow from these, and move with them.
+        independent: indices of the coordinates that the robot controls independently.
+        dependent: indices of the coordinates that follow from the independent ones.
     """
 
-    alone: list[int]
-    others: list[int]
+    independent: list[int]
+    dependent: list[int]
 
 
 def box_about(start: FloatArray, ends: dict[int, tuple[float, float]]) -> Workspace:
@@ -43,7 +43,7 @@ def box_about(start: FloatArray, ends: dict[int, tuple[float, float]]) -> Worksp
     return Workspace(values[:3], Turns(TurnKind.ROLL_PITCH_YAW, tuple(values[3:])))
 
 
-def coordinates_alone(case: Case, start: FloatArray, length: float) -> Coordinates:
+def local_coordinates(case: Case, start: FloatArray, length: float) -> LocalCoordinates:
     """Return the coordinates by which a robot's freedoms are counted.
 
     Args:
@@ -56,14 +56,14 @@ def coordinates_alone(case: Case, start: FloatArray, length: float) -> Coordinat
     chosen = independent_coordinates(case, about) or list(range(6))
     if len(chosen) < len(AXES):
         moved = dependent_of(case, box_about(start, {k: (start[k] - half[k], start[k] + half[k]) for k in chosen}))
-        return Coordinates(chosen, [each.index for each in moved.dependent])
+        return LocalCoordinates(chosen, [each.index for each in moved.dependent])
     try:
         problem = build_problem(case, closed_form(case.model).model, pose_box(about))
     except NotJudgedError:
-        return Coordinates(list(range(len(AXES))), [])
+        return LocalCoordinates(list(range(len(AXES))), [])
     # Loops of a robot that is given by its rows are not known: its constraint wrenches must do no work.
     work = np.zeros(6) if problem.unactuated is None else _work(problem, problem.unactuated.matrix, start)
-    return Coordinates(np.flatnonzero(work <= _ZERO).tolist(), [])
+    return LocalCoordinates(np.flatnonzero(work <= _ZERO).tolist(), [])
 
 
 def _work(problem: Problem, matrix: ca.SX, start: FloatArray) -> FloatArray:
