@@ -55,7 +55,7 @@ class CaseForces(NamedTuple):
 
     @property
     def squares(self) -> tuple[SX, ...]:
-        """Squares (a, 1) of the largest and the smallest force of each actuator, in any order; one if both are equal."""
+        """Squares (a, 1) of largest and smallest force of each actuator, in any order; one if both are equal."""
         if self.spread.is_zero():
             return (self.centre**2 / self.divisor**2,)
         return tuple((self.centre + sign * self.spread) ** 2 / self.divisor**2 for sign in (1, -1))

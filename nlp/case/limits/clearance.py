@@ -33,8 +33,8 @@ from .limit import PosedRobot
 #: Largest limit to which a constraint can be changed, in parts of the distance D beyond which it is 1: closer to D, the
 #: slope falls below an eighth of the slope at the original limit.
 _MOST = 0.9
-#: Regularisation of the division for parallel lines, relative to the squared lengths. The next two clampings correct the
-#: error in s: the squared distance is too large by at most a quarter of this part of a leg's squared length.
+#: Regularisation of the division for parallel lines, relative to the squared lengths. The next two clampings correct
+#: the error in s: the squared distance is too large by at most a quarter of this part of a leg's squared length.
 _PARALLEL = 1e-10
 
 
