@@ -207,7 +207,11 @@ class Case(Whole, Shown):
             CaseError: there is such a limit.
         """
         for limit in self.without_motion:
-            raise CaseError(f"limits.{limit.name}", f"has no effect without [motion]{without}", source=self.source)
+            raise CaseError(
+                f"limits.{limit.name}",
+                f"needs [motion], the largest speeds of the platform{without}",
+                source=self.source,
+            )
 
     def parameter_name(self, name: str) -> str:
         """Return the name of a parameter or component in this case; see :mod:`.names`.
@@ -418,7 +422,7 @@ def _check_parameters(case: Case) -> dict[str, tuple[Value, ...]]:
     for name, parameter in known.items():
         key = f"robot.parameters.{name}"
         if name not in case.parameters:
-            raise CaseError(key, f"is missing: {parameter.description}, {_allowed_form(parameter)}")
+            raise CaseError(key, f"is missing: {parameter.description}; give {_allowed_form(parameter)}")
         given = case.parameters[name]
         if isinstance(given, str | bytes):  # a sequence too, but of no numbers
             check_real(given, key)
@@ -484,7 +488,9 @@ def _check_rotation(case: Case, given: Rotation, pose: str) -> Rotation:
     for place, end in ends.items():
         if abs(end) > largest:
             allowed = case.units.text(largest, Dimension.ANGLE)
-            raise CaseError(place, f"must be at most {allowed} in size {why}", case.units.shown(end, Dimension.ANGLE))
+            raise CaseError(
+                place, f"must be at most {allowed} in magnitude {why}", case.units.shown(end, Dimension.ANGLE)
+            )
     lopsided = isinstance(angle, Free) and angle.lower < 0 < angle.upper and not math.isclose(-angle.lower, angle.upper)
     if given.axis is None and isinstance(angle, Free) and lopsided:
         fault = "must be -max, or have the sign of max: about a free axis the sign of an angle has no meaning"

@@ -53,7 +53,7 @@ def _read_trajectory(written: AlongTable, tasks: Sequence[Task], units: Units, k
     if written.task is None and len(tasks) > 1:
         raise CaseError(f"{key}.task", f"is missing: give the name of one of the tasks {listing(names)}")
     if written.task is not None and written.task not in names:
-        raise CaseError(f"{key}.task", f"is no task of this case; allowed: {listing(names)}", written.task)
+        raise CaseError(f"{key}.task", f"no such task; allowed: {listing(names)}", written.task)
     if written.first == written.last:
         raise CaseError(f"{key}.last", f"must differ from first = {written.first:g}", written.last)
     twist = tasks[0 if written.task is None else names.index(written.task)].twist

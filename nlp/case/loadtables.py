@@ -57,7 +57,7 @@ class LoadTable(Table):
         if self.mass is not None and given:
             raise fault_of(given[0], "conflicts with mass; write another [[load]]")
         if self.mass is None and "centre" in self.model_fields_set:
-            raise fault_of("centre", "has no effect without mass; the point of a force is point")
+            raise fault_of("centre", "has no effect without mass; for a force, use point")
         return self
 
 

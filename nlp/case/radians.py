@@ -52,7 +52,7 @@ def check_radians(angles: Iterable[tuple[str, float]], units: Units) -> None:
     """
     for key, angle in angles:
         if abs(angle) > _TURN * (1 + _ROUNDING):
-            fault = f"must be at most {units.text(_TURN, Dimension.ANGLE)} in size"
+            fault = f"must be at most {units.text(_TURN, Dimension.ANGLE)} in magnitude"
             raise CaseError(key, fault, units.shown(angle, Dimension.ANGLE))
 
 

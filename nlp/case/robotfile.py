@@ -237,7 +237,7 @@ def _error(fault: ErrorDetails, tables: dict[str, Any]) -> CaseError:
     needed = _NEEDED.get(str(location[-1])) if fault["type"] == "missing" else None
     # "points" is a key too, and not a slip for "joint".
     if needed and (written.fault == "is missing" or location == ["joint"]):
-        return CaseError(_place(location), f"is missing: give {needed}", written.value)
+        return CaseError(_place(location), f"is missing; it must be {needed}", written.value)
     return CaseError(_place(location), written.fault, written.value)
 
 

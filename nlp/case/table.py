@@ -158,7 +158,20 @@ _FORMS = {
     "limb": "must be a list of tables: write [[limb]], with two brackets",
     "published": "must be a list of tables: write [[published]], with two brackets",
 }
-#: Keys that name a file, and those of the tables that its rows become.
+#: Advice for missing keys of case files.
+_MISSING = {
+    **dict.fromkeys(("min", "max", "first", "last", "value", "joint_centre"), "give a number"),
+    **dict.fromkeys(("quantity", "source"), "give text in quotes"),
+    **dict.fromkeys(("translation", "acceleration"), "give a list of 3 numbers"),
+    "count": "give a whole number",
+    "length": "give a length by which moments are divided",
+    "position": "give a list of 3, each a number or { min, max }",
+    "reproduced": "give true or false",
+    "robot": "add a table [robot]",
+    "sense": "give 'max' or 'min'",
+    "within": "give the largest allowed difference",
+}
+#: Keys with the name of a file, and keys of the tables that its rows become.
 _FILES = {"poses": "pose", "tasks": "task"}
 
 
@@ -197,14 +210,28 @@ def _sentence_of_missing_key(key: str, table: object) -> str:
     import difflib  # noqa: PLC0415 - only messages need it
 
     close = difflib.get_close_matches(key, table if isinstance(table, dict) else (), n=1)
-    return f"is missing; rename {close[0]!r}?" if close else "is missing"
+    if close:
+        return f"is missing; rename {close[0]!r}?"
+    return f"is missing: {_MISSING[key]}" if key in _MISSING else "is missing"
 
 
 def _sentence_of_number(fault: ErrorDetails) -> str:
     """Return the message about a value that is not a number."""
-    location = fault["loc"]
+    location, text = fault["loc"], fault["input"]
     if location[-1] == "pitch":
         return "must be a number, or inf without quotes"
-    if location[-1] != "<number>":
-        return "must be a number"
-    return "must be a number or a list of numbers" if location[0] == "published" else "must be a number or { min, max }"
+    allowed = "must be a number"
+    if location[-1] == "<number>":
+        allowed += " or a list of numbers" if location[0] == "published" else " or { min, max }"
+    return f"{allowed}{_hint_of_number(text)}" if isinstance(text, str) else allowed
+
+
+def _hint_of_number(text: str) -> str:
+    """Return a hint for a text in the place of a number: without quotes, or without a unit; else empty."""
+    from ..system.slips import hint_of  # noqa: PLC0415 - only messages need it
+
+    try:
+        float(text)
+    except ValueError:
+        return hint_of(text)
+    return f"; write {text.strip()} without quotes"

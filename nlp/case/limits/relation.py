@@ -124,7 +124,7 @@ def _constant(tree: ast.expr, angle: float) -> float | None:
     if sign == "^" and last is not None and abs(last) > LARGEST_POWER:
         raise ExpressionError(f"must have exponents of at most {LARGEST_POWER:g} in magnitude, got {last:g}")
     if sign == "/" and last == 0:
-        raise ExpressionError("divides by zero")
+        raise ExpressionError("divides by zero, which is not allowed")
     if None in values:
         return None
     value = float(expression(tree, {}, angle))
@@ -224,7 +224,8 @@ class _Reader:
             found = _TOKEN.match(self._text, at)
             if found is None:
                 at += len(self._text[at:]) - len(self._text[at:].lstrip())
-                raise ExpressionError(f"{self._text[at]!r} at position {at + 1} is not allowed: {self._pointed(at)}")
+                fault = f"{self._text[at]!r} at position {at + 1} is not allowed: {self._pointed(at)}"
+                raise ExpressionError(f"{fault}; allowed are numbers, names, + - * / ^ ( ) and one of >=, <=, ==")
             kind = str(found.lastgroup)
             text, start = found[kind], found.start(kind)
             head = text.partition(".")[0]

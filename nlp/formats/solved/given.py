@@ -104,7 +104,7 @@ def _closed(robot: GivenRobot, at_home: Mechanism, words: Sequence[ExportedJoint
 
 
 def _apart(robot: GivenRobot, closed: ClosedMechanism, wanted: Mapping[str, float], size: float) -> float:
-    """Return the largest difference from the program's pose and coordinates, radians or relative to the robot's size."""
+    """Return the largest difference from the program's pose and coordinates, radians or relative to the size."""
     found = closed.mechanism
     platform = found.link(found.platform)
     apart = [
@@ -159,7 +159,7 @@ def _actuators(robot: GivenRobot, at_home: Mechanism, limbs: Mapping[str, Sequen
 
 
 def _link_names(at_home: Mechanism, words: Sequence[ExportedJoint]) -> dict[str, str]:
-    """Return the name of each link, from the first joint that leads to it; rods of a parallelogram keep their suffix."""
+    """Return the name of each link, from the first joint that leads to it; parallelogram rods keep their suffix."""
     found: dict[str, str] = {}
     for joint, each in zip(at_home.joints, words, strict=True):
         is_shared = each.name.endswith("_back_a")

@@ -25,12 +25,12 @@ _PARALLEL = 1e-9
 
 _UPS = (
     "Legs are U, P and S joints. The model of the robot has only lines between joint centres, so the axes of each U are"
-    " assumptions: the first one is fixed to the base, normal to the leg and to the z axis of the base at this pose; the"
-    " second one is normal to the first one and to the leg."
+    " assumptions: the first one is fixed to the base, normal to the leg and to the z axis of the base at this pose;"
+    " the second one is normal to the first one and to the leg."
 )
 _UPU = (
-    "Limbs are U, P and U joints. The axes on the platform are those of the model. The model does not define the axes on"
-    " the base, which are assumed to be parallel to those on the platform at this pose."
+    "Limbs are U, P and U joints. The axes on the platform are those of the model. The model does not define the axes"
+    " on the base, which are assumed to be parallel to those on the platform at this pose."
 )
 
 
@@ -55,7 +55,7 @@ def check_legs(model: Model) -> None:
     """Refuse a robot given by its rows if not all of them belong to straight legs.
 
     Raises:
-        InputError: a limb is not a straight leg, or its rows are neither a force nor a force and a couple about an axis.
+        InputError: a limb is not a straight leg, or its rows are neither a force nor a force and a couple.
     """
     kinds: dict[str, list[WrenchKind]] = {leg.name: [] for leg in model.legs}
     drawn: Mapping[str, int] = {name: len(axes_of(model, name)) for name in kinds}

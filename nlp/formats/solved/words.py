@@ -30,7 +30,7 @@ class ExportedJoint:
         label: label of the joint in the robot file, such as ``2:3``: limb and number.
         part: name of the joint coordinate, such as ``first``; empty for a joint with one coordinate.
         actuator: name of the actuator in results; empty for a passive joint.
-        coordinate: coordinate from home at the pose, radians or length; None for a spherical joint, or a joint of a leg.
+        coordinate: coordinate from home at the pose, radians or length; None for a spherical joint or a joint of a leg.
         lever: length of a parallelogram's rod, if limits are on its displacement instead of its angle; else None.
         follows: True if another hinge of the parallelogram has the coordinate of the limits.
     """
@@ -122,7 +122,7 @@ def extent_of(mechanism: Mechanism) -> float:
 
 
 def framed(mechanism: Mechanism, coordinates: Mapping[str, float], size: float) -> Mechanism:
-    """Return a mechanism with link frames at joints, and with the points of prismatic and helical joints on inner links.
+    """Return a mechanism with link frames at joints, and points of prismatic and helical joints on inner links.
 
     Args:
         mechanism: mechanism with the points of prismatic and helical joints on outer links.
@@ -191,7 +191,7 @@ def _rotation(points: Sequence[FloatArray], axes: Sequence[FloatArray], size: fl
 
 
 def _across(directions: Sequence[FloatArray], axis: FloatArray) -> FloatArray:
-    """Return the unit vector (3,) of the first direction that is not parallel to a unit axis, projected normal to it."""
+    """Return the unit vector (3,) of the first direction not parallel to a unit axis, projected normal to it."""
     parts = (direction - axis * float(direction @ axis) for direction in directions)
     # The directions include three world axes, of which at least one is not parallel to the axis.
     part = next(part for part in parts if float(np.linalg.norm(part)) > _PARALLEL)
