@@ -123,7 +123,7 @@ def check_pose(case: Case, pose: int) -> None:
         InputError: the case has fewer poses.
     """
     if not 1 <= pose <= case.pose_count:
-        raise InputError(f"--pose {pose}: must be from 1 to {case.pose_count}, the number of poses of the case")
+        raise InputError(f"--pose {pose}: the case has {case.pose_count} pose{'s' * (case.pose_count > 1)}")
 
 
 def check_formats(formats: Collection[str]) -> tuple[str, ...]:

@@ -143,7 +143,9 @@ def test_what_is_chosen_is_shown_and_a_result_is_taken_up(tmp_path: Path, cli: R
     output_of(cli("export", str(path), "--of", str(target), "--format", "csv", "--out", str(tmp_path / "robot")))
     assert "the best of 6 combinations of values" in report(solve(case))
     for command in (("evaluate",), ("codegen", "--out", str(tmp_path / "c"))):
-        refusal_of(cli(command[0], str(path), *command[1:]), "robot.parameters.x1: has values, of which solve")
+        refusal_of(
+            cli(command[0], str(path), *command[1:]), "robot.parameters.x1: has catalogue values, and only solve"
+        )
     refusal_of(cli("solve", str(path), "--set", "x1.min=3"), "x1 has catalogue values and no bounds")
     proof = ("--proof", str(tmp_path / "proof"))
     refusal_of(cli("certify", str(path), *proof), "--proof: each combination of listed values")

@@ -68,7 +68,7 @@ def test_refusals_are_one_sentence_and_write_nothing(tmp_path: Path, cli: Run, m
     for words, fault in {
         ("--format", "stl", "--out", str(out)): "--format stl: no such format; allowed: mjcf, urdf, csv, dxf, all",
         ("--format", "mjcf", "--out", str(tmp_path / "full")): "holds mine.txt, which screwsynth did not write",
-        ("--format", "mjcf", "--out", str(out), "--pose", "2"): "--pose 2: must be from 1 to 1",
+        ("--format", "mjcf", "--out", str(out), "--pose", "2"): "--pose 2: the case has 1 pose",
     }.items():
         refusal_of(cli("export", case, *words), fault)
     monkeypatch.setitem(sys.modules, "ezdxf", None)
@@ -175,7 +175,7 @@ FAULTS: list[tuple[str, str | bytes, tuple[str, ...], str]] = [
     ("m.xml", HEAD, (*BODY, "--actuated", "ear"), "--actuated ear: no such joint between base and platform"),
     ("m.xml", HEAD, (*BODY, "--actuated", "passive_1"), "the ball joint passive_1 must not have an actuator; only hinges and slides may"),
     ("m.urdf", URDF, BODY, "no joint between base and platform has an actuator; name actuated joints with --actuated; allowed: stewart_1"),
-    ("m.xml", HEAD, (*BODY, "--loops", "x.yaml"), "--loops x.yaml: is for URDF files"),
+    ("m.xml", HEAD, (*BODY, "--loops", "x.yaml"), "--loops x.yaml: is only for URDF files"),
     # Loops.
     ("m.xml", reachy.mjcf(lift=0.001), BODY, "the loop loop_1 is open by 0.001 and 0 deg, more than 1e-06 of the robot's size 0.117; --close closes it by Newton's method"),
     # Hostile and broken files.
@@ -198,8 +198,8 @@ FAULTS: list[tuple[str, str | bytes, tuple[str, ...], str]] = [
     ("m.xml", HEAD.replace('axis="', 'axis="nan '), BODY, "MuJoCo cannot read it: "),
     ("m.xml", HEAD.replace('joint="stewart_3"', 'joint="stewart_9"'), BODY, "an actuator drives 'stewart_9', which is not a hinge or slide of the model"),
     ("m.xml", HEAD.replace("<equality>", '<equality><joint joint1="stewart_1" joint2="stewart_2" polycoef="0 1 2 0 0"/>'), BODY, "must be linear"),
-    ("m.xml", HEAD.replace('name="rod_1"', 'name="rod&#10;1"'), BODY, r"the body 'rod\n1' has a name with characters that cannot be shown"),
-    ("m.xml", HEAD.replace('model="head"', 'model="a&#9;b"'), BODY, r"the robot 'a\tb' has a name with characters that cannot be shown"),
+    ("m.xml", HEAD.replace('name="rod_1"', 'name="rod&#10;1"'), BODY, r"the body 'rod\n1' must have a name of printable characters"),
+    ("m.xml", HEAD.replace('model="head"', 'model="a&#9;b"'), BODY, r"the robot 'a\tb' must have a name of printable characters"),
     ("m.xml", HEAD.replace('model="head"', 'model="a&#27;[31mb"'), BODY, "is not valid XML"),
     # URDF.
     ("m.urdf", URDF.replace('type="spherical"', 'type="rod"', 1), ALL, 'constraint closing_1, type = "rod": must be one of spherical, ball, fixed'),
@@ -218,7 +218,7 @@ FAULTS: list[tuple[str, str | bytes, tuple[str, ...], str]] = [
     ("m.xml", HEAD, (*BODY, "--free", "circle9"), "--free circle9: no such joint, circle or symmetry; did you mean 'circle3'?"),
     ("m.xml", HEAD, (*BODY, "--free", "circle1", "stewart_1"), "--free stewart_1: the centre of stewart_1 is a dimension already"),
     ("m.xml", HEAD, (*BODY, "--free", "passive_1.axis"), "--free passive_1.axis: the joint is of type S, which has no single axis"),
-    ("m.xml", HEAD, (*BODY, "--free", "circle1=a", "circle2=a"), "--free: the dimension a would be given twice"),
+    ("m.xml", HEAD, (*BODY, "--free", "circle1=a", "circle2=a"), "--free: the dimension a exists already"),
     ("m.xml", HEAD, (*BODY, "--free", "circle1=sin"), "the robot cannot be written as a robot file: "),
 ]  # fmt: skip
 

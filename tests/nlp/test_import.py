@@ -371,7 +371,7 @@ def test_a_loop_that_cannot_close_is_named_with_its_least_gap(tmp_path: Path) ->
     with pytest.raises(InputError, match="Newton's method, also from other starts") as fault:
         imported(tmp_path, model("1 0.3 0.25"), "loop.xml", Ends("plate"))
     words = str(fault.value)
-    assert "a loop stays open by parts of the size: shut by" in words
+    assert "gaps relative to the size: shut by" in words
     size = float(words.partition("robot's size ")[2].split()[0])
     assert float(words.partition("shut by ")[2].split(";")[0]) * size == pytest.approx(0.25, rel=0.02)
     assert "correct the frames" in words

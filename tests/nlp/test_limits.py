@@ -249,11 +249,11 @@ def test_a_robot_without_legs_has_limits_on_its_own_measures_only() -> None:
         ):
             Case(**common, tasks=[task], limits=Limits(limit))
     refused = r"tolerance\.joint_centre: is not supported for the robot '{}': {}"
-    with pytest.raises(CaseError, match=refused.format("hexapod", "whose joints")):
+    with pytest.raises(CaseError, match=refused.format("hexapod", "its joint centres")):
         Case(**common, tasks=[task], joint_centre_tolerance=0.1)
     by_joints = robot_function("6-ups")()
     values = {item.name: item.typical[0] for item in by_joints.parameters}
-    with pytest.raises(CaseError, match=refused.format("6-ups", "which is given joint by")):
+    with pytest.raises(CaseError, match=refused.format("6-ups", r"add a \[workspace\]")):
         Case(by_joints, values, by_joints.home, [task], joint_centre_tolerance=0.1)
     for limit in (QuantityLimit("leg_length", max=37.0), LegLength(max=37.0)):
         limited = Case(**common, tasks=[task], limits=Limits(limit))

@@ -198,17 +198,17 @@ OF_ROBOTS = [
     (
         MIXED,
         '[[load]]\nname = "tool"\nmass = 2\ncentre = [1, 0, 0]',
-        f"load[0].mass = 2.0: load 'tool' {IDLE} with a force along x or y, or a moment about z\n",
+        f"load[0].mass = 2.0: load 'tool' {IDLE} a force along x or y, or a moment about z\n",
     ),
     (
         MIXED,
         f"{LOAD}[[load]]\nforce = [0, 0, 5]",
-        f"load[1].force = [0.0, 0.0, 5.0]: load 'load 2' {IDLE} with a force along x or y, or a moment about z\n",
+        f"load[1].force = [0.0, 0.0, 5.0]: load 'load 2' {IDLE} a force along x or y, or a moment about z\n",
     ),
     (
         MIXED,
         '[[load]]\nforce = [0, 0, 5]\nmoment = [1, 2, 0]\nframe = "platform"',
-        f"load[0]: load 'load 1' {IDLE} with a force along x or y, or a moment about z\n",
+        f"load[0]: load 'load 1' {IDLE} a force along x or y, or a moment about z\n",
     ),
     (MORE, "[limits]\nactuator_force = { max = 3 }", f"limits.actuator_force: {REDUNDANT}"),
 ]
@@ -243,14 +243,14 @@ IN_PYTHON = [
     (Loading((Load(mass=-1.0),)), (), r"load\[0\]\.mass = -1\.0: must be at least 0"),
     (Loading((Load(mass=float("nan")),)), (), r"load\[0\]\.mass = nan: must be at least 0 and finite"),
     (Loading((Load(any_moment=float("nan")),)), (), r"load\[0\]\.any\.moment = nan: must be at least 0"),
-    (Loading((Load("a", (0, float("nan"), 0)),)), (), r"load\[0\]\.force: must be three finite"),
+    (Loading((Load("a", (0, float("nan"), 0)),)), (), r"load\[0\]\.force = .*: must be three finite"),
     (Loading((Load("a", "abc"),)), (), r"load\[0\]\.force\[0\]: must be a number, got str 'a'"),
-    (Loading((Load("a", (1, 2)),)), (), r"load\[0\]\.force: must be three finite numbers"),
+    (Loading((Load("a", (1, 2)),)), (), r"load\[0\]\.force = .*: must be three finite numbers"),
     (Loading((Load(),)), (), r"load\[0\]: is empty"),
     (Loading((Load("", (1, 0, 0)),)), (), r'load\[0\]\.name = "": must not be empty'),
     (Loading((), Motion(-1.0)), (), r"motion\.linear = -1\.0: must be at least 0 and finite"),
     (Loading((), Motion()), (), r"motion: is empty: give linear, angular, or both"),
-    (Loading((), None, (0.0, 0.0)), (), r"gravity\.acceleration: must be three finite numbers"),
+    (Loading((), None, (0.0, 0.0)), (), r"gravity\.acceleration = .*: must be three finite numbers"),
     (Loading(), (ActuatorForce(max=2.0),), r"limits\.actuator_force: needs a table \[\[load\]\]"),
     (
         Loading((Load("a", (1, 0, 0)),)),
