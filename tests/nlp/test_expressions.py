@@ -91,9 +91,9 @@ REFUSED = {
     "exp(x1) >= 0": ("'exp' at position 1", "allowed:"),
     "1e999 >= x1": ("finite number",),
     "x1 >= 0; x2 >= 0": ("';' at position 8",),
-    "(" * 300 + "x1": ("more than 40 brackets",),
-    "-" * 300 + "x1 >= 0": ("more than 40 brackets",),
-    "1+" * 300 + "x1 >= 0": ("longer than 400 characters",),
+    "(" * 300 + "x1": ("at most 40 nested brackets",),
+    "-" * 300 + "x1 >= 0": ("at most 40 nested brackets",),
+    "1+" * 300 + "x1 >= 0": ("at most 400 characters",),
 }
 
 

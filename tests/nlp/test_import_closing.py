@@ -167,7 +167,7 @@ def test_relations_that_move_joints_too_far_are_refused() -> None:
     row = [MechanismJoint(f"b{k}", "S", "base", "platform", np.array([0.9 * k, 0.0, 0.0])) for k in range(10)]
     links = (MechanismLink("base"), MechanismLink("platform"))
     given = Mechanism("row", links, tuple(row), "base", "platform")
-    with pytest.raises(InputError, match=r"--snap 1: the axes cannot all be made to meet or to be parallel"):
+    with pytest.raises(InputError, match=r"--snap 1: not all axes that nearly meet or are nearly parallel"):
         snapped(given, 10.0, 1.0)
     np.testing.assert_allclose([each.point for each in snapped(given, 10.0, 0.5)[0].joints], [j.point for j in row])
 

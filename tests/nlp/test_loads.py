@@ -79,7 +79,7 @@ FAULTS = {
     "[motion]\nlinear = 1e31": "motion.linear = 1e+31: must be at most 1e+30 in magnitude",
     "[motion]\nliner = 1": "motion.liner: no such key; did you mean 'linear'? allowed: linear, angular",
     "[[motion]]\nlinear = 1": "motion: must be a table",
-    "[limits]\nactuator_force = { max = 3 }": "limits.actuator_force: needs a table [[load]] with a load on the platform",
+    "[limits]\nactuator_force = { max = 3 }": "limits.actuator_force: needs a table [[load]]",
     "[units]\nforce = 3": "units.force = 3: must be text in quotes",
 }
 #: What is written below [[load]], and the rest of the sentence.

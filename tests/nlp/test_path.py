@@ -455,11 +455,11 @@ def test_quaternions_and_axes_are_the_rotations_of_their_angles(angles: list[tup
     ("text", "words"),
     [
         ("", "has no rows"),
-        ("x,y,t\n", "row 1: column z missing"),
+        ("x,y,t\n", "row 1: column z is missing"),
         ("x,y,z\n1,2,3\n", "fewer than two points"),
         ("x,y,z\n1,2,3\n1,2,3\n", "all of its points are one pose"),
         ("x,y,z,a\n", "row 1: no such column, 'a'"),
-        ("x,y,z,t,feed\n", "row 1: column 'feed' conflicts with 't'"),
+        ("x,y,z,t,feed\n", "row 1: column 'feed' cannot stand beside 't'"),
         ("x,y,z,t\n1,2,3,0\n1,2,4,0\n", "row 3, column t = 0.0: must be later"),
         ("x,y,z,feed\n1,2,3,1\n1,2,4,0\n", "row 3, column feed = 0.0: must be positive"),
         ("x,y,z\n1,2,3\n1,2,nan\n", "row 3, column z = nan: must be finite"),
