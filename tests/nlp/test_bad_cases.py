@@ -148,7 +148,7 @@ MISSING = [
 
 UNKNOWN = [
     paper("unknown-top-key", "title =", "titel =", "titel", "no such key", "'title'"),
-    paper("unknown-task-list", "[[task]]", "[[tasks]]", "tasks", "no such key", "'task'"),
+    paper("unknown-task-list", "[[task]]", "[[tasks]]", "tasks", "the name of a CSV file", "[[task]]"),
     paper("unknown-in-units", "length =", "lenght =", "units.lenght", "no such key", "'length'"),
     paper("unknown-option", "layout =", "layuot =", "robot.layuot", "no such key", "'layout'"),
     hexapod("option-of-no-use", "model =", "layout = 3\nmodel =", "robot.layout", "no such key", "parameters"),
@@ -307,7 +307,7 @@ LIMITS = [
     limit("axis-nested", "base_joint_angle = { max = 9, about = [[0, 0]] }", "base_joint_angle.about[0]", "3 entries"),
     limit("axes-too-few", f"base_joint_angle = {TWO_AXES}", "base_joint_angle.about", "one for each of the 6 legs"),
     limit("home-missing", 'base_joint_angle = { max = 9, about = "home" }', "home", "missing"),
-    limit("home-alone", "home = { position = [0, 0, 30] }", "home", "means nothing"),
+    limit("home-alone", "home = { position = [0, 0, 30] }", "home", "has no effect"),
     limit("home-short", "home = { position = [0, 30] }", "home.position", "3 entries"),
     limit("spacing-zero", "joint_spacing = { min = 0 }", "joint_spacing.min", "above 0 cm"),
     limit("spacing-max", "joint_spacing = { max = 3 }", "joint_spacing.max", "allowed: min"),
@@ -324,13 +324,15 @@ LIMITS = [
         "tolerance-zero", "[expect]", "[tolerance]\njoint_centre = 0\n[expect]", "tolerance.joint_centre", "positive"
     ),
     paper("over-poses-of-one", "[expect]", '[combine]\nover_poses = "sum"\n[expect]', "combine.over_poses", "one pose"),
-    along("along-and-grid", "first = 0, last = 1, count = 2", "pose.grid", "beside", grid="\ngrid = {}"),
+    along(
+        "along-and-grid", "first = 0, last = 1, count = 2", "pose.grid", "conflicts with along_task", grid="\ngrid = {}"
+    ),
     along("along-one", "first = 0, last = 1, count = 1", "pose.along_task.count", "2"),
     along("along-nowhere", "first = 1, last = 1, count = 3", "pose.along_task.last", "differ"),
     along("along-no-task", 'task = "mill", first = 0, last = 1, count = 3', "pose.along_task.task", "no such task"),
     paper("grid-empty", ROTATION, f"{ROTATION}\ngrid = {{}}", "pose.grid", "offsets"),
     paper("grid-crossed", ROTATION, f"{ROTATION}\ngrid.x = {CROSSED}", "pose.grid.x.min", "below max"),
-    paper("grid-huge", ROTATION, f"{ROTATION}\ngrid = {HUGE}", "pose.grid", "729 poses"),
+    paper("grid-huge", ROTATION, f"{ROTATION}\ngrid = {HUGE}", "pose.grid", "at most 200 poses", "got 729"),
 ]
 
 LINES = [
