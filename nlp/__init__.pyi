@@ -52,6 +52,7 @@ from .case.workspace import TurnKind as TurnKind
 from .case.workspace import Turns as Turns
 from .case.workspace import Workspace as Workspace
 from .case.writer import case_text as case_text
+from .case.writer import with_settings as with_settings
 from .comparison.compare import Comparison as Comparison
 from .comparison.compare import compare as compare
 from .comparison.data import comparison_result as comparison_result
@@ -67,6 +68,7 @@ from .errors import EvaluationError as EvaluationError
 from .errors import InputError as InputError
 from .errors import ScrewsynthError as ScrewsynthError
 from .errors import UncoveredError as UncoveredError
+from .evidence.evaluation import evaluate as evaluate
 from .evidence.inverse import InversePoses as InversePoses
 from .evidence.inverse import inverse as inverse
 from .evidence.margins import Margin as Margin
@@ -80,7 +82,6 @@ from .evidence.principal_motions import analyse_tasks as analyse_tasks
 from .evidence.sensitivity import Sensitivity as Sensitivity
 from .evidence.sensitivity import sensitivities as sensitivities
 from .evidence.state import RobotState as RobotState
-from .evidence.state import evaluate as evaluate
 from .evidence.tolerance import ToleranceLoss as ToleranceLoss
 from .evidence.tolerance import tolerance_loss as tolerance_loss
 from .formats.export import export_robot as export_robot
@@ -105,15 +106,15 @@ from .program.program import Program as Program
 from .proof.certificate.branch_and_bound import certify_program as certify_program
 from .proof.certificate.certificate import Certificate as Certificate
 from .proof.certificate.certificate import CertificateStatus as CertificateStatus
-from .proof.workspace.axis_ranges import AxisRange as AxisRange
 from .proof.workspace.axis_ranges import AxisRanges as AxisRanges
-from .proof.workspace.axis_ranges import PairRange as PairRange
-from .proof.workspace.axis_ranges import RangeEnd as RangeEnd
-from .proof.workspace.axis_ranges import RangeStop as RangeStop
 from .proof.workspace.axis_ranges import axis_ranges as axis_ranges
 from .proof.workspace.judge import judge_workspace as judge_workspace
 from .proof.workspace.judgement import Judgement as Judgement
 from .proof.workspace.path_check import check_path as check_path
+from .proof.workspace.range_values import AxisRange as AxisRange
+from .proof.workspace.range_values import PairRange as PairRange
+from .proof.workspace.range_values import RangeEnd as RangeEnd
+from .proof.workspace.range_values import RangeStop as RangeStop
 from .proof.workspace.scale import Scale as Scale
 from .proof.workspace.scale import largest_scale as largest_scale
 from .proof.workspace.verdict import Outcome as Outcome

@@ -70,6 +70,17 @@ def override_number(tables: dict[str, Any], name: str, value: float | list[float
     table[place] = value
 
 
+def fields_of(name: str) -> tuple[str, ...]:
+    """Return the fields of a case that change with a value, by its name as for :func:`override_number`."""
+    if name.startswith(_LIMITS):
+        return ("limits",)
+    if name.startswith(_PLACE):
+        return ("path",)
+    if _TASK.fullmatch(name):
+        return ("tasks", "displacements", "further")  # poses may follow the screw motion of a task
+    return ("parameters", "position", "rotation", "displacements", "further")
+
+
 def _allowed(name: str, tables: Mapping[str, Any], places: Mapping[str, _Place], rotations: list[str]) -> str:
     """Return a hint with the names that can be set; bounds, limits and tasks are shown by one example each."""
     written = {each: table[place] for each, (table, place) in places.items()}

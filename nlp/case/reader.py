@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydantic import ValidationError
 
-from ...models import Dimension, FloatArray, unit_vector
+from ...models import Dimension, FloatArray, Model, unit_vector
 from ...models.fileversions import CASE_FILES
 from ..errors import CaseError
 from ..system.reading import check_version
@@ -179,6 +179,22 @@ def case_from_tables(
         raise (error if error.source else origins.error_in(error, source)) from None
 
 
+def case_with_settings(tables: dict[str, Any], settings: Settings, like: Case) -> Case:
+    """Return the case of a document with values replaced, and with the robot of a case already read from the document.
+
+    Args:
+        tables: the document, as ``tomllib`` returns it; changed in place.
+        settings: new values by name, see :func:`load_case`.
+        like: case read from the document without settings.
+
+    Raises:
+        CaseError: the case has no value with a name, or a value is not allowed.
+    """
+    for key, value in settings.items():
+        override_number(tables, key, value)
+    return _case_of(_parse(tables), like.name, "", "", model=like.model)
+
+
 def _parse(tables: dict[str, Any]) -> Document:
     """Return the checked tables of a document.
 
@@ -194,7 +210,9 @@ def _parse(tables: dict[str, Any]) -> Document:
         raise case_error(error.errors(include_url=False)[0]) from None
 
 
-def _case_of(written: Document, name: str, source: str, folder: str, robot_file: str | None = None) -> Case:
+def _case_of(
+    written: Document, name: str, source: str, folder: str, robot_file: str | None = None, model: Model | None = None
+) -> Case:
     """Return the case of a document.
 
     Args:
@@ -203,12 +221,13 @@ def _case_of(written: Document, name: str, source: str, folder: str, robot_file:
         source: name of the document in messages.
         folder: folder of the document; empty for the current folder.
         robot_file: name of the file with the robot's definition; None if the document contains the definition.
+        model: the robot; None for the robot of the document.
 
     Raises:
         CaseError: the document has an error.
     """
     units = Units(written.units.length, written.units.angle, written.units.force)
-    model = model_of_table(written.robot, robot_file)
+    model = model_of_table(written.robot, robot_file) if model is None else model
     if not model.has_couples and "characteristic_length" in written.robot.model_fields_set:
         fault = f"has no effect on {model.name!r}, which has no constraint couples; remove the key"
         raise CaseError("robot.characteristic_length", fault)

@@ -14,7 +14,7 @@ from .text import Line
 from .verdicts import SHOWN
 
 if TYPE_CHECKING:
-    from ..results.verdicts import WorkspacePose
+    from ..evidence.state import WorkspacePose
     from ..results.workspace import WorkspaceResult
 
 _SINGULAR = {REGULAR: f"{REGULAR}: J is singular", CONSTRAINTS: f"{CONSTRAINTS}: their rank is lost"}

@@ -53,7 +53,7 @@ def test_a_trade_off_with_proofs(up: str, cli: Run) -> None:
 
 
 def test_a_worse_optimum_than_that_of_the_box_is_replaced(up: str) -> None:
-    found = sn.tradeoff(lambda value: sn.load_case(up, {LONGEST: value}), [12, 20], name=LONGEST, certified=True)
+    found = sn.tradeoff(sn.load_case(up), {LONGEST: [12, 20]}, certified=True)
     for point in found.points:
         assert point.certified is not None
         assert point.certified.solution is point.solution
@@ -101,6 +101,23 @@ def test_a_stopped_run_is_taken_up(
     assert not journal.exists()
     one, other = (without_times(json.loads(file.read_text())) for file in files)
     assert one == other
+
+
+def test_a_certificate_that_its_share_of_the_time_cuts_short_is_tried_again(tmp_path: Path) -> None:
+    # Two tasks and their worst case share the time.
+    ends = ("x1 = 12, x2 = 4, x3 = 30", "x1 = { min = 8, max = 12 }, x2 = { min = 3, max = 5 }, x3 = 30")
+    case = sn.load_case(saved(tmp_path / "two.toml", edited(TWO_GOALS, ends) + '[combine]\nmethod = "worst-case"\n'))
+    with SearchJournal(tmp_path / "journal") as journal, kept_in(journal):
+        found = sn.certify(case, time_limit=0.1)
+        statuses = [each.status.value for each in found.certificates]
+        assert "incomplete" in statuses
+        searches = 3
+        assert len(journal) == searches + len(statuses) - statuses.count("incomplete")
+        found = sn.certify(case)
+        assert found.is_proved
+        assert len(journal) == searches + len(statuses)
+        again = sn.certify(case)
+        assert [each.seconds for each in again.certificates] == [each.seconds for each in found.certificates]
 
 
 def test_limits_that_differ_by_little_in_a_small_unit_are_searched_each(tmp_path: Path) -> None:
