@@ -131,11 +131,11 @@ def test_a_case_with_an_objective_is_the_same_when_it_is_written_and_read_again(
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        (('[[load]]\nname = "handling"\nforce = [2, 2, -10]\n', ""), "needs a [[load]]"),
-        (('"actuator_force"', '"actuator_speed"'), "needs [motion]"),
+        (('[[load]]\nname = "handling"\nforce = [2, 2, -10]\n', ""), "needs a table [[load]]"),
+        (('"actuator_force"', '"actuator_speed"'), "needs the table [motion]"),
         (('"actuator_force"', '"leg_length"'), "must be one of 'actuator_force'"),
-        (("[objective]", TASK.replace("min", "max") + "[objective]"), "contradicts [objective]"),
-        (("[objective]", 2 * TASK + "[objective]"), "one at most beside [objective]"),
+        (("[objective]", TASK.replace("min", "max") + "[objective]"), "must be 'min' with objective.minimise"),
+        (("[objective]", 2 * TASK + "[objective]"), "one at most with objective.minimise"),
         (("minimise", "maximise"), "no such key"),
     ],
     ids=["no load", "no motion", "unknown", "sense", "two tasks", "maximise"],

@@ -475,10 +475,12 @@ def test_robots_without_legs_refuse_their_limits_by_name(cli: Run, tmp_path: Pat
     for robot_name, (key, limit) in itertools.product(("delta", "6-rss"), OF_LEGS.items()):
         text = output_of(cli("new", robot_name)).replace("[limits]", f"[limits]\n{key} = {limit}\n#")
         path = saved(tmp_path / "case.toml", text)
-        refusal_of(cli("solve", str(path)), f"limits.{key}: is nothing that '{robot_name}' has; it has actuator_angle")
+        refusal_of(cli("solve", str(path)), f"no such limit for the robot '{robot_name}'; allowed: actuator_angle")
     # Cones of the joints of a file's legs are stated by joint.
     path = saved(tmp_path / "case.toml", CASE.replace("[solve]", "base_joint_angle = 30\n[solve]"))
-    refusal_of(cli("solve", str(path)), "limits.base_joint_angle: is nothing that '6-ups' has; it has leg_length")
+    refusal_of(
+        cli("solve", str(path)), "limits.base_joint_angle: no such limit for the robot '6-ups'; allowed: leg_length"
+    )
 
 
 @pytest.mark.parametrize("name", ["6-ups", "3-rps", "planar-3-rpr", "tricept"])

@@ -283,7 +283,7 @@ def test_one_limit_is_one_end(tmp_path: Path, cli: Run) -> None:
 
 def test_what_is_judged_over_poses_is_refused(tmp_path: Path, cli: Run) -> None:
     poses = str(saved(tmp_path / "poses.csv", "x,y,z\n0,0,0\n0.05,0.02,0\n"))
-    words = "the pose does not determine the positions of driven joints 1:1, 2:1, 3:1 of 'three rails'"
+    words = "the pose does not determine the coordinates of actuated joints 1:1, 2:1, 3:1 of 'three rails'"
     half = "{ min = -0.05, max = 0.05 }"
     workspace = ("[solve]", f"workspace.position = [{half}, {half}, 0]\n[solve]")
     file = planar(tmp_path, workspace)

@@ -89,7 +89,7 @@ def test_every_starter_is_solved_to_a_machine_that_makes_its_task(given: str | M
     assert f'model = "{model.name}"' in text
     case = case_from(text)
     freedoms, task = TASKS.get(model.name, (6, "screw motion"))
-    assert f"this robot has {freedoms} freedoms" in text
+    assert f"which has {freedoms} degree{'s' * (freedoms != 1)} of freedom" in text
     assert case.tasks[0].name == task
     has_turn = isinstance(case.rotation.angle, sn.Free)
     assert has_turn == (model.name not in UPRIGHT)

@@ -214,11 +214,11 @@ def test_what_cannot_be_combined_over_a_workspace_is_refused(cli: Run, tmp_path:
     average = "combine.method = \"average\": must be 'weighted-sum' or 'worst-case' where limits hold"
     for keys, words in [
         (tables_of([LIFT, TURN]), average),
-        (tables_of([LIFT, TURN], **both, **worst), 'objective.over = "workspace": is for a case with one [[task]]'),
-        (tables_of(limits={}, **worst), 'objective.over = "workspace": needs limits that hold there too'),
-        (tables_of(objective={"over": "path"}), 'objective.over = "path": needs limits that hold there too'),
+        (tables_of([LIFT, TURN], **both, **worst), 'objective.over = "workspace": needs exactly one [[task]], got 2'),
+        (tables_of(limits={}, **worst), 'objective.over = "workspace": needs limits over the same poses'),
+        (tables_of(objective={"over": "path"}), 'objective.over = "path": needs limits over the same poses'),
         (tables_of(objective={}), "objective.minimise: is missing: give minimise, over, or both"),
-        (tables_of(pose=poses, **worst), "combine.over_poses = \"sum\": must be 'worst' beside objective.over"),
+        (tables_of(pose=poses, **worst), "combine.over_poses = \"sum\": must be 'worst' together with objective.over"),
     ]:
         refusal_of(cli("solve", str(case_file(tmp_path, keys))), words)
     path = {"file": "path.csv", "place": {"x": {"min": -1, "max": 1}}}

@@ -455,7 +455,7 @@ def test_quaternions_and_axes_are_the_rotations_of_their_angles(angles: list[tup
     ("text", "words"),
     [
         ("", "has no rows"),
-        ("x,y,t\n", "row 1: column z missing"),
+        ("x,y,t\n", "row 1: column z is missing"),
         ("x,y,z\n1,2,3\n", "fewer than two points"),
         ("x,y,z\n1,2,3\n1,2,3\n", "all points are the same pose"),
         ("x,y,z,a\n", "row 1: no such column, 'a'"),
@@ -464,7 +464,7 @@ def test_quaternions_and_axes_are_the_rotations_of_their_angles(angles: list[tup
         ("x,y,z,feed\n1,2,3,1\n1,2,4,0\n", "row 3, column feed = 0.0: must be positive"),
         ("x,y,z\n1,2,3\n1,2,nan\n", "row 3, column z = nan: must be finite"),
         ("x,y,z\n1,2,3\n1,2\n", "row 3: must have 3 cells, got 2"),
-        ("x,y,z\n1,2,3\n1,,3\n", "row 3, column y: is empty; it must be a number"),
+        ("x,y,z\n1,2,3\n1,,3\n", "row 3, column y: must be a number, got an empty cell"),
         ("x,y,z,qw,qx,qy,qz\n1,2,3,1,0,0,0\n1,2,3,1,1,0,0\n", "row 3, columns qw, qx, qy, qz: must be a unit"),
         ("x,y,z,axis_x,axis_y,axis_z,angle\n1,2,3,0,0,1,5\n1,2,3,0,0,0,5\n", "row 3, columns axis_x, axis_y, axis_z"),
     ],

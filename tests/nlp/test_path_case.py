@@ -318,7 +318,7 @@ def test_the_place_of_a_path_and_the_design_are_the_best_of_a_grid(cli: Run, tmp
     refusal_of(cli("path", str(case), "--set", "x1=20"), "path.place.x: is free")
     assert cli("path", str(case), "--of", str(out), "--set", "path.place.x=6")[0] == 1
     assert cli("solve", str(case), "--set", "path.place.x.min=5")[0] == 1
-    refusal_of(cli("solve", str(case), "--set", "path.place.y.min=5"), "path.place.y is not free")
+    refusal_of(cli("solve", str(case), "--set", "path.place.y.min=5"), "path.place.y is fixed")
     refusal_of(cli("solve", str(case), "--set", "path.place.a=5"), "path.place.a: no such key")
 
 

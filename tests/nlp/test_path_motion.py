@@ -153,7 +153,7 @@ def test_limits_on_speeds_and_powers_need_a_motion_of_the_case_or_of_the_path(cl
         str(saved(tmp_path / f"{word}.ngc", f"G20 {word} X1 Y0 Z20\n{word} Z21\nM2")) for word in ("G1 F60", "G0")
     )
     assert "verdict  everything is proved" in output_of(cli("path", case, "--along", timed))
-    fault = "case.toml: limits.actuator_speed: means nothing without [motion]"
+    fault = "case.toml: limits.actuator_speed: needs [motion], the largest speeds"
     refusal_of(cli("path", case, "--along", rapid), f"{fault}, or a path that states times")
     for words in (["workspace", case], ["solve", case], ["path", case, "--range"]):
         assert refusal_of(cli(*words)).strip().endswith(fault)
@@ -163,7 +163,7 @@ def test_limits_on_speeds_and_powers_need_a_motion_of_the_case_or_of_the_path(cl
     assert "F" in shown
     power = f"{text}[[load]]\nforce = [0, 0, 9]\n[limits]\nactuator_power = {{ max = 2 }}\n"
     refused = cli("workspace", str(saved(tmp_path / "power.toml", power)))
-    refusal_of(refused, "limits.actuator_power: means nothing without [motion]")
+    refusal_of(refused, "limits.actuator_power: needs [motion], the largest speeds")
     # Powers are the same whether the case has a motion, which is not used, or none.
     tables |= {"limits": {"actuator_power": {"max": 1e3}}, "load": [{"name": "cut", "force": [3, -2, 10]}]}
     found = []

@@ -213,7 +213,7 @@ FAULTS: list[tuple[str, str | bytes, str]] = [
 
 #: Of a robot of links and joints.
 LINK_FAULTS: list[tuple[str, str, str]] = [
-    ('links = ["base",', '[[limb]]\njoints = []\n#', "joint: cannot stand beside limb: give the robot by limbs, or by links and joints"),
+    ('links = ["base",', '[[limb]]\njoints = []\n#', "joint: conflicts with limb: give the robot by limbs, or by links and joints"),
     ('links = ["base", "crank", "coupler", "rocker", "rod", "bar", "platform"]', "", "links: is missing; it must be a list of the names of all links"),
     ('"bar", "platform"]', '"bar"]', "platform: is 'platform', which is not a link; links are base, crank, coupler, rocker, rod"),
     ("points =", 'base = "ground"\npoints =', "base: is 'ground', which is not a link"),
@@ -424,7 +424,7 @@ def test_actuator_rates_are_those_of_finite_differences(tmp_path: Path) -> None:
     ("old", "new", "fault"),
     [
         ('file = "robot.toml"', "file = 3", "case.toml: robot.file: must be the name of a robot file"),
-        ('file = "robot.toml"', 'file = "robot.toml"\nmodel = "hexapod"', "robot.model: cannot stand beside file"),
+        ('file = "robot.toml"', 'file = "robot.toml"\nmodel = "hexapod"', "robot.model: conflicts with file"),
         ('file = "robot.toml"', 'file = "robot.toml"\naxes = "free"', "case.toml: robot.axes: no such key"),
         ('file = "robot.toml"', "", "case.toml: robot.model: is missing"),
         ('file = "robot.toml"', 'model = "3-rpz"', "did you mean '3-rps'?"),

@@ -105,9 +105,9 @@ ROBOT = (ROBOTS / "reachy-mini-head.toml").read_text(encoding="utf-8")
         (("models", "none.toml"), "none.toml"),
         (("solve", "--hlep"), "--hlep: no such option of solve; did you mean '--help'?"),
         (("--hlep",), "--hlep: no such option of screwsynth; did you mean '--help'?"),
-        (("solve", "delta"), "delta: is a robot, not a case; screwsynth new delta > my-delta.toml writes a case of it"),
+        (("solve", "delta"), "delta: is a robot, not a case; screwsynth new delta > my-delta.toml writes a case"),
         (("workspace", "stewart-gough"), "is a robot, not a case"),
-        (("models", "paper-4.2"), 'robot.model = "paper-4.2": no such robot; this is a case'),
+        (("models", "paper-4.2"), "no such robot; 'paper-4.2' is a case"),
         (("compare", "paper-4.2", "case", "paper-4.3"), "and no such robot file; this is a case"),
         (("solve", "nowhere.toml"), "nowhere.toml: no such file"),
         (("solve", "paper-4.1-helical.toml"), "did you mean 'paper-4.1-helical'? this case comes with screwsynth"),
@@ -133,12 +133,12 @@ def test_the_nearest_right_thing_is_named(arguments: tuple[str, ...], words: str
 
 def test_files_of_another_kind_are_named(tmp_path: Path, cli: Run) -> None:
     named = saved_with_robot(tmp_path, ROBOT, edited(starter_text("6-rus"), ('"6-rus"', '"robot.toml"')))
-    words = 'no such robot; a robot file is named by file = "robot.toml", in the place of model'
+    words = 'no such robot; for a robot file, write file = "robot.toml" instead of model'
     refusal_of(cli("solve", named), f'robot.model = "robot.toml": {words}')
     robot, case = str(tmp_path / "robot.toml"), str(saved(tmp_path / "mine.toml", CASE))
-    refusal_of(cli("solve", robot), 'is a robot file, and not a case; [robot] file = "robot.toml" in a case reads it')
+    refusal_of(cli("solve", robot), 'is a robot file, not a case; write [robot] file = "robot.toml" in a case')
     for arguments in (("models", case), ("new", case), ("compare", "paper-4.2", "case", case)):
-        refusal_of(cli(*arguments), "is a case, and not a robot file; screwsynth solve takes it")
+        refusal_of(cli(*arguments), "is a case, not a robot file; screwsynth solve takes it")
 
 
 def test_units_and_decimal_commas_in_toml_are_named_with_their_lines(tmp_path: Path, cli: Run) -> None:

@@ -422,7 +422,7 @@ def test_what_is_not_covered_is_open_with_the_reason() -> None:
     assert found.outcome is Outcome.OPEN
     assert "does not have the poses" in found.reason
     del tables["workspace"]
-    with pytest.raises(CaseError, match=r"tolerance.joint_centre: is not computed for 'spherical-3-rrr'"):
+    with pytest.raises(CaseError, match=r"tolerance.joint_centre: is not supported for the robot 'spherical-3-rrr'"):
         case_from(tables, "spherical")
 
 

@@ -416,7 +416,7 @@ def test_what_takes_the_limits_at_the_stated_pose_says_so(cli: Run, tmp_path: Pa
     code, out, err = cli("certify", "hexapod-workspace", "--time", "1", "--starts", "1", "--json", str(target))
     assert code in (0, 1)
     result = json.loads(target.read_text(encoding="utf-8"))
-    notice = "the limits are taken at the stated pose alone, not over the workspace"
+    notice = "the limits are evaluated only at the stated pose, not over the workspace"
     assert result["notice"] == notice
     jsonschema.validate(result, result_schema())
     assert notice in " ".join((out + err).split())

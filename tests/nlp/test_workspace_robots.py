@@ -51,7 +51,7 @@ from screwsynth.nlp.proof.workspace.slices.slice_limits import KEPT, UNDECIDED
 from screwsynth.nlp.proof.workspace.slices.slices import Region, Slice, slices_of
 from screwsynth.nlp.solver.solve import solve
 
-NOTICE = "the limits are taken at the stated pose alone, not over the workspace"
+NOTICE = "the limits are evaluated only at the stated pose, not over the workspace"
 
 
 def delta(arm: float, rod: object, **limits: object) -> Case:
