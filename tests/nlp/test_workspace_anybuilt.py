@@ -328,7 +328,7 @@ def test_ranks_and_numbers_of_machines_are_on_paper() -> None:
         assert judged.is_proved
         checked = check_workspace_proof(proof, case)
         assert len(checked.claims) == count, [each.name for each in checked.claims]
-        assert {"all machines together" in each.reason for each in proof.unproved} <= {True}
+        assert {"all robots within the tolerance" in each.reason for each in proof.unproved} <= {True}
         extremes = {(each.name, each.sense.value): each for each in judged.extremes}
         for each in checked.claims:
             if each.bound is not None:
