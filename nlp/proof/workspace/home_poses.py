@@ -79,7 +79,7 @@ class Homes:
         return found
 
     def is_singular(self, y: FloatArray, errors: JointErrors | None, *, constraints: bool) -> bool:
-        """Return whether J, or the constraint wrenches alone, lose their rank at a pose (6,), as ``evaluate`` shows it.
+        """Return whether J, or the constraint wrenches, lose their rank at a pose (6,), as ``evaluate`` reports it.
 
         Args:
             y: coordinates of the pose.

@@ -35,8 +35,8 @@ from .verdict import Outcome, Verdict, not_judged
 if TYPE_CHECKING:
     from .proof_record import ProofRecord
 
-#: Seconds for all searches together where no time is stated: those of singular values have no other end in six
-#: dimensions. Of the time left, each takes half at most.
+#: Default time limit of all searches together, in seconds: singular values in six dimensions need one. Each search
+#: takes at most half of the time left.
 TIME_LIMIT = 60.0
 _PART = 0.5
 #: Gap of the recorded search of a limit that is known to hold: it is made finer where the limit needs it.
