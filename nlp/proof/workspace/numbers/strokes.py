@@ -20,7 +20,7 @@ from .bound_search import Minimum
 from .extremes import verdict_of
 from .searched import Subject
 
-#: Smallest gap of a length, as a part of it, and part of the room that lengths may leave: that of rounding.
+#: Smallest relative gap of a length, near rounding; and part of the margin to a limit that the gap may take.
 _FINEST, _SHARE = 1e-11, 0.9
 
 #: Gaps of lengths with which a limit is tried that the triangle inequality leaves open.
