@@ -392,18 +392,18 @@ class Followed(NamedTuple):
 
 
 class LoopRule(Rule[Followed]):
-    """Rule for boxes of a robot, in which dependent coordinates are followed.
+    """Rule for boxes of a robot with dependent coordinates.
 
     Args:
         problem: the robot.
-        examiner: follows the dependent coordinates, and has the test.
-        recorder: records the boxes for a proof.
+        examiner: examiner of boxes, with the test.
+        recorder: recorder of the boxes for a proof.
 
     Attributes:
-        whole: (n,) widths of the whole workspace along independent coordinates; 0 for others.
+        whole: (n,) widths of the whole workspace along independent coordinates; 0 for dependent ones.
     """
 
-    #: Further columns of the whole workspace, as a tuple or an array.
+    #: Further arrays of the whole workspace, as a tuple or an array.
     _more: Any = ()
 
     def __init__(self, problem: Problem, examiner: Examiner, recorder: TreeRecord | None = None) -> None:
@@ -416,13 +416,13 @@ class LoopRule(Rule[Followed]):
         ]
         self._fixed: FloatArray = np.zeros(len(problem.start))
         if problem.cover is not None:
-            # What is fixed along the path is as wide as its rounding, however often a piece is halved.
+            # Fixed coordinates have a width by rounding, which bisection does not reduce.
             size = np.maximum(np.abs(self._start.lower).max(axis=0), np.abs(self._start.upper).max(axis=0))
             turns = [j for j, k in enumerate(problem.free) if k >= 3]
             size[turns] = np.maximum(size[turns], 1.0)
             self._fixed = np.nan_to_num(_FIXED * size)
             self.whole[~(self.whole > self._fixed)] = 0.0
-        # The boxes in which dependent coordinates became known.
+        # The boxes in which dependent coordinates became known; their sub-boxes are in the same assembly mode.
         self._roots: list[LoopBoxes] = []
         self._root_pieces: list[FloatArray] = []
 
@@ -456,7 +456,7 @@ class LoopRule(Rule[Followed]):
         return parts._replace(lower=found.lower, upper=found.upper)
 
     def parts(self, boxes: Boxes[Followed]) -> Boxes[Followed]:
-        """Return the halves of boxes, all lower ones first; along a path those of its pieces."""
+        """Return the halves of boxes, all lower halves first; along a path the halves of its pieces."""
         cover = self._problem.cover
         if cover is None:
             return bisected(boxes)
@@ -466,16 +466,16 @@ class LoopRule(Rule[Followed]):
         parts.more.along[:count, 2] = parts.more.along[count:, 1] = middle
         own = self._problem.of_path
         parts.lower[:, own], parts.upper[:, own] = self._problem.path_boxes(cover, parts.more.along)
-        # Dependent coordinates are found anew, from a closed point nearby.
+        # Dependent coordinates are computed again from a near point with closed loops.
         D = list(self._problem.dependent)
         parts.lower[:, D] = parts.upper[:, D] = np.nan
         return parts._replace(more=parts.more._replace(is_known=np.full(2 * count, not D)))
 
     def examined(self, boxes: Boxes[Followed]) -> Examined:
-        """Return the results for the boxes that hold poses of the workspace."""
+        """Return the results for the boxes that contain poses of the workspace."""
         inside = self._contracted(loop_boxes_of(boxes))
         found = self._examiner.examine(inside)
-        # Boxes are left out where the ball of rotations is left, which a path has not.
+        # Only boxes outside the ball of rotations are dropped; a path has no ball.
         along = boxes.more.along if self._problem.cover is not None else np.zeros((len(found.shares), 0))
         found = found._replace(along=along)
         new = np.flatnonzero(found.boxes.is_known & ~inside.is_known)
@@ -485,7 +485,7 @@ class LoopRule(Rule[Followed]):
         return found
 
     def _contracted(self, boxes: LoopBoxes) -> LoopBoxes:
-        """Return boxes contracted to the workspace, and record where they lead."""
+        """Return boxes contracted to the workspace, and record the contraction."""
         found, kept = contracted_boxes(self._problem, boxes)
         if self._recorder is not None and self._problem.cover is None:
             before, after = (self._poses(each.lower, each.upper) for each in (boxes, found))
@@ -493,7 +493,7 @@ class LoopRule(Rule[Followed]):
         return found if kept.all() else some(found, kept)
 
     def _poses(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return boxes by the ends of all six coordinates (B, 6): those that follow from others have their range."""
+        """Return boxes by the ends of all six coordinates (B, 6); dependent coordinates have their whole range."""
         box, free = self._problem.box, self._problem.free
         low, high = (np.broadcast_to(each, (len(lower), 6)).copy() for each in (box.lower, box.upper))
         for j in self._independent:
@@ -504,23 +504,23 @@ class LoopRule(Rule[Followed]):
     def boxes_of(
         self, found: Examined, bound: FloatArray, split: NDArray[np.intp], more: FloatArray
     ) -> Boxes[Followed]:
-        """Return examined boxes with bounds (B,), places (B,) of the coordinates to bisect, and columns of the rule."""
+        """Return examined boxes with bounds (B,), indices (B,) of the coordinates to bisect, and arrays of the rule."""
         lower, upper, near, is_known = found.boxes
         columns = np.array(self._independent)[split]
         if self._problem.cover is not None:
-            # Halves of a piece along which the platform stands, but for rounding, are as wide as the piece.
+            # If the platform stands still along a piece, except for rounding, its halves are as wide as the piece.
             own = list(self._problem.stated)
             stands = ((upper - lower)[:, own] <= self._fixed[own]).all(axis=1)
             columns = np.where(stands, SMALL, columns)
         return Boxes(lower, upper, bound, columns, Followed(near, is_known, found.relation, more, found.along))
 
     def widths(self, boxes: LoopBoxes | Boxes[Followed]) -> FloatArray:
-        """Return the widths (B, f) of boxes along independent coordinates, in parts of the whole workspace."""
+        """Return the widths (B, f) of boxes along independent coordinates, relative to the whole workspace."""
         own, whole = self._independent, self.whole[self._independent]
         return (boxes.upper - boxes.lower)[:, own] / np.where(whole > 0, whole, np.inf)
 
     def is_one_assembly(self) -> bool:
-        """Return whether the boxes surely belong to one assembly."""
+        """Return whether the boxes are provably in one assembly mode."""
         if not self._roots:
             return True
         roots = joined(self._roots)
@@ -538,11 +538,11 @@ class LoopRule(Rule[Followed]):
         return bool(one_assembly(self._examiner, roots, pairs.T, np.arange(count) == 0).all())
 
     def assembled_until(self) -> tuple[float, float]:
-        """Return the place of a path up to which boxes surely belong to the assembly of its start; infinite for all."""
+        """Return the place of a path up to which boxes are provably in its first assembly mode; infinite for all."""
         cover, start = self._problem.cover, self._problem.start
         if cover is None or not self._roots:
             return math.inf, 0.0
-        # Pieces in the order of the path: each holds the first point of the next one, and the first the start.
+        # Pieces in the order of the path: each contains the start of the next one.
         roots, along = joined(self._roots), joined(self._root_pieces)
         order = np.lexsort(along.T[[1, 0]])
         ordered, along = some(roots, order), along[order]
@@ -559,12 +559,12 @@ class LoopRule(Rule[Followed]):
     def _are_tied(
         self, cover: PathCover, boxes: Sequence[LoopBoxes], pieces: Sequence[FloatArray]
     ) -> NDArray[np.bool_]:
-        """Return whether boxes of a path have the first point of the next ones, and there the same closed point.
+        """Return whether each box of a path has the same point with closed loops as the next box at their common pose.
 
         Args:
-            cover: of the path.
-            boxes: (B,) of pieces, and of the next ones.
-            pieces: (B, 3) these.
+            cover: boxes of the path.
+            boxes: (B,) boxes of pieces, and (B,) boxes of the next pieces.
+            pieces: (B, 3) pieces, and (B, 3) next pieces.
         """
         (one, other), (before, after) = boxes, pieces
         (k, low, high), (segment, s, _) = before.T, after.T
@@ -572,13 +572,13 @@ class LoopRule(Rule[Followed]):
         meet = is_next | ((segment == k) & (low <= s) & (s <= high))
         end = np.stack([k, np.where(is_next, 1.0, s), np.where(is_next, 1.0, s)], axis=1)
         start = np.stack([segment, s, s], axis=1)
-        # The closed point of a small box is found to be between the ends of a large one, not the other way. In the two
-        # boxes the pose may have other coordinates.
+        # Containment is only proved for the point of the smaller box in the larger box. The same pose may have
+        # different coordinates in the two boxes.
         parts = self._at(cover, one, end, before), self._at(cover, other, start, after)
         return np.asarray(meet & (self._examiner.leads(parts[0], other) | self._examiner.leads(parts[1], one)))
 
     def _at(self, cover: PathCover, boxes: LoopBoxes, points: FloatArray, pieces: FloatArray) -> LoopBoxes:
-        """Return boxes (B,) of pieces (B, 3) of a path with the poses at points of these, pieces without a length."""
+        """Return boxes (B,) of pieces (B, 3) of a path, reduced to points, which are pieces without a length."""
         own = [j for j in self._independent if j < len(self._problem.free)]
         low, high = (each[:, [self._problem.free[j] for j in own]] for each in cover.boxes(points, pieces))
         lower, upper = boxes.lower.copy(), boxes.upper.copy()
@@ -594,17 +594,17 @@ def loop_boxes_of(boxes: Boxes[Followed]) -> LoopBoxes:
 def one_assembly(
     examiner: Examiner, boxes: LoopBoxes, pairs: NDArray[np.intp], is_reached: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Return for each box (B,) whether its closed points surely belong to the assembly of some boxes.
+    """Return whether each box (B,) is provably in the assembly mode of some given boxes.
 
     Args:
-        examiner: of the robot.
-        boxes: with known dependent coordinates where they are in pairs.
-        pairs: (P, 2) boxes that touch.
-        is_reached: (B,) those boxes.
+        examiner: examiner of the robot's boxes.
+        boxes: (B,) boxes; boxes in pairs have known dependent coordinates.
+        pairs: (P, 2) indices of neighbouring boxes.
+        is_reached: (B,) whether a box is one of the given boxes.
     """
     is_reached, tried = is_reached.copy(), np.zeros(len(pairs), dtype=bool)
     while True:
-        # Pairs of a box that is reached and one that is not: the first of each that is left is tried.
+        # Pairs with exactly one reached box; for each other box the first untested pair is tested.
         which = np.flatnonzero((is_reached[pairs[:, 0]] != is_reached[pairs[:, 1]]) & ~tried)
         if not which.size:
             return is_reached

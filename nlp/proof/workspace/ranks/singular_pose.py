@@ -11,8 +11,8 @@ inverse of the rows at a pose, their determinant has the sign of det C if every 
 det C is computed in integers.
 
 A robot within the joint-centre tolerance may be singular although the design is not. The method of Frank and Wolfe [1],
-with steps within the tolerance, reduces the smallest singular value by errors along its derivatives. A singular robot is
-searched from each iterate.
+with steps within the tolerance, reduces the smallest singular value by errors along its derivatives. Each iterate
+starts a search for a singular robot.
 
 Source: 1. M. Frank, P. Wolfe, *An algorithm for quadratic programming*, Naval Research Logistics Quarterly 3 (1956).
 """
@@ -48,7 +48,7 @@ SINGULAR = 1e-10
 BY_NEWTON = "found singular to 1e-10 by Newton's method"
 #: Largest number of Newton steps: where a determinant touches 0, each step halves the distance.
 _STEPS = 60
-#: Number of steps in which the smallest singular value must decrease by a tenth; at the edge of a workspace it does not.
+#: Number of steps in which the smallest singular value must decrease by a tenth; at the edge of a workspace it may not.
 _PATIENCE = 8
 #: Relative singular value of M below which J is tested.
 _NEAR = 1e-6
