@@ -239,7 +239,7 @@ def test_an_incumbent_that_is_too_good_is_refused_and_one_that_is_beaten_replace
     found = certify_program(solution.nlp, solution.nlp.centre)
     assert found.status is CertificateStatus.PROVED
     assert found.was_beaten
-    assert "better than the one given" in found.statement
+    assert "better than the given point" in found.statement
     assert found.incumbent == pytest.approx(solution.F, rel=1e-4)
 
 

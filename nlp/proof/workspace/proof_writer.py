@@ -23,7 +23,7 @@ _OUTWARDS = 1e-6
 #: Outward shift of the bound of an actuator quantity, in parts of the gap: first-order forms need it on these boxes.
 _ROOM = 0.25
 #: Reason for claims about robots within the tolerance if errors cannot be modelled.
-_AS_BUILT = "the robot cannot be assembled with errors of its joint centres"
+_AS_BUILT = "the robot cannot be assembled with joint-centre errors"
 #: Reason for quantities of robots within the tolerance with dependent coordinates or kinks.
 _BY_BOXES = "proved by one search of boxes for all robots within the tolerance, which proof files do not support"
 #: Reason for claims of kinds that the checker does not know.

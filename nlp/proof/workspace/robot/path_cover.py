@@ -96,7 +96,7 @@ class PathCover:
 
     @cached_property
     def pieces(self) -> FloatArray:
-        """Pieces (M, 3) of the segments: index, and both ends of the parameter; segments with large turns have several."""
+        """Pieces (M, 3) of the segments: index, and both ends of the parameter; large turns are divided."""
         count = len(self.knots) - 1
         parts = np.ones(count) if self.turns.counts is None else self.turns.counts.astype(float)
         rows, ends = divided(np.tile([0.0, 1.0], (count, 1)), parts)
