@@ -104,7 +104,7 @@ class Order(enum.Enum):
 
     NEWEST = "parts of the boxes of the step before: depth first"
     LARGEST_CHUNK = "parts of the boxes of the step with the largest bound: cheap, for many boxes"
-    LARGEST = "the boxes with the largest bounds; of many, those of the step with the largest one"
+    LARGEST = "the boxes with the largest bounds; with many open boxes as LARGEST_CHUNK"
 
 
 class BoxResults(NamedTuple, Generic[Columns]):

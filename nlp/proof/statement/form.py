@@ -41,9 +41,9 @@ class Kind(enum.Enum):
     """Origin of a condition."""
 
     LIMIT = "a constraint of the program"
-    LOOP = "an equation of a robot's loops, or a number that it bounds"
-    ASSEMBLY = "a sign or reach of a robot's assembly, which is no constraint of the program"
-    FOLLOWS = "follows from another one: it excludes boxes, and has no multiplier of its own"
+    LOOP = "a loop equation of the robot, or a bound that follows from it"
+    ASSEMBLY = "a sign or reach of the assembly mode, which is not a constraint of the program"
+    FOLLOWS = "a redundant condition that follows from others: it excludes boxes, and has no multiplier"
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 #: takes at most half of the time left.
 TIME_LIMIT = 60.0
 _PART = 0.5
-#: Gap of the recorded search of a limit that is known to hold: it is made finer where the limit needs it.
+#: First gap of the recorded search of a limit that is known to be satisfied; the search reduces it if necessary.
 _AS_NEEDED = 1.0
 #: Reason for quantities of a robot that may not reach all poses.
 _OUT_OF_REACH = "not proved: a robot within the joint-centre tolerance may not reach every pose"
@@ -142,7 +142,7 @@ class _OverBox(Judging):
         )
 
     def shown(self, verdict: Verdict) -> Verdict:
-        """Return a verdict on a number with its value in the home assembly mode."""
+        """Return a verdict with the value of the quantity in the home assembly mode."""
         return verdict if verdict.is_rank else self._homes.shown(verdict)
 
     def subject(self, shortest: float) -> Subject:

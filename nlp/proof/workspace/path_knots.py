@@ -186,7 +186,7 @@ def _robot_about(case: Case, cover: PathCover, workspace: Workspace) -> tuple[Pr
     """Return the design near a path, with all six coordinates of the pose, and its actuator coordinates.
 
     Raises:
-        NotJudgedError: the actuator coordinates are not known, or their number is not that of the degrees of freedom.
+        NotJudgedError: the actuator coordinates are not known, or there are not as many as degrees of freedom.
     """
     if workspace.turns.kind is not TurnKind.ROLL_PITCH_YAW:
         raise NotJudgedError(

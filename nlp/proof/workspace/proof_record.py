@@ -76,7 +76,7 @@ class ProofRecord:
         sign, key = claim.sense.sign, (claim.name, claim.sense.value)
         if not math.isfinite(bound):
             return
-        # Forms of first order need smaller boxes for the same bound.
+        # First-order forms need smaller boxes for the same bound.
         room = _ROOM * abs(bound - reached) if math.isfinite(reached) else 0.0
         beyond = sign * bound + max(room, _OUTWARDS * abs(bound))
         most = math.inf if claim.limit is None else sign * claim.limit

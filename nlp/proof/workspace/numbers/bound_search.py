@@ -104,7 +104,7 @@ class Number(ABC):
         """
         return Examiner(self.problem, self)
 
-    def examine(self, forms: Forms, f: int, errors: int) -> Tested:  # noqa: ARG002 - they are those of the problem
+    def examine(self, forms: Forms, f: int, errors: int) -> Tested:  # noqa: ARG002 - the problem has them
         """Return the lower bounds (B, K) of boxes; no box counts as regular."""
         lower, shares = self.over(forms, f)
         shares = np.nan_to_num(shares, posinf=0.0)

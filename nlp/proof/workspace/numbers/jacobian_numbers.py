@@ -83,7 +83,7 @@ class _RowsNumber(Number):
     Args:
         problem: the design, or all robots within the tolerance.
         length: length that divides moments about the platform's origin.
-        family: robots whose values are taken; those of the problem if None.
+        family: robots for the values; if None, the robots of the problem.
     """
 
     def __init__(self, problem: Problem, length: float, family: Problem | None = None) -> None:

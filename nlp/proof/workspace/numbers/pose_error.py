@@ -4,7 +4,7 @@ By the triangle inequality, errors of joint centres and of a leg's length act as
 leg error + 2 joint error``. To first order the pose error is ``J^-1 d`` with ``|d_i| <= eps``; its position or rotation
 is largest with every ``d_i`` equal to eps or -eps.
 
-For terms of second order, let the first-order error be P eps in position and Q eps in rotation. By Taylor's formula the
+For second-order terms, let the first-order error be P eps in position and Q eps in rotation. By Taylor's formula the
 leg lengths at the true pose differ from the first-order ones by at most
 
     r = ((p + a w)^2 / l + a w^2) / 2,      p = P (eps + r),  w = Q (eps + r),

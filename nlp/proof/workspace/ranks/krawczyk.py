@@ -46,7 +46,7 @@ class Coordinates(NamedTuple):
 
 
 class Relation(NamedTuple):
-    """Dependent coordinates over B boxes, in parts of their half widths.
+    """Dependent coordinates over B boxes, relative to their half widths.
 
     Attributes:
         off: (B, k) values at the middle of the independent coordinates.

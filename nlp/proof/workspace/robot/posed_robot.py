@@ -316,7 +316,7 @@ def _check_freedoms(family: Problem, whole: PosedModel) -> None:
     """Check that equations and screws that were left out still depend on the others with joint-centre errors.
 
     Raises:
-        NotJudgedError: they are independent at random errors.
+        NotJudgedError: left-out equations or screws are independent at random errors.
     """
     loops, own, errors = family.loops, list(family.independent), family.of_errors
     members = [each for each in whole.limbs.members if each.rank < each.screws.shape[1]]

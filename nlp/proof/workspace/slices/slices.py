@@ -47,12 +47,12 @@ class Region(enum.Enum):
     """Verdict on a box of a slice."""
 
     REGULAR = "proved regular"
-    BEYOND = "regular, with a singular pose on the way from the middle"
+    BEYOND = "regular, beyond a singular pose"
     OTHER_SIGN = "regular, with the other sign of the determinant"
-    SINGULAR = "singular, as at every pose"
+    SINGULAR = "singular at every pose"
     OPEN = "open: too close to a singular pose"
-    UNREACHED = "out of reach, proved"
-    UNKNOWN = "open: reach or closed loops are not proved"
+    UNREACHED = "out of reach (proved)"
+    UNKNOWN = "open: reach or loop closure is not proved"
 
 
 #: Order of the regions in arrays.
