@@ -420,7 +420,7 @@ def test_what_is_not_covered_is_open_with_the_reason() -> None:
     delta["workspace"]["position"][2] = build_model("delta").home[2]
     found = judge_workspace(case_from(delta, "delta"), with_limits=False).regularity
     assert found.outcome is Outcome.OPEN
-    assert "does not have the poses" in found.reason
+    assert "does not reach the poses" in found.reason
     del tables["workspace"]
     with pytest.raises(CaseError, match=r"tolerance.joint_centre: is not computed for 'spherical-3-rrr'"):
         case_from(tables, "spherical")
