@@ -268,7 +268,7 @@ def test_a_certificate_speaks_of_the_modes_that_it_names() -> None:
     every = certify(solution, all_assemblies=True)
     assert every.certificate.status is CertificateStatus.PROVED
     assert every.certificate.incumbent > 1.1 * solution.F
-    assert "better than the one given, in another working mode than home's" in every.certificate.statement
+    assert "better than the given point, in another working mode than home" in every.certificate.statement
     # A solution in another mode is no incumbent of home's: all modes are covered.
     (outcome,) = solution.outcomes
     elsewhere = replace(outcome.own, x=every.certificate.x)

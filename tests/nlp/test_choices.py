@@ -104,7 +104,7 @@ def test_limits_leave_combinations_out_and_may_leave_none() -> None:
     found = result_of(none).choice
     assert found.statement == "none of 2 combinations of values, each solved from 4 starts, gave an answer"
     empty = certify(none).certificate
-    assert empty.statement.startswith("proved: no point of the box keeps all limits with any of the 2 combinations")
+    assert empty.statement.startswith("proved: no point of the box satisfies all limits with any of the 2 combinations")
 
 
 def test_several_tasks_are_combined_for_each_combination() -> None:

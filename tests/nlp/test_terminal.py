@@ -627,16 +627,16 @@ def test_a_certificate_that_proves_only_the_obvious_says_so() -> None:
     assert early.incumbent > 0
     assert early.statement.startswith("nothing is proved: stopped after")
     early = replace(early, bound=0.0)
-    assert early.statement.startswith("nothing useful is proved yet (")
+    assert early.statement.startswith("only the trivial bound is proved (")
     assert "F is at least 0" in early.statement
     useful = replace(early, bound=0.5 * early.incumbent)
     assert useful.statement.startswith("incomplete")
     below = replace(early, above=-1.0, status=CertificateStatus.PROVED)
-    assert "says nothing useful: F is at least 0" in below.statement
+    assert "is trivial: F is at least 0" in below.statement
     assert "1 boxes" not in "".join(line.words for line in certificate_lines(certificate_data(replace(early, boxes=1))))
     fixed = certify_program(formulate(load_case("paper-4.4-snu")))
     assert 0 < fixed.bound < 1e-20
-    assert "has F smaller than 0; the best point known has 0" in fixed.statement
+    assert "has F smaller than 0; the best known point has 0" in fixed.statement
     # Where F reaches 0, the bound 0 is all there is to prove.
     reached = replace(early, status=CertificateStatus.PROVED, incumbent=0.0, bound=0.0)
     assert reached.statement.startswith("proved: no point of the box")

@@ -211,7 +211,7 @@ def test_a_refuted_workspace_carries_two_poses(tolerance: str) -> None:
     given = on_paper(case, text, with_limits=False)[1]
     (found,) = check.check_workspace_proof(given, case).claims
     assert found.is_refuted
-    missing = {"it was not judged", "the lengths of legs that it needs have no proof"}
+    missing = {"it was not judged", "it requires leg lengths, which have no proof"}
     assert {each.reason for each in given.unproved} <= missing
     first, second = claim(given, "regular").sides
     for sides, fault in (
