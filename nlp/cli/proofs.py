@@ -161,14 +161,20 @@ def verified_path_lines(proof: Proof, premises: PathPremises, case: Case) -> Ite
         print_notice(f"rejected: {error}")
         raise SystemExit(1) from None
     subject = f"the path {premises.file} of {case.name}"
-    lines = list(_path_premises(premises, path, case))
-    return _checked_lines(proof, checked, case, 0.0, subject, lines)
+    notes = [_untimed_note(len(path.untimed), len(path))] if path.is_timed and path.untimed.size else []
+    return _checked_lines(proof, checked, case, 0.0, subject, list(_path_premises(premises, path, case)), notes)
 
 
 def _checked_lines(
-    proof: Proof, checked: VerifiedWorkspace, case: Case, leg_error: float, whose: str, premises: Sequence[str]
+    proof: Proof,
+    checked: VerifiedWorkspace,
+    case: Case,
+    leg_error: float,
+    whose: str,
+    premises: Sequence[str],
+    notes: Sequence[str] = (),
 ) -> Iterator[Line]:
-    """Yield what a checked proof proves: the counts, claims that have no proof, then every premise and claim."""
+    """Yield what a checked proof proves: the counts, claims that have no proof, notes, then every premise and claim."""
     from ..proof.checker.premises import exact
     from ..proof.statement.claims import ERRORS
     from ..words.text import Line
@@ -183,6 +189,7 @@ def _checked_lines(
         yield Line(words, part="claims that are not on paper" if k >= SHOWN else "")
     if proof.unproved:
         yield Line("the file's reasons for claims that are not on paper are not checked")
+    yield from map(Line, notes)
     yield Line(f"{checked.leaves:,} leaves, shown on {checked.pieces:,} boxes")
     for line in premises:
         yield Line(f"  {line}", part="premises")
@@ -240,9 +247,15 @@ def _path_premises(premises: PathPremises, path: ProgrammedPath, case: Case) -> 
         choices["start"] = ", ".join(map(exact, premises.start))
     yield f"read with: {'; '.join(f'{name} {each}' for name, each in choices.items() if each is not None)}"
     if path.is_timed:
-        yield "speeds and powers: in the path's own motion; 0 along segments without a stated time"
+        yield "speeds and powers: in the path's own motion"
     if case.model.unknowns:
         yield "assembly: that of home at the first point, followed along the path"
+
+
+def _untimed_note(untimed: int, segments: int) -> str:
+    """Return what speeds are along segments without a time."""
+    verb = "has" if untimed == 1 else "have"
+    return f"{untimed:,} of {segments:,} segments {verb} no time: speeds and powers there count as 0"
 
 
 def _words(claim: CheckedClaim, case: Case) -> str:

@@ -238,15 +238,15 @@ def _certify(
             claimed=claimed,
             gap=options.gap,
             above=above,
-            time_limit=None if math.isinf(seconds_left()) else seconds_left() / programs,
             jobs=jobs,
             progress=None if progress is None else progress(name),
             recorder=recorder,
         )
-        # A journal has no trees.
+        # A journal has no trees, and asks within this block whether the search is cut short.
         is_kept = recorder is None
-        certificate = kept_certificate(program, x, certified, gap=options.gap, above=above) if is_kept else certified()
-        return _after_solve(certificate, own, search.starts)
+        with within(seconds_left() / programs):
+            found = kept_certificate(program, x, certified, gap=options.gap, above=above) if is_kept else certified()
+        return _after_solve(found, own, search.starts)
 
     if not several:
         statement = Statement(is_minimum=above is not None and case.tasks[0].sense is Sense.MAX)

@@ -268,6 +268,8 @@ def kept_certificate(
 ) -> Certificate:
     """Return the certificate of a program from the journal in force, or that of a function, which is then kept.
 
+    A certificate that an interrupt or the end of this block's time cuts short is no outcome, and is not kept.
+
     Args:
         nlp: the program.
         x: (n,) best known point; None without one.
@@ -291,7 +293,7 @@ def kept_certificate(
             at = None if known.x is None else _vector(known.x, nlp.n)
             return Certificate(status, nlp, at, above=above, history=history, **values)
     found = certified()
-    if not is_requested():
+    if found.status is not CertificateStatus.INCOMPLETE or not is_requested():
         journal.add(
             KeptCertificate(
                 key,

@@ -9,16 +9,14 @@ from ..case.pathfile import PLACE
 from ..case.pose import Free
 from ..case.task import Sense
 from ..proof.workspace.verdict import Outcome
-from .lines import title_line
 from .motors import TONES
 from .numbers import number
 from .text import Line, TextTable, Tone, in_part
 from .verdicts import (
     SHOWN,
-    answer_line,
     answer_words,
     exchange_lines,
-    following_lines,
+    head_lines,
     machine_lines,
     open_lines,
     outcome_lines,
@@ -46,18 +44,10 @@ def path_summary(
         result: the verdicts.
         command: returns the command that shows a pose; left out, for a page, only tables have single claims.
     """
-    yield title_line(case)
-    path = result.path
+    path, answer = result.path, verdict_words(result)
     limited = [each for each in path.claims if each.limit is not None]
-    yield Line(f"{path.file}: {path.segments:,} segment{'s' * (path.segments != 1)}", label="path")
-    if path.time is not None:
-        yield Line(f"{number(path.time)} s", label="time", after=_untimed_words(path))
-    if path.idle:
-        words = ", ".join(f"{each.word} (line {each.line})" for each in path.idle[:_SHOWN])
-        rest = len(path.idle) - _SHOWN
-        yield Line(words + (f", and {rest} more" if rest > 0 else ""), label="moves nothing")
-    yield answer_line(verdict_words(result), is_proved=result.proved)
-    yield from following_lines(path.dependent or (), path.claims)
+    subject = _subject_lines(path)
+    yield from head_lines(case, answer, path.claims, path.dependent, is_proved=result.proved, subject=subject)
     wrong = first_refuted(result)
     if wrong is not None and wrong.fault is not None:
         yield Line(fault_words(wrong, wrong.fault), label="first fault", tone=Tone.FAULT)
@@ -76,6 +66,17 @@ def path_summary(
         yield _actuator_table(path)
     yield from in_part("tightest limits", tightest_table(limited, "tightest limits along the path"))
     yield from in_part("every number", along_table(case, path.claims))
+
+
+def _subject_lines(path: PathData) -> Iterator[Line]:
+    """Yield the path: its file, its time, and words of it that move nothing."""
+    yield Line(f"{path.file}: {path.segments:,} segment{'s' * (path.segments != 1)}", label="path")
+    if path.time is not None:
+        yield Line(f"{number(path.time)} s", label="time", after=_untimed_words(path))
+    if path.idle:
+        words = ", ".join(f"{each.word} (line {each.line})" for each in path.idle[:_SHOWN])
+        rest = len(path.idle) - _SHOWN
+        yield Line(words + (f", and {rest} more" if rest > 0 else ""), label="moves nothing")
 
 
 def _other_faults(path: PathData, first: PathVerdictData | None) -> Iterator[Line]:

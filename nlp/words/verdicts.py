@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from ..case.case import Case
@@ -12,7 +12,7 @@ from ..case.task import Sense
 from ..case.workspace import POSITION
 from ..proof.workspace.verdict import Outcome
 from ..results.rounding import ordered
-from .lines import counted
+from .lines import counted, title_line
 from .motors import TONES
 from .numbers import number
 from .poses import pose_words
@@ -72,12 +72,35 @@ def exchange_lines(proof: ExchangeData, where: str) -> Iterator[Line]:
     yield Line(words, label="exchange", after=after)
 
 
-def answer_line(words: str, *, is_proved: bool) -> Line:
-    """Return the answer of a judgement as a line."""
-    return Line(words, label="verdict", tone=Tone.ANSWER if is_proved else Tone.NO_ANSWER)
+def head_lines(
+    case: Case,
+    answer: str,
+    claims: Sequence[VerdictData],
+    dependent: Sequence[str] | None,
+    *,
+    is_proved: bool,
+    subject: Iterable[Line] = (),
+    about: Iterable[Line] = (),
+) -> Iterator[Line]:
+    """Yield the head of a judgement: title and answer, then the proved range of each dependent coordinate.
+
+    Args:
+        case: the case.
+        answer: the answer in words.
+        claims: the verdicts.
+        dependent: names of the dependent coordinates; None without any.
+        is_proved: whether everything is proved.
+        subject: lines before the answer.
+        about: lines after it, about the robots and poses that it covers.
+    """
+    yield title_line(case)
+    yield from subject
+    yield Line(answer, label="verdict", tone=Tone.ANSWER if is_proved else Tone.NO_ANSWER)
+    yield from about
+    yield from _following_lines(dependent or (), claims)
 
 
-def following_lines(names: Sequence[str], claims: Sequence[VerdictData]) -> Iterator[Line]:
+def _following_lines(names: Sequence[str], claims: Sequence[VerdictData]) -> Iterator[Line]:
     """Yield the proved range of each dependent coordinate of the pose."""
     for name in names:
         ends = {each.sense: each for each in claims if each.name == name}

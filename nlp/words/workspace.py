@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from ...models import Dimension
@@ -13,16 +14,14 @@ from ..case.task import Sense
 from ..interruption import STOPPED
 from ..proof.workspace.verdict import EVERYWHERE, Outcome
 from .claims import seeing_lines
-from .lines import title_line
 from .motors import TONES, ends_of_motor, motor_tables
 from .numbers import number
 from .poses import pose_words
 from .text import Line, TextTable, Tone, in_part
 from .verdicts import (
-    answer_line,
     answer_words,
     exchange_lines,
-    following_lines,
+    head_lines,
     machine_lines,
     open_lines,
     outcome_lines,
@@ -37,25 +36,21 @@ if TYPE_CHECKING:
     from ..results.workspace import ScaleData, WorkspaceProofData, WorkspaceResult
 
 
-def verdict_lines(case: Case, result: WorkspaceResult) -> Iterator[Line]:
-    """Yield the verdict on a machine, what it is about, and F."""
-    yield answer_line(verdict_words(result), is_proved=result.proved)
+def _about_lines(case: Case, result: WorkspaceResult) -> Iterator[Line]:
+    """Yield the machines and the poses that a verdict covers, where these are more than the exact one and the box."""
     yield from machine_lines(case, result.joint_centre)
-    yield from _dependent_lines(result)
-    for low, high in zip(result.extremes, result.extremes[1:], strict=False):
+    if result.poses is not None:
+        yield Line(result.poses, label="poses")
+
+
+def _objective_lines(extremes: Sequence[VerdictData]) -> Iterator[Line]:
+    """Yield the proved range of F."""
+    for low, high in pairwise(extremes):
         if low.bound is None or high.bound is None:
             continue
         if low.name == high.name and low.name.partition(" ")[0] == "F":
             ends = f"{number(low.bound)} to {number(high.bound)} {low.unit}".rstrip()
             yield Line(ends, label=low.name, after=", at no pose smaller or larger")
-
-
-def _dependent_lines(result: WorkspaceResult) -> Iterator[Line]:
-    """Yield the set of poses of a robot with dependent coordinates, and the proved range of each of these."""
-    if result.poses is None:
-        return
-    yield Line(result.poses, label="poses")
-    yield from following_lines(result.dependent or (), result.extremes)
 
 
 def verdict_words(result: WorkspaceResult) -> str:
@@ -93,10 +88,11 @@ def workspace_summary(
         result: the verdicts.
         command: returns the command that shows a pose; left out, for a page, only tables have single claims.
     """
-    limited = [each for each in result.extremes if each.limit is not None]
-    yield title_line(case)
-    yield from verdict_lines(case, result)
-    yield from _about_lines(case)
+    limited, answer = [each for each in result.extremes if each.limit is not None], verdict_words(result)
+    about = _about_lines(case, result)
+    yield from head_lines(case, answer, result.extremes, result.dependent, is_proved=result.proved, about=about)
+    yield from _objective_lines(result.extremes)
+    yield from _pose_lines(case)
     yield from _regular_lines(case, result.regular)
     if result.constraints is not None:
         yield from _regular_lines(case, result.constraints, "constraints regular", "the constraint wrenches lose")
@@ -116,7 +112,7 @@ def workspace_summary(
     yield from in_part("every number", _tables(case, result.extremes))
 
 
-def _about_lines(case: Case) -> Iterator[Line]:
+def _pose_lines(case: Case) -> Iterator[Line]:
     """Yield the pose about which the workspace of a case with a fixed pose is."""
     if case.workspace is not None and case.workspace.about_pose:
         position, (angle, _) = [ends_of(value)[0] for value in case.position], ends_of(case.rotation.angle)

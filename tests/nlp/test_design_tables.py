@@ -103,6 +103,23 @@ def test_a_stopped_run_is_taken_up(
     assert one == other
 
 
+def test_a_certificate_that_its_share_of_the_time_cuts_short_is_tried_again(tmp_path: Path) -> None:
+    # Two tasks and their worst case share the time.
+    ends = ("x1 = 12, x2 = 4, x3 = 30", "x1 = { min = 8, max = 12 }, x2 = { min = 3, max = 5 }, x3 = 30")
+    case = sn.load_case(saved(tmp_path / "two.toml", edited(TWO_GOALS, ends) + '[combine]\nmethod = "worst-case"\n'))
+    with SearchJournal(tmp_path / "journal") as journal, kept_in(journal):
+        found = sn.certify(case, time_limit=0.1)
+        statuses = [each.status.value for each in found.certificates]
+        assert "incomplete" in statuses
+        searches = 3
+        assert len(journal) == searches + len(statuses) - statuses.count("incomplete")
+        found = sn.certify(case)
+        assert found.is_proved
+        assert len(journal) == searches + len(statuses)
+        again = sn.certify(case)
+        assert [each.seconds for each in again.certificates] == [each.seconds for each in found.certificates]
+
+
 def test_limits_that_differ_by_little_in_a_small_unit_are_searched_each(tmp_path: Path) -> None:
     scaled = (("x1 = 12, x2 = 4", "x1 = 120000, x2 = 40000"), ("min = 5, max = 40", "min = 50000, max = 400000"))
     case = saved(tmp_path / "up.toml", edited(UP, ('"cm"', '"um"'), *scaled, ("min = 2, max = 60", "max = 600000")))

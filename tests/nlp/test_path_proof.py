@@ -470,7 +470,7 @@ def test_pieces_of_other_assemblies_are_rejected() -> None:
 
 def test_the_commands_write_and_verify(cli: Run, tmp_path: Path) -> None:
     part, out = (
-        saved(tmp_path / "part.ngc", "G90 G94\nF60\nG1 X0 Y0 Z20 A0 B0 C0\nX1\nG2 X2 Y1 I1\nM2"),
+        saved(tmp_path / "part.ngc", "G90 G94\nF60\nG1 X0 Y0 Z20 A0 B0 C0\nG0 X1\nG2 X2 Y1 I1\nM2"),
         tmp_path / "proof.json",
     )
     words = ["path", "hexapod-linuxcnc", "--along", str(part), "--unit", "in", "--gap", "0.05", "--proof", str(out)]
@@ -478,10 +478,13 @@ def test_the_commands_write_and_verify(cli: Run, tmp_path: Path) -> None:
     shown = output_of(cli("verify-proof", str(out)))
     assert "holds: 19 of 19 claims about the path" in shown
     assert "the case and the path are those that the proof carries" in " ".join(shown.split())
+    untimed = "1 of 2 segments has no time: speeds and powers there count as 0"
+    assert untimed in " ".join(shown.split())
     own = ["verify-proof", str(out), "hexapod-linuxcnc", "--along", str(part)]
     shown = output_of(cli(*own, "--unit", "in", "--all"))
     assert "proof carries" not in shown
     assert "2 segments, 1 of them arc" in " ".join(shown.split())
+    assert " ".join(shown.split()).count(untimed) == 1
     assert "the path is the one that the proof carries" in " ".join(output_of(cli(*own[:3])).split())
     code, _, said = cli(*own)
     assert (code, "see --unit" in said) == (1, True)
@@ -505,6 +508,7 @@ def test_a_path_of_a_case_is_held_to_its_file(cli: Run, tmp_path: Path) -> None:
     shown = output_of(cli("verify-proof", str(out), str(case), "--all"))
     assert "in its place in the case" in " ".join(shown.split())
     assert "proof carries" not in shown
+    assert "speeds" not in shown
     output_of(cli("verify-proof", str(out)))
     code, _, said = cli("verify-proof", str(out), str(case), "--along", str(poses))
     assert (code, "see --along" in said) == (1, True)
