@@ -12,8 +12,8 @@ from .usage import with_present_names
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-#: Commands by purpose, with the first line of their help and an example. With this list, help and a command start without
-#: the modules of the other commands.
+#: Commands by purpose, with the first line of their help and an example. With this list, a command starts without the
+#: modules of the other commands.
 GROUPS = {
     "Solve": {
         "new": ("Print a commented starter case.", "new stewart-gough > my-robot.toml"),
@@ -64,7 +64,7 @@ GROUPS = {
     },
     "Exchange": {
         "import": (
-            "Convert an MJCF or URDF model with closed loops to a robot file.",
+            "Convert a closed-loop MJCF or URDF model to a robot file.",
             "import robot.xml --platform head --out robot.toml",
         ),
         "export": (

@@ -58,7 +58,7 @@ def import_(
     ] = False,
     force: options.Force = False,
 ) -> None:
-    """Convert an MJCF or URDF model with closed loops to a robot file.
+    """Convert a closed-loop MJCF or URDF model to a robot file.
 
     The joints keep the names of the model. FILE must come before --actuated and --free.
     """

@@ -235,8 +235,8 @@ def alterations(content: dict[str, Any], rng: np.random.Generator, per_field: in
 
 
 BOUND = re.compile(r"at (most|least) ([^\s,]+)")
-BOXES = re.compile(r"[\d,]+ leaves, shown on .*\n")
-REASONS = re.compile(r"(?<=^not on paper: ).*?: .*", re.MULTILINE)
+BOXES = re.compile(r"[\d,]+ leaves of the proof trees?, checked on .*\n")
+REASONS = re.compile(r"(?<=^no proof: ).*?: .*", re.MULTILINE)
 LOSSES = re.compile(r"F being the largest of (\S+) \((\S+) - F\('one'\)\) and (\S+) \(F\('other'\) - (\S+)\)")
 
 
@@ -252,7 +252,7 @@ def least_loss(weight: float, best: float, other_weight: float, other_best: floa
 def is_true(before: str, after: str, reached: dict[tuple[str, str], float]) -> bool:
     """Whether an output says what another one said, but for bounds that are still beyond values that are reached."""
     before, after = (REASONS.sub("", BOXES.sub("", each)) for each in (before, after))
-    if before.startswith("holds: there is no feasible point"):
+    if before.startswith("PROOF VALID: there is no feasible point"):
         # Every claim about the points of an empty set is true.
         return before.partition(" within ")[2] in after or ", F being that of task 'one'" in after
     if (found := LOSSES.search(after)) and after[found.start() :] != before[found.start() :]:
@@ -325,7 +325,7 @@ def test_errors_of_legs_are_those_of_the_command(cli: Run, folder: Path) -> None
     assert cli("verify-proof", proof, case, "--leg-error", "-0.019999999999")[0] == 2
     out = output_of(cli("verify-proof", proof, case, "--leg-error", "0.01", "--all"))
     assert "for every machine whose joint centres are off by at most 0.01 in" in out
-    errors = re.findall(r"(position|rotation) error: at most (\S+) (?:in|deg), for lengths of legs that are (.*)", out)
+    errors = re.findall(r"(position|rotation) error: at most (\S+) (?:in|deg), for leg lengths that are (.*)", out)
     assert [(each[0], each[2]) for each in errors] == [
         ("position", "off by at most 0.01 in"),
         ("rotation", "off by at most 0.01 in"),

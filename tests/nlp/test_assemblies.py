@@ -348,7 +348,7 @@ def test_the_command_says_evaluated(tmp_path: Path) -> None:
     case = case_file(tmp_path, case_tables(robot, pose={"position": [0, 0, values["h"]]}, task=[task]))
     result = ran("solve", str(case))
     assert result.code == 0
-    assert "fixed point: F = " in result.output
+    assert "at the given point F = " in result.output
     assert "(evaluated)" in result.output
     assert "converged" not in result.output
 

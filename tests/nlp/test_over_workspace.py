@@ -179,7 +179,7 @@ def test_f_along_a_path_is_its_worst_too_and_tasks_are_combined_along_it(tmp_pat
     solution = solve(case_from(tables | {"objective": {"over": "path"}}))
     assert solution.path.is_proved
     assert pytest.approx(worst.max(), rel=2e-3) == solution.F
-    assert "along the path, to be as large as possible" in solution.table()
+    assert "the smallest value along the path (maximised)" in solution.table()
     tasks = [LIFT | {"weight": 100}, TURN]
     both = solve(case_from(tables | {"task": tasks, "combine": {"method": "weighted-sum"}}))
     value = np.array([200, 2]) / 101 @ [rates_squared(RADII, [HOME], name)[:, 0] for name in ("lift", "turn")]

@@ -142,7 +142,7 @@ def test_the_shipped_program_is_proved_and_its_page_says_so(cli: Run) -> None:
     shown = output_of(cli("path", "hexapod-pocket"))
     page = (DOCS / "paths.md").read_text(encoding="utf-8")
     _, _, rest = page.partition("<!-- begin: screwsynth path hexapod-pocket -->\n```text\n")
-    assert "everything is proved at every point" in shown
+    assert "PROVED at every point" in shown
     assert max(map(len, shown.splitlines())) <= 80
     assert [line.rstrip() for line in shown.splitlines()] == rest.partition("```")[0].splitlines()
 
@@ -312,7 +312,7 @@ def test_the_place_of_a_path_and_the_design_are_the_best_of_a_grid(cli: Run, tmp
     assert near.min() - 0.2 <= result["path"]["place"]["x"] <= near.max() + 0.2
     assert np.ptp(near) < 2
     assert (result["path"]["place"]["y"], result["path"]["place"]["z"]) == (1.0, 18.0)
-    assert "free between -10 and 10" in shown
+    assert "(bounds -10 .. 10)" in shown
     # The machine and the place of the result, and another place, which has no machine.
     output_of(cli("path", str(case), "--of", str(out)))
     refusal_of(cli("path", str(case), "--set", "x1=20"), "path.place.x: is free")

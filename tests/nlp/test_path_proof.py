@@ -476,7 +476,7 @@ def test_the_commands_write_and_verify(cli: Run, tmp_path: Path) -> None:
     words = ["path", "hexapod-linuxcnc", "--along", str(part), "--unit", "in", "--gap", "0.05", "--proof", str(out)]
     output_of(cli(*words))
     shown = output_of(cli("verify-proof", str(out)))
-    assert "holds: 19 of 19 claims about the path" in shown
+    assert "PROOF VALID: 19 of 19 claims about the path" in shown
     assert "the case and the path are those that the proof carries" in " ".join(shown.split())
     untimed = "1 of 2 segments has no time: speeds and powers there count as 0"
     assert untimed in " ".join(shown.split())

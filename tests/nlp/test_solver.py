@@ -373,7 +373,7 @@ def test_a_design_that_is_refuted_at_the_end_is_no_answer(tmp_path: Path, cli: R
     result = json.loads(target.read_text(encoding="utf-8"))
     assert (code, result["status"], result["F"]) == (1, "not proved", None)
     assert result["workspace"]["proved"] is False
-    assert "not proved over the workspace: the best design found has F = " in unbroken(out)
+    assert "not proved over the workspace: the best design has F = " in unbroken(out)
     assert "(optimal" not in out
     row = row_of_solution(found, 0, 0.0)
     assert (row.status, row.F, row.note) == ("not proved", None, "not proved over the workspace")

@@ -19,7 +19,7 @@ from screwsynth.nlp.system.slips import hint_of, toml_slips
 #: What the same word may mean in one command only: the command exists to write it, or it is about another thing.
 FORMS = {
     "--set": "NAME=VALUE", "--of": "RESULT", "--starts": "N", "--seed": "N", "--jobs": "N", "--time": "SECONDS",
-    "--json": "FILE", "--csv": "FILE", "--html": "FILE", "--plot": "FILE", "--gap": "PART", "--pose": "N",
+    "--json": "FILE", "--csv": "FILE", "--html": "FILE", "--plot": "FILE", "--gap": "FRACTION", "--pose": "N",
 }  # fmt: skip
 #: Words that were, or might be, used for what another word stands for.
 BANNED = {

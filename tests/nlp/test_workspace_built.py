@@ -380,9 +380,9 @@ def test_the_command_shows_the_machine_that_refutes(cli: Run, tmp_path: Path) ->
     assert refuted
     for each in refuted:
         assert max(np.linalg.norm(each.machine.base, axis=1)) == pytest.approx(TOLERANCE)
-    assert shown.index("verdict") < shown.index("tightest limits") < shown.index("limits over every pose")
-    assert "every one whose joint centres are off by at most 0.02 in" in shown
-    assert f"the machine that refutes: {refuted[0].name}" in shown
+    assert shown.index("verdict") < shown.index("limits with the smallest margin") < shown.index("limits over all poses")
+    assert "covers every robot whose joint centres are off by at most 0.02 in" in shown
+    assert f"robot within the tolerance that violates: {refuted[0].name}" in shown
     assert "see it with" in shown
 
 
