@@ -238,7 +238,7 @@ def costliest_words(limits: Sequence[LimitData]) -> str | None:
     return f"The active limit with the largest relative effect is {row.key}: F {cost:+.4g} {per_words(row.unit)}."
 
 
-def holding_lines(limits: Sequence[LimitData], title: str = "") -> Iterator[Line]:
+def active_limit_lines(limits: Sequence[LimitData], title: str = "") -> Iterator[Line]:
     """Yield the active limits of a design with the derivative of F, and the violated limits; nothing without limits.
 
     Args:

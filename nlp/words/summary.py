@@ -16,6 +16,7 @@ from ..results.rounding import robot_size, size_of_F
 from ..units import objective_unit
 from .joints import limb_part_table
 from .lines import (
+    active_limit_lines,
     better_line,
     certificate_lines,
     check_lines,
@@ -24,7 +25,6 @@ from .lines import (
     combined_value_lines,
     fault_lines,
     heading_lines,
-    holding_lines,
     is_unasked_singularity,
     objective_lines,
     singularity_lines,
@@ -86,7 +86,7 @@ def _task_summary(case: Case, result: SolveResult) -> Summary:
     yield from _remark_lines(case)
     if robot is not None:
         yield solved_design_table(case, result, robot)
-    yield from holding_lines(result.limits, limits_title(case, result.workspace or result.path))
+    yield from active_limit_lines(result.limits, limits_title(case, result.workspace or result.path))
     yield from _task_parts(case, result)
 
 
@@ -162,7 +162,7 @@ def _combined_summary(case: Case, result: CombinedResult) -> Summary:
     if robot is not None:
         yield combined_design_table(case, combined, robot)
     if point is not None:
-        yield from holding_lines(point.limits or (), limits_title(case, result.workspace or result.path))
+        yield from active_limit_lines(point.limits or (), limits_title(case, result.workspace or result.path))
     yield from in_part("notes", (Line(notice, label="note") for notice in combined.notices))
     if robot is not None:
         part = "" if is_unasked_singularity(robot, case) else "rank"

@@ -170,7 +170,7 @@ def _room(each: VerdictData) -> float:
     return (value - limit if each.sense is Sense.MIN else limit - value) / (abs(limit) or 1.0)
 
 
-def refuting_machine(case: Case, name: str, machine: MachineData) -> TextTable:
+def violating_robot(case: Case, name: str, machine: MachineData) -> TextTable:
     """Return the joint-centre errors of the robot within the tolerance that violates a claim."""
     unit, title = case.units.length, f"robot within the tolerance that violates: {name}"
     if machine.centres is not None:

@@ -27,9 +27,9 @@ from .verdicts import (
     open_lines,
     outcome_lines,
     proof_line,
-    refuting_machine,
     tightest_table,
     verdict_table,
+    violating_robot,
 )
 
 if TYPE_CHECKING:
@@ -110,7 +110,7 @@ def workspace_summary(
     for regular, label in ((result.regular, "search"), (result.constraints, "search for constraint singularities")):
         if regular is not None:
             yield from in_part("searches", _search_lines(case, regular, label))
-    yield from in_part("robot that violates a limit", _machine_lines(case, result.extremes))
+    yield from in_part("robot that violates a limit", _violating_robot_table(case, result.extremes))
     yield from in_part("all quantities", _tables(case, result.extremes))
 
 
@@ -123,11 +123,11 @@ def _pose_lines(case: Case) -> Iterator[Line]:
         yield Line(f"the stated pose ({words}){turned}", label="workspace relative to")
 
 
-def _machine_lines(case: Case, extremes: Sequence[VerdictData]) -> Iterator[TextTable]:
+def _violating_robot_table(case: Case, extremes: Sequence[VerdictData]) -> Iterator[TextTable]:
     """Yield the errors of the robot within the tolerance that violates the first such limit."""
     for each in extremes:
         if each.outcome is Outcome.REFUTED and each.machine is not None:
-            yield refuting_machine(case, each.name, each.machine)
+            yield violating_robot(case, each.name, each.machine)
             return
 
 
@@ -171,7 +171,7 @@ def _regular_lines(case: Case, regular: RegularData, name: str = REGULAR) -> Ite
 def _search_lines(case: Case, regular: RegularData, label: str) -> Iterator[Line | TextTable]:
     """Yield the robot within the tolerance that is singular, and the size of the search."""
     if regular.machine is not None:
-        yield refuting_machine(case, "full rank of J", regular.machine)
+        yield violating_robot(case, "full rank of J", regular.machine)
     word = "box" if regular.boxes == 1 else "boxes"
     yield Line(f"{regular.boxes:,} {word} examined in {regular.seconds:.2f} s, engine {regular.engine}", label=label)
 

@@ -547,7 +547,7 @@ def test_free_and_active_numbers_come_first_and_fixed_ones_are_folded() -> None:
     assert held == sorted(held, reverse=True)
     assert sum(ranges) == 3
     assert len(design.rows) - design.folded <= 10
-    assert f"and {design.folded} more fixed numbers" in printed([design], 80, whole=False)
+    assert f"and {design.folded} more fixed values" in printed([design], 80, whole=False)
 
 
 def test_a_table_as_csv_has_every_digit(tmp_path: Path, cli: Run) -> None:
