@@ -11,8 +11,8 @@ from .progress import spinner
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from ..evidence.state import WorkspacePose
     from ..proof.workspace.path_knots import Sampling
-    from ..results.verdicts import WorkspacePose
 
 
 def path(

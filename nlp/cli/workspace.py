@@ -11,10 +11,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ..case.case import Case
+    from ..evidence.state import WorkspacePose
     from ..proof.workspace.judgement import Judgement
     from ..proof.workspace.proof_record import ProofRecord
     from ..proof.workspace.slices.slices import Slice
-    from ..results.verdicts import WorkspacePose
     from ..results.workspace import WorkspaceResult
 
 

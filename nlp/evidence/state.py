@@ -85,7 +85,21 @@ class RobotState:
         return self.rank < 6
 
 
-class PlatformPose(JsonObject):
+class WorkspacePose(JsonObject):
+    """A pose of the platform.
+
+    Attributes:
+        position: origin of the platform frame in the world frame.
+        axis: unit axis of the rotation; z without rotation.
+        angle: angle of the rotation about the axis.
+    """
+
+    position: Vector3
+    axis: Vector3
+    angle: Annotated[float, Dimension.ANGLE]
+
+
+class PlatformPose(WorkspacePose):
     """A pose of the platform.
 
     Attributes:
@@ -95,9 +109,6 @@ class PlatformPose(JsonObject):
         rotation: rows of the rotation matrix.
     """
 
-    position: Vector3
-    axis: Vector3
-    angle: Annotated[float, Dimension.ANGLE]
     rotation: Annotated[tuple[Vector3, ...], Size(3), Key("rotation_matrix")]
 
 

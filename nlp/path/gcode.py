@@ -17,9 +17,10 @@ from ..case.pose import LARGEST
 from ..errors import InputError
 from ..units import Units
 from .arcs import PLANES, TOLERANCES, Arc, ArcError, Tolerances, arc_about, arc_length, centre_of_radius
+from .idle import idle_words
 from .options import SYSTEMS, Between, PathOptions, code_of_unit, program_unit
 from .orientation import order_named
-from .path import Kind, ProgrammedPath, idle_words
+from .path import Kind, ProgrammedPath
 from .standing import duration_at, turns_between, without_rests
 from .words import AXES, Block, WordError, block_of
 

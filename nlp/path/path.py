@@ -23,6 +23,7 @@ from ...models import FloatArray
 from ...models.rotation import matrix_from_axis_angle
 from .arcs import PLANES, Arc, arc_length
 from .frame import PathFrame
+from .idle import Idle
 from .options import Between
 from .orientation import (
     Order,
@@ -46,20 +47,6 @@ class Kind(enum.IntEnum):
     LINE = 0
     ARC = 1
     DWELL = 2
-
-
-class Idle(NamedTuple):
-    """A word of a program that moves nothing, or a line that is no part of the path.
-
-    Attributes:
-        line: the first line that has it.
-        word: the word, or what is left out.
-        lines: number of lines that have it.
-    """
-
-    line: int
-    word: str
-    lines: int
 
 
 class Poses(NamedTuple):
@@ -313,8 +300,3 @@ class Segment:
             return pose
         R = SX(frame.rotation.tolist())
         return SymbolicPose(R @ pose.position + SX(frame.origin.tolist()), R @ pose.rotation)
-
-
-def idle_words(counts: dict[str, list[int]]) -> tuple[Idle, ...]:
-    """Return what moves nothing, in the order of the first lines, from first line and count of each word."""
-    return tuple(sorted(Idle(line, word, lines) for word, (line, lines) in counts.items()))

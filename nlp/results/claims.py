@@ -11,7 +11,8 @@ from ..proof.workspace.verdict import Outcome
 from .rounding import ordered
 
 if TYPE_CHECKING:
-    from .verdicts import VerdictData, WorkspacePose
+    from ..evidence.state import WorkspacePose
+    from .verdicts import VerdictData
     from .workspace import WorkspaceResult
 
 #: Beginning of the keys of limits that no single pose refutes, but two: the shortest and the longest length of a leg.

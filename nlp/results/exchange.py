@@ -2,8 +2,9 @@
 
 from typing import TYPE_CHECKING, Any
 
+from ..evidence.state import WorkspacePose
 from ..system.jsonvalues import Absent, JsonObject
-from .verdicts import WorkspacePose, pose_data
+from .verdicts import pose_data
 
 if TYPE_CHECKING:
     from ..solver.semi_infinite import ExchangeProof

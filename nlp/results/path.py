@@ -10,13 +10,15 @@ from ...models import Dimension
 from ...models.statics import driven_joints
 from ..case.pathfile import PLACE
 from ..case.task import Sense
+from ..evidence.state import WorkspacePose
+from ..path.idle import Idle
 from ..proof.statement.claims import ACTUATED
 from ..system.jsonvalues import Absent, Inline, JsonObject
 from .exchange import ExchangeData, exchange_fields
 from .parts import HeadData, SettingsData, VersionsData, settings_data
 from .pathtable import knot_motion
 from .point import head_data, versions
-from .verdicts import VerdictData, WorkspacePose, pose_data, posed_fields
+from .verdicts import VerdictData, pose_data, posed_fields
 
 if TYPE_CHECKING:
     from ..case.overrides import Settings
@@ -102,20 +104,6 @@ class PathKnotsData(JsonObject):
     reason: Absent[str]
 
 
-class IdleData(JsonObject):
-    """A word of a program that moves nothing, or a line that is no part of the path.
-
-    Attributes:
-        word: the word, or what is left out.
-        line: the first line that has it.
-        lines: number of lines that have it.
-    """
-
-    word: str
-    line: int
-    lines: int
-
-
 class PathData(JsonObject):
     """A path and the claims about it.
 
@@ -135,7 +123,7 @@ class PathData(JsonObject):
     segments: int
     time: Absent[float]
     untimed: Absent[int]
-    idle: tuple[IdleData, ...]
+    idle: tuple[Idle, ...]
     dependent: Absent[tuple[str, ...]]
     claims: tuple[PathVerdictData, ...]
     actuators: tuple[PathActuatorData, ...]
@@ -213,7 +201,7 @@ def path_result(judged: "Judgement", settings: "Settings | None" = None) -> Path
             segments=len(judged.path),
             time=judged.path.time if judged.path.is_timed else None,
             untimed=len(judged.path.untimed) if judged.path.is_timed else None,
-            idle=tuple(IdleData.of(each) for each in judged.path.idle),
+            idle=judged.path.idle,
             dependent=judged.dependent or None,
             claims=_claims(judged),
             actuators=tuple(_actuators(judged)),

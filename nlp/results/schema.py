@@ -11,10 +11,10 @@ from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, NamedTuple, TypeAlias, Union, get_args, get_origin
 
 from ...models.fileversions import RESULT_FILES, VERSION_KEY
-from ..errors import InputError, listing
-from ..system.jsonvalues import JsonObject, JsonValue, Mark, kinds_of
+from ..errors import InputError
+from ..system.jsonvalues import JsonObject, JsonValue, without_none
 from ..system.reading import check_version, read_limited
-from ..system.strictjson import Size, WrongValueError, below, json_tree, value_of
+from ..system.strictjson import Size, WrongValueError, entries_of, json_tree, keys_of, object_of
 from .axisranges import AxisRangesResult
 from .checks import ChecksResult
 from .comparison import ComparisonResult
@@ -133,41 +133,29 @@ class _Fields(NamedTuple):
 def _fields(kind: type[JsonObject], definitions: Schema) -> _Fields:
     """Return the fields of an object type, those of its inline parts among them."""
     fields, descriptions = _Fields({}, [], {}), _descriptions(kind)
-    for name, annotation in kinds_of(kind).items():
-        key, mark, *_ = kind.fields[name]
-        if mark is Mark.INLINE:
-            _add_inline(fields, annotation, definitions)
+    for each in entries_of(kind):
+        if each.inline is not None:
+            _add_inline(fields, each.inline, definitions, is_required=each.is_required)
             continue
-        schema = _schema(annotation if mark is None else _type_without_none(annotation), definitions)
-        fields.properties[key] = {**schema, **({"description": descriptions[name]} if name in descriptions else {})}
-        if mark is None:
-            fields.required.append(key)
+        schema = _schema(each.kind if each.is_required else without_none(each.kind), definitions)
+        described = {"description": descriptions[each.name]} if each.name in descriptions else {}
+        fields.properties[each.key] = {**schema, **described}
+        if each.is_required:
+            fields.required.append(each.key)
     return fields
 
 
-def _add_inline(fields: _Fields, annotation: object, definitions: Schema) -> None:
+def _add_inline(fields: _Fields, kind: type[JsonObject], definitions: Schema, *, is_required: bool) -> None:
     """Add the fields of an inline part; where the part may be absent, its fields are present together or not at all."""
-    kind = _type_without_none(annotation)
-    if not (isinstance(kind, type) and issubclass(kind, JsonObject)):
-        raise TypeError(f"only an object can stand inline, which {kind!r} is not")
     part = _fields(kind, definitions)
     fields.properties.update(part.properties)
     fields.together.update(part.together)
-    if kind is get_args(annotation)[0]:
+    if is_required:
         fields.required.extend(part.required)
     elif part.required:
         first, *others = part.required
         for name in part.properties:
             fields.together[name] = [*fields.together.get(name, []), *(others if name == first else [first])]
-
-
-def _type_without_none(annotation: object) -> object:
-    """Return the type of a marked field, without None."""
-    kind = get_args(annotation)[0]
-    if get_origin(kind) not in (Union, UnionType):
-        return kind
-    kinds = [part for part in get_args(kind) if part is not NoneType]
-    return kinds[0] if len(kinds) == 1 else Union[tuple(kinds)]  # noqa: UP007 - the types are known at run time only
 
 
 def _descriptions(kind: type[JsonObject]) -> dict[str, str]:
@@ -246,69 +234,8 @@ def _result(tables: object) -> Result:
         raise WrongValueError("", "must be an object")
     if VERSION_KEY not in tables:
         raise WrongValueError(VERSION_KEY, "is missing")
-    required = {kind: set(_keys(kind, required=True)) for kind in RESULTS}
+    required = {kind: set(keys_of(kind, required=True)) for kind in RESULTS}
     # The kinds have different keys; the one that misses least is the one that was meant.
     kind = min(RESULTS, key=lambda each: (len(required[each] - tables.keys()), -len(required[each])))
-    found: Any = _object(kind, tables, "")
+    found: Any = object_of(kind, tables)
     return found  # type: ignore[no-any-return]
-
-
-def _keys(kind: type[JsonObject], *, required: bool) -> list[str]:
-    """Return the keys of an object in JSON, those of its inline parts among them.
-
-    Args:
-        kind: of the object.
-        required: only the keys that are never absent.
-    """
-    keys = []
-    for name, annotation in kinds_of(kind).items():
-        key, mark, *_ = kind.fields[name]
-        if mark is Mark.INLINE:
-            part = _inline_kind(annotation)
-            if not (required and part is not get_args(annotation)[0]):
-                keys += _keys(part, required=required)
-        elif mark is None or not required:
-            keys.append(key)
-    return keys
-
-
-def _inline_kind(annotation: object) -> type[JsonObject]:
-    """Return the type whose fields stand in the place of a field."""
-    inner = get_args(annotation)[0]
-    kinds = [inner] if isinstance(inner, type) else [each for each in get_args(inner) if each is not NoneType]
-    kind: type[JsonObject] = kinds[0]
-    return kind
-
-
-def _object(kind: type[JsonObject], table: object, key: str) -> JsonObject:
-    """Return an object of a type.
-
-    Raises:
-        WrongValueError: a key is missing or unknown, or a value is not allowed.
-    """
-    if not isinstance(table, dict):
-        raise WrongValueError(key, "must be an object")
-    allowed = _keys(kind, required=False)
-    for name in table:
-        if name not in allowed:
-            raise WrongValueError(below(key, name), f"no such key; allowed: {listing(allowed)}")
-    return _object_of_fields(kind, table, key)
-
-
-def _object_of_fields(kind: type[JsonObject], table: Mapping[str, object], key: str) -> JsonObject:
-    """Return an object from a table that may hold other keys too; the errors are those of :func:`_object`."""
-    values: dict[str, object] = {}
-    for name, annotation in kinds_of(kind).items():
-        name_in_json, mark, *_ = kind.fields[name]
-        if mark is Mark.INLINE:
-            part = _inline_kind(annotation)
-            may_miss = part is not get_args(annotation)[0]
-            missing = may_miss and table.keys().isdisjoint(_keys(part, required=False))
-            values[name] = None if missing else _object_of_fields(part, table, key)
-        elif name_in_json in table:
-            values[name] = value_of(annotation, table[name_in_json], below(key, name_in_json), _object)
-        elif mark is Mark.ABSENT:
-            values[name] = None
-        else:
-            raise WrongValueError(below(key, name_in_json), "is missing")
-    return kind(**values)

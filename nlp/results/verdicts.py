@@ -2,8 +2,8 @@
 
 from typing import TYPE_CHECKING, Annotated, Any
 
-from ...models import Dimension
 from ..case.task import Sense
+from ..evidence.state import WorkspacePose
 from ..proof.enclosure.engine import ENGINE
 from ..proof.statement.machine import has_straight_legs
 from ..proof.workspace.robot.pose_box import pose_box
@@ -18,20 +18,6 @@ if TYPE_CHECKING:
     from ..proof.workspace.judgement import Judgement
     from ..proof.workspace.robot.pose_box import PoseNumbers
     from ..proof.workspace.verdict import Verdict
-
-
-class WorkspacePose(JsonObject):
-    """A pose of the platform.
-
-    Attributes:
-        position: origin of the platform frame in the world frame.
-        axis: unit axis of the rotation; z without rotation.
-        angle: angle of the rotation about the axis.
-    """
-
-    position: Vector3
-    axis: Vector3
-    angle: Annotated[float, Dimension.ANGLE]
 
 
 class CentreData(JsonObject):

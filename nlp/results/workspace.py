@@ -8,6 +8,7 @@ from ...models.statics import driven_joints
 from ..case.loads import NO_LOADING
 from ..case.motors import MotorNumber
 from ..case.task import Sense
+from ..evidence.state import WorkspacePose
 from ..proof.statement.claims import ACTUATED
 from ..proof.workspace.verdict import Outcome, Verdict
 from ..system.jsonvalues import Absent, Inline, JsonObject, Vector
@@ -15,7 +16,7 @@ from ..units import Units
 from .exchange import ExchangeData, exchange_fields
 from .parts import HeadData, SettingsData, VersionsData, settings_data
 from .point import head_data, versions
-from .verdicts import RegularData, VerdictData, WorkspacePose, pose_data, rank_data, verdict_data
+from .verdicts import RegularData, VerdictData, pose_data, rank_data, verdict_data
 
 if TYPE_CHECKING:
     from ..case.case import Case

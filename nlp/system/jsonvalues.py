@@ -11,6 +11,8 @@ a short command a thirtieth slower.
 import enum
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import MISSING
+from types import NoneType, UnionType
 from typing import (
     TYPE_CHECKING,
     Annotated,
@@ -19,7 +21,9 @@ from typing import (
     NamedTuple,
     TypeAlias,
     TypeVar,
+    Union,
     dataclass_transform,
+    get_args,
     get_origin,
     get_type_hints,
 )
@@ -28,7 +32,7 @@ import numpy as np
 
 from ...models import Dimension, FloatArray, frozen_vector
 from ..units import Units
-from .strictjson import Made, Size
+from .strictjson import Entry, Made, Size
 
 if TYPE_CHECKING:
     from typing import Self
@@ -149,6 +153,19 @@ class JsonObject:
         """Return an object for each of several values; arguments are those of :meth:`of`."""
         return tuple(cls.of(row, units) for row in rows)
 
+    @classmethod
+    def entries(cls) -> tuple[Entry, ...]:
+        """Return the fields that JSON has, for :func:`.entries_of`.
+
+        A type whose module few commands need stands in an annotation as text, such as ``Absent["ProofData"]``. Who
+        reads such a value, or makes its schema, has imported that module.
+        """
+        objects = {each.__name__: each for each in _subclasses(JsonObject)}
+        kinds = get_type_hints(cls, localns=objects, include_extras=True)
+        return tuple(
+            _entry(name, each, kinds[name]) for name, each in cls.fields.items() if each.mark is not Mark.HIDDEN
+        )
+
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"{type(self).__name__} is frozen: {name} cannot be set")
 
@@ -171,6 +188,22 @@ def _field(name: str, kind: object) -> Field:
             measure = each
         made = made or isinstance(each, Made)
     return Field(key, mark, measure, made)
+
+
+def _entry(name: str, field: Field, kind: object) -> Entry:
+    """Return what JSON has of a field with an annotation.
+
+    Raises:
+        TypeError: a part that is no object stands inline.
+    """
+    if field.mark is None:
+        return Entry(name, field.key, kind)
+    inner = without_none(kind)
+    if field.mark is Mark.ABSENT:
+        return Entry(name, field.key, kind, None)
+    if not (isinstance(inner, type) and issubclass(inner, JsonObject)):
+        raise TypeError(f"only an object can stand inline, which {inner!r} is not")
+    return Entry(name, field.key, kind, MISSING if inner is get_args(kind)[0] else None, inner)
 
 
 def _copied(value: Any, field: Field, units: Units | None, dimension: Dimension | None) -> object:  # noqa: ANN401 - of any field
@@ -198,15 +231,13 @@ def _shown(value: Any, units: Units, dimension: Dimension) -> object:  # noqa: A
     return None if value is None else units.shown(value, dimension)
 
 
-def kinds_of(kind: type[JsonObject]) -> dict[str, object]:
-    """Return the annotations of an object's fields by name, without those that JSON never has.
-
-    A type whose module few commands need stands in an annotation as text, such as ``Absent["ProofData"]``. Who calls
-    this has imported that module.
-    """
-    objects = {each.__name__: each for each in _subclasses(JsonObject)}
-    found = get_type_hints(kind, localns=objects, include_extras=True)
-    return {name: found[name] for name, each in kind.fields.items() if each.mark is not Mark.HIDDEN}
+def without_none(kind: object) -> Any:  # noqa: ANN401 - another annotation
+    """Return an annotation without its mark, and without None."""
+    inner = get_args(kind)[0]
+    if get_origin(inner) not in (Union, UnionType):
+        return inner
+    kinds = [part for part in get_args(inner) if part is not NoneType]
+    return kinds[0] if len(kinds) == 1 else Union[tuple(kinds)]  # noqa: UP007 - the types are known at run time only
 
 
 def _subclasses(kind: type[JsonObject]) -> Iterator[type[JsonObject]]:

@@ -10,7 +10,7 @@ import dataclasses
 import enum
 import json
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from types import MappingProxyType, NoneType, UnionType
 from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin, get_type_hints
@@ -31,8 +31,6 @@ _WORDS: dict[object, str] = {
 }
 
 Kind = TypeVar("Kind")
-#: Reads an object of a class, from its value and its dotted key.
-ObjectReader = Callable[[type, object, str], object]
 
 
 class Size(NamedTuple):
@@ -49,6 +47,29 @@ class Made(NamedTuple):
     """
 
     of: Callable[[Any], object]
+
+
+class Entry(NamedTuple):
+    """Declaration of a field of a class, of which JSON writes objects.
+
+    Attributes:
+        name: name of the attribute.
+        key: key in JSON.
+        kind: annotation of the value.
+        default: value where the key is missing; ``dataclasses.MISSING`` for a key that must be there.
+        inline: class of the value, where its own fields stand in its place; else None.
+    """
+
+    name: str
+    key: str
+    kind: object
+    default: object = dataclasses.MISSING
+    inline: type | None = None
+
+    @property
+    def is_required(self) -> bool:
+        """Whether the key must be there."""
+        return self.default is dataclasses.MISSING
 
 
 class WrongValueError(ValueError):
@@ -124,15 +145,14 @@ def _unique(pairs: Iterable[tuple[str, object]]) -> dict[str, object]:
     return found
 
 
-def value_of(kind: object, value: object, key: str = "", read: ObjectReader | None = None) -> Any:  # noqa: ANN401 - kind's
+def value_of(kind: object, value: object, key: str = "") -> Any:  # noqa: ANN401 - kind's
     """Return a value of JSON as an annotation has it; a list becomes a tuple.
 
     Args:
-        kind: the annotation: a plain type, an enumeration, a data class, ``Literal``, a union, a tuple of one kind, or
-            a mapping from texts.
-        value: as :func:`json_tree` returns it.
+        kind: the annotation: a plain type, an enumeration, a class of :func:`object_of`, ``Literal``, a union, a tuple
+            of one kind, or a mapping from texts.
+        value: value that :func:`json_tree` returns.
         key: its dotted key, for messages.
-        read: reads objects of classes; :func:`object_of` if left out.
 
     Raises:
         WrongValueError: the annotation does not allow the value.
@@ -142,8 +162,8 @@ def value_of(kind: object, value: object, key: str = "", read: ObjectReader | No
     if kind in _WORDS:
         return _plain(kind, value, key)
     if isinstance(kind, type) and get_origin(kind) is None:
-        return (read or object_of)(kind, value, key) if not issubclass(kind, enum.Enum) else _member(kind, value, key)
-    return _compound(kind, value, key, read)
+        return object_of(kind, value, key) if not issubclass(kind, enum.Enum) else _member(kind, value, key)
+    return _compound(kind, value, key)
 
 
 def _plain(kind: object, value: object, key: str) -> object:
@@ -163,27 +183,25 @@ def _member(kind: type[enum.Enum], value: object, key: str) -> enum.Enum:
     return words[value]
 
 
-def _compound(kind: object, value: object, key: str, read: ObjectReader | None) -> object:
+def _compound(kind: object, value: object, key: str) -> object:
     """Return a value of an annotation with arguments; the errors are those of :func:`value_of`."""
     origin, arguments = get_origin(kind), get_args(kind)
     if origin is Annotated:
-        found = value_of(arguments[0], value, key, read)
+        found = value_of(arguments[0], value, key)
         return _marked(arguments[1:], found, key)
     if origin is Literal:
         if not any(type(value) is type(each) and value == each for each in arguments):
             raise WrongValueError(key, f"must be one of {listing(map(repr, arguments))}")
         return value
     if origin in (Union, UnionType):
-        return _one_of(arguments, value, key, read)
+        return _one_of(arguments, value, key)
     if origin is tuple:
         if not isinstance(value, list):
             raise WrongValueError(key, "must be a list")
-        return tuple(value_of(arguments[0], each, f"{key}[{index}]", read) for index, each in enumerate(value))
+        return tuple(value_of(arguments[0], each, f"{key}[{index}]") for index, each in enumerate(value))
     if not isinstance(value, dict):
         raise WrongValueError(key, "must be an object")
-    return MappingProxyType(
-        {name: value_of(arguments[1], each, below(key, name), read) for name, each in value.items()}
-    )
+    return MappingProxyType({name: value_of(arguments[1], each, below(key, name)) for name, each in value.items()})
 
 
 def _marked(marks: tuple[object, ...], found: object, key: str) -> object:
@@ -196,7 +214,7 @@ def _marked(marks: tuple[object, ...], found: object, key: str) -> object:
     return found
 
 
-def _one_of(kinds: tuple[object, ...], value: object, key: str, read: ObjectReader | None) -> object:
+def _one_of(kinds: tuple[object, ...], value: object, key: str) -> object:
     """Return a value of the first of several annotations that allows it.
 
     Raises:
@@ -206,35 +224,74 @@ def _one_of(kinds: tuple[object, ...], value: object, key: str, read: ObjectRead
     # An exact type goes before a number that an integer could become.
     for kind in sorted(kinds, key=lambda each: each is not type(value)):
         try:
-            return value_of(kind, value, key, read)
+            return value_of(kind, value, key)
         except WrongValueError as error:
             faults.append(error)
     raise max(faults, key=lambda error: len(error.key))
 
 
+def entries_of(kind: Any) -> tuple[Entry, ...]:  # noqa: ANN401 - a data class, or a class that declares its entries
+    """Return the fields of a class, in their order."""
+    return _entries_of(kind)
+
+
 @cache
-def _hints_of(kind: type) -> dict[str, Any]:
-    """Return the annotations of a data class, which are read for each of its objects."""
-    return get_type_hints(kind)
+def _entries_of(kind: Any) -> tuple[Entry, ...]:  # noqa: ANN401 - as above
+    """Return the same; they are wanted for each object of the class."""
+    if not dataclasses.is_dataclass(kind):
+        found: tuple[Entry, ...] = kind.entries()
+        return found
+    hints = get_type_hints(kind)
+    return tuple(Entry(each.name, each.name, hints[each.name], each.default) for each in dataclasses.fields(kind))
+
+
+def keys_of(kind: Any, *, required: bool = False) -> tuple[str, ...]:  # noqa: ANN401 - as above
+    """Return the keys of the objects of a class, those of its inline parts among them.
+
+    Args:
+        kind: the class.
+        required: whether only keys that must be there are returned.
+    """
+    keys: list[str] = []
+    for each in entries_of(kind):
+        if each.is_required or not required:
+            keys += [each.key] if each.inline is None else keys_of(each.inline, required=required)
+    return tuple(keys)
 
 
 def object_of(kind: type[Kind], table: object, key: str = "") -> Kind:
-    """Return a data class from an object with the keys of its fields, of which those with defaults may be missing.
+    """Return a value of a class from an object with the keys of its fields.
+
+    Args:
+        kind: a data class, or a :class:`~.jsonvalues.JsonObject`.
+        table: the object, as :func:`json_tree` returns it.
+        key: its dotted key, for messages.
 
     Raises:
         WrongValueError: a key is missing or unknown, or a value is not allowed.
     """
     if not isinstance(table, dict):
         raise WrongValueError(key, "must be an object")
-    fields: Any = kind
-    hints = _hints_of(fields)
+    allowed = keys_of(kind)
     for name in table:
-        if name not in hints:
-            raise WrongValueError(below(key, name), f"no such key; {nearest(name, hints)}")
-    for each in dataclasses.fields(fields):
-        if each.name not in table and each.default is dataclasses.MISSING:
-            raise WrongValueError(below(key, each.name), "is missing")
-    return kind(**{name: value_of(hints[name], value, below(key, name)) for name, value in table.items()})
+        if name not in allowed:
+            raise WrongValueError(below(key, name), f"no such key; {nearest(name, allowed)}")
+    return _object_of_fields(kind, table, key)
+
+
+def _object_of_fields(kind: type[Kind], table: Mapping[str, object], key: str) -> Kind:
+    """Return a value from a table that may hold other keys too; the errors are those of :func:`object_of`."""
+    values: dict[str, object] = {}
+    for each in entries_of(kind):
+        if each.inline is not None and (each.is_required or not table.keys().isdisjoint(keys_of(each.inline))):
+            values[each.name] = _object_of_fields(each.inline, table, key)
+        elif each.inline is None and each.key in table:
+            values[each.name] = value_of(each.kind, table[each.key], below(key, each.key))
+        elif each.is_required:
+            raise WrongValueError(below(key, each.key), "is missing")
+        else:
+            values[each.name] = each.default
+    return kind(**values)
 
 
 def below(key: str, name: str) -> str:

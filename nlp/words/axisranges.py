@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -16,7 +17,8 @@ from .numbers import number
 from .text import Line, TextTable, Tone, in_part
 
 if TYPE_CHECKING:
-    from ..results.axisranges import AxisRangesResult, PairData, RangeEndData, StopData
+    from ..proof.workspace.range_values import PairRange, RangeEnd, RangeStop
+    from ..results.axisranges import AxisRangesResult
 
 
 def axis_ranges_tables(result: AxisRangesResult) -> Iterator[TextTable]:
@@ -44,7 +46,7 @@ def axis_ranges_summary(case: Case, result: AxisRangesResult) -> Iterator[Line |
     label = units.label(Dimension.ANGLE)
     yield Line(f"{position} {units.length}; roll, pitch, yaw {angles} {label}", label="pose")
     for each in result.faults:
-        value = "" if each.value is None else f": {number(each.value)} {each.unit}".rstrip()
+        value = "" if math.isnan(each.value) else f": {number(each.value)} {each.unit}".rstrip()
         yield Line(_stop_words(each), label="not proved at the pose", tone=Tone.FAULT, after=value)
     if result.not_alone:
         yield Line(f"{', '.join(result.not_alone)}, moving with these coordinates", label="dependent coordinates")
@@ -76,17 +78,17 @@ def _factor_words(factor: float | None) -> str:
     return "" if factor is None else number(factor, digits=3) if factor else OUTCOME_WORDS[Outcome.OPEN]
 
 
-def _pair_words(pair: PairData) -> str:
+def _pair_words(pair: PairRange) -> str:
     """Return the claim that limits two coordinates."""
-    return "nothing more" if pair.limited_by is None else _stop_words(pair.limited_by)
+    return "nothing more" if pair.stop is None else _stop_words(pair.stop)
 
 
-def _end_words(end: RangeEndData) -> str:
+def _end_words(end: RangeEnd) -> str:
     """Return the claim that limits an end of a range."""
-    return "the search range" if end.limited_by is None else _stop_words(end.limited_by)
+    return "the search range" if end.stop is None else _stop_words(end.stop)
 
 
-def _stop_words(stop: StopData) -> str:
+def _stop_words(stop: RangeStop) -> str:
     """Return a claim that is not proved: a violation, or an undecided claim."""
     if stop.outcome is Outcome.OPEN:
         name = CLAIM_WORDS.get(stop.name, stop.name)

@@ -16,7 +16,7 @@ from .text import Line
 from .verdicts import SHOWN
 
 if TYPE_CHECKING:
-    from ..results.verdicts import WorkspacePose
+    from ..evidence.state import WorkspacePose
     from ..results.workspace import WorkspaceResult
 
 #: Claims about ranks in words; a singularity of each; its label; and the sentence that is proved.

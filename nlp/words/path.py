@@ -28,8 +28,8 @@ from .verdicts import (
 
 if TYPE_CHECKING:
     from ..case.case import Case
+    from ..evidence.state import WorkspacePose
     from ..results.path import PathData, PathFaultData, PathProofData, PathResult, PathVerdictData
-    from ..results.verdicts import WorkspacePose
 
 #: Title of the table of limits with the smallest margin.
 TIGHTEST_ALONG = "limits with the smallest margin along the path"

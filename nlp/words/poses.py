@@ -17,7 +17,7 @@ from .numbers import number
 if TYPE_CHECKING:
     from ..case.case import Case
     from ..case.overrides import Settings
-    from ..results.verdicts import WorkspacePose
+    from ..evidence.state import WorkspacePose
 
 #: Digits of a pose in a command: the smallest number, the number where no limit is violated, and all digits.
 _FEWEST, _ENOUGH, _ALL = 3, 6, 17

@@ -33,7 +33,8 @@ from .verdicts import (
 )
 
 if TYPE_CHECKING:
-    from ..results.verdicts import RegularData, VerdictData, WorkspacePose
+    from ..evidence.state import WorkspacePose
+    from ..results.verdicts import RegularData, VerdictData
     from ..results.workspace import ScaleData, WorkspaceProofData, WorkspaceResult
 
 

@@ -37,7 +37,7 @@ def test_height_of_a_hexapod_ends_where_the_formula_of_its_legs_does() -> None:
     for end, sign, limit in ((z.lower, -1, 25), (z.upper, 1, 43)):
         assert 0 < sign * (end.failed - end.value) <= accuracy
         stop = end.stop
-        assert (stop.outcome, stop.extreme.limit, stop.name[:10]) == (Outcome.REFUTED, limit, "leg_length")
+        assert (stop.outcome, stop.limit, stop.name[:10]) == (Outcome.REFUTED, limit, "leg_length")
         assert stop.value == pytest.approx(limit, abs=1e-6)
     assert found.pairs == ()
 
@@ -64,7 +64,7 @@ def test_every_axis_of_a_hexapod_keeps_its_legs_to_the_end_and_no_farther() -> N
                 continue
             limited += 1
             beyond = lengths_at(moved(here, axis, np.array([end.failed])))[0, LEGS.index(end.stop.name.split()[-1])]
-            assert beyond > 38 if end.stop.extreme.sense.value == "max" else beyond < 24
+            assert beyond > 38 if end.stop.sense.value == "max" else beyond < 24
             assert beyond == pytest.approx(end.stop.value, abs=1e-9)
     assert limited > 3
     rng, by_name = np.random.default_rng(0), {each.axis: each for each in found.axes}
@@ -97,7 +97,7 @@ def test_a_turn_ends_where_the_platform_is_singular() -> None:
     (yaw,) = axis_ranges(hexapod(), axes=["yaw"], most=(1, math.radians(120))).axes
     for end, sign in ((yaw.lower, -1), (yaw.upper, 1)):
         assert 0 < math.pi / 2 - sign * end.value <= 1e-5
-        assert (end.stop.name, end.stop.outcome, end.stop.extreme) == ("regular", Outcome.REFUTED, None)
+        assert (end.stop.name, end.stop.outcome, end.stop.limit) == ("regular", Outcome.REFUTED, None)
 
 
 def test_a_translational_robot_slides_and_does_not_turn() -> None:

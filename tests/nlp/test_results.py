@@ -31,7 +31,7 @@ from screwsynth.nlp.output.report.report import report_of
 from screwsynth.nlp.output.report.webpage import page_of
 from screwsynth.nlp.results import data, parts
 from screwsynth.nlp.results.checks import check_case
-from screwsynth.nlp.results.schema import RESULTS, _object, result_from_json, result_schema
+from screwsynth.nlp.results.schema import RESULTS, result_from_json, result_schema
 from screwsynth.nlp.solver import multistart, starts
 from screwsynth.nlp.system.jsonvalues import (
     Absent,
@@ -44,7 +44,7 @@ from screwsynth.nlp.system.jsonvalues import (
     Row,
     Slope,
 )
-from screwsynth.nlp.system.strictjson import WrongValueError
+from screwsynth.nlp.system.strictjson import WrongValueError, object_of
 from screwsynth.nlp.words.summary import case_summary
 from screwsynth.nlp.words.text import Line, TextTable, Tone
 
@@ -204,6 +204,7 @@ def test_a_result_is_read_again_from_its_file(cli: Run, tmp_path: Path) -> None:
     [
         (lambda table: table.pop("schema"), "schema: is missing"),
         (lambda table: table.update(extra=1), "extra: no such key; allowed: schema, case"),
+        (lambda table: table.update(titel=""), r"titel: no such key; did you mean 'title'\? allowed: schema"),
         (lambda table: table.update(status="perfect"), "status: must be one of 'optimal'"),
         (lambda table: table.update(F="large"), "F: must be a number"),
         (lambda table: table.update(seed=1.5), "seed: must be an integer"),
@@ -325,16 +326,16 @@ def test_numbers_that_are_none_and_arrays_are_read_again() -> None:
     for value, written in ((math.nan, None), (math.inf, None), (0.5, 0.5)):
         data = json.loads(json.dumps(json_data(reading(value)), allow_nan=False))
         assert data == {"label": "a", "value": written, "cost": 2.0, "turn": [0, math.pi], "row": [1, 2], "note": ""}
-        found = _object(Reading, data, "")
+        found = object_of(Reading, data)
         assert isinstance(found, Reading)
         assert json_data(found) == data
         assert (found.name, found.dimension) == ("a", Dimension.NUMBER)
         assert math.isnan(found.value) or found.value == value
         assert found.row.tolist() == [1.0, 2.0]
     with pytest.raises(WrongValueError, match="label: is missing"):
-        _object(Reading, {}, "")
+        object_of(Reading, {})
     with pytest.raises(WrongValueError, match="dimension: no such key; allowed: label, value"):
-        _object(Reading, {"dimension": "angle"}, "")
+        object_of(Reading, {"dimension": "angle"})
 
 
 def test_words_need_neither_terminal_nor_page() -> None:

@@ -39,7 +39,7 @@ from screwsynth.nlp.case.pose import RotationForm
 from screwsynth.nlp.case.robots import model_options
 from screwsynth.nlp.evidence.kkt import close_equations
 from screwsynth.nlp.evidence.screwvalues import motion_of
-from screwsynth.nlp.evidence.state import evaluate
+from screwsynth.nlp.evidence.state import WorkspacePose, evaluate
 from screwsynth.nlp.output.report.report import report_of
 from screwsynth.nlp.output.report.webpage import page_of
 from screwsynth.nlp.output.terminal import PLAIN_WIDTH, ROOM, show
@@ -52,7 +52,6 @@ from screwsynth.nlp.results.evaluation import EvaluationResult, evaluation_of
 from screwsynth.nlp.results.evidence import certificate_data
 from screwsynth.nlp.results.poses import rotation_form, rotation_numbers
 from screwsynth.nlp.results.result import result_of
-from screwsynth.nlp.results.verdicts import WorkspacePose
 from screwsynth.nlp.words.lines import certificate_lines, headline, motion_words, task_words
 from screwsynth.nlp.words.models import model_words
 from screwsynth.nlp.words.numbers import listed, number

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ...case.pose import RotationForm
-from ...results.verdicts import WorkspacePose
+from ...evidence.state import WorkspacePose
 from ...system.jsonvalues import json_data
 from ...words.path import checked_claims, fault_words, first_refuted, path_summary, verdict_words
 from ...words.poses import pose_words

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from ...case.case import Case
 from ...errors import EvaluationError
+from ...evidence.state import WorkspacePose
 from ...proof.workspace.slices.slices import Slice
 from ...results.claims import refuted_claims, worst_claim
-from ...results.verdicts import WorkspacePose
 from ...results.workspace import WorkspaceResult
 from ...system.jsonvalues import json_data
 from ...words.claims import claim_words

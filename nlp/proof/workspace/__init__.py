@@ -9,5 +9,5 @@ The rooms and modules import each other in this order:
   the home assembly mode), ``judge`` (a box of poses), ``scale`` (the largest box), ``proof_writer`` (proof files),
   ``slices`` (pictures);
 * ``path_domain``, ``path_faults``, ``path_ranks``, ``path_judge`` (a tool path);
-* ``edge_samples``, ``alone`` and ``axis_ranges`` (free travel from a pose).
+* ``range_values``, ``edge_samples``, ``alone`` and ``axis_ranges`` (free travel from a pose).
 """

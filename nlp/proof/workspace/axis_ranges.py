@@ -24,6 +24,7 @@ from ...case.limits.legs import Actuator
 from ...case.pose import Free
 from ...errors import InputError, nearest
 from ...evidence.dependent import robot_size
+from ...evidence.state import WorkspacePose
 from ...interruption import is_requested, one_call, one_search, why_stopped, within
 from ...path.options import Between
 from ...path.orientation import ORDERS, roll_pitch_yaw
@@ -33,7 +34,8 @@ from .edge_samples import EdgeSamples
 from .judge import judge_workspace
 from .judgement import Judgement
 from .path_judge import judge_path
-from .robot.pose_box import PoseNumbers, pose_box
+from .range_values import AxisRange, PairRange, RangeEnd, RangeStop
+from .robot.pose_box import pose_box
 from .robot.posed_robot import NotJudgedError, build_problem
 from .verdict import Outcome, Verdict
 
@@ -49,79 +51,6 @@ TOLERANCE, HALVED, _WHOLE, PAIRED = 1e-6, 1e-4, 1e-3, 0.01
 #: Gap of numbers, of which verdicts alone are asked for, a motion that is none, as a part of the largest
 #: one, and parts of an accuracy that are a short step.
 _GAP, _STILL, _SHORT = 0.5, 1e-12, 10
-
-
-@dataclass(frozen=True, eq=False)
-class RangeStop:
-    """A claim that is not proved at a pose, or on the way to it.
-
-    Attributes:
-        name: the claim.
-        outcome: refuted at the pose, or open on the way to it.
-        extreme: the number that the claim limits; None of a rank.
-        value: of this number at the pose; NaN where it is not known.
-        pose: the pose; None where none is known.
-        reason: why the claim stays open, or how a singular pose was found; else empty.
-    """
-
-    name: str
-    outcome: Outcome
-    extreme: Verdict | None
-    value: float
-    pose: PoseNumbers | None
-    reason: str
-
-
-@dataclass(frozen=True, eq=False)
-class RangeEnd:
-    """An end of a proved range.
-
-    Attributes:
-        value: the end, length or radians: everything is proved up to it.
-        failed: the first value known beyond it up to which not everything is proved; None at the end of the largest
-            range that is asked for.
-        stop: the claim that fails there; None with ``failed``.
-    """
-
-    value: float
-    failed: float | None
-    stop: RangeStop | None
-
-
-@dataclass(frozen=True, eq=False)
-class AxisRange:
-    """How far a coordinate can move alone.
-
-    Attributes:
-        axis: its name.
-        dimension: length or angle.
-        at: its value at the pose.
-        lower: the lower end of the proved range about the pose.
-        upper: the upper end.
-    """
-
-    axis: str
-    dimension: Dimension
-    at: float
-    lower: RangeEnd
-    upper: RangeEnd
-
-
-@dataclass(frozen=True, eq=False)
-class PairRange:
-    """How far two coordinates can move at once.
-
-    Attributes:
-        axes: their names.
-        factor: everything is proved in the box of their ranges times this factor, about the pose; at most 1.
-        failed: the smallest factor known at which not everything is; None where the whole box is proved.
-        stop: the claim that fails there; None with ``failed``.
-    """
-
-    axes: tuple[str, str]
-    factor: float
-    failed: float | None
-    stop: RangeStop | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -293,9 +222,6 @@ def _range(case: Case, start: FloatArray, k: int, most: float, *, has_whole: boo
         return first._replace(part=first.part * part)
 
     ends = [_largest(partial(one_way, way), HALVED) for way in ways]
-    found = [RangeEnd(at(each.proved, way)[k], None, None) for each, way in zip(ends, ways, strict=True)]
-    beyond = [None if each.failed is None else at(each.failed, way)[k] for each, way in zip(ends, ways, strict=True)]
-    found = [replace(e, failed=b, stop=f.stop) for e, b, f in zip(found, beyond, ends, strict=True)]
     if has_whole:
 
         def whole(part: float) -> _Failed | None:
@@ -304,12 +230,19 @@ def _range(case: Case, start: FloatArray, k: int, most: float, *, has_whole: boo
 
         both = _largest(whole, _WHOLE)
         if both.failed is not None:
-            found = [
-                RangeEnd(at(both.proved * e.proved, way)[k], at(both.failed * e.proved, way)[k], both.stop)
-                for e, way in zip(ends, ways, strict=True)
-            ]
+            ends = [_Found(both.proved * e.proved, both.failed * e.proved, both.stop) for e in ends]
     dimension = Dimension.LENGTH if k < 3 else Dimension.ANGLE
-    return AxisRange(AXES[k], dimension, float(start[k]), *found)
+    lower, upper = (
+        RangeEnd(
+            value=float(at(each.proved, way)[k]),
+            failed=None if each.failed is None else float(at(each.failed, way)[k]),
+            stop=each.stop,
+            dimension=dimension,
+        )
+        for each, way in zip(ends, ways, strict=True)
+    )
+    unit = case.units.label(dimension)
+    return AxisRange(axis=AXES[k], unit=unit, at=float(start[k]), lower=lower, upper=upper, dimension=dimension)
 
 
 def _samples(case: Case, start: FloatArray, ranges: Sequence[AxisRange]) -> EdgeSamples | None:
@@ -340,7 +273,7 @@ def _pair(case: Case, start: FloatArray, samples: EdgeSamples | None, *ranges: A
         return None if judged.is_proved else _Failed(part, next(_failures(judged)).stop)
 
     if any(each.lower.value == each.upper.value for each in ranges):
-        return PairRange((one.axis, other.axis), 0.0, None, None)
+        return PairRange(axes=(one.axis, other.axis), factor=0.0, failed=None, stop=None)
     guess = 1.0
     if samples is not None:
         moves = np.zeros((2, 2, 6))
@@ -348,7 +281,7 @@ def _pair(case: Case, start: FloatArray, samples: EdgeSamples | None, *ranges: A
             move[:, AXES.index(each.axis)] = each.lower.value - each.at, each.upper.value - each.at
         guess = samples.first(moves)
     found = _largest(judge, PAIRED, guess)
-    return PairRange((one.axis, other.axis), *found)
+    return PairRange(axes=(one.axis, other.axis), factor=found.proved, failed=found.failed, stop=found.stop)
 
 
 def _largest(judge: _Judge, tolerance: float, guess: float = 1.0) -> _Found:
@@ -373,7 +306,7 @@ def _largest(judge: _Judge, tolerance: float, guess: float = 1.0) -> _Found:
             return _Found(proved, failed, stop)
         if is_requested():
             # Between what is proved and what fails nothing is known.
-            stop = None if stop is None else replace(stop, outcome=Outcome.OPEN, reason=why_stopped())
+            stop = None if stop is None else RangeStop.of(stop, outcome=Outcome.OPEN, reason=why_stopped())
             return _Found(proved, failed, stop)
         if failed is None:
             part, step = min(part + step, 1.0), 8 * step
@@ -406,7 +339,13 @@ def _failures(judged: Judgement) -> Iterator[_Failed]:
         fault, value, pose = each.first_fault, each.reached, each.pose
         if fault is not None:
             _, value, pose = fault
-        stop = RangeStop(each.name, each.outcome, None if each.is_rank else each, value, pose, each.reason)
+        stop = RangeStop.of(
+            each,
+            unit=None if each.is_rank else judged.case.units.label(each.dimension),
+            sense=None if each.is_rank else each.sense,
+            value=math.nan if each.is_rank else value,
+            pose=None if pose is None else WorkspacePose.of(pose),
+        )
         part = 1.0 if fault is None or _is_over_poses(each) else fault.place.parameter
         is_first = fault is not None and (part < 1 or each.is_rank or each.fault is not None)
         found.append(_Failed(part, stop, is_first=is_first))
