@@ -199,7 +199,7 @@ def test_results_of_several_tasks_have_the_proof(tmp_path: Path) -> None:
     tables["workspace"] = {"position": [ends(0.2), ends(0.2), ends(0.1, 1.1)], "rotation": rotation}
     solution = solve(case_from(tables | {"units": {"length": "m"}, "solve": {"starts": 1}}))
     shown, written = solution.table(), solution.to_dict()
-    assert "proved: regular and within the limits at every pose" in shown
+    assert "proved: no singularity and no violated limit at any pose" in shown
     assert "where a pose of the workspace became a constraint" in shown
     jsonschema.validate(written, result_schema())
     assert json_data(load_result(saved(tmp_path / "out.json", json.dumps(written)))) == written

@@ -201,7 +201,7 @@ def test_a_design_keeps_its_limits_along_a_path_and_is_the_best_of_a_grid(tmp_pa
 def test_the_proof_along_a_path_is_a_result(cli: Run, tmp_path: Path) -> None:
     case, out = saved(tmp_path / "case.toml", toml_document(design_along(tmp_path))), tmp_path / "out.json"
     shown = output_of(cli("solve", str(case), "--json", str(out)))
-    assert "2 segments: proved: regular and within the limits at every point" in " ".join(shown.split())
+    assert "2 segments: proved: no singularity and no violated limit at any point" in " ".join(shown.split())
     written = json.loads(out.read_text())
     jsonschema.validate(written, result_schema())
     assert json_data(load_result(out)) == written

@@ -247,8 +247,8 @@ def test_no_time_and_no_box_are_no_number(tmp_path: Path, cli: Run) -> None:
     assert not nowhere.reason
     path, target, page = tmp_path / "c.toml", tmp_path / "r.json", tmp_path / "p.html"
     for text, time, words, reason in (
-        (HORNS, "1e-6", "largest proved box: none found within the time", "the time is over"),
-        (edited(HORNS, IMPOSSIBLE), "0.4", "not even the smallest", None),
+        (HORNS, "1e-6", "largest proved box  none found within the time limit", "the time is over"),
+        (edited(HORNS, IMPOSSIBLE), "0.4", "even the smallest box tried is not proved", None),
     ):
         pages = ("--html", str(page)) if reason else ()
         found = cli("workspace", str(saved(path, text)), "--scale", "--time", time, "--json", str(target), *pages)
