@@ -420,7 +420,7 @@ def test_a_better_point_that_did_not_converge_is_a_note_and_the_optimum_stays(tm
     text = unbroken(found.table())
     for words in ("local maximum F = ", "(locally optimal", "1 of 2 searches converged, the best at F = "):
         assert words in text
-    assert "a search that did not converge reached" in text
+    assert "an unconverged search reached F = " in text
     assert "largest F" not in text
     path, target = saved(tmp_path / "case.toml", TWO_ENDS), tmp_path / "result.json"
     target.write_text(json.dumps(found.to_dict()), encoding="utf-8")
