@@ -48,7 +48,7 @@ def certify(
         answer_after(Milestone.BOUND)
         CertifyOptions(gap, above, time, jobs)  # a fault of an option is reported before a fault of the case
         files = options.Outputs(json=json_file, proof=proof)
-        loaded, text, inputs = options.read_machine(case, settings, of).file
+        loaded, text, inputs = options.read_changed_case(case, settings, of).file
         files.check(inputs)
         certified = certify_with_progress(
             loaded,

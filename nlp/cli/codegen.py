@@ -29,7 +29,7 @@ def codegen(
 
     if not force:
         check_folder(out)
-    loaded, text, inputs = options.read_machine(case, settings, of).file
+    loaded, text, inputs = options.read_changed_case(case, settings, of).file
     files = generate_c(loaded, text)
     for name in files if Path(out).is_dir() else ():
         check_outputs(inputs, {"--out": str(Path(out) / name)})

@@ -51,7 +51,7 @@ def compare(
     from ..interruption import Milestone, answer_after, is_requested, why_stopped
 
     files = options.Outputs(resume=resume, json=json_file, csv=csv_file, markdown=markdown, html=html, plot=plot)
-    read = options.read_machine(case, settings, of).file
+    read = options.read_changed_case(case, settings, of).file
     inputs = dict(read.inputs)
     for each in read_robots(robots, read.case):
         if each.file is not None:

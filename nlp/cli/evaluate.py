@@ -39,7 +39,7 @@ def evaluate(
     from ..program.formulation import formulate_each
     from ..results.evaluation import evaluation_of
 
-    given = options.read_machine(case, settings, of, at_pose=True, claim=claim).file
+    given = options.read_changed_case(case, settings, of, at_pose=True, claim=claim).file
     loaded = given.case
     if left_out := loaded.without_motion:  # a pose of a path: its speeds come from the motion of the path
         loaded = replace(loaded, limits=Limits(*(each for each in loaded.limits if each not in left_out)))

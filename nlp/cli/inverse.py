@@ -32,7 +32,7 @@ def inverse(
     if derivatives and csv_file is None:
         raise InputError("--derivatives: needs --csv FILE")
     files = options.Outputs(csv=csv_file)
-    loaded, _, inputs = options.read_machine(case, settings, of).file
+    loaded, _, inputs = options.read_changed_case(case, settings, of).file
     files.check({**inputs, Path(poses): "the file of the poses"})
     given = read_poses(poses, loaded.units, "--poses")
     found = inverse_at(loaded, given.positions, given.rotations, follow="previous" if previous else "home")

@@ -230,16 +230,16 @@ def _read_setting(text: str) -> tuple[str, float | list[float]]:
     return name, numbers[0] if len(numbers) == 1 else numbers
 
 
-class Machine(NamedTuple):
+class ChangedCase(NamedTuple):
     """A case, and the values that replace those of its file."""
 
     file: CaseFile
     settings: Settings
 
 
-def read_machine(
+def read_changed_case(
     name: str, texts: list[str] | None, of: str | None, *, at_pose: bool = False, claim: str | None = None
-) -> Machine:
+) -> ChangedCase:
     """Read a case with the values of ``--set``, and with the dimensions of the result of ``--of``.
 
     Args:
@@ -260,7 +260,7 @@ def read_machine(
 
         settings = {**claim_settings(claim, read_case(name, settings).case), **settings}
     if of is None:
-        return Machine(read_case(name, settings), settings)
+        return ChangedCase(read_case(name, settings), settings)
     from ..errors import one_line
     from ..results.settings import dimensions_of, load_answer, place_of, robot_of, settings_of
 
@@ -274,7 +274,7 @@ def read_machine(
     if not is_same:
         what = "dimensions and the pose" if has_pose else "dimensions"
         print_notice(f"--of {one_line(of)}: gives the {what} of the case {one_line(result.head.case)!r}")
-    return Machine(read_case(name, chosen), chosen)
+    return ChangedCase(read_case(name, chosen), chosen)
 
 
 def read_robot(file: str) -> Model:

@@ -44,7 +44,7 @@ def pareto(
     from ..interruption import Milestone, answer_after, is_requested, why_stopped
 
     files = options.Outputs(resume=resume, json=json_file, csv=csv_file, markdown=markdown, html=html, plot=plot)
-    read = options.read_machine(case, settings, of).file
+    read = options.read_changed_case(case, settings, of).file
     read_goals(goals, read.case)  # before the files are looked at
     files.check(read.inputs)
     answer_after(Milestone.POINT)

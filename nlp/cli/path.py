@@ -82,7 +82,7 @@ def path(
     )
     record = proof_record(proof, json_file)
     answer_after(Milestone.BOUND)
-    (loaded, text, inputs), chosen = options.read_machine(case, settings, of)
+    (loaded, text, inputs), chosen = options.read_changed_case(case, settings, of)
     files = options.Outputs(json=json_file, csv=csv_file, plot=plot, html=html, proof=proof)
     own = PathOptions() if along is not None or ranges or loaded.path is None else options_of(loaded.path)
     choices = pathoptions.PathChoices(unit, start, offset or [], angles, between).over(own)

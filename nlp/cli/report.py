@@ -33,7 +33,7 @@ def report(
     from ..output.pictures.requirements import check_library
     from .progress import solve_with_progress
 
-    (loaded, text, inputs), fixed = options.read_machine(case, settings, of)
+    (loaded, text, inputs), fixed = options.read_changed_case(case, settings, of)
     loaded = replace(loaded, search=loaded.search.but(starts, seed))
     check_outputs(inputs, {"--out": out})
     check_library("plotly", "reports")

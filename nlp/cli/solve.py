@@ -43,7 +43,7 @@ def solve(
     from .progress import solve_with_progress
 
     answer_after(Milestone.START)
-    given = options.read_machine(case, settings, of).file
+    given = options.read_changed_case(case, settings, of).file
     loaded = replace(given.case, search=given.case.search.but(starts, seed, compiled=compiled))
     files = options.Outputs(json=json_file, plot=plot, csv=csv_file)
     options.check_csv(csv_file, table, loaded, at_point=False)

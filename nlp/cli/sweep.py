@@ -71,7 +71,7 @@ def sweep(
         check_drawn(chosen)
     if out is not None:
         check_table(out)
-    read = options.read_machine(case, settings, of).file
+    read = options.read_changed_case(case, settings, of).file
     inputs = dict(read.inputs)
     if points is not None:
         from pathlib import Path

@@ -56,7 +56,7 @@ def tradeoff(
     if not 2 <= len(values) <= _MOST:
         raise InputError(f"--over {over}: must have from 2 to {_MOST} values")
     files = options.Outputs(resume=resume, json=json_file, csv=csv_file, markdown=markdown, html=html, plot=plot)
-    fixed = options.read_machine(case, settings, of).settings
+    fixed = options.read_changed_case(case, settings, of).settings
     read = {value: read_case(case, {**fixed, name: value}) for value in values}
     files.check(read[values[0]].inputs)
     with designs.resumed(resume):

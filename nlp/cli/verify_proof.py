@@ -65,7 +65,7 @@ def verify_proof(
         if is_given[name] and name not in own:
             raise InputError(f"{name}: is no option for this kind of proof, which another command wrote")
     if case is not None:
-        loaded = options.read_machine(case, settings, of).file.case
+        loaded = options.read_changed_case(case, settings, of).file.case
     elif settings or of:
         raise InputError(f"{'--set' if settings else '--of'}: needs the argument CASE")
     else:

@@ -50,7 +50,7 @@ def workspace(
 
     record = proof_record(proof, json_file)
     answer_after(Milestone.BOUND)
-    (loaded, text, inputs), chosen = options.read_machine(case, settings, of)
+    (loaded, text, inputs), chosen = options.read_changed_case(case, settings, of)
     workspace_of_case(loaded)
     tell_workspace(loaded)
     files = options.Outputs(json=json_file, csv=csv_file, plot=plot, plot_pose=plot_pose, html=html, proof=proof)

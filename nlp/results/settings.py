@@ -60,7 +60,7 @@ def robot_of(result: Answer, source: str, case: Case, *, of_any_case: bool = Fal
         raise InputError(f"{source}: has the units {units.length!r} and {units.angle!r}, but the case has {own}")
     robot = result.robot
     if robot is None or (not isinstance(result, EvaluationResult) and not result.status.is_answer):
-        raise InputError(f"{source}: has no answer: its solve gave none")
+        raise InputError(f"{source}: holds no answer: its solve gave none")
     return robot
 
 

@@ -46,7 +46,7 @@ def _faults(check: CaseCheck) -> Iterator[str]:
             yield f"{check.name}: {row.quantity} is {row.computed}, expected {row.expected} within {row.tolerance:g}"
     for published in check.published:
         if not published.passed:
-            yield f"{check.name}: changed since the last check: {published_words(published)}"
+            yield f"{check.name}: newly changed: {published_words(published)}"
 
 
 def reproduction_table(checks: Iterable[CaseCheck]) -> TextTable:

@@ -43,7 +43,7 @@ def model_words(name: str, model: Model | None, options: Sequence[ModelOption]) 
         yield Line(model.description)
     if options:
         rows = [
-            (option.name, option.allowed, "none (required)" if option.default is None else option.default)
+            (option.name, option.allowed, "none: must be given" if option.default is None else option.default)
             for option in options
         ]
         yield TextTable(("option", "allowed", "default"), tuple(rows))

@@ -245,7 +245,7 @@ def test_what_failed_is_no_answer(tmp_path: Path) -> None:
     assert "largest F =" not in found.words
     assert found.tables["design"][0][1] == "reached"
     # What a solver leaves as multipliers of a failed search is no cost.
-    assert ["", "side", "value", "unit", "state"] in [rows[0] for rows in found.tables.values()]
+    assert ["", "bound", "value", "unit", "status"] in [rows[0] for rows in found.tables.values()]
     assert "multiplier" not in found.words
     assert {"class": "answer none", "id": "answer"} in [a for _, a in found.elements]
 
