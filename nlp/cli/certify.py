@@ -74,7 +74,7 @@ def certify(
 
     def shown() -> Iterable[Line | TextTable]:
         in_home_mode = all(each.nlp.in_home_mode for each in certified.certificates)
-        options.show(contents.unknown_lines(loaded.model, all_assemblies=not in_home_mode), whole=True)
-        return contents.certified_summary(loaded, result)
+        unknowns = contents.unknown_lines(loaded.model, all_assemblies=not in_home_mode)
+        return [*contents.certified_summary(loaded, result), *unknowns]
 
     files.deliver(shown, whole=whole, done=certified.is_proved, proof=proof_text, json=lambda: result)

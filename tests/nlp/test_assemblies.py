@@ -287,8 +287,10 @@ def test_a_certificate_speaks_of_the_modes_that_it_names() -> None:
 def test_certify_names_the_limbs_with_unknowns_first(tmp_path: Path, cli: Run) -> None:
     path, proof = saved(tmp_path / "delta.toml", DELTA), tmp_path / "proof.json"
     out = output_of(cli("certify", str(path), "--proof", str(proof)))
-    words = "limbs 1, 2, 3 need 1 joint position each and the loop equations, in"
-    assert " ".join(out.split()).startswith(f"unknowns {words} home's working mode Delta certificate proved")
+    words = "limbs 1, 2, 3: 1 joint coordinate each, from the loop equations; covers home's working mode"
+    shown = " ".join(out.split())
+    assert shown.startswith("Delta certificate proved")
+    assert f"unknowns {words}" in shown
     out = output_of(cli("verify-proof", str(proof)))
     assert "within the limits of delta in home's working mode" in unbroken(out)
     every = json.loads(output_of(cli("certify", str(path), "--all-assemblies", "--json", "-")))

@@ -211,7 +211,7 @@ def test_the_proof_along_a_path_is_a_result(cli: Run, tmp_path: Path) -> None:
     # Of no base all legs are so short: the path has no design.
     status, shown, _ = cli("solve", str(case), "--set", "limits.leg_length.max=25.5")
     assert status == 1
-    assert "proved: regular" not in shown
+    assert "proved: no singularity" not in shown
     refusal_of(
         cli("solve", str(saved(tmp_path / "none.toml", case.read_text().replace("arc.ngc", "no.ngc")))), "no.ngc"
     )

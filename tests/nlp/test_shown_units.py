@@ -217,9 +217,9 @@ def test_tables_over_a_workspace_say_at_which_poses_they_hold(cli: Run) -> None:
 
 def test_a_point_of_a_case_over_a_workspace_says_that_its_limits_are_of_that_point(cli: Run) -> None:
     _, out, _ = cli("evaluate", "hexapod-workspace")
-    assert "limits at the stated pose, not over the workspace" in unbroken(out)
+    assert "checked at the stated pose only, not over the workspace" in unbroken(out)
     _, out, _ = cli("evaluate", "hexapod-machining")
-    assert "limits at" not in out
+    assert "checked at" not in out
     assert load_case("hexapod-machining").workspace is None
 
 
@@ -235,7 +235,8 @@ def test_rounding_of_wrenches_and_displacements_of_a_load_is_shown_as_zero() -> 
     assert 0 < np.abs(held).max() < 1e-12  # all digits are in JSON
     text = found.table(width=120)
     tables_of = {
-        title: text.partition(title)[2].splitlines() for title in ("wrenches of the limbs'", "displacement of")
+        title: text.partition(title)[2].splitlines()
+        for title in ("constraint wrenches of the limbs", "displacement of")
     }
     rows = [[row.split() for row in lines if row.startswith("part ")] for lines in tables_of.values()]
     assert [row[2:] for row in rows[0][:3]] == [["0"] * 6] * 3
