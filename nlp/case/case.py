@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -42,6 +42,9 @@ from .radians import angles_of, check_radians, with_radians
 from .settings import Expectation, Published, Search
 from .task import MEASURES, Method, Sense, Task
 from .workspace import Workspace
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,6 +167,24 @@ class Case(Whole, Shown):
         from .. import case_text  # noqa: PLC0415 - files come after cases
 
         return case_text(self)
+
+    def replace(self, settings: Mapping[str, float | ArrayLike] | None = None, /, **numbers: float | ArrayLike) -> Case:
+        """Return the case with some of its numbers replaced by name, as ``--set`` does.
+
+        Numbers are in the units of the case: ``case.replace(x2=7, x3=20)`` has an angle of 20 degrees where the case is
+        in degrees. A free number becomes fixed.
+
+        Args:
+            settings: numbers by names with dots, such as ``{"limits.leg_length.max": 40, "p_z.min": 15}``; three for an
+                axis, point or direction.
+            numbers: the same by names without dots.
+
+        Raises:
+            CaseError: the case has no number of a name, or does not allow a value.
+        """
+        from .. import with_settings  # noqa: PLC0415 - files come after cases
+
+        return with_settings(self, {**(settings or {}), **numbers})
 
     def components(self, name: str) -> tuple[Value, ...]:
         """Return the values of a parameter's components.

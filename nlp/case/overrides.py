@@ -70,6 +70,17 @@ def override_number(tables: dict[str, Any], name: str, value: float | list[float
     table[place] = value
 
 
+def fields_of(name: str) -> tuple[str, ...]:
+    """Return the fields of a case in which a number is that has a name as for :func:`override_number`."""
+    if name.startswith(_LIMITS):
+        return ("limits",)
+    if name.startswith(_PLACE):
+        return ("path",)
+    if _TASK.fullmatch(name):
+        return ("tasks", "displacements", "further")  # poses may follow the screw motion of a task
+    return ("parameters", "position", "rotation", "displacements", "further")
+
+
 def _allowed(name: str, tables: Mapping[str, Any], places: Mapping[str, _Place], rotations: list[str]) -> str:
     """Return the names that can be set, those of ends, limits and tasks by an example each, as a hint."""
     written = {each: table[place] for each, (table, place) in places.items()}

@@ -291,6 +291,17 @@ def rotation_from_rpy(rpy: ArrayLike, key: str) -> AxisAngle:
     )
 
 
+def rotations_from_rpy(rpy: FloatArray) -> FloatArray:
+    """Return the rotations (N, 3, 3) ``Rz(yaw) Ry(pitch) Rx(roll)`` of rows (N, 3) of roll, pitch and yaw, radians."""
+    (sr, sp, sy), (cr, cp, cy) = np.sin(rpy).T, np.cos(rpy).T
+    rows = [
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ]
+    return np.array(rows).transpose(2, 0, 1)
+
+
 def _numbers(values: ArrayLike, shape: tuple[int, ...], key: str, words: str) -> FloatArray:
     """Return finite numbers as an array.
 

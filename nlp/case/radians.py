@@ -16,6 +16,8 @@ from .workspace import TURNS, Workspace
 _TURN = 2 * math.pi
 #: Rounding of a whole turn.
 _ROUNDING = 1e-9
+#: Largest size of an angle of a case: a whole turn, with the rounding of one.
+WHOLE_TURN = _TURN * (1 + _ROUNDING)
 
 
 def angles_of(
@@ -51,7 +53,7 @@ def check_radians(angles: Iterable[tuple[str, float]], units: Units) -> None:
         CaseError: there is one.
     """
     for key, angle in angles:
-        if abs(angle) > _TURN * (1 + _ROUNDING):
+        if abs(angle) > WHOLE_TURN:
             fault = f"must be at most {units.text(_TURN, Dimension.ANGLE)} in size"
             raise CaseError(key, fault, units.shown(angle, Dimension.ANGLE))
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydantic import ValidationError
 
-from ...models import Dimension, FloatArray, unit_vector
+from ...models import Dimension, FloatArray, Model, unit_vector
 from ...models.fileversions import CASE_FILES
 from ..errors import CaseError
 from ..system.reading import check_version
@@ -179,6 +179,22 @@ def case_from_tables(
         raise (error if error.source else origins.error_in(error, source)) from None
 
 
+def case_with_settings(tables: dict[str, Any], settings: Settings, like: Case) -> Case:
+    """Return the case of a document with numbers replaced, and with the robot of the case that the document states.
+
+    Args:
+        tables: the document, as ``tomllib`` returns it; changed in place.
+        settings: as for :func:`load_case`.
+        like: the case that the document states.
+
+    Raises:
+        CaseError: the case has no number of a name, or does not allow a value.
+    """
+    for key, value in settings.items():
+        override_number(tables, key, value)
+    return _case_of(_parse(tables), like.name, "", "", model=like.model)
+
+
 def _parse(tables: dict[str, Any]) -> Document:
     """Return a document as tables of the schema.
 
@@ -194,7 +210,9 @@ def _parse(tables: dict[str, Any]) -> Document:
         raise case_error(error.errors(include_url=False)[0]) from None
 
 
-def _case_of(written: Document, name: str, source: str, folder: str, robot_file: str | None = None) -> Case:
+def _case_of(
+    written: Document, name: str, source: str, folder: str, robot_file: str | None = None, model: Model | None = None
+) -> Case:
     """Return the case of a document.
 
     Args:
@@ -203,12 +221,13 @@ def _case_of(written: Document, name: str, source: str, folder: str, robot_file:
         source: name of the document in messages.
         folder: of the document; an empty name for the current one.
         robot_file: name of the file from which the robot's definition is; None where the document has it.
+        model: the robot; None for that of the document.
 
     Raises:
         CaseError: the document holds a fault.
     """
     units = Units(written.units.length, written.units.angle, written.units.force)
-    model = model_of_table(written.robot, robot_file)
+    model = model_of_table(written.robot, robot_file) if model is None else model
     if not model.has_couples and "characteristic_length" in written.robot.model_fields_set:
         raise CaseError("robot.characteristic_length", f"means nothing for {model.name!r}, which has no couple rows")
     dimensions = {parameter.name: parameter.dimension for parameter in model.parameters}

@@ -92,6 +92,43 @@ class Task:
         twist = unit_twist(axis, point, pitch, "task")
         return cls(twist, Sense(sense), name, weight, None if pitch == math.inf else point)
 
+    @classmethod
+    def rotation(
+        cls, axis: ArrayLike, through: ArrayLike, *, sense: Sense | str = "max", name: str = "task", weight: float = 1.0
+    ) -> Task:
+        """Return a pure rotation about an axis.
+
+        Args:
+            axis: (3,) direction of the axis, any length but zero; the right-hand rule gives the sense of rotation.
+            through: (3,) any point of the axis, length.
+            sense: ``"max"`` or ``"min"``.
+            name: a few words.
+            weight: positive weight among several tasks.
+
+        Raises:
+            CaseError: the sense is another word, the axis is zero, or a number is not finite.
+        """
+        point = check_vector(through, "task.through")
+        return cls.screw(sense, axis=axis, pitch=0.0, point=point, name=name, weight=weight)
+
+    @classmethod
+    def translation(
+        cls, direction: ArrayLike, *, sense: Sense | str = "max", name: str = "task", weight: float = 1.0
+    ) -> Task:
+        """Return a pure translation along a direction.
+
+        Args:
+            direction: (3,) direction of the velocity, any length but zero.
+            sense: ``"max"`` or ``"min"``.
+            name: a few words.
+            weight: positive weight among several tasks.
+
+        Raises:
+            CaseError: the sense is another word, the direction is zero, or a number is not finite.
+        """
+        along = check_direction(direction, "task.direction")
+        return cls.screw(sense, axis=along, pitch=math.inf, name=name, weight=weight)
+
 
 def unit_twist(axis: ArrayLike | None, point: ArrayLike | None, pitch: float | None, key: str) -> FloatArray:
     """Return the twist (6,) of a unit screw motion.

@@ -10,6 +10,8 @@ import itertools
 import math
 import tomllib
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
@@ -18,13 +20,18 @@ from ...models import Dimension, FloatArray, Model, Substitution, axis_from_scre
 from ..errors import CaseError
 from ..units import Units
 from .case import Case
+from .checks import check_real, check_reals
 from .displacements import written_displacements
 from .loads import Loading
-from .pose import Free, Pose, written_value
-from .reader import case_from_tables
+from .overrides import fields_of
+from .pose import Free, Pose, Rotation, written_value
+from .reader import case_from_tables, case_with_settings
 from .settings import Expectation, Search
 from .task import Task, unit_twist
 from .toml import TomlValue, plain_value, toml_lines, toml_table, toml_tables
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 #: Digits to which a ratio of two components is rounded in the search of a short direction, such as [2, 2, 1].
 _DIGITS = 12
@@ -55,6 +62,45 @@ def case_text(case: Case) -> str:
         fault = "cannot be written to a case file: the robot of this name, with these options, is another one"
         raise CaseError("robot.model", fault, case.model.name)
     return text
+
+
+def with_settings(case: Case, settings: Mapping[str, float | ArrayLike]) -> Case:
+    """Return a case with some of its numbers replaced by name, as ``--set`` does; the rest is that of the case.
+
+    Args:
+        case: the case; its robot need not have a name.
+        settings: numbers in the case's units, by the names that :func:`load_case` takes.
+
+    Raises:
+        CaseError: the case has no number of a name, does not allow a value, or has a part that no case file can state.
+    """
+    try:
+        numbers = {name: _setting(name, value) for name, value in settings.items()}
+        read = case_with_settings(tomllib.loads("\n".join(_lines(case))), numbers, case)
+    except CaseError as error:
+        raise (error if error.source or not case.source else error.within(case.source)) from None
+    found = {field: getattr(read, field) for name in numbers for field in fields_of(name)}
+    if "rotation" in found:
+        found["rotation"] = _as_stated(case.rotation, read.rotation)
+        further = zip(case.further, read.further, strict=True)
+        found["further"] = [replace(new, rotation=_as_stated(old.rotation, new.rotation)) for old, new in further]
+    if case.path is not None and read.path is not None and "path" in found:
+        found["path"] = replace(case.path, place=read.path.place)
+    return replace(case, **found)
+
+
+def _setting(name: str, value: float | ArrayLike) -> float | list[float]:
+    """Return a number, or the numbers of a point, axis or direction; the error is that of a number of a case."""
+    if np.ndim(value) == 0:
+        return check_real(value, name)
+    return [float(part) for part in check_reals(value, name)]
+
+
+def _as_stated(old: Rotation, new: Rotation) -> Rotation:
+    """Return a rotation in the form in which the case states it, where it is the same."""
+    one, other = ((), ()) if old.axis is None or new.axis is None else (old.axis, new.axis)
+    is_same = (old.axis is None) == (new.axis is None) and np.array_equal(one, other)
+    return old if is_same and old.angle == new.angle else new
 
 
 def _lines(case: Case) -> Iterator[str]:

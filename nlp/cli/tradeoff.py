@@ -46,7 +46,7 @@ def tradeoff(
     from ..interruption import Milestone, answer_after, is_requested, why_stopped
     from ..results.tradeoff import tradeoff_result
     from ..solver.status import Status
-    from ..solver.tradeoff import tradeoff as solve_along
+    from ..solver.tradeoff import solve_along
     from ..sweeps.points import grid
     from ..words.tradeoff import tradeoff_designs
 

@@ -8,6 +8,7 @@ assembly, and the steps are made shorter. Driven joints that the pose does not d
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -25,7 +26,8 @@ from ...models.parts import Quantity
 from ...models.rows import independent_rows
 from ...models.statics import driven_joints, inverse_rates, rows_about
 from ..case.case import Case
-from ..case.pose import ROUNDING
+from ..case.pose import ROUNDING, rotations_from_rpy
+from ..case.radians import WHOLE_TURN
 from ..errors import InputError
 from .assembly import home_position, unknowns_from_home
 from .closed_loops import DEPENDENT, Loops
@@ -97,6 +99,7 @@ def inverse(
     positions: ArrayLike,
     rotations: ArrayLike | None = None,
     *,
+    rpy: ArrayLike | None = None,
     follow: Literal["home", "previous"] = "home",
 ) -> InversePoses:
     """Return positions of all joints, J and rates of the actuators at many poses.
@@ -108,7 +111,9 @@ def inverse(
     Args:
         case: whose robot has fixed dimensions; its poses, limits and tasks do not count.
         positions: (N, 3) origins of the platform frame in the world frame, length.
-        rotations: (N, 3, 3) platform to world coordinates, orthogonal to 1e-6; none for no rotation.
+        rotations: (N, 3, 3) platform to world coordinates, orthogonal to 1e-6; left out for no rotation.
+        rpy: (N, 3) roll, pitch and yaw of each pose instead, radians, about the world's axes x, y and z in this order,
+            as the columns ``roll``, ``pitch`` and ``yaw`` of a CSV file state them.
         follow: the assembly of the joints where loops are not closed by formulas: that of ``"home"``, or that to which
             the way from the closed pose ``"previous"`` to each one leads, which takes one pose after the other. Angles
             of actuators then have no jumps by a turn either.
@@ -117,14 +122,20 @@ def inverse(
 
     Raises:
         CaseError: a dimension of the case's robot is free.
-        InputError: the arrays have other shapes, the positions of the robot's actuators are not known, or ``follow`` is
-            another word.
+        InputError: the arrays have other shapes, rotations are stated in two forms, an angle is more than a whole turn,
+            the positions of the robot's actuators are not known, or ``follow`` is another word.
     """
+    if rotations is not None and rpy is not None:
+        raise InputError("rpy: conflicts with rotations; state the rotations in one form")
     p = np.array(positions, dtype=np.float64)
     shape = (*p.shape[:1], 3, 3)
-    R = np.broadcast_to(np.eye(3), shape) if rotations is None else np.array(rotations, dtype=np.float64)
+    if rpy is not None:
+        R = rotations_from_rpy(_rpy_rows(rpy, len(p) if p.ndim else 0))
+    else:
+        R = np.broadcast_to(np.eye(3), shape) if rotations is None else np.array(rotations, dtype=np.float64)
     if p.ndim != 2 or p.shape[1] != 3 or R.shape != shape:
-        raise InputError(f"poses must be arrays (N, 3) and (N, 3, 3), got {p.shape} and {R.shape}")
+        hint = "; rows of roll, pitch and yaw are the argument rpy" if R.shape == (*shape[:1], 3) else ""
+        raise InputError(f"poses must be arrays (N, 3) and (N, 3, 3), got {p.shape} and {R.shape}{hint}")
     if follow not in ("home", "previous"):
         raise InputError(f"follow = {follow!r}: must be 'home' or 'previous'")
     found = _inverse(case, p, R, follow)
@@ -134,6 +145,28 @@ def inverse(
     if near is None or not near.dependent:
         return found
     return replace(_inverse(case, near.positions, near.rotations, follow), dependent=near.dependent)
+
+
+def _rpy_rows(rpy: ArrayLike, count: int) -> FloatArray:
+    """Return rows (N, 3) of roll, pitch and yaw, radians.
+
+    Args:
+        rpy: the rows.
+        count: number of the poses.
+
+    Raises:
+        InputError: they have another shape, or an angle is more than a whole turn.
+    """
+    rows = np.array(rpy, dtype=np.float64)
+    if rows.shape != (count, 3):
+        raise InputError(f"rpy: must be an array (N, 3) of roll, pitch and yaw for N = {count} poses, got {rows.shape}")
+    large = np.argwhere(np.abs(rows) > WHOLE_TURN)
+    if len(large):
+        k, column = large[0]
+        angle = float(rows[k, column])
+        words = f"{angle:.6g} rad = {math.degrees(angle):.1f} deg; angles are radians in Python"
+        raise InputError(f"rpy[{k}][{column}] = {angle:.6g}: must be at most 2 pi in size; {words}")
+    return rows
 
 
 def _inverse(case: Case, p: FloatArray, R: FloatArray, follow: str) -> InversePoses:

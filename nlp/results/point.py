@@ -16,6 +16,7 @@ from .. import __version__
 from ..case.case import Case
 from ..case.loads import NO_LOADING
 from ..evidence.conventions import dependence_of
+from ..evidence.evaluation import shown_parameters
 from ..evidence.kkt import FEASIBLE, linearise
 from ..evidence.loads import loading_of, loads_at
 from ..evidence.margins import measured_numbers, measured_slack, unit_of_side
@@ -24,7 +25,7 @@ from ..evidence.state import PlatformPose, RobotState, evaluate, stated_poses
 from ..program.free_joints import FreeJoint, free_joints
 from ..program.nlp import Nlp
 from ..program.pairs import with_pairs_at
-from ..system.jsonvalues import Vector, vector
+from ..system.jsonvalues import vector
 from .joints import joints_data
 from .objective import pose_objective
 from .parts import (
@@ -87,7 +88,7 @@ def robot_data(nlp: Nlp, x: FloatArray, state: RobotState, task: int | None) -> 
     dependence = None if task is None else dependence_of(nlp, x)
     return RobotData.of(
         state,
-        parameters=parameters_data(case, state),
+        parameters=shown_parameters(case, state),
         pose=pose_data(case, state) if several is None else several.stated_poses[0],
         task=None if task is None else task_data(case, task),
         limbs=tuple(row.limb for row in case.model.rows),
@@ -174,15 +175,6 @@ def task_data(case: Case, task: int) -> TaskData:
         motion=motion_of(chosen.twist),
         stated_point=None if chosen.point is None else vector(np.asarray(chosen.point, dtype=np.float64)),
     )
-
-
-def parameters_data(case: Case, state: RobotState) -> Mapping[str, float | Vector]:
-    """Return the parameters of the robot by name, in the case's units; three numbers for a point or direction."""
-    shown: dict[str, float | Vector] = {}
-    for parameter in case.model.parameters:
-        values = [case.units.shown(float(value), parameter.dimension) for value in state.parameters[parameter.name]]
-        shown[parameter.name] = values[0] if len(values) == 1 else tuple(values)
-    return MappingProxyType(shown)
 
 
 def _quantities(case: Case, state: RobotState) -> Mapping[str, ByOwner]:

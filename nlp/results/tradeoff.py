@@ -12,7 +12,7 @@ from ..evidence.state import PlatformPose
 from ..interruption import is_requested
 from ..solver.solution import Solution
 from ..solver.status import Status
-from ..solver.tradeoff import Tradeoff, TradeoffPoint, tradeoff
+from ..solver.tradeoff import Tradeoff, TradeoffPoint, solve_along
 from ..system.jsonvalues import Absent, Inline, JsonObject, Vector, finite_or_none
 from .data import CaseResult, CertificateData, SolveResult
 from .evidence import certificate_data
@@ -216,7 +216,7 @@ def limit_curves(
         values = [value for value in _values_about(row.limit) if _is_allowed(at, value)]
         if len(values) > 1:
             starts = min(_STARTS, solution.case.search.starts)
-            found = tradeoff(at, values, name=name, starts=starts, jobs=jobs, first=[solution.x])
+            found = solve_along(at, values, name=name, starts=starts, jobs=jobs, first=[solution.x])
             if is_requested():  # incomplete curves are not shown
                 break
             curves.append(tradeoff_result(found))

@@ -8,17 +8,21 @@ followed to the others.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import partial, wraps
+from typing import Any, ParamSpec
 
 from ...models import FloatArray
 from ..case.case import Case
 from ..case.settings import Search
-from ..errors import InputError
+from ..case.varied import Over, axes_of
+from ..case.writer import with_settings
+from ..errors import InputError, listing
 from ..interruption import Milestone, is_requested, reached, seconds_left, why_stopped, within
 from ..program.formulation import formulate_each
 from ..proof.enclosure.engine import kernel
+from ..system.deprecated import warn_deprecated
 from .certified import Certified, certify
 from .compromise import solution_of_one_task
 from .multistart import ProgramSolution, solve_program
@@ -27,6 +31,8 @@ from .solve import solve_programs
 
 #: A neighbour's optimum counts as better from this part of the objective's scale on: less is rounding.
 _BETTER = 1e-9
+
+Given = ParamSpec("Given")
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +67,74 @@ class Tradeoff:
     unsolved: tuple[float, ...] = ()
 
 
+def _with_earlier_form(tradeoff: Callable[Given, Tradeoff]) -> Callable[Given, Tradeoff]:
+    """Return the function, which takes its arguments of version 0.1.0 too: ``case_at``, ``values`` and ``name``."""
+
+    @wraps(tradeoff)
+    def with_both(*args: Given.args, **given: Given.kwargs) -> Tradeoff:
+        options: dict[str, Any] = dict(given)
+        is_earlier = len(args) > 1 and callable(args[0]) and not isinstance(args[1], Mapping)
+        if not (is_earlier or "case_at" in options or "values" in options):
+            return tradeoff(*args, **given)
+        options |= zip(("case_at", "values"), args, strict=False)
+        now = "tradeoff(case, {name: values}), where case is a case or a function from a value to one"
+        warn_deprecated("tradeoff(case_at, values, name=...)", now)
+        return solve_along(**options)
+
+    return with_both
+
+
+@_with_earlier_form
 def tradeoff(
+    case: Case | Callable[[float], Case],
+    over: Over,
+    *,
+    starts: int | None = None,
+    seed: int | None = None,
+    jobs: int | None = None,
+    first: Sequence[FloatArray] = (),
+    certified: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> Tradeoff:
+    """Solve a case again for each value of one of its numbers.
+
+    Args:
+        case: the case; or a function from a value to a case, for a number that ``--set`` cannot name. All of its cases
+            have the same free numbers.
+        over: values of the number, in the case's unit, by its name, as for :func:`sweep`:
+            ``{"limits.leg_length.max": [50, 55, 60]}``.
+        starts: number of starting points instead of the case's.
+        seed: seed instead of the case's.
+        jobs: number of threads; the result does not depend on it.
+        first: points (n,) to start from at every value.
+        certified: whether the optimum at each value is proved too, in an equal part of the time left.
+        progress: called after each solve of the first pass with the numbers of solves done and of all.
+
+    Raises:
+        CaseError: the case has no number of this name, or a value is not allowed; nothing has been solved by then.
+        InputError: there is not one number, it has no values, or the C kernel was not built, which a proof needs.
+        UncoveredError: an optimum is to be proved, and an expression has an operation without a rule.
+    """
+    axes = axes_of(over)
+    if len(axes) != 1:
+        fault = f"over: must have one number for a trade-off curve, got {listing(axes)}"
+        raise InputError(f"{fault}; sweep takes several" if axes else fault)
+    ((name, values),) = axes.items()
+    case_at = case if not isinstance(case, Case) else lambda value: with_settings(case, {name: value})
+    return solve_along(
+        case_at,
+        values.tolist(),
+        name=name,
+        starts=starts,
+        seed=seed,
+        jobs=jobs,
+        first=first,
+        certified=certified,
+        progress=progress,
+    )
+
+
+def solve_along(
     case_at: Callable[[float], Case],
     values: Sequence[float],
     *,
@@ -76,16 +149,15 @@ def tradeoff(
     """Solve a case again for each value of one of its numbers.
 
     Args:
-        case_at: returns the case with a value of the number; all of its cases have the same free numbers. For a case
-            file it is ``lambda value: load_case(file, {name: value})``.
+        case_at: returns the case with a value of the number; all of its cases have the same free numbers.
         values: values of the number, in the case's unit, at least one.
-        name: of the number.
-        starts: number of starting points instead of the case's.
-        seed: seed instead of the case's.
-        jobs: number of threads; the result does not depend on it.
-        first: points (n,) to start from at every value.
-        certified: whether the optimum at each value is proved too, in an equal part of the time left.
-        progress: called after each solve of the first pass with the numbers of solves done and of all.
+        name: name of the number.
+        starts: as for :func:`tradeoff`, like all others.
+        seed: likewise.
+        jobs: likewise.
+        first: likewise.
+        certified: likewise.
+        progress: likewise.
 
     Raises:
         CaseError: a value is not allowed; nothing has been solved by then.

@@ -499,4 +499,4 @@ def test_a_limit_is_added_by_its_file_and_a_row_of_the_registry(tmp_path: Path) 
     assert row["cost"] == pytest.approx(found["slope"], rel=0.01)
     # The starter's platform is at most 10 cm above 35 cm.
     assert found["relaxed"] == [["platform_height.min", pytest.approx(45, rel=1e-4)]]
-    assert found["schema"]["description"] == "of the platform's origin above the base"
+    assert found["schema"]["description"] == "height of the platform's origin above the base"

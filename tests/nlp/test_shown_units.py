@@ -95,7 +95,7 @@ def test_values_and_slopes_of_a_tradeoff_are_in_the_unit_of_the_case(over: str) 
 
     found = {}
     for unit, steps in (("deg", values), ("rad", [values[1] * (1.0 if over == "rb" else UNITS["rad"])])):
-        curve = tradeoff(lambda value, unit=unit: case_at(value, unit), steps, name=over)
+        curve = tradeoff(lambda value, unit=unit: case_at(value, unit), {over: steps})
         found[unit] = json_data(tradeoff_result(curve))["points"]
     # The slope in the middle is that of the values beside it.
     before, here, after = found["deg"]

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import MISSING, dataclass, fields
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 from ....models import Model
-from ...errors import CaseError, did_you_mean, listing
+from ...errors import CaseError, did_you_mean, listing, nearest
 from ...units import Units
 from .limit import Limit, LimitedCase
 
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 #: Likeness of names from which on one is a slip for the other, and no measure of another robot.
 _SLIP = 0.85
 
+#: A limit by its key: smallest and largest number, the numbers by name, or one number for the largest angle.
+LimitValue: TypeAlias = Sequence[float | None] | Mapping[str, object] | Sequence[str] | float
+
 LimitT = TypeVar("LimitT", bound=Limit[Any])
 
 
@@ -24,16 +27,26 @@ LimitT = TypeVar("LimitT", bound=Limit[Any])
 class Limits:
     """The limits of a case, such as ``Limits(LegLength(min=28, max=40), LegClearance(min=2))``.
 
+    The same by the keys of ``[limits]`` in a case file: ``Limits(leg_length=(28, 40), leg_clearance=(2, None))``. The
+    value is the smallest and the largest number, with None for no limit; or a mapping of the limit's arguments, such as
+    ``actuator={"stroke_max": 12}``. Lengths are in the case's unit and angles in radians. A key that belongs to no type
+    of limits is the name of a quantity of the robot.
+
     Attributes:
         items: the limits, in the order of the registry.
 
     Raises:
-        CaseError: one limit is given twice.
+        CaseError: one limit is given twice, or a value by its key has another form.
     """
 
     items: tuple[Limit[Any], ...]
 
-    def __init__(self, *limits: Limit[Any]) -> None:
+    def __init__(self, *limits: Limit[Any], **by_key: LimitValue) -> None:
+        limits = (*limits, *(_limit_of(key, value) for key, value in by_key.items()))
+        for limit in limits:
+            if not isinstance(limit, Limit):
+                fault = "must be limits such as LegLength(min=28), or keys with values such as leg_length=(28, 40)"
+                raise CaseError("limits", f"{fault}, got {type(limit).__name__} {limit!r:.60}")
         names = [limit.name for limit in limits]
         for name in names:
             if names.count(name) > 1:
@@ -82,6 +95,53 @@ class Limits:
                 raise CaseError(f"limits.{limit.name}", fault)
         for limit in self.items:
             limit.check(case)
+
+
+def _limit_of(key: str, value: LimitValue) -> Limit[Any]:
+    """Return a limit that is stated by its key in ``[limits]``.
+
+    Raises:
+        CaseError: the value has another form, or lacks a number.
+    """
+    from .registry import LIMIT_TYPES  # noqa: PLC0415 - a case without limits starts without their tables
+
+    kinds = {kind.key: kind for kind in LIMIT_TYPES}
+    kind, name = kinds.get(key, kinds[""]), f"limits.{key}"
+    if key == "joint":
+        raise CaseError(name, "must be stated as JointMotion or JointCone, such as JointMotion('2:3', max=0.5)")
+    known = {field.name: field for field in fields(kind) if field.name != "measure"}
+    if key == "custom" and (isinstance(value, str) or (isinstance(value, list | tuple) and value)):
+        return kind(*([value] if isinstance(value, str) else value))
+    if key.endswith("_joint_angle") and isinstance(value, int | float) and not isinstance(value, bool):
+        given: Mapping[str, Any] = {"max": value}
+    elif isinstance(value, list | tuple) and len(value) == 2 and {"min", "max"} & known.keys():
+        given = {end: part for end, part in zip(("min", "max"), value, strict=True) if part is not None}
+    elif isinstance(value, Mapping) and key != "custom":
+        given = value
+    else:
+        raise CaseError(name, f"must be {_forms(key, known)}, got {type(value).__name__} {value!r:.60}")
+    for each in given:
+        if each not in known:
+            raise CaseError(f"{name}.{each}", f"no such key; {nearest(each, known)}")
+    for each, field in known.items():
+        if field.default is MISSING and each not in given:
+            raise CaseError(f"{name}.{each}", "is missing")
+    return kind(key, **given) if kind is kinds[""] else kind(**given)  # type: ignore[call-arg]
+
+
+def _forms(key: str, known: Iterable[str]) -> str:
+    """Return the forms of a limit that is stated by its key, in words.
+
+    Args:
+        key: the key.
+        known: names of the limit's arguments.
+    """
+    if key == "custom":
+        return 'a list of relations such as "x1 - 1.5*x2 >= 0"'
+    ends = [end for end in ("min", "max") if end in known]
+    pair = f"({', '.join(end if end in ends else 'None' for end in ('min', 'max'))})"
+    mapping = f"a mapping with {', '.join(known)}"
+    return f"{pair}, with None for no limit, or {mapping}" if ends else mapping
 
 
 def _rank(limit: Limit[Any]) -> int:
