@@ -200,7 +200,7 @@ def design_table(
     if more:
         rows += more
         words, named, folded = "more values", len(rows), folded + len(more)
-    slope = "derivative\nper unit" if combined else "dF/dx\nper unit"
+    slope = "derivative" if combined else "dF/dx"
     headers = ("", "reached" if reached else "value", "unit", "bounds", "status", slope)
     columns = len(headers) if any(row.cells[4] for row in rows) else 4
     cells = tuple(row.cells[:columns] for row in rows)

@@ -425,7 +425,7 @@ def test_proofs_of_machines_with_settings_or_of_a_result(cli: Run, tmp_path: Pat
 def test_a_result_in_other_units_or_of_another_robot_is_refused(cli: Run, tmp_path: Path) -> None:
     result = str(tmp_path / "result.json")
     cli("evaluate", str(saved(tmp_path / "inches.toml", MACHINE)), "--json", result)
-    units = "has the units 'in' and 'deg', but the case "
+    units = "has the units 'in' and 'deg', but the case has "
     radians = edited(MACHINE, ('"in"', '"in"\nangle = "rad"'), ("x3 = 1, x4 = 5", "x3 = 0.1, x4 = 0.1"))
     for text, words in (
         (edited(MACHINE, ('"in"', '"mm"')), f"{units}'mm' and 'deg'"),
