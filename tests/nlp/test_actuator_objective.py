@@ -150,7 +150,7 @@ def test_a_proof_file_states_the_root_of_what_its_tree_bounds(cli: Run, tmp_path
     status, _, _ = cli("certify", str(case), "--gap", "0.01", "--proof", str(proof))
     assert status == 0
     out = unbroken(output_of(cli("verify-proof", str(proof), str(case))))
-    assert "holds: the largest actuator force over all actuators and loads, at 8 poses is at least 7.45" in out
+    assert "PROOF VALID: the largest actuator force over all actuators and loads, at 8 poses is at least 7.45" in out
     stated = json.loads(proof.read_text())
     (claim,) = stated["claims"]
     claim["bound"] *= 1.03**2

@@ -172,7 +172,7 @@ def test_a_search_that_is_stopped_says_that_not_all_is_searched(monkeypatch: pyt
     result = result_of(solution)
     assert result.F is None
     assert result.choice.statement == (
-        "stopped after 2 of 6 combinations of values, solved from 4 starts; the others are not all searched"
+        "stopped after 2 of 6 combinations of values, solved from 4 starts; not all others are searched"
     )
 
 

@@ -164,7 +164,7 @@ PAIRS = "closed_loop: [[loop1_A, loop1_B]]\ntype: [3d]\nname_mot: [stewart_1]\n"
 #: Name of the file, its text, arguments, and words of the sentence.
 FAULTS: list[tuple[str, str | bytes, tuple[str, ...], str]] = [
     # Platform, base and actuators.
-    ("m.xml", HEAD, (), "--platform: is missing: BODY, body, link or site that is the platform"),
+    ("m.xml", HEAD, (), "--platform: is missing: BODY, platform: a body, link or site of the model"),
     ("m.xml", HEAD, ("--platform", "haed"), "--platform haed: no such body or frame; did you mean 'head'?"),
     ("m.xml", HEAD, ("--platform", ""), "--platform: needs a value, BODY"),
     ("m.xml", HEAD, (*BODY, "--base", "tors"), "--base tors: no such body; did you mean 'torso'?"),

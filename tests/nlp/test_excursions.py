@@ -282,7 +282,7 @@ def test_all_commands_take_the_workspace_at_the_pose_of_a_result(tmp_path: Path,
     drawn = [word for pair in zip(("--plot", "--plot-pose", "--html"), pictures, strict=True) for word in pair]
     words = ("--of", result, "--proof", proof, *drawn, "--quantity", "condition_number")
     out = output_of(cli("workspace", str(file), *words))
-    assert "everything is proved for every pose" in unbroken(out)
+    assert "PROVED at every pose" in unbroken(out)
     assert f"about  the pose (0, 0, {height:.5g})" in unbroken(out)
     assert all(Path(each).stat().st_size > 1000 for each in pictures)
     out = unbroken(output_of(cli("verify-proof", proof, str(file), "--of", result, "--all")))

@@ -179,7 +179,7 @@ def test_f_along_a_path_is_its_worst_too_and_tasks_are_combined_along_it(tmp_pat
     solution = solve(case_from(tables | {"objective": {"over": "path"}}))
     assert solution.path.is_proved
     assert pytest.approx(worst.max(), rel=2e-3) == solution.F
-    assert "along the path, to be as large as possible" in solution.table()
+    assert "the smallest value along the path (maximised)" in solution.table()
     tasks = [LIFT | {"weight": 100}, TURN]
     both = solve(case_from(tables | {"task": tasks, "combine": {"method": "weighted-sum"}}))
     value = np.array([200, 2]) / 101 @ [rates_squared(RADII, [HOME], name)[:, 0] for name in ("lift", "turn")]
@@ -199,7 +199,7 @@ def test_results_of_several_tasks_have_the_proof(tmp_path: Path) -> None:
     tables["workspace"] = {"position": [ends(0.2), ends(0.2), ends(0.1, 1.1)], "rotation": rotation}
     solution = solve(case_from(tables | {"units": {"length": "m"}, "solve": {"starts": 1}}))
     shown, written = solution.table(), solution.to_dict()
-    assert "proved: regular and within the limits at every pose" in shown
+    assert "proved: no singularity and no violated limit at any pose" in shown
     assert "where a pose of the workspace became a constraint" in shown
     jsonschema.validate(written, result_schema())
     assert json_data(load_result(saved(tmp_path / "out.json", json.dumps(written)))) == written

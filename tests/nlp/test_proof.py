@@ -156,7 +156,7 @@ def test_the_command_line_writes_and_checks_proofs(cli: Run, tmp_path: Path) -> 
     assert (code, "proved" in out) == (0, True)
     for arguments in ((str(target),), (str(target), NAME)):
         code, out, _ = cli("verify-proof", *arguments)
-        assert (code, "holds: F is at most" in out) == (0, True), out
+        assert (code, "PROOF VALID: F is at most" in out) == (0, True), out
     code, _, err = cli("verify-proof", str(target), "paper-4.1-rotation-axis-z")
     assert (code, "other expressions" in err) == (1, True)
     # Of a search that ends before, there is none.

@@ -321,7 +321,7 @@ def test_nested_loops_are_evaluated_and_solved_and_c_is_refused(tmp_path: Path, 
     assert str(slides["2"]) == "@1=0, [@1, @1, 1]"
     assert slides["1"] is not None
     out = output_of(cli("evaluate", name))
-    assert "freedoms  2 with free actuators" in out
+    assert "degrees of freedom  2 with free actuators" in out
     assert "rates  1: " in out
     assert "motor: " in out
     refusal_of(
@@ -332,7 +332,7 @@ def test_nested_loops_are_evaluated_and_solved_and_c_is_refused(tmp_path: Path, 
     # With a coupling the rest is one network too.
     coupled = LINKS + COUPLING.replace('pivot = "-s"', "slide = 2")
     out = output_of(cli("evaluate", saved_with_robot(tmp_path, coupled, LINKS_CASE)))
-    assert "freedoms  1 with free actuators" in out
+    assert "degrees of freedom  1 with free actuators" in out
 
 
 SHIPPED = Path(screwsynth.models.__file__).parent / "robots"
@@ -364,7 +364,7 @@ def test_a_robot_file_of_a_case_is_solved(tmp_path: Path, cli: Run, robot_text: 
     name = saved_with_robot(tmp_path, robot_text, case_text)
     result = tmp_path / "result.json"
     out = output_of(cli("solve", name, "--starts", "6", "--json", str(result)))
-    assert "freedoms  3 with free actuators" in out
+    assert "degrees of freedom  3 with free actuators" in out
     data = json.loads(result.read_text(encoding="utf-8"))
     assert data["F"] == pytest.approx(F, abs=1e-6)
     assert len(data["joints"]["actuators"]) == 3

@@ -127,7 +127,7 @@ def test_proofs_that_hold_are_short_too(cli: Run, tmp_path: Path) -> None:
         proof = str(tmp_path / f"{command}.json")
         output_of(cli(command, name, *gap, "--proof", proof))
         out, every = output_of(cli("verify-proof", proof, name)), output_of(cli("verify-proof", proof, name, "--all"))
-        assert out.startswith("holds: ")
+        assert out.startswith("PROOF VALID: ")
         assert len(out.splitlines()) <= ROOM
         assert widest(out + every) <= PLAIN_WIDTH
 
@@ -146,12 +146,12 @@ def test_every_limit_is_counted_by_its_outcome(refuted: tuple[str, Path]) -> Non
     assert widest(out) <= PLAIN_WIDTH
     outcomes = [each["outcome"] for each in json.loads(target.read_text())["extremes"] if "limit" in each]
     assert len(outcomes) == 18
-    for outcome in ("refuted", "open", "proved"):
-        shown = re.search(rf"^{outcome}  (\d+) limits?: ", out, re.MULTILINE)
+    for outcome, word in {"refuted": "violated", "open": "undecided", "proved": "proved"}.items():
+        shown = re.search(rf"^{word}  (\d+) limits?: ", out, re.MULTILINE)
         assert (0 if shown is None else int(shown[1])) == outcomes.count(outcome)
     # The first ones are shown in full, and others are named.
     assert len(commands_in(out, "see it with")) == 2
-    assert re.search(r"^other refuted claims  \d+: --all, ", out, re.MULTILINE)
+    assert re.search(r"^other violated claims  \d+: --all, ", out, re.MULTILINE)
 
 
 def printed(items: Iterable[Line | TextTable], width: int, *, whole: bool = True) -> str:
@@ -283,7 +283,7 @@ def test_a_command_has_no_more_digits_than_show_the_claim(cli: Run) -> None:
 def test_the_command_at_a_singular_pose_and_beyond_reach_shows_both(cli: Run, refuted: tuple[str, Path]) -> None:
     out, _ = refuted
     singular, beyond = commands_in(out, "see it with")
-    assert "refuted  regular: J is singular" in unbroken(out)
+    assert "violated  J is singular" in unbroken(out)
     assert any(each.startswith("rpy=") for each in singular)
     assert json.loads(cli(*singular, "--json", "-")[1])["rank"] < 6
     status, _, err = cli(*beyond)
@@ -546,7 +546,7 @@ def test_free_and_active_numbers_come_first_and_fixed_ones_are_folded() -> None:
     assert held == sorted(held, reverse=True)
     assert sum(ranges) == 3
     assert len(design.rows) - design.folded <= 10
-    assert f"and {design.folded} more fixed numbers" in printed([design], 80, whole=False)
+    assert f"and {design.folded} more fixed values" in printed([design], 80, whole=False)
 
 
 def test_a_table_as_csv_has_every_digit(tmp_path: Path, cli: Run) -> None:
@@ -562,7 +562,7 @@ def test_a_table_as_csv_has_every_digit(tmp_path: Path, cli: Run) -> None:
         "motions", "margins",
     ]  # fmt: skip
     assert cli("solve", "paper-4.2", "--starts", "2", "--csv", str(target), "--table", "tasks")[0] == 0
-    assert target.read_text(encoding="utf-8").startswith("task,sense,weight,F,best alone,loss,")
+    assert target.read_text(encoding="utf-8").startswith("task,sense,weight,F,separate optimum,loss,")
 
 
 @pytest.mark.parametrize("command", ["solve", "evaluate"])

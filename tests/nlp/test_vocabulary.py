@@ -19,7 +19,7 @@ from screwsynth.nlp.system.slips import hint_of, toml_slips
 #: What the same word may mean in one command only: the command exists to write it, or it is about another thing.
 FORMS = {
     "--set": "NAME=VALUE", "--of": "RESULT", "--starts": "N", "--seed": "N", "--jobs": "N", "--time": "SECONDS",
-    "--json": "FILE", "--csv": "FILE", "--html": "FILE", "--plot": "FILE", "--gap": "PART", "--pose": "N",
+    "--json": "FILE", "--csv": "FILE", "--html": "FILE", "--plot": "FILE", "--gap": "FRACTION", "--pose": "N",
 }  # fmt: skip
 #: Words that were, or might be, used for what another word stands for.
 BANNED = {
@@ -117,9 +117,9 @@ ROBOT = (ROBOTS / "reachy-mini-head.toml").read_text(encoding="utf-8")
         (("help",), "help: no such command; write screwsynth --help"),
         (("help", "solve"), "help: no such command; write screwsynth solve --help"),
         (("version",), "version: no such command; write screwsynth --version"),
-        (("my.toml",), "my.toml: no such command; a case stands behind a command, as in screwsynth solve my.toml"),
+        (("my.toml",), "my.toml: no such command; this is a case: write it after a command, as in screwsynth"),
         (("paper-4.2", "--all"), "as in screwsynth solve paper-4.2"),
-        (("delta",), "this is a robot: screwsynth models delta shows it, screwsynth new delta writes a case of it"),
+        (("delta",), "this is a robot: screwsynth models delta shows it, screwsynth new delta prints a case for it"),
         (("slove",), "did you mean 'solve'?"),
         (("solve", "paper-4.2", "--set", "x1=12,5"), "must be NAME=NUMBER, or axis=X,Y,Z; write 12.5: a decimal"),
         (("solve", "paper-4.2", "--set", "x1=12 cm"), "; write 12: a number is written without its unit"),

@@ -380,9 +380,10 @@ def test_the_command_shows_the_machine_that_refutes(cli: Run, tmp_path: Path) ->
     assert refuted
     for each in refuted:
         assert max(np.linalg.norm(each.machine.base, axis=1)) == pytest.approx(TOLERANCE)
-    assert shown.index("verdict") < shown.index("tightest limits") < shown.index("limits over every pose")
-    assert "every one whose joint centres are off by at most 0.02 in" in shown
-    assert f"the machine that refutes: {refuted[0].name}" in shown
+    places = [shown.index(each) for each in ("verdict", "limits with the smallest margin", "limits over all poses")]
+    assert places == sorted(places)
+    assert "covers every robot whose joint centres are off by at most 0.02 in" in shown
+    assert f"robot within the tolerance that violates: {refuted[0].name}" in shown
     assert "see it with" in shown
 
 

@@ -231,11 +231,11 @@ def test_the_commands_write_and_check_proofs(cli: Run, tmp_path: Path) -> None:
     file = saved(tmp_path / "machine.toml", text)
     code, _, err = cli("workspace", str(file), "--gap", "0.1", "--proof", str(target))
     assert code == 1
-    missing = "not on paper: actuator.stroke_max limb 1- max: refuted"
+    missing = "no proof: actuator.stroke_max limb 1- max: refuted"
     assert missing in err
     for arguments in ((str(target),), (str(target), str(file))):
         out = unbroken(output_of(cli("verify-proof", *arguments, "--all")))
-        assert out.startswith("holds: ")
+        assert out.startswith("PROOF VALID: ")
         assert "regular: J has full rank at every pose" in out
         assert missing in out
     saved(file, edited(text, ("min = -2, max = 2", "min = -2, max = 3")))

@@ -425,4 +425,4 @@ def test_the_shipped_machine_as_it_is_built_is_accepted(cli: Run, tmp_path: Path
     case = case_file(tmp_path, case_tables("hexapod-linuxcnc", tolerance={"joint_centre": 0.002}))
     target = tmp_path / "proof.json"
     output_of(cli("workspace", str(case), "--gap", "0.2", "--time", "200", "--proof", str(target)))
-    assert "not on paper" not in output_of(cli("verify-proof", str(target)))
+    assert "no proof" not in output_of(cli("verify-proof", str(target)))
