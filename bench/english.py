@@ -100,7 +100,7 @@ def _entries(docstring: str, first: int) -> Iterator[tuple[int, str, str]]:
 
 
 def paragraphs(markdown: str) -> Iterator[Text]:
-    """Paragraphs, items of lists, headings and rows of tables of a document, without blocks of code and formulas."""
+    """Paragraphs, items of lists, headings and rows of tables of a document, without code and formulas in lines."""
     fence, start, block = "", 1, list[str]()
     for number, line in enumerate([*markdown.splitlines(), ""], 1):
         opened = re.match(r" *(```+|~~~+|\$\$)", line)
@@ -112,7 +112,7 @@ def paragraphs(markdown: str) -> Iterator[Text]:
             fence = "" if closed else opened[1]
         apart = inside or not line.strip() or re.match(r" *([-*]|\d+\.) +| *(\||#|<|:|=+$|-+$)", line)
         if apart and block:
-            yield Text(start, "docs", " ".join(block))
+            yield Text(start, "docs", re.sub(r"`[^`]*`", "`code`", " ".join(block)))
             block = []
         if not inside and line.strip():
             start = start if block else number
@@ -127,8 +127,7 @@ def sentences(markdown: str) -> Iterator[Text]:
 
 
 def _split(line: int, text: str) -> Iterator[Text]:
-    plain = re.sub(r"`[^`]*`", "code", re.sub(r"\]\([^)]*\)", "]", text))
-    plain = re.sub(r"\$[^$]*\$", "formula", plain)
+    plain = re.sub(r"\$[^$]*\$", "formula", re.sub(r"\]\([^)]*\)", "]", text))
     for sentence in re.split(r"(?<=[.!?])[\")*\]]*\s+(?=\S)", plain):
         yield Text(line, "docs", sentence)
 

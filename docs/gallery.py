@@ -16,9 +16,10 @@ OPENING, CLOSING = "<!-- begin: gallery -->", "<!-- end -->"
 CASES = ROOT / "docs" / "cases.md"
 CASES_HEAD = """# Cases
 
-These cases come with the package: each command below finds its case by the name. `make docs` writes this page from the
-case files, and `make figures` draws the pictures. [Choosing](choosing.md) works through six of them;
-[the paper's numbers](reproduction.md) are those of the cases of the paper.
+These [cases](glossary.md#case) come with the package. Each command below finds its case by the name.
+[Six worked designs](worked-designs.md) explain six of them. The cases `paper-...` give
+[the paper's results](reproduction.md). `make docs` writes this page from the case files, and `make figures` draws the
+pictures.
 """
 
 
@@ -49,7 +50,7 @@ def counted(values: list[int]) -> str:
 def table() -> str:
     """Return the table as Markdown."""
     lines = [
-        "| robot | limbs (\\* actuated) | freedoms | rows | dim W | dim C | rank of J | source |",
+        "| robot | limbs (\\* actuated) | degrees of freedom | rows | dim W | dim C | rank of J | source |",
         "|---|---|---|---|---|---|---|---|",
     ]
     for path in sorted(FOLDER.glob("*.toml")):
@@ -71,7 +72,7 @@ def table() -> str:
 
 
 def cases() -> str:
-    """Return the page of all cases: what each asks, the command that answers, and its picture."""
+    """Return the page of all cases: question, command and picture of each."""
     parts = [CASES_HEAD]
     for path in sorted(Path(screwsynth.cases.__file__).parent.glob("*.toml")):
         text, name = path.read_text(encoding="utf-8"), path.stem

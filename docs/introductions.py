@@ -1,8 +1,9 @@
-"""Run the commands of the introductions and of README.md, and write what they print there: run by ``make docs``.
+"""Run the commands of tutorials, how-to pages and README.md, and write their output into them: ``make docs``.
 
 A page has three kinds of blocks. ``<!-- file: NAME -->`` stands before a block that is a file. ``<!-- run: WORDS -->``
-stands before a block that begins with ``$`` and a command, and has the lines of its output below that WORDS choose, see
-:func:`chosen`. ``<!-- run slowly: WORDS -->`` is the same, for commands that tests leave out.
+stands before a block that begins with ``$`` and a command. Below are the lines of its output that WORDS choose, see
+:func:`chosen`. A command that ends with ``> FILE`` writes its output to a file. ``<!-- run slowly: WORDS -->`` is the
+same, for commands that tests leave out.
 """
 
 import itertools
@@ -16,7 +17,7 @@ from pathlib import Path
 
 FOLDER = Path(__file__).parent
 INTRODUCTIONS = ("intro-machine-tool", "intro-delta", "intro-motion-base", "intro-wrist")
-PAGES = (*INTRODUCTIONS, "../README")
+PAGES = (*INTRODUCTIONS, "start", "certificate", "loads", "workspace", "../README")
 _PYTHON = [sys.executable, "-P"]
 #: Programs of the commands, and what runs them.
 _PROGRAMS = {"screwsynth": [*_PYTHON, "-m", "screwsynth.nlp"], "python": _PYTHON, "make": ["make", "--silent"]}
@@ -33,18 +34,21 @@ def output_of(command: str, folder: Path) -> list[str]:
     Raises:
         CalledProcessError: the command fails.
     """
+    command, _, target = command.partition(" > ")
     program, *arguments = shlex.split(command)
     done = subprocess.run(  # noqa: S603 - commands of our own pages
         [*_PROGRAMS[program], *arguments], cwd=folder, capture_output=True, text=True, check=True
     )
-    return [line.rstrip() for line in done.stdout.splitlines()]
+    if target:
+        (folder / target).write_text(done.stdout, encoding="utf-8")
+    return [line.rstrip() for line in ("" if target else done.stdout).splitlines()]
 
 
 def chosen(lines: list[str], words: str) -> list[str]:
     """Return the lines of an output that words choose, in the order of the words; spaces in lines count once.
 
     Args:
-        lines: of the output.
+        lines: lines of the output.
         words: nothing for all lines, ``none``, or parts with ``|`` between them: ``A`` for all lines that begin with A,
             ``A!`` for the first of them, ``A .. B`` for the first of them and all before one that begins with B. The
             further lines of one that is broken, with two spaces before them, belong to it.

@@ -1,4 +1,4 @@
-"""What a reader tries: every public name has a docstring, the first steps print what they show, the notebook runs."""
+"""What a reader tries: every public name has a docstring, the notebook runs."""
 
 import dataclasses
 import inspect
@@ -47,20 +47,6 @@ def _parts_of(value: type | FunctionType) -> list[str]:
     if dataclasses.is_dataclass(value):
         return [field.name for field in dataclasses.fields(value) if not field.name.startswith("_")]
     return list(getattr(value, "fields" if issubclass(value, JsonObject) else "_fields", ()))
-
-
-def test_the_first_steps_of_the_documentation_print_what_they_show(tmp_path: Path) -> None:
-    page = (DOCS / "start.md").read_text(encoding="utf-8")
-    ran = re.findall(r"```sh\nscrewsynth (.*)\n```(?:\n\n```text\n([^`]*)```)?", page)
-    assert [bool(shown) for _, shown in ran] == [False, True, True, True]
-    for line, shown in ran:
-        arguments, _, target = line.partition(" > ")
-        command = [sys.executable, "-P", "-m", "screwsynth.nlp", *arguments.split()]
-        out = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True).stdout
-        if target:
-            (tmp_path / target).write_text(out, encoding="utf-8")
-        printed = [each.rstrip() for each in out.splitlines()]
-        assert [each for each in shown.splitlines() if each not in printed] == []
 
 
 def test_the_notebook_runs_and_shows_what_it_shows_here(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Tables of the race in Markdown: the methods, expected times by case, and one table for each case."""
+"""Markdown tables of the comparison of methods: methods, expected times by case, and one table for each case."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Any
 from .summary import Best, Score, best_of, elsewhere, score_of
 from .tables import number, percent, table
 
-#: The row with which others are compared.
+#: Row to which the ratios refer.
 _OWN = "screwsynth solve"
 
 
 def race_tables(section: Mapping[str, Any]) -> str:
-    """Return all tables of the race."""
+    """Return all tables of the comparison."""
     peers = {peer["name"]: peer for peer in section["peers"]}
     best, scores = {}, {}
     for name, case in section["cases"].items():
@@ -30,32 +30,33 @@ def race_tables(section: Mapping[str, Any]) -> str:
 
 
 def _plan_lines(section: Mapping[str, Any]) -> str:
-    """Return the budgets, and how much of the processor the attempts had."""
+    """Return the budgets, and the share of CPU time in wall time."""
     plan, budget = section["plan"], section["plan"]["budget"]
     attempts = [each for pair in section["pairs"] for each in pair["attempts"]]
     seconds, wall = (sum(each[key] for each in attempts) for key in ("seconds", "wall"))
     share = f" CPU time was {percent(seconds / wall)} of wall time." if wall else ""
     return (
-        f"Up to {plan['seeds']} attempts of each method on each case, until {number(plan['pair_seconds'])} CPU s "
-        f"are used up; an attempt may take {budget['evaluations']:,} evaluations and {number(budget['seconds'])} s. "
-        f"{len(attempts):,} attempts.{share}\n"
+        f"Each method has up to {plan['seeds']} attempts on each case, "
+        f"within {number(plan['pair_seconds'])} s of CPU time. "
+        f"An attempt has at most {budget['evaluations']:,} evaluations and {number(budget['seconds'])} s. "
+        f"{len(attempts):,} attempts in total.{share}\n"
     )
 
 
 def _methods(peers: Sequence[Mapping[str, Any]]) -> str:
-    """Return the methods with what they use, and the lines that a user writes."""
+    """Return the methods with search, derivatives and constraints, and the number of lines of their call."""
     rows = [
         (
             each["name"],
             each["kind"],
             each["derivatives"],
-            each["constraints"],
+            "native" if each["constraints"] == "own" else each["constraints"],
             str(each["lines"]),
             f"`bench/peers/{each['module']}.py`",
         )
         for each in peers
     ]
-    return table(("method", "search", "derivatives", "constraints", "lines", "the call"), rows)
+    return table(("method", "search", "derivatives", "constraints", "lines", "file"), rows)
 
 
 def _expected(scores: Mapping[str, Sequence[Score]]) -> str:
@@ -71,28 +72,24 @@ def _expected(scores: Mapping[str, Sequence[Score]]) -> str:
         cells = [f"**{number(ms)}**" if bold and ms else number(ms) for ms, bold in zip(found, is_least, strict=True)]
         tried = [each[k].attempts > 0 for each in scores.values()]
         rows.append((name, *(cell if has else "" for cell, has in zip(cells, tried, strict=True))))
-    text = (
-        "Expected CPU time to a correct answer, ms; a dash where no attempt was correct, empty where none was made:\n\n"
-    )
+    text = "Expected CPU time to a correct answer, ms. A dash: no correct attempt. Empty: no attempt:\n\n"
     return text + table(("method", *(f"`{case}`" for case in scores)), rows)
 
 
 def _case_lines(name: str, case: Mapping[str, Any], best: Best, pairs: Sequence[Mapping[str, Any]]) -> str:
-    """Return the sizes of a case, its best F known, and what is notable about it."""
+    """Return the sizes of a case, its best known F, and remarks."""
     proof = ", proved to be the optimum" if best.reference.is_proved else ", the best known"
     sizes = f"{case['variables']} variables, {case['constraints']} inequalities, {case['equations']} equations"
     formulation = f"Formulation: {number(1e3 * case['formulation_seconds'])} ms."
     lines = [f"{sizes}; F = {best.reference.F:.9g}{proof}. {formulation}"]
     if best.finder:
-        lines.append(
-            f"{best.finder} found this F; this program's solve with {case['starts']} starts has {case['F']:.9g}."
-        )
+        lines.append(f"{best.finder} has this F; `screwsynth solve` with {case['starts']} starts has {case['F']:.9g}.")
     if best.contradicts_proof:
         lines.append(f"**A feasible answer contradicts the proof of {name}.**")
     others = elsewhere(case, pairs)
     if others.count:
         lines.append(
-            f"{others.count} answers are in another working mode than home's and not counted; "
+            f"{others.count} answers in another working mode than that of home are not counted; "
             f"the best has F = {others.F:.7g}."
         )
     return " ".join(lines) + "\n"
@@ -121,7 +118,7 @@ def _case_table(scores: Sequence[Score]) -> str:
     columns = (
         "method",
         "correct",
-        "after a polish",
+        "correct after polishing",
         "error of F",
         "median ms",
         "evaluations",

@@ -1,4 +1,4 @@
-"""Tables of the sections in Markdown, but for the race's."""
+"""Markdown tables of all sections except the comparison of methods."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 Row = Mapping[str, Any]
-#: Load of each core at the begin above which a machine is busy with something else.
+#: Load of each core at the start above which the computer counts as busy.
 _BUSY = 0.5
 _RUNS = {"quick": "A quick run, with few attempts and short limits", "full": "A full run"}
 
 
 def table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table."""
+    """Return a Markdown table."""
     lines = [f"| {' | '.join(columns)} |", f"|{'---|' * len(columns)}"]
     return "\n".join([*lines, *(f"| {' | '.join(each.replace('|', '/') for each in row)} |" for row in rows)]) + "\n"
 
@@ -34,27 +34,27 @@ def percent(value: float | None) -> str:
 
 
 def machine_lines(data: Row) -> str:
-    """Return machine, versions, date and the kind of the run."""
+    """Return computer, versions, date and kind of the run."""
     at = data["machine"]
     packages = ", ".join(f"{name} {version}" for name, version in at["packages"].items())
     run = _RUNS[data["run"]] + (", cut short" if data.get("is_shortened") else "")
     if at["load"] > _BUSY * at["cores"]:
-        run = f"**Preliminary, on a machine that was busy with other work.** {run}"
+        run = f"**Preliminary, on a busy computer.** {run}"
     begin = f"{run}, {at['date']}, revision {at['revision']}, {data.get('seconds', '-')} s."
-    hardware = f"{at['processor']}, {at['cores']} cores, load {at['load']} at the begin."
+    hardware = f"{at['processor']}, {at['cores']} cores, load {at['load']} at the start."
     return f"{begin} {hardware} {at['system']}, Python {at['python']}, {at['compiler']}; {packages}.\n"
 
 
 def evaluation_tables(section: Row) -> str:
     """Return nanoseconds of F and its derivatives by implementation."""
-    ways = ("generated C", "CasADi", "NumPy", "C by hand")
+    implementations = ("generated C", "CasADi", "NumPy", "C by hand")
     columns = (
         "case",
         "quantity",
         "operations",
-        "of them divisions and roots",
-        "least ns",
-        *(f"{way}, ns" for way in ways),
+        "divisions and roots",
+        "lower bound, ns",
+        *(f"{way}, ns" for way in implementations),
     )
     rows = []
     for row in section["rows"]:
@@ -62,7 +62,7 @@ def evaluation_tables(section: Row) -> str:
             rows.append((f"`{row['case']}`", row["note"], *("-" for _ in columns[2:])))
             continue
         least = row["operations"] * row["operation_nanoseconds"]
-        times = [row["nanoseconds"].get(way) for way in ways]
+        times = [row["nanoseconds"].get(way) for way in implementations]
         cells = [
             "-" if each is None else f"{number(each)} ({number(each / times[0], 2)})" if k else number(each)
             for k, each in enumerate(times)
@@ -82,7 +82,7 @@ def certificate_tables(section: Row) -> str:
         nodes = f"{row['nodes']:,}" if "nodes" in row else "-"
         cells = (number(best, 6), number(bound, 6), percent(gap), nodes, number(row.get("seconds")))
         rows.append((row["problem"], names[row["method"]], *cells, row.get("note", "")))
-    head = f"At most {number(section['seconds_each'])} s each, asked for a gap of {percent(section['gap'])}.\n\n"
+    head = f"At most {number(section['seconds_each'])} s each, for a gap of {percent(section['gap'])}.\n\n"
     return head + table(("problem", "method", "best F", "bound", "gap", "boxes or nodes", "s", "remark"), rows)
 
 
@@ -96,9 +96,9 @@ def growth_tables(section: Row) -> str:
         pairs = zip(series["sizes"], series["seconds"], series["counts"], strict=True)
         each = [f"{size}: {number(s)} s{'' if n is None else f', {n:,} boxes'}" for size, s, n in pairs]
         exponent = number(series["exponent"], 2)
-        fit = f"factor {exponent} each, of boxes" if series["is_exponential"] else f"power {exponent}"
+        fit = f"boxes: factor {exponent} for each" if series["is_exponential"] else f"power {exponent}"
         reach = f"{min(series['sizes'])} to {max(series['sizes'])}"
         turns = f"median of {series['turns']}"
         remark = "; ".join(part for part in (turns, series["note"]) if part)
         rows.append((series["name"], "; ".join(each), "-" if series["exponent"] is None else fit, reach, remark))
-    return table(("what grows", "size: time", "fit", "range", "remark"), rows)
+    return table(("varied size", "size: time", "fit", "range", "remark"), rows)

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from ...models import FloatArray
 from ..case.case import Case
+from ..case.varied import Over, axes_of
 from ..errors import InputError, check_seconds
 from ..interruption import one_call, within
 from ..sweeps.columns import SweepColumns, columns_of, row_reader, sweep_columns
@@ -176,7 +176,7 @@ def _fingerprint(path: Path) -> str | None:
 @one_call
 def sweep(
     case: Case,
-    over: Mapping[str, Iterable[float]] | None = None,
+    over: Over | None = None,
     *,
     points: Mapping[str, Sequence[float]] | None = None,
     out: str | Path | None = None,
@@ -242,7 +242,7 @@ def sweep(
         return columns_of(found, table_rows(target, found))
 
 
-def _points(over: Mapping[str, Iterable[float]] | None, points: Mapping[str, Sequence[float]] | None) -> Points:
+def _points(over: Over | None, points: Mapping[str, Sequence[float]] | None) -> Points:
     """Return the points of the arguments ``over`` and ``points``.
 
     Raises:
@@ -251,30 +251,11 @@ def _points(over: Mapping[str, Iterable[float]] | None, points: Mapping[str, Seq
     """
     if (not over) == (not points):
         raise InputError("a sweep needs either over or points, a mapping from names to values")
-    given = over or points or {}
-    axes = [_values(name, values) for name, values in given.items()]
+    axes = axes_of(over) if over else axes_of(points or {}, "points", repeated=True)
     if over:
-        for name, values in zip(given, axes, strict=True):
-            if len(np.unique(values)) < len(values):
-                raise InputError(f"over {name}: contains a value twice; the values must be different")
-        return grid_of(tuple(given), axes)
-    lengths = {len(values) for values in axes}
+        return grid_of(tuple(axes), list(axes.values()))
+    lengths = {len(values) for values in axes.values()}
     if len(lengths) > 1:
-        counts = ", ".join(f"{name} {len(values)}" for name, values in zip(given, axes, strict=True))
+        counts = ", ".join(f"{name} {len(values)}" for name, values in axes.items())
         raise InputError(f"points: all names need the same number of values, got {counts}")
-    return Points(tuple(given), np.stack(axes, axis=1))
-
-
-def _values(name: str, values: Iterable[float]) -> FloatArray:
-    """Return the values of one name as an array (k,).
-
-    Raises:
-        InputError: there are no values, or one is not a finite number.
-    """
-    found = list(values)
-    for value in found:
-        if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not math.isfinite(value):
-            raise InputError(f"{name} = {value}: must be a finite number")
-    if not found:
-        raise InputError(f"{name}: has no values")
-    return np.array(found, dtype=np.float64)
+    return Points(tuple(axes), np.stack(list(axes.values()), axis=1))

@@ -23,7 +23,7 @@ from measures import circle_joints, exponential, scaled
 from screwsynth.nlp import Case, RobotState, Solution, evaluate, formulate, load_case, solve
 from screwsynth.nlp.case.source import find_case
 
-PAGE = (Path(__file__).parents[2] / "docs" / "choosing.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[2] / "docs" / "worked-designs.md").read_text(encoding="utf-8")
 PROBLEMS = ("peg-in-hole", "drilling-spindle", "camera-mount", "free-wrist", "haptic-device", "flight-simulator")
 
 
@@ -255,7 +255,7 @@ def numbers_of_the_peg() -> Iterator[tuple[str, str]]:
     (legs, push, F), (_, tilt, F_tilt) = answers("peg-in-hole")
     before, k = started("peg-in-hole"), 200.0
     yield "F of pushing, at the start and at the answer", f"{objective(before, push):.3f} and {F:.3f}"
-    yield "F of tilting, at the start and at the answer, mm^2", f"{objective(before, tilt):.1f} and {F_tilt:.2f}"
+    yield "F of tilting, at the start and at the answer, mm²", f"{objective(before, tilt):.1f} and {F_tilt:.2f}"
     yield "stiffness along the peg, legs of 200 N/mm", f"{k * F:.0f} N/mm"
     yield "stiffness against tilting about the tip", f"{k * F_tilt / 1000:.1f} N m/rad"
     K = stiffness(legs, k)
@@ -264,14 +264,14 @@ def numbers_of_the_peg() -> Iterator[tuple[str, str]]:
     load = [np.concatenate([np.cross([0, 0, z], [1, 0, 0]), [1, 0, 0]]) for z in (0.0, 1.0)]
     at = [float(soft[1] @ each) for each in load]
     yield "height of the centre of compliance", f"{-at[0] / (at[1] - at[0]):.1f} mm"
-    yield "F of turning about the peg, mm^2", f"{objective(legs, turn(np.array([0, 0, 1.0]), np.zeros(3))):.1f}"
+    yield "F of turning about the peg, mm²", f"{objective(legs, turn(np.array([0, 0, 1.0]), np.zeros(3))):.1f}"
 
 
 def numbers_of_the_drill() -> Iterator[tuple[str, str]]:
     ((legs, drill, F),) = answers("drilling-spindle")
     before, k = started("drilling-spindle"), 100.0
     yield "F of drilling, at the start and at the answer", f"{objective(before, drill):.3f} and {F:.3f}"
-    yield "stiffness along the drill, legs of 100 N/um", f"{k * F:.0f} N/um"
+    yield "stiffness along the drill, legs of 100 N/µm", f"{k * F:.0f} N/µm"
     yield "F of all directions across the drill together", f"{6 - F:.3f}"
     across = np.linalg.eigvalsh(stiffness(legs)[3:, 3:])[:2]
     yield "F of the two directions across the drill", f"{across[0]:.3f} and {across[1]:.3f}"
@@ -289,13 +289,13 @@ def numbers_of_the_camera() -> Iterator[tuple[str, str]]:
         return np.sort(np.sqrt(squares)) / (2 * math.pi)
 
     first, now = hertz(before), hertz(legs)
-    yield "F of the two swings at the start, m^2", f"{objective(before, below):.4f} and {objective(before, above):.4f}"
-    yield "F of the two swings at the answer, m^2", f"{F:.5f} and {F_above:.5f}"
-    yield "natural frequencies at the start, legs of 1 N/um, 5 kg", f"{first[0]:.1f} and {first[1]:.1f} Hz"
+    yield "F of the two swings at the start, m²", f"{objective(before, below):.4f} and {objective(before, above):.4f}"
+    yield "F of the two swings at the answer, m²", f"{F:.5f} and {F_above:.5f}"
+    yield "natural frequencies at the start, legs of 1 N/µm, 5 kg", f"{first[0]:.1f} and {first[1]:.1f} Hz"
     yield "natural frequencies at the answer", f"{now[0]:.1f} and {now[1]:.1f} Hz"
     alone = [each @ stiffness(legs, k) @ each / part for each, part in zip(swings, np.diag(kinetic), strict=True)]
     tilt, sway = (math.sqrt(square) / (2 * math.pi) for square in alone)
-    yield "of tilt and sway by themselves, at the answer", f"{tilt:.1f} and {sway:.1f} Hz"
+    yield "the same for tilt and for sway separately, at the answer", f"{tilt:.1f} and {sway:.1f} Hz"
     azimuths = np.radians([20.0, 55.0, 130.0])
     others = [objective(legs, turn(np.array([math.cos(a), math.sin(a), 0]), np.array([0, 0, 0.22]))) for a in azimuths]
     yield "F of the lower swing for winds from 20, 55 and 130 degrees", ", ".join(f"{each:.5f}" for each in others)
@@ -307,8 +307,8 @@ def numbers_of_the_wrist() -> Iterator[tuple[str, str]]:
     tables["task"][0]["sense"] = "max"
     stiffest = solve(case_from(tables, "wrist")).F
     q = np.abs(rates(legs, twist))
-    yield "smallest and largest F within the same limits, mm^2", f"{F:.1f} and {stiffest:.0f}"
-    yield "way of each leg for one degree", f"{math.radians(1) * max(q) * 1000:.1f} um"
+    yield "smallest and largest F within the same limits, mm²", f"{F:.1f} and {stiffest:.0f}"
+    yield "travel of each leg for one degree", f"{math.radians(1) * max(q) * 1000:.1f} µm"
     yield "speed of the tool, legs of 50 mm/s", f"{50 / max(q):.1f} rad/s"
     yield "torque about the tool, legs of 100 N", f"{100 * sum(q) / 1000:.2f} N m"
     yield "play of the tool, legs with a play of 0.01 mm", f"{math.degrees(0.01 / max(q)):.2f} deg"
@@ -324,8 +324,8 @@ def numbers_of_the_haptic_device() -> Iterator[tuple[str, str]]:
     now = [objective(legs, translation(*axis)) for axis in np.eye(3)]
     yield "F along x, y, z at the start", ", ".join(f"{each:.2f}" for each in first)
     yield "F along x, y, z at the answer", ", ".join(f"{each:.2f}" for each in now)
-    yield "mass felt at the start, legs with 50 g in motion", f"{m * min(first):.0f} to {m * max(first):.0f} g"
-    yield "mass felt at the answer", f"{m * F:.0f} to {m * F_up:.0f} g"
+    yield "apparent mass at the start, legs with 50 g in motion", f"{m * min(first):.0f} to {m * max(first):.0f} g"
+    yield "apparent mass at the answer", f"{m * F:.0f} to {m * F_up:.0f} g"
 
 
 def numbers_of_the_simulator() -> Iterator[tuple[str, str]]:
@@ -336,9 +336,9 @@ def numbers_of_the_simulator() -> Iterator[tuple[str, str]]:
     neutral = [found[0].legs, placed_with(states("flight-simulator")[0], x1=2.0)]
     surge = [objective(each, translation(1, 0, 0)) for each in neutral]
     q = np.abs(rates(legs, twist))
-    yield "F in the eight poses, m^2", ", ".join(f"{each:.2f}" for each in F)
+    yield "F in the eight poses, m²", ", ".join(f"{each:.2f}" for each in F)
     yield "worst pose", str(int(np.argmin(F)) + 1)
-    yield "the worst F with a base of 2 m, m^2", f"{min(wide):.2f}"
+    yield "the worst F with a base of 2 m, m²", f"{min(wide):.2f}"
     yield "F of surge in the first pose, as it is and with a base of 2 m", f"{surge[0]:.2f} and {surge[1]:.2f}"
     yield "torque about the roll axis in the worst pose, legs of 40 kN", f"{40 * sum(q):.0f} kN m"
     yield "roll speed there, legs of 1 m/s", f"{math.degrees(1 / max(q)):.0f} deg/s"

@@ -476,7 +476,7 @@ def test_a_wrist_does_not_translate() -> None:
     tables = starter_tables("spherical-3-rrr")
     tables["robot"]["parameters"]["radius"] = 0.1
     tables["workspace"] = {"position": [{"min": -0.02, "max": 0.02}] * 3}
-    with pytest.raises(CaseError, match="this robot cannot choose x and y and z"):
+    with pytest.raises(CaseError, match="this robot cannot control x and y and z"):
         judge_workspace(case_from(tables | {"limits": {}}), time_limit=20)
 
 

@@ -107,7 +107,7 @@ def test_compiled_rows_are_those_of_solve(tmp_path: Path, cli: Run) -> None:
     before = out.read_bytes()
     code, _, err = cli(*command)
     assert (code, out.read_bytes()) == (0, before)
-    assert "holds all 12 points already" in err
+    assert "already has all 12 points" in err
     err = refusal_of(cli("sweep", CASE, *OVER, "--starts", "3", "--out", str(out)))
     assert out.read_bytes() == before
     sentence = "exists and is not the table of this sweep; choose another name, or remove it"
@@ -185,7 +185,7 @@ def test_joints_are_no_design() -> None:
     assert set(found.design) == {"rb", "p_x", "p_y", "p_z", "q_x", "q_y", "q_z"}
     for arguments, words in (
         ({}, "a sweep needs either over or points"),
-        ({"over": {"rb": (1, 1)}}, "contains a value twice"),
+        ({"over": {"rb": (1, 1)}}, "has a value twice"),
         ({"over": {"rb": (1, "a")}}, "rb = a: must be a finite number"),
         ({"over": {"rb": ()}}, "rb: has no values"),
         ({"points": {"rb": (1, 2), "rp": (1,)}}, "got rb 2, rp 1"),
@@ -212,10 +212,10 @@ def test_joints_are_no_design() -> None:
         (("--over", "EMPTY"), "has 0 points"),
         (("--over", "SHORT"), "row 3: must have 2 cells, got 1"),
         (("--over", "WORDS"), 'row 4, column x2 = "1,1": must be a number; write 1.1'),
-        (("--over", "x1=1,2", "--over", "EMPTY"), "a file of points stands alone, without ranges or lists beside it"),
-        ((), "--over: is missing: NAME=FIRST:LAST:COUNT, a number to vary"),
+        (("--over", "x1=1,2", "--over", "EMPTY"), "a file of points cannot be combined with ranges or lists"),
+        ((), "--over: is missing: NAME=FIRST:LAST:COUNT, parameter to vary"),
         (("--over", "x1=1,2", "--engine", "fast"), "--engine fast: must be compiled or ipopt"),
-        (("--over", "x1=10,12", "--starts", "17", "--engine", "compiled"), "has at most 16 starting points, and 17 are requested"),
+        (("--over", "x1=10,12", "--starts", "17", "--engine", "compiled"), "at most 16 starting points, and 17 are"),
         (("--over", "x1=1,2", "--over", "x2=1,2", "--over", "x3=1,2", "--plot", "p.png"), "got a grid over 3 names"),
     ],
 )  # fmt: skip

@@ -36,8 +36,8 @@ from screwsynth.nlp.proof.checker.workspace.pose_boxes import _PoseRule
 from screwsynth.nlp.proof.checker.workspace.statement import robot_claims
 from screwsynth.nlp.proof.statement.claims import REGULAR
 from screwsynth.nlp.proof.statement.machine import workspace_of_case
-from screwsynth.nlp.proof.workspace.numbers.machines import Machines
 from screwsynth.nlp.proof.workspace.numbers.searched import Subject, motor_extremes
+from screwsynth.nlp.proof.workspace.numbers.within_tolerance import RobotsWithinTolerance
 from screwsynth.nlp.proof.workspace.proof_record import ProofRecord
 from screwsynth.nlp.proof.workspace.proof_writer import proof_of as written
 from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularPose
@@ -229,10 +229,10 @@ def test_a_singular_pose_of_a_robot_without_loops_is_on_paper() -> None:
     ("name", "reached", "words"),
     [
         ("6-sps", True, ""),
-        ("6-rus", True, "the assembly of home"),
-        ("6-rus", False, "every assembly"),
-        ("planar-3-prr", True, "every assembly in which limbs in closed form are as at home"),
-        ("3-rps", True, "every assembly"),
+        ("6-rus", True, "the home assembly mode"),
+        ("6-rus", False, "every assembly mode"),
+        ("planar-3-prr", True, "every assembly mode in which limbs in closed form are as at home"),
+        ("3-rps", True, "every assembly mode"),
     ],
 )
 def test_claims_name_the_assemblies_of_their_numbers(name: str, reached: bool, words: str) -> None:
@@ -256,7 +256,7 @@ def motors_on_paper(case: Case) -> tuple[dict[tuple[str, str], Verdict], Proof]:
     box = box_of(case)
     meant = build_problem(case, closed.model, box)
     if case.joint_centre_tolerance:
-        meant = Machines(case, closed, meant).family
+        meant = RobotsWithinTolerance(case, closed, meant).family
     found = tuple(motor_extremes(Subject(case, closed.model, meant), record=record))
     judged = Judgement(case, workspace_of_case(case), (not_judged(REGULAR, "not requested"), *found))
     proof = read_proof(written(judged, record, "").as_text(), "again")

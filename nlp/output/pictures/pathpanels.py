@@ -19,6 +19,7 @@ from ...proof.workspace.judgement import Judgement
 from ...proof.workspace.path_samples import PathSamples, SampledNumber, motor_numbers
 from ...proof.workspace.verdict import Outcome
 from ...results.path import PathResult, PathVerdictData
+from ...words.claims import CLAIM_WORDS
 from ...words.numbers import number
 from ...words.path import checked_claims
 
@@ -168,7 +169,8 @@ class PathPicture:
             notes.append("Red: segments with a known violation. Vertical lines: first violation of each limit or rank.")
         if any(not each.is_refuted for each in self.bands):
             notes.append("Grey: undecided segments, or segments with unknown joint coordinates.")
-        unplaced = [each.name for each in checked_claims(self.result) if _is_open(each) and each.segment is None]
+        claims = checked_claims(self.result)
+        unplaced = [CLAIM_WORDS.get(each.name, each.name) for each in claims if _is_open(each) and each.segment is None]
         if unplaced:
             notes.append(f"Undecided without a known segment: {', '.join(unplaced)}.")
         if self.judged.case.joint_centre_tolerance:

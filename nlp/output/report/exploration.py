@@ -40,7 +40,7 @@ def optima(report: Report) -> Markup:
     result = report.result
     results = [result] if isinstance(result, SolveResult) else result.tasks
     solutions: list[tuple[str, str, str, ProgramSolution, RobotData | None]] = [
-        (f"Separate optima of “{part.name}”", part.label, part.unit, part.solution, own.robot)
+        (f"Task “{part.name}”", part.label, part.unit, part.solution, own.robot)
         for part, own in zip(report.parts, results, strict=True)
     ]
     if report.combined is not None:

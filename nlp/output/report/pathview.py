@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict
 import numpy as np
 
 from ....models import FloatArray
+from ...words.claims import SINGULAR
 from ...words.numbers import number
 from ..pictures.drawing import Drawing, drawing_without_task
 from ..pictures.pathpanels import LIMIT_COLOURS, PathPicture, percent
@@ -113,7 +114,10 @@ def path_view(picture: PathPicture) -> PathView | None:
             "margins": [_margin(picture, k) for k in way],
             "most": MOST_MARGIN,
             "marks": [
-                {"words": f"line {each.line}: {', '.join(each.names)}", "position": _rounded(position, size)}
+                {
+                    "words": f"line {each.line}: {', '.join(SINGULAR.get(name, name) for name in each.names)}",
+                    "position": _rounded(position, size),
+                }
                 for each, position in zip(picture.marks, marks, strict=True)
             ],
             "first": first,
