@@ -48,7 +48,8 @@ class RangeEnd(JsonObject):
 
     Attributes:
         value: end of the range; all claims are proved up to this value.
-        failed: smallest known value beyond the end at which a claim is not proved; absent at the end of the largest range.
+        failed: smallest known value beyond the end at which a claim is not proved; absent at the end of the largest
+            requested range.
         stop: claim that is not proved at ``failed``; absent without ``failed``.
         dimension: dimension of the coordinate, in radians for an angle.
     """
