@@ -17,7 +17,7 @@ $(VENV)/solving: pyproject.toml
 $(VENV)/ready: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --editable '.[dev]'
-	$(BIN)/python -m compileall -q models nlp cases
+	$(BIN)/python -m compileall -q __init__.py models nlp cases
 	touch $@ $(VENV)/solving
 
 demo: $(VENV)/solving ## set up what solving needs and solve the paper's Section 4.1
@@ -33,10 +33,11 @@ soak: $(VENV)/ready ## run what make test leaves out: whole loops over robots, c
 	$(BIN)/python -P -m pytest --numprocesses auto --dist worksteal -m soak
 	$(BIN)/python bench/soundness/units.py 120 0
 
-# Type checkers cannot follow the editable install's hook, so they get the folders under the package's name.
-build/typing/screwsynth:
+# Type checkers cannot follow the editable install's hook, so they get the package under its name, without tests and docs.
+build/typing/screwsynth: pyproject.toml
 	mkdir -p $@
-	ln -sfn ../../../models ../../../nlp ../../../cases $@
+	ln -sfn $(addprefix ../../../,__init__.py __init__.pyi py.typed models nlp cases) $@
+	touch $@
 
 check: lint types more-types house ## check formatting, lint, types and import contracts; with --jobs 2 at once
 

@@ -1,7 +1,8 @@
 """Kinematics in C: nanoseconds of a call beside hand-written closed forms in one run, code size and stack.
 
-Usage: python bench/kinematics.py [NAME ...]. The hand-written forms are six leg lengths of a hexapod, and the three cranks
-of a rotary Delta. Sizes are those of the functions that a program links for one call, without the mathematics library.
+Usage: python bench/kinematics.py [NAME ...]. The hand-written forms are six leg lengths of a hexapod, and the three
+cranks of a rotary Delta. Sizes are those of the functions that a program links for one call, without the mathematics
+library.
 """
 
 from __future__ import annotations
@@ -110,7 +111,8 @@ def by_hand(name: str) -> str:
             hand = _DELTA % {key: each[0] for key, each in values.items()}
         else:
             rows = {
-                end: ", ".join("{%r, %r, %r}" % values[f"{end}_{k}"] for k in range(1, 7)) for end in ("base", "platform")
+                end: ", ".join(f"{{{', '.join(map(repr, values[f'{end}_{k}']))}}}" for k in range(1, 7))
+                for end in ("base", "platform")
             }
             hand = _HEXAPOD % rows
         text = _MAIN % {"file": file, "kin": kin, "KIN": kin.upper(), "hand": hand, "size": size}
@@ -167,10 +169,10 @@ def sizes(name: str, target: Target) -> list[str]:
 def main() -> None:
     """Print the figures."""
     for name in ("hexapod", "delta"):
-        print(f"{name}: {by_hand(name)}")  # noqa: T201
+        print(f"{name}: {by_hand(name)}")
     for name in sys.argv[1:] or ("hexapod", "delta", "6-rss", "3-rrs", "orthoglide"):
         for target in (X86_64, CORTEX_M7):
-            print(f"{name}, {target.name}: {'; '.join(sizes(name, target))}")  # noqa: T201
+            print(f"{name}, {target.name}: {'; '.join(sizes(name, target))}")
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ BIN = Path(sys.executable).parent
 BASE = "import casadi, numpy"
 COMMANDS = {
     BASE: ["python", "-P", "-c", BASE],
+    "import screwsynth": ["python", "-P", "-c", "import screwsynth"],
     "import screwsynth.nlp": ["python", "-P", "-c", "import screwsynth.nlp"],
     "screwsynth --version": ["screwsynth", "--version"],
     "screwsynth --help": ["screwsynth", "--help"],

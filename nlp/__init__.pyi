@@ -52,6 +52,7 @@ from .case.workspace import TurnKind as TurnKind
 from .case.workspace import Turns as Turns
 from .case.workspace import Workspace as Workspace
 from .case.writer import case_text as case_text
+from .case.writer import with_settings as with_settings
 from .comparison.compare import Comparison as Comparison
 from .comparison.compare import compare as compare
 from .comparison.data import comparison_result as comparison_result
@@ -67,6 +68,7 @@ from .errors import EvaluationError as EvaluationError
 from .errors import InputError as InputError
 from .errors import ScrewsynthError as ScrewsynthError
 from .errors import UncoveredError as UncoveredError
+from .evidence.evaluation import evaluate as evaluate
 from .evidence.inverse import InversePoses as InversePoses
 from .evidence.inverse import inverse as inverse
 from .evidence.margins import Margin as Margin
@@ -80,7 +82,6 @@ from .evidence.principal_motions import analyse_tasks as analyse_tasks
 from .evidence.sensitivity import Sensitivity as Sensitivity
 from .evidence.sensitivity import sensitivities as sensitivities
 from .evidence.state import RobotState as RobotState
-from .evidence.state import evaluate as evaluate
 from .evidence.tolerance import ToleranceLoss as ToleranceLoss
 from .evidence.tolerance import tolerance_loss as tolerance_loss
 from .formats.export import export_robot as export_robot

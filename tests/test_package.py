@@ -2,10 +2,12 @@
 
 import ast
 import html
+import inspect
 import pkgutil
 import re
 import subprocess
 import sys
+import textwrap
 import tomllib
 from importlib import import_module
 from importlib.metadata import version
@@ -14,6 +16,7 @@ from pathlib import Path
 import pytest
 from builders import docs_script, printed
 
+import screwsynth
 import screwsynth.cases
 import screwsynth.models
 import screwsynth.nlp
@@ -29,7 +32,7 @@ def text_of(page: str) -> str:
     return (ROOT / "docs" / page).read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("package", [screwsynth.models, screwsynth.nlp])
+@pytest.mark.parametrize("package", [screwsynth, screwsynth.models, screwsynth.nlp])
 def test_every_public_name_is_there_and_listed_in_order(package: object) -> None:
     names = package.__all__  # type: ignore[attr-defined]
     assert list(names) == sorted(names)
@@ -55,18 +58,46 @@ def test_the_stub_is_the_one_list_of_public_names() -> None:
         _ = screwsynth.nlp.no_such_name  # type: ignore[attr-defined]
 
 
+def test_the_package_has_every_public_name_of_nlp_and_those_of_robots() -> None:
+    stub = ast.parse((ROOT / "__init__.pyi").read_text(encoding="utf-8"))
+    imports = {
+        (node.module, alias.name): alias.asname for node in stub.body[1:] for alias in getattr(node, "names", [])
+    }
+    of_robots = [name for place, name in imports if place == "models"]
+    assert {"Model", "stewart_gough", "hexapod", "three_upu", "robot", "model_names"} <= set(of_robots)
+    # A name of both packages would be one of them by chance.
+    assert set(of_robots).isdisjoint(screwsynth.nlp.__all__)
+    assert sorted([*screwsynth.nlp.__all__, *of_robots, "models", "nlp"]) == screwsynth.__all__
+    for name in screwsynth.__all__:
+        package = screwsynth.models if name in of_robots else screwsynth.nlp
+        if name not in ("models", "nlp"):
+            assert getattr(screwsynth, name) is getattr(package, name)
+    assert (screwsynth.models, screwsynth.nlp) == (sys.modules["screwsynth.models"], sys.modules["screwsynth.nlp"])
+    assert set(dir(screwsynth)) == {*screwsynth.__all__, "__version__"}
+    with pytest.raises(AttributeError, match="module 'screwsynth' has no attribute 'no_such_name'"):
+        _ = screwsynth.no_such_name  # type: ignore[attr-defined]
+
+
+def test_the_package_is_imported_without_the_numerical_libraries() -> None:
+    code = (
+        "import sys, screwsynth as ss\n"
+        "heavy = {'casadi', 'numpy', 'pydantic', 'screwsynth.models'} & set(sys.modules)\n"
+        "assert not heavy and {'solve', 'Case', 'stewart_gough'} < set(dir(ss)) and ss.__version__, heavy\n"
+        "assert ss.models.stewart_gough is ss.stewart_gough"
+    )
+    ended = subprocess.run([sys.executable, "-P", "-c", code], check=False, capture_output=True, text=True)
+    assert (ended.returncode, ended.stderr) == (0, "")
+
+
 def test_every_package_is_listed_for_the_wheel() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     modules = (path for folder in ("cases", "models", "nlp") for path in (ROOT / folder).rglob("*.py"))
     packages = {".".join(("screwsynth", *path.parent.relative_to(ROOT).parts)) for path in modules}
-    assert sorted(project["tool"]["setuptools"]["packages"]) == sorted(packages)
+    assert sorted(project["tool"]["setuptools"]["packages"]) == sorted(packages | {"screwsynth"})
 
 
 def test_the_version_is_that_of_the_distribution() -> None:
-    assert screwsynth.nlp.__version__ == version("screwsynth")
-    # A namespace package has no file that could hold a name.
-    assert not hasattr(screwsynth, "__version__")
-    assert screwsynth.__spec__.origin is None
+    assert screwsynth.nlp.__version__ == screwsynth.__version__ == version("screwsynth")
 
 
 def test_no_public_name_is_that_of_a_room() -> None:
@@ -171,6 +202,18 @@ def test_the_python_of_the_first_steps_runs() -> None:
     space: dict[str, object] = {}
     exec(compile(code, "start.md", "exec"), space)  # noqa: S102 - our own page
     assert pytest.approx(407.2107, abs=5e-5) == space["solution"].F  # type: ignore[attr-defined]
+
+
+def test_the_python_of_the_reference_runs_and_begins_the_package(capsys: pytest.CaptureFixture[str]) -> None:
+    blocks = re.findall(r"```python\n(.*?)```", text_of("api.md"), flags=re.DOTALL)
+    assert inspect.cleandoc(screwsynth.__doc__ or "").find(textwrap.indent(blocks[0], "    ").rstrip()) > 0
+    space: dict[str, object] = {}
+    exec(compile("\n".join(blocks), "api.md", "exec"), space)  # noqa: S102 - our own page
+    first, start, height, curve = capsys.readouterr().out.splitlines()
+    assert re.fullmatch(r"F = 407\.2 \(cm/rad\)² at p_z = 50\.0 cm, turned by -?\d+\.\d deg", first)
+    assert float(start) == pytest.approx(338.84944, abs=5e-6)
+    assert 25 <= float(height) <= 50
+    assert "407.21" in curve
 
 
 @pytest.mark.parametrize(

@@ -57,6 +57,7 @@ def wheel(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     with tarfile.open(archive) as sources:
         names = {name.partition("/")[2] for name in sources.getnames()}
     assert {"nlp/proof/enclosure/kernel/rank.h", "nlp/embedding/c/screwsynth-sqp.h", "LICENSE"} <= names
+    assert {"__init__.py", "__init__.pyi", "py.typed"} <= names
     subprocess.run([sys.executable, *PIP, "wheel", "--no-deps", "--wheel-dir", folder, archive], check=True)
     (built,) = folder.glob("*.whl")
     return built
@@ -100,10 +101,19 @@ def test_a_wheel_without_a_compiler_holds_every_module_and_case_and_runs(source:
         for path in (ROOT / folder).rglob("*"):
             if path.suffix in suffixes and "__pycache__" not in path.parts:
                 assert f"screwsynth/{path.relative_to(ROOT).as_posix()}" in held
+    # The package's folder is that of the repository: nothing else of it belongs to the package.
+    beside = {name.removeprefix("screwsynth/") for name in held if re.fullmatch(r"screwsynth/[^/]+", name)}
+    assert beside == {"__init__.py", "__init__.pyi", "py.typed"}
     site = tmp_path / "site"
     subprocess.run([sys.executable, *PIP, "install", "--no-deps", "--target", str(site), str(wheel)], check=True)
     code = f"import screwsynth.nlp.cli.main as c; assert c.__file__.startswith({str(site)!r}), c.__file__; c.main()"
     environment = {**os.environ, "PYTHONPATH": str(site)}
+    first = "import screwsynth as ss; print(ss.__file__, ss.solve(ss.load_case('paper-4.2-translation'), starts=2).F)"
+    command = [sys.executable, "-P", "-c", first]
+    printed = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True).stdout
+    file, F = printed.split()
+    assert file == str(site / "screwsynth" / "__init__.py")
+    assert float(F) == pytest.approx(6)
     for name, status in (("solve", 0), ("certify", 2)):
         command = [sys.executable, "-P", "-c", code, name, "paper-4.2-translation", "--starts", "2"]
         ran = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)

@@ -31,8 +31,8 @@ class Controller:
     Attributes:
         length: unit of length; empty for that of the case.
         angle: unit of actuator angles and of roll, pitch and yaw.
-        zero: coordinate of the controller where the actuator coordinate of the case is 0, by actuator; radians or length
-            of the case. An empty name stands for all actuators.
+        zero: coordinate of the controller where that of the case is 0, by actuator; radians or length of the case. An
+            empty name stands for all actuators.
         sign: 1 or -1, sense of the controller's coordinate relative to the case, by actuator; an empty name as above.
         origin: origin of the controller's world frame in the world frame of the case, length of the case.
         rpy: roll, pitch and yaw of the controller's world frame in the world frame of the case, radians.
@@ -133,7 +133,12 @@ def controller_of(
     Args:
         drives: the actuators of the robot.
         units: units of the file.
-        length, angle, zero, sign, origin, rpy: values of the table.
+        length: unit of length of the controller.
+        angle: unit of angles of the controller.
+        zero: coordinate of the controller where that of the case is 0, of all actuators or by name.
+        sign: sense of the controller's coordinates, of all actuators or by name.
+        origin: (3,) origin of the controller's world frame.
+        rpy: (3,) roll, pitch and yaw of the controller's world frame.
     """
     dimensions = {each.name: each.dimension for each in drives} | {"": _common(drives)}
 
@@ -147,7 +152,9 @@ def controller_of(
     }
     x, y, z = origin
     a, b, c = (units.to_internal(each, Dimension.ANGLE) for each in rpy)
-    return Controller(length, angle, MappingProxyType(zeros), MappingProxyType(dict(by_name(sign))), (x, y, z), (a, b, c))
+    return Controller(
+        length, angle, MappingProxyType(zeros), MappingProxyType(dict(by_name(sign))), (x, y, z), (a, b, c)
+    )
 
 
 #: The conventions of the case itself, with angles in radians.

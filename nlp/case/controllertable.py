@@ -28,7 +28,8 @@ class ControllerTable(Table):
         default=Controller.angle, description="unit of actuator angles and of roll, pitch, yaw in C"
     )
     zero: _ByActuator | None = Field(
-        default=None, description="coordinate of the controller where that of the case is 0: of all actuators or by name"
+        default=None,
+        description="coordinate of the controller where that of the case is 0: of all actuators or by name",
     )
     sign: _ByActuator | None = Field(
         default=None, description="1 or -1: sense of the controller's coordinates, of all actuators or by name"

@@ -1,4 +1,4 @@
-"""The command ``codegen``."""
+"""Command ``codegen``."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def codegen(
     settings: options.SettingTexts = None,
     of: options.ResultFile = None,
     no_measure: Annotated[
-        bool, options.flag("--no-measure", "Do not compile the C to write its flash and stack into it")
+        bool, options.flag("--no-measure", "Do not compile the code to measure its flash and stack size")
     ] = False,
     kinematics: Annotated[
         bool, options.flag("--kinematics", "Write only the kinematics: motors, rates, torques and forward kinematics")
@@ -26,11 +26,14 @@ def codegen(
         bool, options.flag("--single", "With --kinematics: positions, rates and torques in single precision")
     ] = False,
     coordinates: Annotated[
-        str, options.text("--coordinates", "NAME", "With --kinematics: pose, or a limb whose joint coordinates are used too")
+        str,
+        options.text(
+            "--coordinates", "NAME", "With --kinematics: pose, or a limb whose joint coordinates are used too"
+        ),
     ] = "pose",
     force: options.Force = False,
 ) -> None:
-    """Write F and its derivatives, or the kinematics alone, as C for embedding."""
+    """Write F and its derivatives, or the kinematics alone, as C code for controllers."""
     from ..errors import InputError
 
     if kinematics:
@@ -46,7 +49,7 @@ def codegen(
 
     if not force:
         check_folder(out)
-    loaded, text, inputs = options.read_machine(case, settings, of).file
+    loaded, text, inputs = options.read_changed_case(case, settings, of).file
     files = generate_c(loaded, text)
     for name in files if Path(out).is_dir() else ():
         check_outputs(inputs, {"--out": str(Path(out) / name)})
@@ -93,13 +96,13 @@ def _write_kinematics(
 
 
 def _measured(files: dict[str, str], prefix: str) -> dict[str, str]:
-    """Return the files with figures of flash and stack, which are printed; a terminal shows the progress."""
+    """Return the files with the measured sizes of flash and stack, which are printed; a terminal shows the progress."""
     from ..embedding.measure import figure_words, measure, with_figures
 
     if sys.stderr.isatty():
         from rich.console import Console
 
-        with Console(stderr=True).status("compiling to measure flash and stack; --no-measure leaves this out"):
+        with Console(stderr=True).status("compiling to measure flash and stack; --no-measure skips this"):
             figures = measure(files, prefix)
     else:
         figures = measure(files, prefix)

@@ -1,4 +1,4 @@
-"""The command ``evaluate``."""
+"""Command ``evaluate``."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ def evaluate(
     case: options.CaseName,
     settings: options.SettingTexts = None,
     of: Annotated[
-        str | None, options.text("--of", "RESULT", "Take dimensions and pose from a result that solve --json wrote")
+        str | None, options.text("--of", "RESULT", "Take dimensions and pose from a result of solve --json")
     ] = None,
     claim: Annotated[
         str | None,
         options.text(
-            "--set-from", "RESULT#N", "Take the pose of the N-th refuted claim of workspace --json or path --json"
+            "--set-from", "RESULT#N", "Take the pose of violation N in a result of workspace --json or path --json"
         ),
     ] = None,
     json_file: options.JsonFile = None,
@@ -25,24 +25,20 @@ def evaluate(
     table: options.CsvTable = None,
     whole: options.ShowAll = False,
 ) -> None:
-    """Show F, J, rank and rates at one point.
+    """Show F, limits, rank and rates at one design and pose.
 
-    Nothing is optimised. Free numbers are at their starts, or in the middle of their ranges. Driven joints that the
-    pose does not determine are at home, or where --of has them.
+    Nothing is optimised. A variable has its start value, or else the middle of its bounds. Actuator coordinates that
+    the pose does not determine are 0 (home), or those of the result of --of.
     """
-    from dataclasses import replace
-
-    from ..case.limits.limits import Limits
     from ..evidence import state
-    from ..evidence.closing import closed_start
-    from ..program.epigraph import with_exact_level
+    from ..evidence.evaluation import starting_point, without_speeds
     from ..program.formulation import formulate_each
     from ..results.evaluation import evaluation_of
 
-    given = options.read_machine(case, settings, of, at_pose=True, claim=claim).file
+    given = options.read_changed_case(case, settings, of, at_pose=True, claim=claim).file
     loaded = given.case
-    if left_out := loaded.without_motion:  # a pose of a path, whose own motion is meant
-        loaded = replace(loaded, limits=Limits(*(each for each in loaded.limits if each not in left_out)))
+    if left_out := loaded.without_motion:  # a pose of a path: its speeds come from the motion of the path
+        loaded = without_speeds(loaded)
         names = ", ".join(f"limits.{each.name}" for each in left_out)
         print_notice(f"{names}: left out, as the case has no [motion]")
     files = options.Outputs(json=json_file, csv=csv_file)
@@ -54,7 +50,7 @@ def evaluate(
         from ..results.settings import joints_of, load_answer, robot_of
 
         nlps[0] = begun_at(nlps[0], joints_of(robot_of(load_answer(of), f"--of {of}", loaded), loaded))
-    x = with_exact_level(nlps[0], closed_start(nlps[0]))
+    x = starting_point(nlps[0])
     result = evaluation_of(nlps, x, [state.evaluate(nlp, x) for nlp in nlps])
     files.deliver(
         lambda: contents.evaluation_summary(loaded, result),

@@ -216,7 +216,10 @@ class Kinematics:
         rows = [k for k, row in enumerate(model.frame_rows) if row.kind is not WrenchKind.FORCE]
         if model.actuators or not rows:
             return SX(0, 6 + self.unknowns)
-        own = rows_about(self.robot.expressions.jacobian, self.robot.z[9:POSE])[rows, :3] / self.case.characteristic_length
+        own = (
+            rows_about(self.robot.expressions.jacobian, self.robot.z[9:POSE])[rows, :3]
+            / self.case.characteristic_length
+        )
         (couples,) = ca.Function("couples", [self.robot.z], [ca.densify(own)]).call([self.world])
         return ca.horzcat(couples @ ca.DM(self.transform.turn), SX(len(rows), 3 + self.unknowns))
 

@@ -21,18 +21,36 @@ from .ctext import comment_text, identifier, matrix_table, name_cases
 from .kinematics import Kinematics, matrix_of_rpy
 from .kinematicsjoints import LimbCoordinates, coordinate_texts, limb_coordinates
 from .kinematicslimits import KinematicLimit, limit_texts, limits_of
-from .templates import casadi_texts, fill_template
+from .templates import casadi_texts, fill_template, prototype
 
-#: Number of poses of the self-test, the seed of their random choice, and their largest distances from home: parts of the
-#: robot's size and radians; few are farther away.
+#: Number of poses of the self-test, the seed of their random choice, and their largest distances from home, in parts
+#: of the robot's size and radians: of most poses, and of a quarter of them.
 _POSES, _SEED, _NEAR, _FAR = 48, 3, 0.08, 0.6
 #: Part of the determinant at home above which a pose of the self-test counts as reached without a singularity.
 _REGULAR = 0.05
 #: Constants of C in double, and names of the coordinates of a pose.
 _NUMBER = re.compile(r"(?<![\w.])(\d+\.\d*(?:[eE][+-]?\d+)?)(?![\w.])")
+#: Kind of an actuator coordinate, by whether the actuator turns.
+_KINDS = {True: "angle", False: "length"}
 _COORDINATES = ("x", "y", "z", "a", "b", "c")
 #: Functions of the mathematics library that generated C may call.
-_LIBM = ("sin", "cos", "tan", "asin", "acos", "atan2", "atan", "sqrt", "floor", "fabs", "fmax", "fmin", "exp", "log", "pow")
+_LIBM = (
+    "sin",
+    "cos",
+    "tan",
+    "asin",
+    "acos",
+    "atan2",
+    "atan",
+    "sqrt",
+    "floor",
+    "fabs",
+    "fmax",
+    "fmin",
+    "exp",
+    "log",
+    "pow",
+)
 
 
 class KinematicsFiles(NamedTuple):
@@ -55,9 +73,7 @@ def kinematics_prefix(name: str) -> str:
     return identifier(name).replace("screwsynth_", "kinematics_", 1)
 
 
-def generate_kinematics(
-    case: Case, source: str, *, single: bool = False, coordinates: str = "pose"
-) -> dict[str, str]:
+def generate_kinematics(case: Case, source: str, *, single: bool = False, coordinates: str = "pose") -> dict[str, str]:
     """Generate the files of a folder with the kinematics of a case.
 
     Args:
@@ -83,9 +99,7 @@ def generate_kinematics(
     return {**files, **texts, "case.toml": source}
 
 
-def kinematics_files(
-    case: Case, *, single: bool = False, coordinates: str = "pose"
-) -> KinematicsFiles:
+def kinematics_files(case: Case, *, single: bool = False, coordinates: str = "pose") -> KinematicsFiles:
     """Return the library of the kinematics of a case, and the texts for its test, example and description.
 
     Raises:
@@ -99,14 +113,17 @@ def kinematics_files(
     names = {"kin": kin, "KIN": kin.upper(), "file": file, "single": str(int(single))}
     functions = _functions(robot, kin, limits, joints)
     names |= _substitutions(robot, functions)
-    names |= limit_texts(robot, limits, kin)
-    names |= coordinate_texts(robot, joints, coordinates, kin)
+    names |= _motor_texts(robot, names)
+    names |= limit_texts(limits, names)
+    names |= coordinate_texts(robot, joints, coordinates, names)
     names["prototypes"] += f"\n{names['limits_prototype']}\n{names['coordinates_prototype']}"
     sources = {
         "-casadi.c": casadi_texts(functions.of_results, f"{kin}_CASADI")[".c"],
         "-newton.c": casadi_texts(functions.of_newton, f"{kin}_NEWTON")[".c"],
     }
-    head = f'#include "{file}.h"\n#if {kin.upper()}_SINGLE\n#include <tgmath.h>\n#endif\n#define casadi_real {kin}_real\n'
+    head = (
+        f'#include "{file}.h"\n#if {kin.upper()}_SINGLE\n#include <tgmath.h>\n#endif\n#define casadi_real {kin}_real\n'
+    )
     sources["-casadi.c"] = head + _NUMBER.sub(r"((casadi_real)\1)", sources["-casadi.c"])
     names["libm"] = " ".join(each for each in _LIBM if re.search(rf"\b{each}\(", "".join(sources.values()))) or "none"
     files = {f"{file}{end}": fill_template(f"kinematics/kinematics{end}.in", names) for end in (".h", ".c")}
@@ -123,7 +140,7 @@ def combined_kinematics(case: Case) -> KinematicsFiles:
         files, names = kinematics_files(case)
     except InputError as error:
         reason = markdown_text(str(error))
-        section = f"## Kinematics\n\nThis folder has no functions for motors, rates, torques and forward kinematics: {reason}."
+        section = f"## Kinematics\n\nThis folder has no functions of the kinematics: {reason}."
         return KinematicsFiles({}, {f"kinematics_{each}": "" for each in none} | {"kinematics_section": section})
     kin, file, prefix = names["kin"], names["file"], identifier(case.name)
     program = "selftest-kinematics"
@@ -139,7 +156,7 @@ def combined_kinematics(case: Case) -> KinematicsFiles:
             f"  add_test(NAME {prefix}-{program} COMMAND {prefix}-{program})\n"
         ),
         "header": f" {file}.h",
-        "rows": f"| `{file}.h`, `.c`, `-casadi.c`, `-newton.c`, `{program}.c` | kinematics: `{kin}_motors` and others |\n",
+        "rows": f"| `{file}.h`, `.c`, `-casadi.c`, `-newton.c`, `{program}.c` | `{kin}_motors` and others |\n",
         "section": conventions,
     }
     return KinematicsFiles({**files, f"{program}.c": test}, {f"kinematics_{key}": text for key, text in texts.items()})
@@ -226,27 +243,31 @@ def _substitutions(robot: Kinematics, functions: _Functions) -> dict[str, str]:
     frame = _frame_words(controller, case)
     at_home = robot.home_coordinates
     lines = [
-        f" *           {i}: {comment_text(each.name)}, {'angle' if turns else 'length'} in {label}, {value:.10g} at home"
+        f" *           {i}: {comment_text(each.name)}, {_KINDS[turns]} in {label}, {value:.10g} at home"
         for i, (each, turns, label, value) in enumerate(zip(drives, turning, labels, at_home, strict=True))
     ]
     rows = ["| actuator | coordinate | unit | sense | at home |", "|---|---|---|---|---|"]
     rows += [
         f"| {i}: {markdown_text(each.name)} | {measure.replace('_', ' ')} | {label} "
         f"| {'+' if controller.sign_of(each.name) > 0 else '-'} | {value:.10g} |"
-        for i, (each, measure, label, value) in enumerate(zip(drives, robot.robot.measures, labels, at_home, strict=True))
+        for i, (each, measure, label, value) in enumerate(
+            zip(drives, robot.robot.measures, labels, at_home, strict=True)
+        )
     ]
     given = " ".join(_COORDINATES[k] for k in robot.coordinates)
-    freedom = f"the platform has {robot.freedoms} degree{'s' * (robot.freedoms != 1)} of freedom; all coordinates are given."
+    freedom = (
+        f"the platform has {robot.freedoms} degree{'s' * (robot.freedoms != 1)} of freedom; all coordinates are given."
+    )
     if completes:
         freedom = (
-            f"the platform has {robot.freedoms} degrees of freedom. The caller gives a full pose whose dependent coordinates "
-            f"fit; `{kin}_complete` computes them from {given}. Another value gives `LOOPS_OPEN`."
+            f"the platform has {robot.freedoms} degrees of freedom. The caller gives a full pose whose dependent "
+            f"coordinates fit; `{kin}_complete` computes them from {given}. Another value gives `LOOPS_OPEN`."
         )
-    limbs = "Loops are closed in closed form." if not f else f"{f} joint coordinates are followed by Newton's method from a state."
-    notes = "" if not f else (
-        f"A state `double u[{KIN}_STATE]` belongs to the caller, one for each thread: `{kin}_start(u)` is home. Each call follows\n"
-        "the joints along a straight path from the pose of the state, in at most 85 steps of at most 15 iterations, and keeps the\n"
-        "new state if its status is OK."
+    limbs = f"{f} joint coordinates are followed by Newton's method from a state." if f else "Loops have a closed form."
+    notes = (
+        f"A state `double u[{KIN}_STATE]` belongs to the caller, one for each thread; `{kin}_start(u)` is home. Each call\n"
+        "follows the joints along a straight path from the pose of the state, in at most 85 steps of at most 15\n"
+        "iterations, and keeps the new state if its status is OK."
     )
     return {
         "title": comment_text(case.title or case.name),
@@ -260,7 +281,7 @@ def _substitutions(robot: Kinematics, functions: _Functions) -> dict[str, str]:
         "actuator_rows": "\n".join(rows),
         "freedom": freedom,
         "limbs": limbs,
-        "notes": notes,
+        "notes": notes if f else "",
         "na": str(a),
         "nf": str(f),
         "nstate": str(12 + f if f else 1),
@@ -288,7 +309,6 @@ def _substitutions(robot: Kinematics, functions: _Functions) -> dict[str, str]:
         "work": str(max(each.sz_w() for each in functions.all)),
         "moved": str(next((k for k in (2, 0, 1) if k in robot.coordinates), 2)),
         "motor_step": repr(1e-5 * float(robot.motor_sizes[0])),
-        **_motor_texts(robot, kin),
         **_state_texts(f, kin),
         **_reference_texts(robot),
     }
@@ -306,57 +326,16 @@ def _frame_words(controller: Controller, case: Case) -> str:
     )
 
 
-def _motor_texts(robot: Kinematics, kin: str) -> dict[str, str]:
-    """Return the texts about one motor alone."""
-    KIN = kin.upper()
+def _motor_texts(robot: Kinematics, names: Mapping[str, str]) -> dict[str, str]:
+    """Return the texts about one motor alone, from those of the other placeholders."""
+    keys = {"motor": "motor.h", "motor_body": "motor.c", "test_motor": "motor-test.c", "bench_motor": "motor-bench.c"}
     if robot.unknowns:
-        return dict.fromkeys(("motor", "motor_body", "prototypes", "test_motor", "bench_motor"), "")
-    count = range(len(robot.drives))
-    prototypes = "\n".join(
-        f"int {kin}_CASADI_motor{i}(const real **arg, real **res, int *iw, real *w, int mem);" for i in count
-    )
-    cases = "\n".join(
-        f"        case {i}: failed = {kin}_CASADI_motor{i}(arg, res, 0, w, 0); break;" for i in count
-    )
-    return {
-        "motor": (
-            "/* One coordinate alone, of actuator 0 and so on: for step generators. Loops of other limbs and dependent\n"
-            " * coordinates are not checked. */\n"
-            f"int {kin}_motor(int actuator, const {kin}_real position[3], const {kin}_real rotation[9], {kin}_real *q);\n"
-        ),
-        "motor_body": f"""int {kin}_motor(int actuator, const {kin}_real position[3], const {kin}_real rotation[9], {kin}_real *q) {{
-    double z[Z];
-    real point[Z], value[1], w[WORK + 1];
-    const real *arg[4];
-    real *res[4];
-    int failed = 1;
-    if (!get_pose(position, rotation, z)) return {KIN}_BAD_INPUT;
-    to_real(z, point, Z);
-    arg[0] = point;
-    res[0] = value;
-    switch (actuator) {{
-{cases}
-        default: return {KIN}_BAD_INPUT;
-    }}
-    if (failed || !is_finite(value[0])) return {KIN}_OUT_OF_REACH;
-    *q = value[0];
-    return {KIN}_OK;
-}}
-""",
-        "prototypes": prototypes,
-        "test_motor": (
-            "    for (i = 0; i < A; ++i) {\n"
-            f"        {kin}_real one = 0;\n"
-            f'        expect("one motor", pose, {kin}_motor(i, p, R, &one) == {KIN}_OK && fabs(one - q[i]) <= most * motor_sizes[i]);\n'
-            "    }\n"
-        ),
-        "bench_motor": (
-            "    begin = clock();\n    for (r = 0; r < RUNS; ++r) {\n"
-            f"        p[{next((k for k in (2, 0, 1) if k in robot.coordinates), 2)}] = z + ({kin}_real)({robot.size!r} * 1e-4 * (r % 64));\n"
-            f"        if ({kin}_motor(0, p, R, q) == {KIN}_OK) sum += q[0];\n    }}\n"
-            '    printf("motor     %9.1f ns, one motor alone\\n", elapsed(begin));\n'
-        ),
-    }
+        return dict.fromkeys((*keys, "prototypes"), "")
+    kin, count = names["kin"], range(len(robot.drives))
+    calls = (f"        case {i}: failed = {kin}_CASADI_motor{i}(arg, res, 0, w, 0); break;" for i in count)
+    own = {"motor_cases": "\n".join(calls), **names}
+    texts = {key: fill_template(f"kinematics/{template}.in", own) for key, template in keys.items()}
+    return {**texts, "prototypes": "\n".join(prototype(kin, f"motor{i}") for i in count)}
 
 
 def _state_texts(unknowns: int, kin: str) -> dict[str, str]:
@@ -370,8 +349,8 @@ def _state_texts(unknowns: int, kin: str) -> dict[str, str]:
         "pass_u": "u, ",
         "void_u": ", (void)u",
         "start": (
-            "\n/* State at home. A state belongs to the caller: each call follows the joints from the pose of the state to the\n"
-            " * given one, and keeps the new state if its status is OK. */\n"
+            "\n/* State at home. A state belongs to the caller: each call follows the joints from the pose of the state\n"
+            " * to the given one, and keeps the new state if its status is OK. */\n"
             f"void {kin}_start(double u[{kin.upper()}_STATE]);\n"
         ),
         "state_declaration": f"    double u[{kin.upper()}_STATE];",
@@ -402,7 +381,7 @@ def _reference_texts(robot: Kinematics) -> dict[str, str]:
     for k in np.flatnonzero(closed):
         z, motion = robot.point(poses[k], found.unknowns[k]), rng.uniform(-1, 1, len(robot.step_sizes))
         twists[k] = robot.feasible(z, motion)
-        # Between home and a pose with another sign lies a singularity, and before it may be another pose with the motors.
+        # Between home and a pose with another sign lies a singularity; before it may be another pose with the motors.
         near[k] &= robot.side(z) > _REGULAR
     singular = found.singular | ~closed
 
@@ -431,4 +410,3 @@ def _reference_texts(robot: Kinematics) -> dict[str, str]:
             ]
         ),
     }
-

@@ -7,6 +7,7 @@ the screws of its joints at home.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import casadi as ca
@@ -19,6 +20,7 @@ from ...models.rotation import matrix_from_axis_angle
 from ..errors import CaseError, listing
 from .ctext import comment_text, name_cases
 from .kinematics import Kinematics
+from .templates import fill_template, prototype
 
 #: Joint types with screws that move with their links alone.
 _TYPES = frozenset(("R", "P", "H", "C", "U"))
@@ -73,7 +75,9 @@ def limb_coordinates(robot: Kinematics, limb: str) -> LimbCoordinates:
     measured_world = ca.vertcat(*[each.measured for _, each in stated])
     (measured,) = ca.Function("measured", [robot.robot.z], [ca.densify(measured_world)]).call([robot.world])
     dimensions = tuple(each.dimension for _, each in stated)
-    units = np.array([robot.transform.degrees if d is Dimension.ANGLE else 1 / robot.transform.scale for d in dimensions])
+    units = np.array(
+        [robot.transform.degrees if d is Dimension.ANGLE else 1 / robot.transform.scale for d in dimensions]
+    )
     measured = measured / ca.DM(units)
     at_home = np.array(ca.Function("home", [robot.z], [measured])(robot.home), dtype=np.float64).ravel()
     values = SX.sym("c", len(stated))
@@ -92,7 +96,9 @@ def _fault(robot: Kinematics, joints: list[LimbJoint], counts: dict[str, int]) -
     """Return why the joint coordinates of a limb do not serve as coordinates, as the end of a sentence; else empty."""
     for each in joints:
         if each.type not in _TYPES:
-            return f"has the joint {each.label} of type {each.type}, which has no coordinates: allowed are R, P, H, C, U"
+            return (
+                f"has the joint {each.label} of type {each.type}, which has no coordinates: allowed are R, P, H, C, U"
+            )
         if len(each.coordinates) != counts[each.label]:
             return f"has the joint {each.label}, whose coordinates are not known"
     if sum(counts.values()) != robot.freedoms:
@@ -103,9 +109,7 @@ def _fault(robot: Kinematics, joints: list[LimbJoint], counts: dict[str, int]) -
     return ""
 
 
-def _chain(
-    robot: Kinematics, screws: FloatArray, values: SX, at_home: FloatArray, units: FloatArray
-) -> tuple[SX, SX]:
+def _chain(robot: Kinematics, screws: FloatArray, values: SX, at_home: FloatArray, units: FloatArray) -> tuple[SX, SX]:
     """Return pose (12, 1) and twists (6, k) of the controller as expressions of the coordinates.
 
     Args:
@@ -172,158 +176,36 @@ def _check(robot: Kinematics, found: LimbCoordinates, at_home: FloatArray, limb:
             raise CaseError("--coordinates", fault, limb, robot.case.source)
 
 
-def coordinate_texts(robot: Kinematics, found: LimbCoordinates | None, limb: str, kin: str) -> dict[str, str]:
-    """Return the texts for the placeholders about joint coordinates of a limb."""
+def coordinate_texts(
+    robot: Kinematics, found: LimbCoordinates | None, limb: str, names: Mapping[str, str]
+) -> dict[str, str]:
+    """Return the texts for the placeholders about joint coordinates of a limb.
+
+    Args:
+        robot: the kinematics.
+        found: the coordinates; None for those of the pose alone.
+        limb: name of the limb.
+        names: texts of the other placeholders.
+    """
     if found is None:
-        return dict.fromkeys(
-            ("coordinates_declarations", "coordinates_bodies", "coordinates_prototype", "coordinates_rows"), ""
-        )
-    KIN, count = kin.upper(), len(found.names)
-    u, pass_u = ("double *u, ", "u, ") if robot.unknowns else ("", "")
-    length = robot.controller.length or robot.case.units.length
-    labels = [robot.controller.angle if each is Dimension.ANGLE else length for each in found.dimensions]
-    lines = "\n".join(
-        f" *   {k}: {comment_text(name)}, {label}"
-        for k, (name, label) in enumerate(zip(found.names, labels, strict=True))
-    )
-    units = [robot.transform.degrees if each is Dimension.ANGLE else 1.0 for each in found.dimensions]
-    unit_row = ", ".join(repr(each) for each in units)
-    names = name_cases(found.names)
+        keys = ("coordinates_declarations", "coordinates_bodies", "coordinates_prototype", "coordinates_rows")
+        return dict.fromkeys(keys, "")
+    kin, length = names["kin"], robot.controller.length or robot.case.units.length
+    turns = [each is Dimension.ANGLE for each in found.dimensions]
+    units = [robot.controller.angle if turn else length for turn in turns]
+    labels = [f"{comment_text(name)} ({unit})" for name, unit in zip(found.names, units, strict=True)]
+    own = {
+        "limb": comment_text(limb),
+        "joint_count": str(len(found.names)),
+        "joint_lines": "\n".join(f" *   {k}: {label}" for k, label in enumerate(labels)),
+        "joint_units": ", ".join(repr(robot.transform.degrees if turn else 1.0) for turn in turns),
+        "joint_names": name_cases(found.names),
+        **names,
+    }
+    words = f"Joint coordinates of limb {own['limb']}, for `{kin}_joint_motors` and the like: {', '.join(labels)}."
     return {
-        "coordinates_rows": (
-            f"\nJoint coordinates of limb {comment_text(limb)}, for `{kin}_joint_motors` and the like: "
-            + ", ".join(f"{comment_text(n)} ({label})" for n, label in zip(found.names, labels, strict=True))
-            + ".\n"
-        ),
-        "coordinates_prototype": (
-            f"int {kin}_CASADI_pose(const real **arg, real **res, int *iw, real *w, int mem);\n"
-            f"int {kin}_CASADI_joints(const real **arg, real **res, int *iw, real *w, int mem);"
-        ),
-        "coordinates_declarations": f"""
-/* The same functions with joint coordinates of limb {comment_text(limb)} in the place of the pose:
-{lines}
- */
-#define {KIN}_JOINTS {count}
-const char *{kin}_joint_name(int joint);
-
-/* Pose from joint coordinates, and joint coordinates at a pose. */
-int {kin}_pose(const {kin}_real joints[{KIN}_JOINTS], {kin}_real position[3], {kin}_real rotation[9]);
-int {kin}_joints(const {kin}_real position[3], const {kin}_real rotation[9], {u}{kin}_real joints[{KIN}_JOINTS]);
-
-int {kin}_joint_motors(const {kin}_real joints[{KIN}_JOINTS], {u}{kin}_real q[{KIN}_ACTUATORS]);
-
-/* Derivatives of the actuator coordinates by the joint coordinates. */
-int {kin}_joint_rates(const {kin}_real joints[{KIN}_JOINTS], {u}{kin}_real rates[{KIN}_ACTUATORS][{KIN}_JOINTS]);
-
-/* Torques of the actuators that balance a load of a torque (or force) on each joint coordinate: torques * speeds of actuators
- * + load * speeds of joints = 0, angles in rad. For the torques that make the joints push with a load, give its negative. */
-int {kin}_joint_torques(const {kin}_real joints[{KIN}_JOINTS], {u}const {kin}_real load[{KIN}_JOINTS],
-                        {kin}_real torques[{KIN}_ACTUATORS]);
-
-/* Joint coordinates from actuator coordinates; in joints is the guess. */
-int {kin}_joint_forward(const {kin}_real q[{KIN}_ACTUATORS], {kin}_real joints[{KIN}_JOINTS], {u}int *iterations);
-""",
-        "coordinates_bodies": f"""
-const char *{kin}_joint_name(int joint) {{
-    switch (joint) {{
-{names}
-        default: return "";
-    }}
-}}
-
-/* Pose (12) and twists (6, joints) at joint coordinates. */
-static int pose_at(const real *joints, real *pose, real *twists) {{
-    const real *arg[ARGUMENTS];
-    real *res[RESULTS], w[WORK + 1];
-    int i;
-    for (i = 0; i < {KIN}_JOINTS; ++i)
-        if (!is_finite(joints[i])) return {KIN}_BAD_INPUT;
-    arg[0] = joints;
-    res[0] = pose;
-    res[1] = twists;
-    if ({kin}_CASADI_pose(arg, res, 0, w, 0)) return {KIN}_BAD_INPUT;
-    for (i = 0; i < 12; ++i)
-        if (!is_finite(pose[i])) return {KIN}_BAD_INPUT;
-    return {KIN}_OK;
-}}
-
-int {kin}_pose(const {kin}_real joints[{KIN}_JOINTS], {kin}_real position[3], {kin}_real rotation[9]) {{
-    real pose[12], twists[6 * {KIN}_JOINTS];
-    int i;
-    if (pose_at(joints, pose, twists) != {KIN}_OK) return {KIN}_BAD_INPUT;
-    for (i = 0; i < 9; ++i) rotation[i] = pose[i];
-    for (i = 0; i < 3; ++i) position[i] = pose[9 + i];
-    return {KIN}_OK;
-}}
-
-int {kin}_joints(const {kin}_real position[3], const {kin}_real rotation[9], {u}{kin}_real joints[{KIN}_JOINTS]) {{
-    double z[Z];
-    real point[Z], q[A], found[{KIN}_JOINTS], w[WORK + 1];
-    const real *arg[ARGUMENTS];
-    real *res[RESULTS];
-    int i, status = get_point(position, rotation, {pass_u}z);
-    if (status == {KIN}_OK) status = motors_at(z, q);
-    if (status != {KIN}_OK) return status;
-    to_real(z, point, Z);
-    arg[0] = point;
-    res[0] = found;
-    if ({kin}_CASADI_joints(arg, res, 0, w, 0)) return {KIN}_SINGULAR;
-    for (i = 0; i < {KIN}_JOINTS; ++i)
-        if (!is_finite(found[i])) return {KIN}_SINGULAR;
-    for (i = 0; i < {KIN}_JOINTS; ++i) joints[i] = found[i];
-    KEEP(z);
-    return {KIN}_OK;
-}}
-
-int {kin}_joint_motors(const {kin}_real joints[{KIN}_JOINTS], {u}{kin}_real q[{KIN}_ACTUATORS]) {{
-    real pose[12], twists[6 * {KIN}_JOINTS];
-    const int status = pose_at(joints, pose, twists);
-    return status == {KIN}_OK ? {kin}_motors(pose + 9, pose, {pass_u}q) : status;
-}}
-
-int {kin}_joint_rates(const {kin}_real joints[{KIN}_JOINTS], {u}{kin}_real rates[{KIN}_ACTUATORS][{KIN}_JOINTS]) {{
-    real pose[12], twists[6 * {KIN}_JOINTS], of_pose[A][6];
-    int i, j, k, status = pose_at(joints, pose, twists);
-    if (status == {KIN}_OK) status = {kin}_rates(pose + 9, pose, {pass_u}of_pose);
-    if (status != {KIN}_OK) return status;
-    for (i = 0; i < A; ++i)
-        for (j = 0; j < {KIN}_JOINTS; ++j) {{
-            real sum = 0;
-            for (k = 0; k < 6; ++k) sum += of_pose[i][k] * twists[6 * j + k];
-            rates[i][j] = sum;
-        }}
-    return {KIN}_OK;
-}}
-
-int {kin}_joint_torques(const {kin}_real joints[{KIN}_JOINTS], {u}const {kin}_real load[{KIN}_JOINTS],
-                        {kin}_real torques[{KIN}_ACTUATORS]) {{
-#if {KIN}_HAS_TORQUES && {KIN}_ACTUATORS == {KIN}_JOINTS
-    static const double units[] = {{{unit_row}}};
-    real rates[A][A];
-    double matrix[A * A], right[A], found[A];
-    int rows[A], columns[A], i, j, status;
-    for (j = 0; j < A; ++j)
-        if (!is_finite(load[j])) return {KIN}_BAD_INPUT;
-    status = {kin}_joint_rates(joints, {pass_u}rates);
-    if (status != {KIN}_OK) return status;
-    for (i = 0; i < A; ++i)
-        for (j = 0; j < A; ++j) matrix[A * i + j] = rates[i][j] * (turns[i] ? UNIT : 1.0) / units[j];
-    if (!factor(A, matrix, rows, columns)) return {KIN}_SINGULAR;
-    for (j = 0; j < A; ++j) right[j] = -load[j];
-    solve_transposed(A, matrix, rows, columns, right, found);
-    for (i = 0; i < A; ++i) torques[i] = (real)found[i];
-    return {KIN}_OK;
-#else
-    (void)joints, (void)load, (void)torques{", (void)u" if robot.unknowns else ""};
-    return {KIN}_SINGULAR;
-#endif
-}}
-
-int {kin}_joint_forward(const {kin}_real q[{KIN}_ACTUATORS], {kin}_real joints[{KIN}_JOINTS], {u}int *iterations) {{
-    real pose[12], twists[6 * {KIN}_JOINTS];
-    int status = pose_at(joints, pose, twists);
-    if (status == {KIN}_OK) status = {kin}_forward(q, pose + 9, pose, {pass_u}iterations);
-    return status == {KIN}_OK ? {kin}_joints(pose + 9, pose, {pass_u}joints) : status;
-}}
-""",
+        "coordinates_rows": f"\n{words}\n",
+        "coordinates_prototype": "\n".join(prototype(kin, each) for each in ("pose", "joints")),
+        "coordinates_declarations": fill_template("kinematics/joints.h.in", own),
+        "coordinates_bodies": fill_template("kinematics/joints.c.in", own),
     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import casadi as ca
@@ -12,12 +12,21 @@ from casadi import SX
 from ...models import Dimension
 from ..case.limits.constraint import BoundedConstraint, Reading
 from ..case.limits.limit import PosedRobot
+from .ctext import comment_text, name_cases
 from .kinematics import Kinematics
+from .templates import fill_template, prototype
 
 #: Limits that depend on loads, motions or the whole Jacobian.
 _NOT_OF_JOINTS = frozenset(
-    ("condition_number", "smallest_singular_value", "actuator_rate", "actuator_force", "actuator_speed", "actuator_power")
-    + ("deflection", "rate_share", "custom")
+    (
+        "condition_number",
+        "smallest_singular_value",
+        "actuator_rate",
+        "actuator_force",
+        "actuator_speed",
+        "actuator_power",
+    )
+    + ("deflection", "rate_share", "custom", "F")
 )
 #: Values at which two forms of a reading are compared, and their largest relative difference.
 _VALUES, _SAME = (0.15, 0.4, 0.85), 1e-9
@@ -89,56 +98,21 @@ def _measured(reading: Reading) -> Callable[[SX], SX]:
     raise ValueError(f"no expression is known for the reading {reading}")
 
 
-def limit_texts(robot: Kinematics, limits: tuple[KinematicLimit, ...], kin: str) -> dict[str, str]:
-    """Return the texts for the placeholders about limits."""
-    from .ctext import comment_text, name_cases  # noqa: PLC0415 - short names beside those of the templates
+def limit_texts(limits: tuple[KinematicLimit, ...], names: Mapping[str, str]) -> dict[str, str]:
+    """Return the texts for the placeholders about limits.
 
-    KIN, u = kin.upper(), "double *u, " if robot.unknowns else ""
-    pass_u = "u, " if robot.unknowns else ""
+    Args:
+        limits: the limits.
+        names: texts of the other placeholders.
+    """
     if not limits:
-        return {"nlimits": "0", "limits_declarations": "", "limits_bodies": "", "limits_prototype": ""}
-    lines = "\n".join(f" *   {k}: {comment_text(each.name)} ({each.unit or 'number'})" for k, each in enumerate(limits))
-    names = name_cases([each.name for each in limits])
+        empty = dict.fromkeys(("limits_declarations", "limits_bodies", "limits_prototype"), "")
+        return {"nlimits": "0", **empty}
+    lines = (f" *   {k}: {comment_text(each.name)} ({each.unit or 'number'})" for k, each in enumerate(limits))
+    own = {"limit_lines": "\n".join(lines), "limit_names": name_cases([each.name for each in limits]), **names}
     return {
         "nlimits": str(len(limits)),
-        "limits_declarations": f"""
-/* Margins of the case's limits on legs and joints: distances to the limits, negative where one is violated. violated is their
- * number, and may be 0 for none. The margins are
-{lines}
- */
-int {kin}_limits(const {kin}_real position[3], const {kin}_real rotation[9], {u}{kin}_real margins[{KIN}_LIMITS], int *violated);
-const char *{kin}_limit_name(int limit);
-""",
-        "limits_prototype": f"int {kin}_CASADI_limits(const real **arg, real **res, int *iw, real *w, int mem);",
-        "limits_bodies": f"""
-const char *{kin}_limit_name(int limit) {{
-    switch (limit) {{
-{names}
-        default: return "";
-    }}
-}}
-
-int {kin}_limits(const {kin}_real position[3], const {kin}_real rotation[9], {u}{kin}_real margins[{KIN}_LIMITS], int *violated) {{
-    double z[Z];
-    real point[Z], q[A], found[{KIN}_LIMITS], w[WORK + 1];
-    const real *arg[ARGUMENTS];
-    real *res[RESULTS];
-    int i, count = 0, status = get_point(position, rotation, {pass_u}z);
-    if (status == {KIN}_OK) status = motors_at(z, q);
-    if (status != {KIN}_OK) return status;
-    to_real(z, point, Z);
-    arg[0] = point;
-    res[0] = found;
-    if ({kin}_CASADI_limits(arg, res, 0, w, 0)) return {KIN}_SINGULAR;
-    for (i = 0; i < {KIN}_LIMITS; ++i)
-        if (!is_finite(found[i])) return {KIN}_SINGULAR;
-    for (i = 0; i < {KIN}_LIMITS; ++i) {{
-        margins[i] = found[i];
-        count += found[i] < 0;
-    }}
-    if (violated) *violated = count;
-    KEEP(z);
-    return {KIN}_OK;
-}}
-""",
+        "limits_prototype": prototype(names["kin"], "limits"),
+        "limits_declarations": fill_template("kinematics/limits.h.in", own),
+        "limits_bodies": fill_template("kinematics/limits.c.in", own),
     }

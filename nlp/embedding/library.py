@@ -381,7 +381,7 @@ def checked_numbers(name: str, given: ArrayLike) -> FloatArray:
     except (ValueError, TypeError, OverflowError):
         array = None
     if array is None:
-        raise InputError(f"{name}: must be an array of real numbers, without texts or complex numbers")
+        raise InputError(f"{name}: must be an array of numbers, without texts or complex numbers")
     wrong = np.argwhere(~np.isfinite(array))
     if len(wrong):
         place = ", ".join(str(index) for index in wrong[0])

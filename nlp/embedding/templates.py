@@ -21,6 +21,11 @@ def fill_template(template: str, names: Mapping[str, str]) -> str:
     return Template((TEMPLATES / template).read_text(encoding="utf-8")).substitute(names)
 
 
+def prototype(kin: str, name: str) -> str:
+    """Return the declaration of a function of CasADi's for the kinematics with a prefix."""
+    return f"int {kin}_CASADI_{name}(const real **arg, real **res, int *iw, real *w, int mem);"
+
+
 def casadi_texts(functions: Iterable[ca.Function], name: str) -> dict[str, str]:
     """Generate C and header, by file ending; CasADi's names in them begin with the given name."""
     generator = ca.CodeGenerator(f"{name}.c", {"with_header": True, "casadi_int": "int", "indent": 0})

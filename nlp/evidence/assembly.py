@@ -74,7 +74,7 @@ class Assembly:
             return f"another working mode ({names_of(self.turned)})"
         if not self.is_home:
             return "another assembly mode" if self.nearness else "another operation or assembly mode"
-        return "" if self.nearness >= NEAR_SINGULAR else "possibly in a different operation mode"
+        return "" if self.nearness >= NEAR_SINGULAR else "possibly another operation mode"
 
     @property
     def sentences(self) -> tuple[str, ...]:

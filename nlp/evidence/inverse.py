@@ -8,6 +8,7 @@ steps.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -25,7 +26,8 @@ from ...models.parts import Quantity
 from ...models.rows import independent_rows
 from ...models.statics import driven_joints, inverse_rates, rows_about
 from ..case.case import Case
-from ..case.pose import ROUNDING
+from ..case.pose import ROUNDING, rotations_from_rpy
+from ..case.radians import WHOLE_TURN
 from ..errors import InputError
 from .assembly import home_position, unknowns_from_home
 from .closed_loops import DEPENDENT, Loops
@@ -97,6 +99,7 @@ def inverse(
     positions: ArrayLike,
     rotations: ArrayLike | None = None,
     *,
+    rpy: ArrayLike | None = None,
     follow: Literal["home", "previous"] = "home",
 ) -> InversePoses:
     """Return joint coordinates, Jacobian and actuator rates at many poses.
@@ -109,18 +112,27 @@ def inverse(
         case: case with fixed dimensions; its poses, limits and tasks are not read.
         positions: (N, 3) origins of the platform frame in the world frame, length.
         rotations: (N, 3, 3) platform to world coordinates, orthogonal to 1e-6; the identity if left out.
+        rpy: (N, 3) roll, pitch and yaw of each pose in place of ``rotations``, radians, about the world's axes x, y and
+            z in this order, like the columns ``roll``, ``pitch`` and ``yaw`` of a CSV file.
         follow: assembly mode where the loops have no closed form: ``"home"``, or ``"previous"`` to follow the joints
             from each closed pose to the next. With ``"previous"``, actuator angles have no jumps by a full turn.
 
     Raises:
         CaseError: a dimension of the case's robot is free.
-        InputError: the arrays have other shapes, ``follow`` is another word, or an actuator coordinate is not known.
+        InputError: the arrays have other shapes, rotations are stated in two forms, an angle is more than a whole turn,
+            ``follow`` is another word, or an actuator coordinate is not known.
     """
+    if rotations is not None and rpy is not None:
+        raise InputError("rpy: conflicts with rotations; state the rotations in one form")
     p = np.array(positions, dtype=np.float64)
     shape = (*p.shape[:1], 3, 3)
-    R = np.broadcast_to(np.eye(3), shape) if rotations is None else np.array(rotations, dtype=np.float64)
+    if rpy is not None:
+        R = rotations_from_rpy(_rpy_rows(rpy, len(p) if p.ndim else 0))
+    else:
+        R = np.broadcast_to(np.eye(3), shape) if rotations is None else np.array(rotations, dtype=np.float64)
     if p.ndim != 2 or p.shape[1] != 3 or R.shape != shape:
-        raise InputError(f"poses: expected arrays (N, 3) and (N, 3, 3), got {p.shape} and {R.shape}")
+        hint = "; rows of roll, pitch and yaw are the argument rpy" if R.shape == (*shape[:1], 3) else ""
+        raise InputError(f"poses: expected arrays (N, 3) and (N, 3, 3), got {p.shape} and {R.shape}{hint}")
     if follow not in ("home", "previous"):
         raise InputError(f"follow = {follow!r}: must be 'home' or 'previous'")
     found = _inverse(case, p, R, follow)
@@ -130,6 +142,28 @@ def inverse(
     if near is None or not near.dependent:
         return found
     return replace(_inverse(case, near.positions, near.rotations, follow), dependent=near.dependent)
+
+
+def _rpy_rows(rpy: ArrayLike, count: int) -> FloatArray:
+    """Return rows (N, 3) of roll, pitch and yaw, radians.
+
+    Args:
+        rpy: (N, 3) roll, pitch and yaw, radians.
+        count: number of poses.
+
+    Raises:
+        InputError: the array has another shape, or an angle is more than a whole turn.
+    """
+    rows = np.array(rpy, dtype=np.float64)
+    if rows.shape != (count, 3):
+        raise InputError(f"rpy: must be an array (N, 3) of roll, pitch and yaw for N = {count} poses, got {rows.shape}")
+    large = np.argwhere(np.abs(rows) > WHOLE_TURN)
+    if len(large):
+        k, column = large[0]
+        angle = float(rows[k, column])
+        words = f"{angle:.6g} rad = {math.degrees(angle):.1f} deg; angles are radians in Python"
+        raise InputError(f"rpy[{k}][{column}] = {angle:.6g}: must be at most 2 pi in size; {words}")
+    return rows
 
 
 def _inverse(case: Case, p: FloatArray, R: FloatArray, follow: str) -> InversePoses:

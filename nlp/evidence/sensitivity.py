@@ -30,7 +30,7 @@ _OUTSIDE, _ZERO = 1e-7, 1e-12
 class Hindrance(enum.Enum):
     """Reason why the optimal F has no derivative with respect to a fixed parameter."""
 
-    NO_CHOICE = "the loops close only at this value"
+    LOOPS = "loops close at no other value"
     CORNER = "F has a kink at this value"
 
 
@@ -77,7 +77,7 @@ def sensitivities(nlp: Nlp, x: FloatArray) -> list[Sensitivity]:
     without_choice = ~_can_follow(*_loop_derivatives(nlp, x))
     arguments, found = nlp.program.arguments, []
     for k in places:
-        hindrance = Hindrance.NO_CHOICE if without_choice[k] else Hindrance.CORNER if cornered[k] else None
+        hindrance = Hindrance.LOOPS if without_choice[k] else Hindrance.CORNER if cornered[k] else None
         found.append(
             Sensitivity(
                 name=arguments[k].name,

@@ -153,7 +153,7 @@ def _together(
 
 
 def _at_end(certificate: Certificate, seconds: float) -> Certificate:
-    """Return a certificate with the time of the whole search; the last entry of its history is at this time."""
+    """Return a certificate with the time of the whole search, and only the final entry in its history."""
     is_known = math.isfinite(certificate.bound) and math.isfinite(certificate.incumbent)
     history = ((seconds, certificate.bound, certificate.incumbent),) if is_known else ()
     return replace(certificate, seconds=seconds, history=history)

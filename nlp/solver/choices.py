@@ -191,7 +191,7 @@ class _Search:
         return tuple(ranges)
 
     def _divided(self, part: _Part) -> tuple[Ranges, Ranges]:
-        """Return two halves of a part, split at the parameter farthest from a listed value relative to its spacing."""
+        """Return two halves of a part, split where a solved value is relatively farthest from any listed one."""
         farthest, cut = -1.0, (0, 1)
         for k, (number, (first, behind)) in enumerate(zip(self._numbers, part.ranges, strict=True)):
             if behind - first > 1:

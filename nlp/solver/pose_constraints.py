@@ -440,8 +440,7 @@ class PoseConstraints:
 def with_margin(nlp: Nlp, part: float) -> Nlp:
     """Return a program with limits at poses that are tighter than in the case by a part of their present margin.
 
-    With ``part`` 0 they are the limits of the case: such constraints hold for every design that satisfies them at all
-    poses.
+    With ``part`` 0 they are the limits of the case, and any poses give constraints that a valid design satisfies.
     """
     stated = [each.stated for each in nlp.program.constraints]
 

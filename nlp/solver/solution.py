@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -13,11 +14,13 @@ from ...models.whole import Whole
 from ..case.case import Case
 from ..case.choices import ChosenNumber, Ranges
 from ..case.task import Method, Task
-from ..errors import EvaluationError
+from ..errors import EvaluationError, InputError, nearest
+from ..evidence.evaluation import shown_numbers, shown_parameters
 from ..evidence.optimality import Evidence
 from ..evidence.state import RobotState
 from ..program.nlp import Nlp
 from ..program.relaxation import RelaxedLimit
+from ..system.jsonvalues import Vector
 from .multistart import ProgramSolution
 from .starts import Optimum, Start
 from .status import Status
@@ -198,6 +201,9 @@ class Solution(Whole, Shown, Answer):
     several tasks, ``F`` raises an error, and the others are those of the combined program; for an average they raise an
     error too.
 
+    ``solution["x1"]`` is a parameter or pose coordinate at the point, in the units of the case, by its name for
+    ``--set``: a parameter, a component such as ``base_1_x``, ``p_x``, ``p_y``, ``p_z``, ``angle``, or ``axis``.
+
     Attributes:
         case: the case.
         status: outcome of the solve.
@@ -233,6 +239,44 @@ class Solution(Whole, Shown, Answer):
             found = f", {len(self.outcomes)} tasks by {self.combination.method.value}"
             found += "" if value is None else f", value {value:.7g}"
         return f"<Solution of {self.case.name!r}: {self.status.value}{found}>"
+
+    # Values have names but no indices: without this, Python would iterate over solution[0], solution[1], ...
+    __iter__ = None
+
+    def __getitem__(self, name: str) -> float | Vector:
+        """Return a parameter or pose coordinate at the point, in the units of the case.
+
+        Args:
+            name: name of the value for ``--set``.
+
+        Raises:
+            InputError: the case has no value of this name.
+            EvaluationError: the robot's loops cannot be closed at the point.
+        """
+        numbers = shown_numbers(self.outcomes[0].own.nlp, self.x, self._state())
+        if name not in numbers:
+            raise InputError(f"{name}: no such number; {nearest(str(name), numbers)}")
+        return numbers[name]
+
+    @property
+    def parameters(self) -> Mapping[str, float | Vector]:
+        """Parameters of the robot at the point, in the units of the case; a point or direction has several components.
+
+        Raises:
+            EvaluationError: the robot's loops cannot be closed at the point.
+        """
+        return shown_parameters(self.case, self._state())
+
+    @property
+    def jacobian(self) -> FloatArray:
+        """Jacobian (m, 6) at the first pose: unit wrenches, force, then moment about the world origin.
+
+        Forces have no unit, and moments the case's unit of length.
+
+        Raises:
+            EvaluationError: the robot's loops cannot be closed at the point.
+        """
+        return self._state().jacobian
 
     @property
     def keeps_limits(self) -> bool:
@@ -301,6 +345,16 @@ class Solution(Whole, Shown, Answer):
         """Seed of the starting points."""
         return self.outcomes[0].own.seed
 
+    def _state(self) -> RobotState:
+        """Return the state of the robot at the point.
+
+        Raises:
+            EvaluationError: the robot's loops cannot be closed at the point.
+        """
+        if self.state is None:
+            raise EvaluationError(f"the robot does not exist at the point of this solution ({self.status.value})")
+        return self.state
+
     def _decisive_solution(self) -> ProgramSolution:
         """Return the solution of the deciding program.
 
@@ -308,7 +362,7 @@ class Solution(Whole, Shown, Answer):
             EvaluationError: there is no single program, as for an average.
         """
         if self.decided_by is None:
-            raise EvaluationError("an average of tasks has no program: outcomes has the separate program of each task")
+            raise EvaluationError("an average of tasks has no combined program: outcomes has the separate programs")
         return self.decided_by
 
 

@@ -8,17 +8,21 @@ the curve.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import partial, wraps
+from typing import Any, ParamSpec
 
 from ...models import FloatArray
 from ..case.case import Case
 from ..case.settings import Search
-from ..errors import InputError
+from ..case.varied import Over, axes_of
+from ..case.writer import with_settings
+from ..errors import InputError, listing
 from ..interruption import Milestone, is_requested, reached, seconds_left, why_stopped, within
 from ..program.formulation import formulate_each
 from ..proof.enclosure.engine import kernel
+from ..system.deprecated import warn_deprecated
 from .certified import Certified, certify
 from .compromise import solution_of_one_task
 from .multistart import ProgramSolution, solve_program
@@ -27,6 +31,8 @@ from .solve import solve_programs
 
 #: Smallest improvement by a neighbour's optimum, in parts of the objective's scale, that is more than rounding.
 _BETTER = 1e-9
+
+Given = ParamSpec("Given")
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +67,74 @@ class Tradeoff:
     unsolved: tuple[float, ...] = ()
 
 
+def _with_earlier_form(tradeoff: Callable[Given, Tradeoff]) -> Callable[Given, Tradeoff]:
+    """Return the function; it also takes the arguments of version 0.1.0: ``case_at``, ``values`` and ``name``."""
+
+    @wraps(tradeoff)
+    def with_both(*args: Given.args, **given: Given.kwargs) -> Tradeoff:
+        options: dict[str, Any] = dict(given)
+        is_earlier = len(args) > 1 and callable(args[0]) and not isinstance(args[1], Mapping)
+        if not (is_earlier or "case_at" in options or "values" in options):
+            return tradeoff(*args, **given)
+        options |= zip(("case_at", "values"), args, strict=False)
+        now = "tradeoff(case, {name: values}), where case is a case or a function from a value to one"
+        warn_deprecated("tradeoff(case_at, values, name=...)", now)
+        return solve_along(**options)
+
+    return with_both
+
+
+@_with_earlier_form
 def tradeoff(
+    case: Case | Callable[[float], Case],
+    over: Over,
+    *,
+    starts: int | None = None,
+    seed: int | None = None,
+    jobs: int | None = None,
+    first: Sequence[FloatArray] = (),
+    certified: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> Tradeoff:
+    """Solve a case again for each value of one parameter, bound or limit.
+
+    Args:
+        case: the case; or a function from a value to a case, if ``--set`` has no name for the varied quantity. All
+            cases have the same free variables.
+        over: name of the varied parameter, bound or limit, with its values in the case's unit, as for :func:`sweep`:
+            ``{"limits.leg_length.max": [50, 55, 60]}``.
+        starts: number of starting points; the case's number if left out.
+        seed: seed of the starting points; the case's seed if left out.
+        jobs: number of threads; the result does not depend on it.
+        first: points (n,) to start from at every value.
+        certified: If true, also prove the optimum at each value, in an equal share of the remaining time.
+        progress: function to call after each solve of the first pass, with the number of solves done and of all.
+
+    Raises:
+        CaseError: the case has nothing of this name, or a value is not allowed; nothing has been solved by then.
+        InputError: ``over`` has not exactly one name with values, or the C kernel for a proof was not built.
+        UncoveredError: an optimum is to be proved, and an expression has an operation without an interval rule.
+    """
+    axes = axes_of(over)
+    if len(axes) != 1:
+        fault = f"over: must have one number for a trade-off curve, got {listing(axes)}"
+        raise InputError(f"{fault}; sweep takes several" if axes else fault)
+    ((name, values),) = axes.items()
+    case_at = case if not isinstance(case, Case) else lambda value: with_settings(case, {name: value})
+    return solve_along(
+        case_at,
+        values.tolist(),
+        name=name,
+        starts=starts,
+        seed=seed,
+        jobs=jobs,
+        first=first,
+        certified=certified,
+        progress=progress,
+    )
+
+
+def solve_along(
     case_at: Callable[[float], Case],
     values: Sequence[float],
     *,
@@ -76,8 +149,7 @@ def tradeoff(
     """Solve a case again for each value of one parameter, bound or limit.
 
     Args:
-        case_at: function that returns the case with a given value; all of its cases have the same free variables. For a
-            case file it is ``lambda value: load_case(file, {name: value})``.
+        case_at: function that returns the case with a given value; all of its cases have the same free variables.
         values: values in the case's unit, at least one.
         name: name of the varied parameter, bound or limit.
         starts: number of starting points; the case's number if left out.

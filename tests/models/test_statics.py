@@ -95,9 +95,10 @@ def test_forces_of_mechanisms_of_any_topology_equal_those_of_virtual_work_in_muj
 #: Tables of mechanisms whose forces no load determines, by their seeds, and why.
 HINDERED = {
     0: "its platform cannot move",
-    12: "it has 2 actuators for 1 freedom, so that they can load each other with forces that no load determines",
-    20: "its 2 actuators do not hold the 4 freedoms of its platform",
-    112: "its 1 actuator does not hold the 2 freedoms of its platform",
+    12: "it has 2 actuators for 1 degree of freedom, so internal forces between actuators are not determined by the "
+    "load",
+    20: "its 2 actuators do not control the 4 degrees of freedom of its platform",
+    112: "its 1 actuator does not control the 2 degrees of freedom of its platform",
 }
 
 

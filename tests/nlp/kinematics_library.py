@@ -21,7 +21,7 @@ from screwsynth.nlp.units import Units
 OK, OUT_OF_REACH, LOOPS_OPEN, OTHER_ASSEMBLY, SINGULAR, NOT_CONVERGED, BAD_INPUT = range(7)
 
 
-def typical_case(name: str, **changes: Any) -> Case:
+def typical_case(name: str, **changes: Any) -> Case:  # noqa: ANN401 - fields of a case
     """Return a case of a robot with its typical dimensions."""
     model = build_model(name)
     dimensions = {each.name: each.typical if len(each.typical) > 1 else each.typical[0] for each in model.parameters}
@@ -60,12 +60,10 @@ class Library:
     def start(self) -> None:
         """Set the state to home."""
         if self.state is not None:
-            self._call("start", self.state)
+            self.call("start", self.state)
 
-    def _call(self, name: str, *arguments: object) -> int:
-        pointers = [
-            ctypes.c_void_p(each.ctypes.data) if isinstance(each, np.ndarray) else each for each in arguments
-        ]
+    def call(self, name: str, *arguments: object) -> int:
+        pointers = [ctypes.c_void_p(each.ctypes.data) if isinstance(each, np.ndarray) else each for each in arguments]
         return int(getattr(self._loaded, f"{self.kin}_{name}")(*pointers))
 
     def at(self, name: str, p: Array, R: Array, size: int, *further: Array) -> Answer:
@@ -73,7 +71,7 @@ class Library:
         found = np.full(size, -77.0, self.type)
         pose = [np.array(p, self.type), np.array(R, self.type).reshape(9)]
         own = [] if self.state is None else [self.state]
-        return Answer(self._call(name, *pose, *own, *[np.array(each, self.type) for each in further], found), found)
+        return Answer(self.call(name, *pose, *own, *[np.array(each, self.type) for each in further], found), found)
 
     def motors(self, p: Array, R: Array) -> Answer:
         """Return the actuator coordinates."""
@@ -84,14 +82,14 @@ class Library:
         position, rotation = np.array(p, self.type), np.array(R, self.type).reshape(9)
         own = [] if self.state is None else [self.state]
         iterations = np.zeros(1, np.int32)
-        status = self._call("forward", np.array(q, self.type), position, rotation, *own, iterations)
+        status = self.call("forward", np.array(q, self.type), position, rotation, *own, iterations)
         return status, position, rotation.reshape(3, 3)
 
     def complete(self, p: Array, R: Array) -> tuple[int, Array, Array]:
         """Return status, position and rotation with dependent coordinates."""
         position, rotation = np.array(p, self.type), np.array(R, self.type).reshape(9)
         own = [] if self.state is None else [self.state]
-        return self._call("complete", position, rotation, *own), position, rotation.reshape(3, 3)
+        return self.call("complete", position, rotation, *own), position, rotation.reshape(3, 3)
 
     @property
     def home(self) -> tuple[Array, Array]:

@@ -53,7 +53,7 @@ def test_a_trade_off_with_proofs(up: str, cli: Run) -> None:
 
 
 def test_a_worse_optimum_than_that_of_the_box_is_replaced(up: str) -> None:
-    found = sn.tradeoff(lambda value: sn.load_case(up, {LONGEST: value}), [12, 20], name=LONGEST, certified=True)
+    found = sn.tradeoff(sn.load_case(up), {LONGEST: [12, 20]}, certified=True)
     for point in found.points:
         assert point.certified is not None
         assert point.certified.solution is point.solution

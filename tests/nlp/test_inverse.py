@@ -182,7 +182,7 @@ def test_the_command_writes_a_row_for_each_pose(tmp_path: Path, cli: Run) -> Non
         np.testing.assert_allclose(float(row["rate 2- omega_y"]), rates[2, 1], atol=1e-11)
         np.testing.assert_allclose(float(row["J 6 m_z"]), J[5, 5], atol=1e-11)
     text = output_of(cli("inverse", "hexapod-linuxcnc", "--poses", str(poses)))
-    assert "all 2 poses are closed" in text
+    assert "solved at all 2 poses" in text
 
 
 def test_the_command_ends_with_status_1_where_poses_are_not_closed(tmp_path: Path, cli: Run) -> None:
@@ -191,7 +191,7 @@ def test_the_command_ends_with_status_1_where_poses_are_not_closed(tmp_path: Pat
     poses = saved(tmp_path / "poses.csv", f"x,y,z\n{x},{y},{z + 0.05}\n0,0,-9\n0,0,-8\n")
     code, text, err = cli("inverse", str(case), "--poses", str(poses), "--csv", str(out))
     assert (code, err) == (1, "")
-    assert "2 of 3 poses are not closed, the first in row 3 of" in " ".join(text.split())
+    assert "no solution at 2 of 3 poses, the first in row 3 of" in " ".join(text.split())
     assert str(poses).replace(" ", "") in "".join(text.split())
     rows = rows_of(out.read_text(encoding="utf-8"))
     assert [row["closed"] for row in rows] == ["yes", "no", "no"]

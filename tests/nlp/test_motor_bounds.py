@@ -256,8 +256,8 @@ def test_proofs_name_the_assembly_that_numbers_of_actuators_are_about() -> None:
         checked = VerifiedWorkspace((), "every assembly", workspace_of_case(each), 0, 0)
         said.append(list(_premises(each, checked))[-1])
     assert said == [
-        f"assemblies: {ranks} in the one of home in the middle of the workspace, {numbers} in every assembly"
-        for ranks, numbers in (("ranks, forces, speeds and powers", "other numbers"), ("ranks", "numbers"))
+        f"assembly modes: {ranks} in the home assembly mode at the workspace centre, {numbers} in every assembly"
+        for ranks, numbers in (("ranks, forces, speeds and powers", "other quantities"), ("ranks", "quantities"))
     ]
 
 

@@ -318,7 +318,7 @@ def test_neighbours_lead_each_other_to_better_optima() -> None:
     assert all(one < 0.9 * other for one, other in zip(worse, better, strict=True)), "two optima"
     # Only the middle value's own start leads to the better optimum.
     starts = {10.0: -2.3, 11.0: 1.4, 12.0: -2.3}
-    found = sn.tradeoff(lambda radius: platform(radius, starts[radius]), radii, starts=1)
+    found = sn.tradeoff(lambda radius: platform(radius, starts[radius]), {"x1": radii}, starts=1)
     assert [point.solution.F for point in found.points] == pytest.approx(better, rel=1e-9)
 
 
@@ -326,15 +326,15 @@ def test_in_python() -> None:
     def at(value: float) -> sn.Case:
         return platform(value, 1.4)
 
-    found = sn.tradeoff(at, [10, 11], name="x1", starts=3)
+    found = sn.tradeoff(at, {"x1": [10, 11]}, starts=3)
     assert [point.solution.status for point in found.points] == [sn.Status.OPTIMAL, sn.Status.OPTIMAL]
     assert sn.json_data(sn.tradeoff_result(found))["over"] == "x1"
     one = sn.result_of(sn.solve(at(11), starts=3))
     assert sn.json_data(sn.tradeoff_result(found).points[1])["F"] == pytest.approx(sn.json_data(one)["F"])
-    with pytest.raises(sn.InputError, match="at least one value"):
-        sn.tradeoff(at, [])
+    with pytest.raises(sn.InputError, match="x1: has no values"):
+        sn.tradeoff(at, {"x1": []})
     with pytest.raises(sn.CaseError, match="x1"):
-        sn.tradeoff(at, [10, -1])
+        sn.tradeoff(at, {"x1": [10, -1]})
 
 
 def figures_of(page: str) -> list[tuple[str, ElementTree.Element]]:
@@ -379,5 +379,5 @@ def test_all_designs_have_one_scale(tmp_path: Path, cli: Run) -> None:
         drawn = [next(each for each in svg.iter() if each.get("id") == plate) for _, svg in figures]
         assert len(set(map(ElementTree.tostring, drawn))) == count
     assert changed_words(["a"], ["a", "b"]) == "b becomes active"
-    assert changed_words(["a", "b"], ["c", "d"]) == "c, d become active; a, b no longer are"
-    assert changed_words(["a"], []) == "a no longer is"
+    assert changed_words(["a", "b"], ["c", "d"]) == "c, d become active; a, b become inactive"
+    assert changed_words(["a"], []) == "a becomes inactive"

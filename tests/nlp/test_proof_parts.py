@@ -384,7 +384,7 @@ def test_an_interrupt_of_python_proves_no_regular_poses(place: str, monkeypatch:
     assert found.reason == "interrupted"
 
 
-SENTENCE = "nothing can be proved here: the C kernel was not built when the package was installed; install a C compiler"
+SENTENCE = "proofs are not available: the C kernel was not built when the package was installed; install a C compiler"
 HELICAL = "paper-4.1-helical-axis-z"
 GOALS = ("--goal", "max F:push along the normal", "--goal", "min F:turn about the normal")
 

@@ -328,7 +328,7 @@ def test_ranks_and_numbers_of_machines_are_on_paper() -> None:
         assert judged.is_proved
         checked = check_workspace_proof(proof, case)
         assert len(checked.claims) == count, [each.name for each in checked.claims]
-        assert {"all machines together" in each.reason for each in proof.unproved} <= {True}
+        assert {"all robots within the tolerance" in each.reason for each in proof.unproved} <= {True}
         extremes = {(each.name, each.sense.value): each for each in judged.extremes}
         for each in checked.claims:
             if each.bound is not None:
@@ -411,18 +411,18 @@ def test_what_is_not_covered_is_open_with_the_reason() -> None:
     tables["workspace"]["position"] = [0, 0, 0]
     judged = judge_workspace(case_from(tables, "spherical"), with_objective=False)
     assert judged.regularity.outcome is Outcome.OPEN
-    assert "take freedoms" in judged.regularity.reason
+    assert "remove degrees of freedom" in judged.regularity.reason
     assert judged.extremes
     assert all(each.outcome is Outcome.OPEN for each in judged.extremes)
-    assert all("take freedoms" in each.reason for each in judged.extremes)
+    assert all("remove degrees of freedom" in each.reason for each in judged.extremes)
     # With errors a Delta that is held without rotation would have to turn.
     delta = tables_of("3-rps", turn=0, robot=typical("delta"), height=build_model("delta").home[2])
     delta["workspace"]["position"][2] = build_model("delta").home[2]
     found = judge_workspace(case_from(delta, "delta"), with_limits=False).regularity
     assert found.outcome is Outcome.OPEN
-    assert "does not have the poses" in found.reason
+    assert "does not reach the poses" in found.reason
     del tables["workspace"]
-    with pytest.raises(CaseError, match=r"tolerance.joint_centre: is not computed for 'spherical-3-rrr'"):
+    with pytest.raises(CaseError, match=r"tolerance.joint_centre: is not supported for the robot 'spherical-3-rrr'"):
         case_from(tables, "spherical")
 
 

@@ -380,9 +380,10 @@ def test_the_command_shows_the_machine_that_refutes(cli: Run, tmp_path: Path) ->
     assert refuted
     for each in refuted:
         assert max(np.linalg.norm(each.machine.base, axis=1)) == pytest.approx(TOLERANCE)
-    assert shown.index("verdict") < shown.index("tightest limits") < shown.index("limits over every pose")
-    assert "every one whose joint centres are off by at most 0.02 in" in shown
-    assert f"the machine that refutes: {refuted[0].name}" in shown
+    places = [shown.index(each) for each in ("verdict", "limits with the smallest margin", "limits over all poses")]
+    assert places == sorted(places)
+    assert "covers every robot whose joint centres are off by at most 0.02 in" in shown
+    assert f"robot within the tolerance that violates: {refuted[0].name}" in shown
     assert "see it with" in shown
 
 
@@ -416,7 +417,7 @@ def test_what_takes_the_limits_at_the_stated_pose_says_so(cli: Run, tmp_path: Pa
     code, out, err = cli("certify", "hexapod-workspace", "--time", "1", "--starts", "1", "--json", str(target))
     assert code in (0, 1)
     result = json.loads(target.read_text(encoding="utf-8"))
-    notice = "the limits are taken at the stated pose alone, not over the workspace"
+    notice = "the limits are evaluated only at the stated pose, not over the workspace"
     assert result["notice"] == notice
     jsonschema.validate(result, result_schema())
     assert notice in " ".join((out + err).split())

@@ -99,7 +99,7 @@ def _of_limbs(tree: bytes, form: StandardForm, bound: float) -> Iterator[_Block]
     reader, bounds, fault = (
         TreeReader(tree, 1),
         list[float](),
-        "the bounds of the limbs sum to more than the proven bound",
+        "the bounds of the limbs together exceed the proven bound",
     )
     for limb in separation.limbs:
         bounds.append(reader.number())

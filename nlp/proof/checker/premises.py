@@ -50,9 +50,9 @@ def check_minimum(case: Case) -> None:
         InputError: the case has several tasks, or its F is the least of several poses.
     """
     if len(case.tasks) > 1:
-        raise InputError("above: needs a case with one task")
+        raise InputError("above: is for a case with one task")
     if case.pose_count > 1 and case.over_poses is OverPoses.WORST and case.tasks[0].sense is Sense.MAX:
-        raise InputError("above: is not supported for the worst of several poses, where F is maximised")
+        raise InputError("above: is not for the worst of several poses, where F is to be maximised")
 
 
 def program_of(case: Case, statement: Statement) -> Nlp:

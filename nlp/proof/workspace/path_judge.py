@@ -1,7 +1,7 @@
 """Judgement of a robot along a tool path.
 
-Claims are those about a box of poses. Boxes cover pieces of the path, which are halved along it, and values are those
-of its points. The robot stands for every robot within the case's joint-centre tolerance.
+The claims are the same as over a box of poses. Boxes cover pieces of the path, which are bisected, and values are taken
+at points of the path. With a joint-centre tolerance, the claims cover every robot within the tolerance.
 """
 
 from __future__ import annotations
@@ -44,12 +44,12 @@ from .robot.path_cover import PathCover
 from .robot.posed_robot import NotJudgedError
 from .verdict import Fault, Verdict, not_judged
 
-#: Seconds after which a judgement stops where no time is stated.
+#: Default time limit of a judgement, in seconds.
 TIME_LIMIT = 600.0
-#: Part of the time left that a search takes at most, and gap of a number without a limit, as a part of it.
+#: Largest part of the time left for one search, and relative gap of a quantity without a limit.
 _PART, GAP = 0.5, 1e-3
-#: Reason for numbers with an operation that no rule bounds.
-_NO_RULE = "the check has no rule for it"
+#: Reason for quantities with an operation without an interval rule.
+_NO_RULE = "no interval rule for one of its operations"
 
 
 @one_call
@@ -67,19 +67,19 @@ def judge_path(
     """Judge a robot at every point of a path.
 
     Args:
-        case: the robot, whose own poses and workspace are not used.
-        path: in the case's unit of length.
-        gap: largest relative gap of a number without a limit.
-        time_limit: seconds of all searches; None for no limit.
-        sampling: distance that knots of the path keep; None for no knots.
-        limits_only: whether numbers of actuators without a limit are left out.
-        progress: called with the name of the next step.
+        case: the robot and its limits; poses and workspace of the case are not used.
+        path: the tool path, in the case's unit of length.
+        gap: largest relative gap of a quantity without a limit.
+        time_limit: seconds for all searches together; None for no limit.
+        sampling: rule for the knots of the path; None for no knots.
+        limits_only: If true, leave out quantities of actuators without a limit.
+        progress: function that is called with the name of the next step.
         record: record of the searches for a proof.
 
     Raises:
         CaseError: a dimension of the robot is free, or limits need a motion that neither the case nor the path states.
-        InputError: the path has rotations that are not covered, there is no C kernel, or knots are too many, or of a
-            robot of which the positions of actuators are not known.
+        InputError: rotations of the path are not covered, there is no C kernel, or there are too many knots; or knots
+            are requested for a robot whose actuator positions are not known.
     """
     cover, box, workspace = covered(path, robot_length(case))
     case = replace(case, workspace=workspace)
@@ -117,17 +117,17 @@ class _AlongPath(Judging):
     """A judgement along a path.
 
     Args:
-        case: the case, in a motion.
-        workspace: box that holds the path.
-        robots: all robots within the tolerance; None where they are not judged.
+        case: the case, with a motion.
+        workspace: box that contains the path.
+        robots: robots within the tolerance; None if they are not judged.
         cover: boxes of the path.
-        search: gap of numbers without a limit.
+        search: gap, threads and record of the searches.
 
     Attributes:
         is_timed: whether the path states times.
-        with_all: whether numbers of actuators without a limit are judged too.
-        reason: why the robot is not judged; else empty.
-        report: called with the name of the next step.
+        with_all: whether quantities of actuators without a limit are judged too.
+        reason: reason for a robot that is not judged; else empty.
+        report: function that is called with the name of the next step.
     """
 
     is_timed, with_all, reason = False, True, ""
@@ -150,10 +150,10 @@ class _AlongPath(Judging):
 
     @property
     def _robots(self) -> RobotsWithinTolerance:
-        """All robots within the tolerance.
+        """Robots within the tolerance.
 
         Raises:
-            NotJudgedError: they are not judged.
+            NotJudgedError: the robots are not judged.
         """
         if self._within_tolerance is None:
             raise NotJudgedError(self.reason)
@@ -191,12 +191,12 @@ class _AlongPath(Judging):
             yield from found
 
     def subject(self, shortest: float) -> Subject:
-        """Return the robot of which the other numbers are."""
+        """Return the robot for the searches of the other quantities."""
         robots = self._robots
         return Subject(self.case, robots.model, robots.family, "", shortest)
 
     def actuators(self, subject: Subject) -> Iterator[Verdict]:
-        """Yield the numbers of actuators, in the path's own motion where its times are stated."""
+        """Yield the verdicts on actuators; a path with times defines its motion."""
         for each in refuted(list(self.verdicts.values())).values():
             if each.claim.kind in (ClaimKind.CLEARANCE, ClaimKind.SPECTRUM):
                 self._keep_faults(subject.number(each.claim), {0: each})
@@ -204,7 +204,7 @@ class _AlongPath(Judging):
         if not self.is_timed:
             yield from self._motors(subject)
             return
-        # Powers are those in the path's motion, whether the case states another one or none.
+        # A path with times defines the motion for powers, whether or not the case states another one.
         speeds, case = speeds_on_path(self._robots, self._cover, self.search.gap, self.search.record), subject.case
         yield from speeds.verdicts
         moving = in_path_motion(case)
@@ -220,7 +220,7 @@ class _AlongPath(Judging):
             yield from (verdict_of(each, Minimum(reason=reason)) for each in powers if each.limit is not None)
 
     def finer(self, claim: Claim, gap: float, about: Directions | None) -> Verdict | None:
-        """Return the verdict on a leg length with a finer gap; None with directions."""
+        """Return the verdict on a leg length with a smaller gap; None with directions."""
         search = replace(self.search, gap=gap)
         return None if about is not None else self._robots.searched([claim], search, is_enough=False)[0]
 
@@ -233,7 +233,7 @@ class _AlongPath(Judging):
         self._faults |= first_faults(numbers, wrong, self._cover)
 
     def _motors(self, subject: Subject, speeds: Mapping[str, float] | None = None) -> Iterator[Verdict]:
-        """Yield the verdicts on forces, powers and speeds in any direction, and keep the faults of these."""
+        """Yield the verdicts on actuator forces, powers and speeds in any direction, and keep their faults."""
         found = list(motor_extremes(subject, with_all=self.with_all, speeds=speeds, record=self.search.record))
         yield from found
         for _, group in itertools.groupby(refuted(found).values(), lambda each: each.motor and each.motor.place):
@@ -243,16 +243,16 @@ class _AlongPath(Judging):
                 self._keep_faults(numbers, dict(enumerate(wrong)))
 
     def _searched(self, claims: Sequence[Claim]) -> list[Verdict]:
-        """Return the verdicts on numbers by one search; those without rules are open."""
+        """Return the verdicts on quantities by one search; quantities without interval rules stay open."""
         robots, search, reason = self._robots, self.search, _NO_RULE
         covered = [claim for claim in claims if robots.is_covered(claim)]
         found = dict[Claim, Verdict]()
         try:
             found = dict(zip(covered, robots.searched(covered, search) if covered else [], strict=True))
-            # A number that cannot be decided ends the search of all.
+            # A quantity that cannot be decided ends the common search.
             limited = [each for each in covered if each.limit is not None and len(covered) > 1]
             for claim in (each for each in limited if found[each].reason == TOO_SMALL):
                 (found[claim],) = robots.searched([claim], search)
-        except UncoveredError as error:  # of an equation of loops
+        except UncoveredError as error:  # from a loop equation
             reason = str(error)
         return [found.get(claim) or verdict_of(claim, Minimum(reason=reason)) for claim in claims]

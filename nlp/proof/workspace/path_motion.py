@@ -1,4 +1,4 @@
-"""Speeds of actuators along a path that states its times: proven largest sizes, in place of those by [motion]."""
+"""Proved largest actuator speeds along a tool path with times; they replace the speeds that [motion] implies."""
 
 from __future__ import annotations
 
@@ -25,12 +25,18 @@ from .robot.path_cover import PathCover
 from .robot.posed_robot import NotJudgedError
 from .verdict import Verdict
 
-#: Number of places at which the width of a bound over machines is taken.
+#: Number of places at which the width of a bound over the robots within the tolerance is sampled.
 _POINTS, _SEED = 64, 0
 
 
 class SpeedsOnPath(NamedTuple):
-    """Largest speeds of actuators, and what they were searched with: None where nothing is known of them."""
+    """Verdicts on the largest actuator speeds.
+
+    Attributes:
+        claims: claims about the speeds.
+        verdicts: verdict on each claim.
+        number: the speeds as searched; None if they are not known.
+    """
 
     claims: Sequence[Claim]
     verdicts: Sequence[Verdict]
@@ -40,12 +46,12 @@ class SpeedsOnPath(NamedTuple):
 def speeds_on_path(
     robots: RobotsWithinTolerance, cover: PathCover, gap: float, record: ProofRecord | None = None
 ) -> SpeedsOnPath:
-    """Return the largest speed of each actuator of all machines along a path with times.
+    """Return the largest speed of each actuator along a path with times, over all robots within the tolerance.
 
     Args:
         robots: robots within the tolerance.
-        cover: of the path.
-        gap: as a part of a speed.
+        cover: boxes of the path.
+        gap: allowed relative gap of a speed.
         record: record of the search for a proof.
     """
     claims, number = list(speed_claims(robots.case)), None
@@ -70,9 +76,9 @@ def speeds_on_path(
 
 
 def _wider(number: PathSpeeds, cover: PathCover) -> FloatArray:
-    """Return by how much bounds at places are beyond the values of the design there, (K,): no smaller boxes help.
+    """Return by how much bounds over all robots within the tolerance exceed values of the design at one place, (K,).
 
-    They are those of all machines.
+    Smaller boxes do not reduce this difference.
     """
     problem = number.problem
     if not problem.names or problem.problem.dependent:
@@ -83,13 +89,13 @@ def _wider(number: PathSpeeds, cover: PathCover) -> FloatArray:
 
 
 def coordinates_of(robots: RobotsWithinTolerance) -> SX:
-    """Return the coordinates (a, 1) of all actuators in those of machines: lengths of legs, or from home.
+    """Return the coordinates (a, 1) of all actuators, as expressions: leg lengths, or displacements from home.
 
     Raises:
-        NotJudgedError: they are not known.
+        NotJudgedError: the position of an actuator is not known.
     """
     layout, family = robots.symbols.layout, robots.family
     found = actuator_coordinates(layout)
     if not found or len(found) < len(driven_joints(layout.case.model)):
-        raise NotJudgedError("the positions of its actuators are not known")
+        raise NotJudgedError("the positions of the robot's actuators are not known")
     return robots.symbols.of(ca.vertcat(*found.values()), family.errors, family.problem.z)

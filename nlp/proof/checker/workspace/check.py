@@ -53,10 +53,10 @@ from .statement import (
     case_along_path,
     expected_along_path,
     expected_claims,
-    hold_premises,
-    hold_robot,
     leg_error_of,
     refuse_other_lemmas,
+    refuse_other_premises,
+    refuse_other_robot,
     robot_along_path,
     robot_claims,
 )
@@ -159,8 +159,8 @@ def _check(proof: Proof, begun: Callable[[], _Checker]) -> VerifiedWorkspace:
     named = [*given, *(key for each in proof.unproved if (key := (each.name, each.sense)) in expected)]
     if sorted(named) != sorted(expected) or len(given) != len(proof.claims):
         wrong = [*(set(expected) - set(named)), *(set(given) - set(expected))]
-        name = " ".join(min(wrong)).strip() if wrong else "one of them"
-        raise ProofError(f"the claims are not those of the case, each once: see {name}")
+        name = " ".join(min(wrong)).strip() if wrong else "a claim that occurs twice"
+        raise ProofError(f"the proof must have each claim of the case exactly once: see {name}")
     refuse_other_lemmas(proof.lemmas, checker.expected)
     claims = []
     for key in (each for each in expected if each in given):
@@ -179,7 +179,7 @@ class _Checker:
         if not isinstance(premises, Premises):
             raise ProofError("the proof is not about a workspace")
         robot = robot_claims(case, workspace, {each.name for each in proof.claims})
-        hold_premises(case, workspace, robot.legs, leg_error, premises)
+        refuse_other_premises(case, workspace, robot.legs, leg_error, premises)
         self._begin(proof, case, pose_root(workspace), robot, workspace)
         self._eps = leg_error_of(case, leg_error)
         try:
@@ -316,7 +316,7 @@ class _Checker:
     def _of_legs(self) -> tuple[Legs, float]:
         """Return the joint centres of six straight legs, and a lower bound of their lengths within the tolerance."""
         if self.robot.legs is None:
-            raise ProofError("the robot of the case has not six straight legs")
+            raise ProofError("the robot of the case does not have six straight legs")
         return self.robot.legs, min(self._length(leg.name, Sense.MIN) for leg in self._case.model.legs)
 
     def _lengths(self, each: Claim, given: ProofClaim) -> float:
@@ -423,7 +423,7 @@ class _PathChecker(_Checker):
         case = case_along_path(case, path)
         root = PathRoot(case, path)
         robot = robot_along_path(case, root, with_angles=premises.with_angles)
-        hold_robot(case, robot.legs, premises)
+        refuse_other_robot(case, robot.legs, premises)
         self._is_timed = path.is_timed
         self._begin(proof, case, root, robot, root.workspace)
         self.expected = expected_along_path(case, robot, is_timed=path.is_timed)

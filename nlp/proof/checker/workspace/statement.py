@@ -307,17 +307,19 @@ def legs_numbers(legs: Legs | None) -> tuple[tuple[float, ...], ...]:
     return () if legs is None else tuple(map(tuple, [*legs.base.tolist(), *legs.platform.tolist()]))
 
 
-def hold_premises(case: Case, workspace: Workspace, legs: Legs | None, leg_error: float, given: Premises) -> None:
+def refuse_other_premises(
+    case: Case, workspace: Workspace, legs: Legs | None, leg_error: float, given: Premises
+) -> None:
     """Refuse a proof whose file has other premises than the case; the check itself does not use them."""
     if workspace_numbers(workspace) != given.workspace:
         raise ProofError("the proof is for another workspace than this case's")
     if given.leg_error != leg_error:
         stated = f"the proof is for leg errors of at most {exact(given.leg_error)} {case.units.length}"
         raise ProofError(f"{stated}, but {exact(leg_error)} was given: see --leg-error")
-    hold_robot(case, legs, given)
+    refuse_other_robot(case, legs, given)
 
 
-def hold_robot(case: Case, legs: Legs | None, given: Premises | PathPremises) -> None:
+def refuse_other_robot(case: Case, legs: Legs | None, given: Premises | PathPremises) -> None:
     """Refuse a proof whose file names other joint centres, or another joint-centre tolerance, than the case has."""
     numbers = legs_numbers(legs)
     same = list(map(len, numbers)) == list(map(len, given.legs))
