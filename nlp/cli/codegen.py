@@ -84,7 +84,7 @@ def _write_kinematics(
     if of is None:
         loaded, text, inputs = read_robot_case(name, options.read_settings(settings))
     else:
-        loaded, text, inputs = options.read_machine(name, settings, of).file
+        loaded, text, inputs = options.read_changed_case(name, settings, of).file
     files = generate_kinematics(loaded, text, single=single, coordinates=coordinates)
     for each in files if Path(out).is_dir() else ():
         check_outputs(inputs, {"--out": str(Path(out) / each)})

@@ -265,8 +265,8 @@ def _substitutions(robot: Kinematics, functions: _Functions) -> dict[str, str]:
         )
     limbs = f"{f} joint coordinates are followed by Newton's method from a state." if f else "Loops have a closed form."
     notes = (
-        f"A state `double u[{KIN}_STATE]` belongs to the caller, one for each thread; `{kin}_start(u)` is home. Each call\n"
-        "follows the joints along a straight path from the pose of the state, in at most 85 steps of at most 15\n"
+        f"A state `double u[{KIN}_STATE]` belongs to the caller, one for each thread; `{kin}_start(u)` is home. Each\n"
+        "call follows the joints along a straight path from the pose of the state, in at most 85 steps of at most 15\n"
         "iterations, and keeps the new state if its status is OK."
     )
     return {
@@ -349,8 +349,8 @@ def _state_texts(unknowns: int, kin: str) -> dict[str, str]:
         "pass_u": "u, ",
         "void_u": ", (void)u",
         "start": (
-            "\n/* State at home. A state belongs to the caller: each call follows the joints from the pose of the state\n"
-            " * to the given one, and keeps the new state if its status is OK. */\n"
+            "\n/* State at home. A state belongs to the caller: each call follows the joints from the pose of the\n"
+            " * state to the given one, and keeps the new state if its status is OK. */\n"
             f"void {kin}_start(double u[{kin.upper()}_STATE]);\n"
         ),
         "state_declaration": f"    double u[{kin.upper()}_STATE];",

@@ -1,6 +1,6 @@
 """Joint coordinates of a limb in the place of the pose, such as pitch and roll of an ankle.
 
-The limb has as many joint coordinates as the platform has degrees of freedom. The pose then is a product of exponentials of
+The limb has as many joint coordinates as the platform has degrees of freedom. The pose is a product of exponentials of
 the screws of its joints at home.
 """
 

@@ -18,15 +18,8 @@ from .templates import fill_template, prototype
 
 #: Limits that depend on loads, motions or the whole Jacobian.
 _NOT_OF_JOINTS = frozenset(
-    (
-        "condition_number",
-        "smallest_singular_value",
-        "actuator_rate",
-        "actuator_force",
-        "actuator_speed",
-        "actuator_power",
-    )
-    + ("deflection", "rate_share", "custom", "F")
+    {"condition_number", "smallest_singular_value", "actuator_rate", "actuator_force", "actuator_speed"}
+    | {"actuator_power", "deflection", "rate_share", "custom", "F"}
 )
 #: Values at which two forms of a reading are compared, and their largest relative difference.
 _VALUES, _SAME = (0.15, 0.4, 0.85), 1e-9
