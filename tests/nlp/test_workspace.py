@@ -32,7 +32,7 @@ from screwsynth.models import FloatArray
 from screwsynth.nlp import Case, CaseError, Free, Limits, json_data, load_case, load_result, result_of, solve
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.proof.enclosure.forms import Encloser
-from screwsynth.nlp.proof.statement.machine import Legs, legs_of
+from screwsynth.nlp.proof.statement.fixed_robot import Legs, legs_of
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal, Number
 from screwsynth.nlp.proof.workspace.numbers.jacobian_numbers import WorstError
