@@ -44,7 +44,7 @@ def driven_joints(model: Model) -> tuple[DrivenJoint, ...]:
     return tuple(DrivenJoint(each.name, each.name, Dimension.LENGTH) for each in model.legs)
 
 
-def freedoms_of(model: Model) -> int:
+def degrees_of_freedom(model: Model) -> int:
     """Return the degrees of freedom of the platform with free actuators, at almost all dimensions and poses."""
     if model.generic is not None:
         return 6 - model.generic.constraints
@@ -53,7 +53,7 @@ def freedoms_of(model: Model) -> int:
 
 def statics_hindrance(model: Model) -> str:
     """Return the reason why loads do not determine the actuator forces, as a clause; empty if they do."""
-    count, freedoms = len(driven_joints(model)), freedoms_of(model)
+    count, freedoms = len(driven_joints(model)), degrees_of_freedom(model)
     if not count:
         return "its actuators are not known"
     if not freedoms:

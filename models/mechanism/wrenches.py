@@ -20,8 +20,8 @@ from ..rows import RANK_TOLERANCE, rank_of
 from ..wrench import WrenchKind
 from .centre import centre_of, centre_rule
 from .decomposition import MemberGraph, robot_graph
-from .freedoms import Mobility
 from .graph import Mechanism, check_mechanism
+from .mobility import Mobility
 
 
 def scaled_twists(twists: FloatArray, centre: FloatArray, length: float) -> FloatArray:

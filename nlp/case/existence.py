@@ -23,9 +23,7 @@ if TYPE_CHECKING:
 _REMEMBERED = 64
 
 
-def fault_of_dimensions(
-    model: Model, parameters: Mapping[str, Value | Sequence[Value] | FloatArray], units: Units
-) -> str:
+def assembly_fault(model: Model, parameters: Mapping[str, Value | Sequence[Value] | FloatArray], units: Units) -> str:
     """Return the reason why a robot cannot be assembled with some dimensions, as a clause; empty for no known reason.
 
     Args:

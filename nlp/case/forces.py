@@ -16,7 +16,7 @@ from casadi import SX
 
 from ...models import Model
 from ...models.parts import Dimension
-from ...models.statics import DrivenJoint, Statics, driven_joints, freedoms_of
+from ...models.statics import DrivenJoint, Statics, degrees_of_freedom, driven_joints
 from .loads import LoadCase, Loading, Motion
 
 #: Smoothing of the norm of a vector at 0: the norm is too large by at most this part of a typical norm.
@@ -153,7 +153,7 @@ def _reaches(joints: Sequence[DrivenJoint], size: SX) -> list[SX]:
 
 def _speeds(model: Model, statics: Statics, motion: Motion, joints: Sequence[DrivenJoint], size: SX) -> SX:
     """Return the largest speeds (a, 1) of the actuators."""
-    is_legs = freedoms_of(model) == 6 and not model.actuators
+    is_legs = degrees_of_freedom(model) == 6 and not model.actuators
     rates = statics.rows if is_legs else statics.rates(SX(motion.length(size)))
     return ca.vertcat(
         *[

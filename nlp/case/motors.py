@@ -6,7 +6,7 @@ import enum
 from typing import NamedTuple
 
 
-class MotorNumber(enum.Enum):
+class ActuatorQuantity(enum.Enum):
     """Kinds of quantities of an actuator; each value is the word in results."""
 
     COORDINATE = "coordinate"
@@ -26,7 +26,7 @@ class Motor(NamedTuple):
         is_backwards: If true, a power is that of negative forces.
     """
 
-    number: MotorNumber = MotorNumber.FORCE
+    number: ActuatorQuantity = ActuatorQuantity.FORCE
     place: int = 0
     actuator: str = ""
     load: str = ""

@@ -93,7 +93,7 @@ def tell_workspace(case: Case) -> None:
     """
     from ..errors import one_line
 
-    found = case.not_held
+    found = case.outside_workspace
     if found is not None and (case.limits_over == "workspace" or found.may_be_excursions):
         sys.stderr.write(f"{one_line(found.sentence)}\n")
 

@@ -264,7 +264,7 @@ def _words(claim: CheckedClaim, case: Case) -> str:
     from ..proof.statement.claims import CONSTRAINTS
     from ..results.objective import unit_of_claim
 
-    if claim.by_machine:
+    if claim.is_within_tolerance:
         return "refuted: at the stated pose J is singular for a robot within the tolerance"
     if claim.is_refuted:
         return "refuted: J is singular at a pose between the two stated ones"

@@ -105,7 +105,7 @@ def _hold_path(
     from ..path.options import PathOptions
     from ..path.reader import options_of, text_of_path
     from ..proof.checker.proof_file import ProofError
-    from ..proof.checker.workspace.path_premises import hold_path, premises_of
+    from ..proof.checker.workspace.path_premises import check_path_premises, premises_of
 
     stated = case.path if is_own and along is None and given.of_case else None
     if along is None and stated is None:
@@ -116,7 +116,7 @@ def _hold_path(
     file = along if stated is None else str(stated.name)
     try:
         text = text_of_path(file or "")
-        hold_path(given, premises_of(case, file or "", text, own, of_case=stated is not None))
+        check_path_premises(given, premises_of(case, file or "", text, own, of_case=stated is not None))
     except ProofError as error:
         print_notice(f"rejected: {error}")
         raise SystemExit(1) from None
@@ -132,13 +132,13 @@ def _verify(
         Exit: with status 1 where the proof does not hold.
     """
     from ..proof.checker.check import check_proof
-    from ..proof.checker.premises import claim_words, hold_statement, program_of, root_below
+    from ..proof.checker.premises import check_statement, claim_words, program_of, root_below
     from ..proof.checker.proof_file import ProofError
     from ..results.objective import unit_of_objective
     from ..words.text import Line
 
     try:
-        hold_statement(case, statement, above=above, all_assemblies=all_assemblies)
+        check_statement(case, statement, above=above, all_assemblies=all_assemblies)
         checked = check_proof(claim, program_of(case, statement))
         shown = root_below(-checked.bound) if case.tasks[0].measure else -checked.bound
         if above is not None and not shown > above:

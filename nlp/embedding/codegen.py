@@ -39,7 +39,7 @@ from .kinematicsfiles import combined_kinematics
 from .loops import find_loops
 from .manifest import MANIFEST, NumberColumns, manifest_text, number_columns
 from .measure import NOT_MEASURED
-from .runtimelimits import held_by_fixed_numbers, held_texts, limit_texts, run_time_limits
+from .runtimelimits import fixed_condition_texts, fixed_conditions, limit_texts, run_time_limits
 from .stages import StagedFunctions, loop_texts, stage_functions
 from .subject import Subject, find_subject, magnitude_of, objective_words, turning_joints
 from .templates import TEMPLATES, casadi_texts, fill_template
@@ -94,12 +94,12 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
     """
     subject = find_subject(case)
     nlp, prefix = subject.nlp, identifier(case.name)
-    held = held_by_fixed_numbers(nlp)
+    held = fixed_conditions(nlp)
     staged = stage_functions(nlp.program, magnitude_of(nlp), f"{prefix}_CASADI", held)
     limits = run_time_limits(nlp, f"{prefix}_CASADI")
     columns = number_columns(nlp, limits.limits, prefix)
     names = _substitutions(subject, staged, columns)
-    names |= held_texts(held, limits)
+    names |= fixed_condition_texts(held, limits)
     names |= limit_texts(limits, prefix, columns.limits)
     core = {ending: _core_text(ending, prefix) for ending in _CORE}
     names |= _stated_texts(names, core)

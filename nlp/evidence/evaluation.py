@@ -64,7 +64,7 @@ def shown_parameters(case: Case, state: RobotState) -> Mapping[str, float | Vect
     return MappingProxyType(shown)
 
 
-def shown_numbers(nlp: Nlp, x: FloatArray, state: RobotState) -> Mapping[str, float | Vector]:
+def shown_values(nlp: Nlp, x: FloatArray, state: RobotState) -> Mapping[str, float | Vector]:
     """Return the parameters and pose coordinates of a case at a point in its units, by their names for ``--set``.
 
     Args:

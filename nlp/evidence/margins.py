@@ -84,13 +84,13 @@ def measured_slack(nlp: Nlp, x: FloatArray, at: Linearisation, numbers: Sequence
         nlp: the nonlinear program.
         x: (n,) the point.
         at: linearised program at the point.
-        numbers: measured values of the constraints, from :func:`measured_numbers`; computed if left out.
+        numbers: measured values of the constraints, from :func:`measured_values`; computed if left out.
     """
     slack, constraints = at.slack.copy(), nlp.program.constraints
     sides = [(j, side.constraint) for j, side in enumerate(at.sides) if side.constraint is not None]
     for j, k in sides:
         if constraints[k].measure is not None:
-            numbers = measured_numbers(nlp, x) if numbers is None else numbers
+            numbers = measured_values(nlp, x) if numbers is None else numbers
             value = float(constraints[k].reading.to_value(SX(numbers[k])))
             slack[j] = -float(nlp.sides.sign[j] * (value - nlp.sides.limit[j]) * at.per_unit[j])
     return slack
@@ -102,7 +102,7 @@ def measured_violation(nlp: Nlp, x: FloatArray) -> float:
     return replace(at, slack=measured_slack(nlp, x, at)).violation
 
 
-def measured_numbers(nlp: Nlp, x: FloatArray) -> list[float]:
+def measured_values(nlp: Nlp, x: FloatArray) -> list[float]:
     """Return the measured value of each constraint's limit at a point (n,), radians for angles; NaN without a limit."""
     return _measured(nlp, x, nlp.program.constraints, nlp.evaluate(x)[1])
 
@@ -122,7 +122,7 @@ def margins_of(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
     active = set(at.active())
     mu, _ = multipliers(at, sorted(active)) if optimal else (np.zeros(len(at.sides)), 0.0)
     gained = -mu * nlp.sides.sign * at.per_unit * nlp.objective_scale * nlp.sign
-    measured = measured_numbers(nlp, x)
+    measured = measured_values(nlp, x)
     slack = measured_slack(nlp, x, at, measured)
     rows = []
     for j, side in enumerate(nlp.sides.sides):

@@ -21,7 +21,7 @@ from ...models.basis import settled_basis
 from ...models.linalg import echelon_basis
 from ...models.values import dataclass
 from ..case.case import Case
-from ..case.existence import fault_of_dimensions
+from ..case.existence import assembly_fault
 from ..errors import EvaluationError
 from ..program.nlp import Nlp
 from ..program.places import HeldRotation
@@ -134,7 +134,7 @@ def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
     parts = np.split(numbers.parameters.ravel(), np.cumsum(sizes)[:-1]) if sizes else []
     if not all(np.isfinite(each).all() for each in (numbers.squares, numbers.jacobian, numbers.rates, rotation)):
         dimensions = {item.name: part for item, part in zip(model.parameters, parts, strict=True)}
-        if fault := fault_of_dimensions(model, dimensions, case.units):
+        if fault := assembly_fault(model, dimensions, case.units):
             raise EvaluationError(f"{where}{fault}")
     for row, square in zip(model.wrenches, numbers.squares.ravel(), strict=True):
         if square == 0:

@@ -42,7 +42,7 @@ from ...models import (
 from ...models.instance import length_of, sizes_at
 from ...models.values import dataclass
 from ..case.case import Case
-from ..case.choices import check_no_choice
+from ..case.choices import check_no_catalogue
 from ..case.limits.constraint import BoundedConstraint, Call, Constraint, PairFamily, Reading, squared
 from ..case.pose import Free, Pose, Value, sizes_of_turn
 from ..case.task import Sense, Task
@@ -141,7 +141,7 @@ def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) 
     Raises:
         CaseError: an equation of fixed parameters is violated, or a dimension has a list of values to choose from.
     """
-    check_no_choice(case)
+    check_no_catalogue(case)
     table, model = SymbolTable(), case.model
     parameters = [
         table.add_each(case.component_names(item), item.dimension, _component_values(case, item))

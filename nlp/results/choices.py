@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from ...models import Dimension
-from ..case.choices import ChosenNumber, chosen_settings, listed_numbers
+from ..case.choices import ChosenDimension, catalogue_dimensions, chosen_settings
 from ..solver.status import Status
 from ..system.jsonvalues import JsonObject
 
@@ -26,7 +26,7 @@ class ChoiceData(JsonObject):
         statement: outcome in words.
     """
 
-    numbers: tuple[ChosenNumber, ...]
+    numbers: tuple[ChosenDimension, ...]
     combinations: int
     solved: int
     complete: bool
@@ -49,7 +49,7 @@ class RoundingData(JsonObject):
     """
 
     step: float
-    numbers: tuple[ChosenNumber, ...]
+    numbers: tuple[ChosenDimension, ...]
     before: float
     loss: float | None
     relative_loss: float | None
@@ -66,8 +66,10 @@ def choice_data(solution: "Solution") -> ChoiceData | None:
         return None
     chosen = chosen_settings(case, solution.outcomes[0].own.nlp.case)
     numbers = tuple(
-        ChosenNumber.of(each, case.units, value=chosen[each.name], unit=case.units.label(each.dimension), before=None)
-        for each in listed_numbers(case)
+        ChosenDimension.of(
+            each, case.units, value=chosen[each.name], unit=case.units.label(each.dimension), before=None
+        )
+        for each in catalogue_dimensions(case)
     )
     return ChoiceData.of(
         choice,
@@ -115,7 +117,7 @@ def rounding_data(solution: "Solution") -> RoundingData | None:
     choice = rounding.choice
     return RoundingData(
         step=rounding.step,
-        numbers=ChosenNumber.of_each(rounding.numbers, case.units),
+        numbers=ChosenDimension.of_each(rounding.numbers, case.units),
         before=before,
         loss=loss,
         relative_loss=None if loss is None or not before else loss / abs(before),

@@ -19,7 +19,7 @@ from ..evidence.conventions import dependence_of
 from ..evidence.evaluation import shown_parameters
 from ..evidence.kkt import FEASIBLE, linearise
 from ..evidence.loads import loading_of, loads_at
-from ..evidence.margins import measured_numbers, measured_slack, unit_of_side
+from ..evidence.margins import measured_slack, measured_values, unit_of_side
 from ..evidence.screwvalues import motion_of
 from ..evidence.state import PlatformPose, RobotState, evaluate, stated_poses
 from ..program.free_joints import FreeJoint, free_joints
@@ -211,7 +211,7 @@ def violations(nlp: Nlp, x: FloatArray) -> tuple[ViolationData, ...]:
     worst = -float(np.min(slack, initial=0.0)) if np.isfinite(slack).all() else math.inf
     least = -max(FEASIBLE, _SMALL * worst)
     outside = [j for j in range(len(slack)) if not slack[j] >= least]
-    measured = measured_numbers(nlp, x) if outside else []
+    measured = measured_values(nlp, x) if outside else []
     rows: list[ViolationData] = []
     for j in outside:
         side, limit = nlp.sides.sides[j], float(nlp.sides.limit[j])

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from ...models.statics import driven_joints
 from ..case.loads import NO_LOADING
-from ..case.motors import MotorNumber
+from ..case.motors import ActuatorQuantity
 from ..case.task import Sense
 from ..evidence.state import WorkspacePose
 from ..proof.statement.claims import ACTUATED
@@ -61,7 +61,7 @@ class MotorData(JsonObject):
     """
 
     actuator: str
-    number: MotorNumber
+    number: ActuatorQuantity
     unit: str
     load: Absent[str]
     smallest: Absent[MotorEndData]
@@ -189,7 +189,7 @@ def _motors(judged: "Judgement") -> Iterator[MotorData]:
     case = judged.case
     if case.loading == NO_LOADING:
         return
-    found: dict[tuple[MotorNumber, str, str], list[Verdict]] = {}
+    found: dict[tuple[ActuatorQuantity, str, str], list[Verdict]] = {}
     for each in judged.extremes:
         if each.motor is not None:
             found.setdefault((each.motor.number, each.motor.actuator, each.motor.load), []).append(each)
@@ -197,8 +197,8 @@ def _motors(judged: "Judgement") -> Iterator[MotorData]:
         names = [f"{measure} limb {joint.name}" for measure in ("leg_length", *ACTUATED)]
         own = {each.sense: each for each in judged.extremes if each.name in names}
         if len(own) == len(Sense):
-            found[MotorNumber.COORDINATE, joint.name, ""] = list(own.values())
-    order, names = list(MotorNumber), [joint.name for joint in driven_joints(case.model)]
+            found[ActuatorQuantity.COORDINATE, joint.name, ""] = list(own.values())
+    order, names = list(ActuatorQuantity), [joint.name for joint in driven_joints(case.model)]
     for key in sorted(found, key=lambda key: (names.index(key[1]), order.index(key[0]))):
         (what, actuator, load), every = key, found[key]
         ends = {sense: [each for each in every if each.sense is sense] for sense in Sense}

@@ -12,7 +12,7 @@ from ...models import FloatArray
 from ...models.shown import Shown
 from ...models.whole import Whole
 from ..case.case import Case
-from ..case.choices import listed_numbers
+from ..case.choices import catalogue_dimensions
 from ..case.task import Method, Sense
 from ..errors import InputError, check_seconds
 from ..interruption import is_requested, one_call, reason_of, seconds_left, within
@@ -162,7 +162,7 @@ def certify(
             tasks = tuple(replace(each, scope=_ROUNDED) for each in own.tasks)
             combined = None if own.combined is None else replace(own.combined, scope=_ROUNDED)
             return replace(own, solution=solution, tasks=tasks, combined=combined)
-        if listed_numbers(case):
+        if catalogue_dimensions(case):
             return _certify_choices(found, options, starts, seed, prove)
         return prove(found, options)
 
@@ -175,7 +175,7 @@ def _check_writable(case: Case, *, is_rounded: bool) -> None:
     """
     if is_rounded:
         raise OptionError("proof: no case file contains the rounded dimensions; give them with --set")
-    if listed_numbers(case):
+    if catalogue_dimensions(case):
         raise OptionError("proof: each combination of listed values is a separate program; give the values with --set")
     if case.is_optimised_everywhere:
         raise OptionError(

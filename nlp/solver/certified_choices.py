@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
 from ..case.case import Case
-from ..case.choices import Ranges, listed_numbers, within_ranges
+from ..case.choices import Ranges, catalogue_dimensions, within_ranges
 from ..interruption import is_requested, seconds_left, why_stopped, within
 from ..proof.certificate.certificate import Certificate, CertificateStatus
 from .choices import combinations_of, exists
@@ -66,7 +66,7 @@ def prove_choices(
         is_each: If true, certify every combination separately, as for a lower bound on F.
     """
     began = time.perf_counter()
-    numbers, chosen = listed_numbers(case), choice.chosen
+    numbers, chosen = catalogue_dimensions(case), choice.chosen
     parts = [part for part in choice.parts if part.ranges != choice.chosen]
     if is_each:
         parts = [each for part in parts for each in _combinations_in(part, choice.chosen)]

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..case.case import Case
-from ..case.choices import ListedNumber, Ranges, all_values, listed_numbers, within_ranges
+from ..case.choices import CatalogueDimension, Ranges, all_values, catalogue_dimensions, within_ranges
 from ..errors import EvaluationError, NoRobotError
 from ..interruption import is_requested, one_call
 from .solution import Choice, ChoicePart, Solution, interrupted
@@ -75,7 +75,7 @@ class _Search:
 
     def __init__(self, case: Case, solve_fixed: Callable[[Case], Solution], most: float) -> None:
         self._case, self._solve, self._most = case, solve_fixed, most
-        self._numbers = listed_numbers(case)
+        self._numbers = catalogue_dimensions(case)
         self._solved: dict[Ranges, Solution] = {}
         self._cut: dict[Ranges, Solution] = {}
         self._relaxed = 0
@@ -206,7 +206,7 @@ class _Search:
         return low, high
 
 
-def exists(case: Case, numbers: Sequence[ListedNumber], ranges: Ranges) -> bool:
+def exists(case: Case, numbers: Sequence[CatalogueDimension], ranges: Ranges) -> bool:
     """Return whether the robot's loops can be closed with the values of a combination."""
     try:
         within_ranges(case, numbers, ranges)
@@ -222,7 +222,7 @@ def combinations_of(ranges: Ranges) -> Iterator[Ranges]:
         yield tuple((first + k, first + k + 1) for (first, _), k in zip(ranges, index, strict=True))
 
 
-def _value_of(solution: Solution | None, number: ListedNumber) -> float:
+def _value_of(solution: Solution | None, number: CatalogueDimension) -> float:
     """Return the value of a listed parameter at a solution; the middle of its values where the robot has none."""
     state = None if solution is None else solution.outcomes[0].state
     if state is None:

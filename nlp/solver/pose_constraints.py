@@ -45,7 +45,7 @@ from ..program.epigraph import level_constraint
 from ..program.nlp import Nlp
 from ..program.places import Scalar
 from ..proof.statement.claims import Claim, dependent_claims
-from ..proof.statement.machine import workspace_of_case
+from ..proof.statement.fixed_robot import workspace_of_case
 from ..proof.statement.tolerance import BuiltModel, built_model
 from ..proof.workspace.robot.pose_box import PoseNumbers, pose_box, rotation_of
 from ..proof.workspace.robot.posed_robot import NotJudgedError, Problem, build_problem

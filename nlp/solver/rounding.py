@@ -19,7 +19,7 @@ import numpy as np
 
 from ...models import Dimension
 from ..case.case import Case
-from ..case.choices import ChosenNumber, listed_numbers, within_ranges
+from ..case.choices import ChosenDimension, catalogue_dimensions, within_ranges
 from ..case.pose import Free, Value
 from ..case.task import Method
 from ..errors import InputError
@@ -80,7 +80,9 @@ def round_design(
     check_rounding(case, step)
     if not solution.status.is_answer:
         return solution
-    chosen = case if solution.choice is None else within_ranges(case, listed_numbers(case), solution.choice.chosen)
+    chosen = (
+        case if solution.choice is None else within_ranges(case, catalogue_dimensions(case), solution.choice.chosen)
+    )
     places = list(_places(chosen, solution))
     solve_fixed = partial(solve, starts=starts, seed=seed, jobs=jobs, compiled=compiled)
     found, farther = solution, 0
@@ -91,12 +93,12 @@ def round_design(
             for item in case.model.parameters
         }
         near = replace(chosen, parameters=parameters)
-        found = solve_choices(near, solve_fixed, _MOST) if listed_numbers(near) else solve_fixed(near)
+        found = solve_choices(near, solve_fixed, _MOST) if catalogue_dimensions(near) else solve_fixed(near)
         if found.status.is_answer or found.status is Status.INTERRUPTED:
             break
     state = found.outcomes[0].state
     numbers = tuple(
-        ChosenNumber(
+        ChosenDimension(
             name=each.name,
             value=math.nan if state is None else float(np.ravel(state.parameters[each.parameter])[each.component]),
             unit=case.units.label(each.dimension),

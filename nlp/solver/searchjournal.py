@@ -108,7 +108,7 @@ class SearchJournal(JournalFile):
             path, {"screwsynth": "searches", "version": __version__}, "command", "choose another --resume, or remove it"
         )
 
-    def found(self, place: int, line: bytes) -> None:
+    def load_entry(self, place: int, line: bytes) -> None:
         """Store an entry that is in the file."""
         del place
         with suppress(ValueError):

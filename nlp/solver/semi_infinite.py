@@ -38,7 +38,7 @@ from ..path.path import SymbolicPose
 from ..program.nlp import Nlp
 from ..proof.enclosure.engine import kernel
 from ..proof.statement.claims import REGULAR
-from ..proof.statement.machine import JointErrors, workspace_of_case
+from ..proof.statement.fixed_robot import JointErrors, workspace_of_case
 from ..proof.statement.posed_layout import reach_claims
 from ..proof.workspace.judge import judge_workspace
 from ..proof.workspace.judgement import Judgement

@@ -12,10 +12,10 @@ from ...models.shown import Shown
 from ...models.values import dataclass
 from ...models.whole import Whole
 from ..case.case import Case
-from ..case.choices import ChosenNumber, Ranges
+from ..case.choices import ChosenDimension, Ranges
 from ..case.task import Method, Task
 from ..errors import EvaluationError, InputError, nearest
-from ..evidence.evaluation import shown_numbers, shown_parameters
+from ..evidence.evaluation import shown_parameters, shown_values
 from ..evidence.optimality import Evidence
 from ..evidence.state import RobotState
 from ..program.nlp import Nlp
@@ -189,7 +189,7 @@ class Rounding:
     before: float
     after: float
     farther: int
-    numbers: tuple[ChosenNumber, ...]
+    numbers: tuple[ChosenDimension, ...]
     choice: Choice | None
 
 
@@ -253,7 +253,7 @@ class Solution(Whole, Shown, Answer):
             InputError: the case has no value of this name.
             EvaluationError: the robot's loops cannot be closed at the point.
         """
-        numbers = shown_numbers(self.outcomes[0].own.nlp, self.x, self._state())
+        numbers = shown_values(self.outcomes[0].own.nlp, self.x, self._state())
         if name not in numbers:
             raise InputError(f"{name}: no such number; {nearest(str(name), numbers)}")
         return numbers[name]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from ...models import FloatArray
 from ..case.case import Case
-from ..case.choices import listed_numbers
+from ..case.choices import catalogue_dimensions
 from ..case.settings import Search
 from ..errors import CaseError
 from ..program.formulation import formulate_each, formulate_everywhere
@@ -64,7 +64,7 @@ def solve(
             workspace or along a path, and the C kernel for their proof was not built; or the path cannot be read.
     """
     began = time.perf_counter()
-    if listed_numbers(case):
+    if catalogue_dimensions(case):
         from .choices import solve_choices  # noqa: PLC0415 - few cases have listed values
 
         solve_fixed = partial(

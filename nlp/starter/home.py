@@ -23,7 +23,7 @@ from ...models import (
     homogenised,
     screw_from_axis,
 )
-from ...models.mechanism.freedoms import null_space
+from ...models.mechanism.mobility import null_space
 from ...models.rows import rank_of
 from ..case.case import Case
 from ..case.pose import Free, Rotation, Value

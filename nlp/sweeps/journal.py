@@ -99,7 +99,7 @@ class Journal(JournalFile):
         head = {"screwsynth": "sweep", "fingerprint": fingerprint, "points": count}
         super().__init__(path, head, "sweep", "choose another --out, or remove it")
 
-    def found(self, place: int, line: bytes) -> None:
+    def load_entry(self, place: int, line: bytes) -> None:
         """Register a row of the file at its position."""
         with suppress(ValueError):
             index = row_of(Row, line).point

@@ -80,7 +80,7 @@ class JournalFile:
             self._file.close()
             raise
 
-    def found(self, place: int, line: bytes) -> None:
+    def load_entry(self, place: int, line: bytes) -> None:
         """Process an existing line of the file at a byte position."""
         raise NotImplementedError
 
@@ -153,7 +153,7 @@ class JournalFile:
         for line in self._file:
             if not line.endswith(b"\n"):
                 break
-            self.found(place, line)
+            self.load_entry(place, line)
             place += len(line)
         self._file.truncate(place)
         return place

@@ -62,7 +62,7 @@ def claim_words(claim: PosedClaim) -> str:
     return f"{each.name}:{value}{limit}{where}"
 
 
-def seeing_lines(result: WorkspaceResult, command: Callable[[WorkspacePose], str]) -> Iterator[Line]:
+def violation_lines(result: WorkspaceResult, command: Callable[[WorkspacePose], str]) -> Iterator[Line]:
     """Yield the commands that show violations: for each limit, the claim that is farthest beyond it.
 
     Args:

@@ -219,7 +219,7 @@ def certificate_columns(certificate_of: Callable[[Row], CertificateData | None])
     yield Column("gap", number_of("gap"), ColumnKind.PROOF)
 
 
-def free_numbers(nlp: Nlp, x: FloatArray) -> tuple[str, ...]:
+def design_values(nlp: Nlp, x: FloatArray) -> tuple[str, ...]:
     """Return the free dimensions and pose coordinates of a program, with name, value and unit."""
     units, variables = nlp.case.units, nlp.program.variables
     found = []

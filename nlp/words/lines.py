@@ -179,7 +179,7 @@ def objective_lines(case: Case) -> Iterator[Line]:
 def evidence_lines(result: SolveResult, case: Case) -> Iterator[Line]:
     """Yield the kind of the point, its evidence, and the limits that a failed solve violates or that must be moved."""
     if result.optimality is not None:
-        yield verdict_line(result.optimality)
+        yield optimality_line(result.optimality)
     yield from check_lines(result)
     yield from fault_lines(result, case)
 
@@ -208,7 +208,7 @@ def fault_lines(result: SolveResult, case: Case) -> Iterator[Line]:
         yield Line(sentence)
 
 
-def verdict_line(evidence: Evidence) -> Line:
+def optimality_line(evidence: Evidence) -> Line:
     """Return the kind of a point, such as a strict local maximum."""
     return Line(evidence.kind.value, label="optimality")
 
@@ -392,4 +392,4 @@ def combined_value_lines(combined: CombinedData) -> Iterator[Line]:
         return
     yield Line(number(combined.value), label=f"{combined.method.value} objective")
     if combined.optimality is not None:
-        yield verdict_line(combined.optimality)
+        yield optimality_line(combined.optimality)

@@ -18,11 +18,11 @@ from .verdicts import (
     answer_words,
     exchange_lines,
     head_lines,
-    machine_lines,
     open_lines,
     outcome_lines,
     proof_line,
     tightest_table,
+    tolerance_lines,
     verdict_table,
 )
 
@@ -177,7 +177,7 @@ def path_proof_lines(case: Case, proof: PathProofData) -> Iterator[Line]:
                 between = f" (bounds {' .. '.join(ends)})"
             yield Line(f"{number(given)} {case.units.label(dimension)}", label=f"path placement {name}", after=between)
     yield from exchange_lines(proof, "path")
-    yield from machine_lines(case, proof.joint_centre)
+    yield from tolerance_lines(case, proof.joint_centre)
 
 
 def tightest_along(proof: PathProofData) -> Iterator[TextTable]:

@@ -27,12 +27,12 @@ from .lines import (
     heading_lines,
     is_unasked_singularity,
     objective_lines,
+    optimality_line,
     singularity_lines,
     starts_lines,
     task_lines,
     title_line,
     tolerance_line,
-    verdict_line,
     violation_lines,
 )
 from .loads import loading_tables
@@ -73,13 +73,13 @@ def _task_summary(case: Case, result: SolveResult) -> Summary:
     yield from fault_lines(result, case)
     if result.F is None:
         yield from starts_lines(result.starts, robot)
-        if case.limits_over == "workspace" and case.not_held is not None:
-            yield Line(case.not_held.sentence, label="note")
+        if case.limits_over == "workspace" and case.outside_workspace is not None:
+            yield Line(case.outside_workspace.sentence, label="note")
     elif (caution := better_line(result.starts)) is not None:
         yield caution
     yield from _proof_lines(case, result)
     if result.optimality is not None:
-        yield verdict_line(result.optimality)
+        yield optimality_line(result.optimality)
     yield from certificate_lines(result.certificate)
     if robot is not None and result.reached is None:
         yield from singularity_lines(robot, case.units)
@@ -116,11 +116,11 @@ def _proof_lines(case: Case, result: CaseResult) -> Iterator[Line]:
     """Yield the proof of a design over a workspace, or along a path."""
     if result.workspace is not None:
         # Few cases have a proof, and these modules load the rooms of proofs.
-        from .verdicts import machine_lines  # noqa: PLC0415
+        from .verdicts import tolerance_lines  # noqa: PLC0415
         from .workspace import proof_lines  # noqa: PLC0415
 
         yield from proof_lines(result.workspace)
-        yield from machine_lines(case, result.workspace.joint_centre)
+        yield from tolerance_lines(case, result.workspace.joint_centre)
     if result.path is not None:
         from .path import path_proof_lines  # noqa: PLC0415 - in the same way
 

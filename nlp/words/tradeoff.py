@@ -9,7 +9,7 @@ from ..case.case import Case
 from ..results.tradeoff import LIMITS, TradeoffPointData, TradeoffResult
 from ..solver.status import Status
 from ..solver.tradeoff import Tradeoff
-from .designs import Column, ColumnKind, Designs, DrawnDesign, Join, PageWords, certificate_columns, free_numbers
+from .designs import Column, ColumnKind, Designs, DrawnDesign, Join, PageWords, certificate_columns, design_values
 from .lines import title_line
 from .numbers import number, per_words
 from .text import Line, Tone
@@ -125,7 +125,7 @@ def _drawn(result: TradeoffResult, found: Tradeoff) -> list[DrawnDesign]:
                 DrawnDesign(
                     f"{result.over} = {row.value:.5g} {result.unit}".rstrip(),
                     F or ", ".join(of_each),
-                    free_numbers(outcome.own.nlp, outcome.x),
+                    design_values(outcome.own.nlp, outcome.x),
                     tuple(each.removeprefix(LIMITS) for each in row.active),
                     outcome.own.nlp,
                     outcome.x,

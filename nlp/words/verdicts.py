@@ -20,7 +20,7 @@ from .text import Line, TextTable, Tone
 
 if TYPE_CHECKING:
     from ..results.exchange import ExchangeData
-    from ..results.verdicts import MachineData, VerdictData
+    from ..results.verdicts import JointErrorsData, VerdictData
 
 #: Largest number of claims in the digest, and of kinds of limits in the count of an outcome.
 _TIGHTEST, _GROUPS = 5, 6
@@ -128,7 +128,7 @@ def _size_of(name: str, claims: Sequence[VerdictData]) -> float:
     return max((abs(part) for pose in poses for part in pose.position), default=0.0)
 
 
-def machine_lines(case: Case, joint_centre: float | None) -> Iterator[Line]:
+def tolerance_lines(case: Case, joint_centre: float | None) -> Iterator[Line]:
     """Yield the tolerance that a verdict covers; nothing where it is about the exact robot only."""
     if joint_centre is not None:
         words = f"covers every robot whose joint centres are off by at most {joint_centre:g} {case.units.length}"
@@ -170,7 +170,7 @@ def _room(each: VerdictData) -> float:
     return (value - limit if each.sense is Sense.MIN else limit - value) / (abs(limit) or 1.0)
 
 
-def violating_robot(case: Case, name: str, machine: MachineData) -> TextTable:
+def violating_robot(case: Case, name: str, machine: JointErrorsData) -> TextTable:
     """Return the joint-centre errors of the robot within the tolerance that violates a claim."""
     unit, title = case.units.length, f"robot within the tolerance that violates: {name}"
     if machine.centres is not None:

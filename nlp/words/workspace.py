@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 from ...models import Dimension
 from ..case.case import Case
-from ..case.motors import MotorNumber
+from ..case.motors import ActuatorQuantity
 from ..case.pose import ends_of
 from ..case.task import Sense
 from ..interruption import STOPPED
 from ..proof.statement.claims import CONSTRAINTS, REGULAR
 from ..proof.workspace.verdict import EVERYWHERE, Outcome
-from .claims import CLAIM_WORDS, rank_line, seeing_lines
+from .claims import CLAIM_WORDS, rank_line, violation_lines
 from .motors import OUTCOME_WORDS, ends_of_motor, motor_tables
 from .numbers import number
 from .poses import pose_words
@@ -23,11 +23,11 @@ from .verdicts import (
     answer_words,
     exchange_lines,
     head_lines,
-    machine_lines,
     open_lines,
     outcome_lines,
     proof_line,
     tightest_table,
+    tolerance_lines,
     verdict_table,
     violating_robot,
 )
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 def _about_lines(case: Case, result: WorkspaceResult) -> Iterator[Line]:
     """Yield the tolerance and the set of poses that a verdict covers, where these are not the robot and the box."""
-    yield from machine_lines(case, result.joint_centre)
+    yield from tolerance_lines(case, result.joint_centre)
     if result.poses is not None:
         yield Line(result.poses, label="poses")
 
@@ -61,7 +61,10 @@ def verdict_words(result: WorkspaceResult) -> str:
     limits = [each.outcome for each in result.extremes if each.limit is not None]
     words = answer_words(ranks, limits, "at every pose", is_proved=result.proved)
     ends = [
-        end for each in result.motors or () if each.number is not MotorNumber.COORDINATE for end in ends_of_motor(each)
+        end
+        for each in result.motors or ()
+        if each.number is not ActuatorQuantity.COORDINATE
+        for end in ends_of_motor(each)
     ]
     shown = sum(each.limit is None and each.outcome is Outcome.OPEN for each in result.extremes)
     shown += sum(each.limit is None and each.outcome is Outcome.OPEN for each in ends)
@@ -101,7 +104,7 @@ def workspace_summary(
         yield from _regular_lines(case, result.constraints, CONSTRAINTS)
     yield from outcome_lines(limited)
     if command is not None:
-        yield from seeing_lines(result, command)
+        yield from violation_lines(result, command)
         yield from open_lines(limited)
     yield from _needs_line(case, result)
     if result.scale is not None:

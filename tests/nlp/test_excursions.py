@@ -15,7 +15,7 @@ from measures import circle_joints
 from path_cases import turns_of
 
 from screwsynth.nlp import Case, CaseError, Solution, case_text, compare, judge_workspace, solve
-from screwsynth.nlp.proof.statement.machine import workspace_of_case
+from screwsynth.nlp.proof.statement.fixed_robot import workspace_of_case
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseNumbers, pose_box
 from screwsynth.nlp.solver.frames import pose_of
 
@@ -334,7 +334,7 @@ HELD = {
 
 def notice_of(given: dict[str, Any]) -> str:
     """The sentence about a workspace that holds no pose; empty for another."""
-    found = case_from(given).not_held
+    found = case_from(given).outside_workspace
     assert found is None or len(found.sentence) < 200
     return "" if found is None else found.sentence
 

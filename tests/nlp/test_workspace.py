@@ -32,7 +32,7 @@ from screwsynth.models import FloatArray
 from screwsynth.nlp import Case, CaseError, Free, Limits, json_data, load_case, load_result, result_of, solve
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.proof.enclosure.forms import Encloser
-from screwsynth.nlp.proof.statement.machine import Legs, legs_of
+from screwsynth.nlp.proof.statement.fixed_robot import Legs, legs_of
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal, Number
 from screwsynth.nlp.proof.workspace.numbers.jacobian_numbers import WorstError
@@ -401,7 +401,7 @@ def test_slices_show_where_the_determinant_has_which_sign(case: Case, cli: Run, 
     output_of(cli("workspace", str(machine), "--gap", "0.05", "--plot", str(picture)))
     text = picture.read_text(encoding="utf-8")
     assert 'id="workspace"' in text
-    assert 'id="proved: regular, and every limit is kept"' in text
+    assert 'id="proved: no singularity, all limits satisfied"' in text
 
 
 def random_errors(robot: Legs, box: PoseBox, eps: float, count: int, *, extreme: bool) -> tuple[FloatArray, FloatArray]:

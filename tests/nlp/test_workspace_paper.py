@@ -44,7 +44,7 @@ from screwsynth.nlp.proof.checker.workspace.number_claims import (
 )
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import BoxClaim, PoseRoot, pose_root
 from screwsynth.nlp.proof.checker.workspace.ranks import RankClaim, rank_claim
-from screwsynth.nlp.proof.statement.machine import Legs, legs_of
+from screwsynth.nlp.proof.statement.fixed_robot import Legs, legs_of
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Number
 from screwsynth.nlp.proof.workspace.numbers.jacobian_numbers import WorstError
 from screwsynth.nlp.proof.workspace.numbers.pose_error import PoseErrors, with_rest

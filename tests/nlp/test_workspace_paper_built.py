@@ -38,7 +38,7 @@ from screwsynth.nlp.proof.checker.workspace.number_claims import SecondOrderClai
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import PoseRoot, pose_root
 from screwsynth.nlp.proof.checker.workspace.ranks import RankClaim, rank_claim
 from screwsynth.nlp.proof.checker.workspace.statement import RobotsWithinTolerance
-from screwsynth.nlp.proof.statement.machine import Legs
+from screwsynth.nlp.proof.statement.fixed_robot import Legs
 from screwsynth.nlp.proof.statement.tolerance import Directions, length_of_one_robot, second_order_name
 from screwsynth.nlp.proof.workspace.numbers.extremes import NumberSearch
 from screwsynth.nlp.proof.workspace.numbers.searched import Subject, searched_extremes
@@ -372,7 +372,7 @@ def test_a_singular_machine_within_the_tolerance_is_on_paper() -> None:
     assert judged.regularity.errors is not None
     (found,) = check.check_workspace_proof(given, case_of(text)).claims
     assert found.is_refuted
-    assert found.by_machine
+    assert found.is_within_tolerance
     design, machine = claim(given, "regular").sides
     assert design == (*machine[:6], *[0.0] * 36)
     for sides, fault in (

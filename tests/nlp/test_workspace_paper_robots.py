@@ -28,14 +28,14 @@ from screwsynth.models import FloatArray
 from screwsynth.models.joints.model.closedform import closed_form
 from screwsynth.nlp import Case, Judgement, Loading, Motion, Outcome, Verdict
 from screwsynth.nlp.case.source import find_case
-from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, read_proof, workspace_numbers
+from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, read_proof, workspace_premise
 from screwsynth.nlp.proof.checker.tree import Node, node_bytes
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.checker.workspace.closed_loops import Assembly
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import _PoseRule
 from screwsynth.nlp.proof.checker.workspace.statement import robot_claims
 from screwsynth.nlp.proof.statement.claims import REGULAR
-from screwsynth.nlp.proof.statement.machine import workspace_of_case
+from screwsynth.nlp.proof.statement.fixed_robot import workspace_of_case
 from screwsynth.nlp.proof.workspace.numbers.searched import Subject, motor_extremes
 from screwsynth.nlp.proof.workspace.numbers.within_tolerance import RobotsWithinTolerance
 from screwsynth.nlp.proof.workspace.proof_record import ProofRecord
@@ -191,7 +191,7 @@ def test_the_tree_of_another_workspace_does_not_hide_a_singular_pose(
     _, proof = reachy
     case = reachy_case(1.0)
     monkeypatch.setattr(_PoseRule, "most_pieces", 100)
-    other = stating(only(proof, "regular"), workspace=workspace_numbers(case.workspace))
+    other = stating(only(proof, "regular"), workspace=workspace_premise(case.workspace))
     # All claims about limits are named, and none is proved.
     assert "could not be shown" in rejected(other, case)
 
@@ -221,7 +221,7 @@ def test_a_singular_pose_of_a_robot_without_loops_is_on_paper() -> None:
     assert "opposite signs" in rejected(only(proof, "regular", sides=(first, first)), case)
     assert "not one of the workspace" in rejected(only(proof, "regular", sides=(first, (99.0, *second[1:]))), case)
     small = gallery_case("6-ups", 0.02, 5, 1)
-    other = stating(proof, workspace=workspace_numbers(small.workspace))
+    other = stating(proof, workspace=workspace_premise(small.workspace))
     assert "not one of the workspace" in rejected(other, small)
 
 

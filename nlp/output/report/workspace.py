@@ -16,7 +16,7 @@ from ...words.claims import claim_words
 from ...words.numbers import number
 from ...words.poses import pose_words
 from ...words.text import TextTable
-from ...words.verdicts import machine_lines
+from ...words.verdicts import tolerance_lines
 from ...words.workspace import verdict_words, workspace_summary
 from ..pictures.figures import picture
 from ..pictures.workspaces import Kind, drawing_at, slice_images, slices_legend, slices_notes
@@ -106,7 +106,7 @@ def _dimensions(report: WorkspaceReport) -> Markup:
         names = case.component_names(item)
         rows += [(name, number(value, largest), unit) for name, value in zip(names, values, strict=True)]
     table = html_table(TextTable(("", "value", "unit"), tuple(rows), "dimensions"), "Dimensions", id="dimensions")
-    return join_markup([table, paragraphs(machine_lines(case, report.result.joint_centre))])
+    return join_markup([table, paragraphs(tolerance_lines(case, report.result.joint_centre))])
 
 
 def _robot(report: WorkspaceReport) -> Markup:

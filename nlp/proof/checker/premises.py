@@ -128,7 +128,7 @@ def is_same_program(one: str, other: str) -> bool:
         return False
 
 
-def hold_statement(case: Case, statement: Statement, *, above: float | None, all_assemblies: bool) -> None:
+def check_statement(case: Case, statement: Statement, *, above: float | None, all_assemblies: bool) -> None:
     """Refuse a proof whose statement is not the requested one.
 
     Args:

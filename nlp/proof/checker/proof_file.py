@@ -124,7 +124,7 @@ class Premises:
     """Premises of a proof about a workspace, as stated in its file; everything else follows from the case.
 
     Attributes:
-        workspace: poses of the workspace, from :func:`workspace_numbers`.
+        workspace: poses of the workspace, from :func:`workspace_premise`.
         legs: (12, 3) joint centres of six straight legs, base before platform; empty for another robot.
         quantities: names of the requested quantities.
         leg_error: largest error of a leg's length.
@@ -217,7 +217,7 @@ class Proof:
         return json.dumps(asdict(file), indent=1, allow_nan=False) + "\n"
 
 
-def workspace_numbers(workspace: Workspace) -> Poses:
+def workspace_premise(workspace: Workspace) -> Poses:
     """Return a workspace as texts and numbers: ranges of the position, kind, ranges of the angles, axis."""
     position, angles = (tuple(map(ends_of, values)) for values in (workspace.position, workspace.turns.angles))
     return position, workspace.turns.kind.value, angles, tuple(workspace.turns.axis)

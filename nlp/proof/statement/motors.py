@@ -16,7 +16,7 @@ from ...case.forces import dimension_of_force, dimension_of_speed
 from ...case.limits.constraint import Reading
 from ...case.limits.forces import ActuatorForce, ActuatorLimit, ActuatorPower, ActuatorSpeed
 from ...case.loads import Motion
-from ...case.motors import Motor, MotorNumber
+from ...case.motors import ActuatorQuantity, Motor
 from ...case.task import Sense
 from ...program.layout import Layout
 from .claims import ACTUATED, Claim, ClaimKind
@@ -76,7 +76,7 @@ def _claims(case: Case) -> Iterator[Claim]:
         reading = Reading(dimension_of_force(joint))
         yield from _speeds(case, k, joint) if loading.motion is not None else ()
         for load in loading.cases:
-            motor = Motor(MotorNumber.FORCE, k, joint.name, load.name)
+            motor = Motor(ActuatorQuantity.FORCE, k, joint.name, load.name)
             for limit in forces:
                 low, high = (limit.min, limit.max) if isinstance(limit, ActuatorForce) else (None, None)
                 if low is None and high is not None:  # a largest force without a smallest one limits both directions
@@ -85,14 +85,14 @@ def _claims(case: Case) -> Iterator[Claim]:
                     yield _claim(motor, " smallest", Sense.MIN, reading, limit, "min", low)
                 yield _claim(motor, "", Sense.MAX, reading, limit)
             for limit, part in itertools.product(powers if loading.motion is not None else (), ("", " backwards")):
-                power = Motor(MotorNumber.POWER, k, joint.name, load.name, is_backwards=bool(part))
+                power = Motor(ActuatorQuantity.POWER, k, joint.name, load.name, is_backwards=bool(part))
                 yield _claim(power, part, Sense.MAX, Reading(Dimension.POWER), limit)
 
 
 def _speeds(case: Case, k: int, joint: DrivenJoint) -> Iterator[Claim]:
     """Yield the claim about the speed of an actuator for each of its limits, or without a limit."""
     for limit in _limits(case, ActuatorSpeed, joint.name):
-        motor = Motor(MotorNumber.SPEED, k, joint.name)
+        motor = Motor(ActuatorQuantity.SPEED, k, joint.name)
         yield _claim(motor, "", Sense.MAX, Reading(dimension_of_speed(joint)), limit)
 
 

@@ -18,7 +18,7 @@ from ....models.rotation import turn_about
 from ...case.case import Case
 from ...case.limits.constraint import Reading
 from ...case.limits.limits import Limits
-from ...case.pose import HERE, Pose, Rotation, Value
+from ...case.pose import NO_DISPLACEMENT, Pose, Rotation, Value
 from ...case.task import Sense
 from ...case.workspace import TurnKind, Workspace
 from ...program.layout import Layout, StatedPoseSymbols, assemble, lay_out
@@ -40,7 +40,7 @@ def at_one_pose(case: Case, position: Sequence[Value], rotation: Rotation) -> Ca
         case,
         position=position,
         rotation=rotation,
-        displacements=(HERE,),
+        displacements=(NO_DISPLACEMENT,),
         further=(),
         worst_everywhere=False,
         workspace=None,
@@ -65,7 +65,9 @@ def posed_layout(case: Case, workspace: Workspace) -> Layout:
         ]
         about = [turn_about(k, ca.cos(angle), ca.sin(angle)) for k, angle in enumerate(angles)]
         turned = about[2] @ about[1] @ about[0]
-        return StatedPoseSymbols(turned, position.symbols, position.places, position.symbols, None, [], (HERE,))
+        return StatedPoseSymbols(
+            turned, position.symbols, position.places, position.symbols, None, [], (NO_DISPLACEMENT,)
+        )
 
     return lay_out(one, one.tasks, add_turns)
 

@@ -26,12 +26,12 @@ from ...case.limits.constraint import LENGTH, BoundedConstraint, Constraint, Rea
 from ...case.limits.joints import BaseJointAngle, JointAngle, MountingPose, unit_axes
 from ...case.limits.limit import Limit
 from ...case.limits.limits import Limits
-from ...case.pose import HERE, Free, Pose, Rotation, Value
+from ...case.pose import NO_DISPLACEMENT, Free, Pose, Rotation, Value
 from ...case.task import Sense
 from ...program.layout import Layout, StatedPoseSymbols, lay_out
 from ...program.places import SymbolTable
 from .claims import Claim, claims_of, one_robot_name
-from .machine import joint_centres
+from .fixed_robot import joint_centres
 from .posed_layout import at_one_pose, reach_claims_on, without_loops
 
 #: Part of the norm of a derivative below which the norm is smoothed; and relative place in the ranges of the pose at
@@ -129,7 +129,9 @@ def coordinate_layout(case: Case, at: PoseCoordinates) -> Layout:
         turn = ca.vertcat(*turns)
         ball = Constraint(f"{prefix}turn", ca.sumsqr(turn), Reading(Dimension.NUMBER))
         held = [BoundedConstraint(ball, -math.inf, at.ball)] if at.ball < math.inf else []
-        return StatedPoseSymbols(at.rotation(turn), placed.symbols, placed.places, placed.symbols, None, held, (HERE,))
+        return StatedPoseSymbols(
+            at.rotation(turn), placed.symbols, placed.places, placed.symbols, None, held, (NO_DISPLACEMENT,)
+        )
 
     return lay_out(one, one.tasks, add_pose)
 

@@ -25,7 +25,7 @@ from ...evidence.state import evaluate
 from ...program.layout import Layout, robot_length
 from ...program.nlp import Nlp
 from ..statement.claims import REACH, Claim, claims_of
-from ..statement.machine import JointErrors
+from ..statement.fixed_robot import JointErrors
 from ..statement.posed_layout import extreme_program
 from ..statement.tolerance import coordinate_layout
 from .numbers.within_tolerance import RobotsWithinTolerance

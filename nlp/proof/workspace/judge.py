@@ -16,7 +16,7 @@ from ...case.workspace import Workspace
 from ...interruption import one_call, within
 from ..enclosure.engine import kernel
 from ..statement.claims import REACH, REGULAR, SPECTRAL, Claim, claims_of, dependent_claims
-from ..statement.machine import check_leg_error, has_straight_legs, workspace_of_case
+from ..statement.fixed_robot import check_leg_error, has_straight_legs, workspace_of_case
 from ..statement.posed_layout import closed_layout, posed_layout, reach_claims
 from ..statement.tolerance import Directions, coordinate_layout, length_of_one_robot
 from .home_poses import Homes

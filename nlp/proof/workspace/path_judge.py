@@ -14,7 +14,7 @@ import casadi as ca
 
 from ...case.case import Case
 from ...case.checks import check_determined_joints
-from ...case.motors import MotorNumber
+from ...case.motors import ActuatorQuantity
 from ...case.workspace import Workspace
 from ...errors import UncoveredError
 from ...interruption import one_call, within
@@ -215,7 +215,9 @@ class _AlongPath(Judging):
             subject = replace(subject, case=replace(moving, loading=moving.loading._replace(motion=None)))
         yield from self._motors(subject, {each.motor.actuator: each.bound for each in speeds.verdicts if each.motor})
         if speeds.number is None:
-            powers = [each for each in motor_claims(moving) if each.motor and each.motor.number is MotorNumber.POWER]
+            powers = [
+                each for each in motor_claims(moving) if each.motor and each.motor.number is ActuatorQuantity.POWER
+            ]
             reason = speeds.verdicts[0].reason
             yield from (verdict_of(each, Minimum(reason=reason)) for each in powers if each.limit is not None)
 

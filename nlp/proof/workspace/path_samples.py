@@ -18,7 +18,7 @@ import numpy as np
 from ....models import FloatArray, axis_angle_from_matrix
 from ....models.joints.model.closedform import ClosedForm
 from ...case.case import Case
-from ...case.motors import Motor, MotorNumber
+from ...case.motors import ActuatorQuantity, Motor
 from ...case.task import Sense
 from ...case.workspace import TurnKind
 from ...errors import InputError, UncoveredError
@@ -161,8 +161,8 @@ def _numbers(
     case, closed = judged.case, closed_form_along(judged.case, judged.path)
     motors, lost = list(motor_claims(case)), list[Claim]()
     if judged.path.is_timed:  # the path defines speeds then, and powers from [motion] are not shown
-        lost = [each for each in motors if each.motor and each.motor.number is MotorNumber.POWER]
-        motors = [each for each in motors if each.motor and each.motor.number is MotorNumber.FORCE]
+        lost = [each for each in motors if each.motor and each.motor.number is ActuatorQuantity.POWER]
+        motors = [each for each in motors if each.motor and each.motor.number is ActuatorQuantity.FORCE]
     claims = [*searched_claims(case), *motors]
     keys = [each.key for each in (*claims, *lost) if each.limit is not None]
     if joints is None and closed.model.unknowns:
@@ -254,11 +254,11 @@ def _margins(numbers: Sequence[SampledNumber], count: int) -> tuple[tuple[str, .
 _OTHER = {Sense.MIN: Sense.MAX, Sense.MAX: Sense.MIN}
 
 
-def motor_numbers(numbers: Sequence[SampledNumber], kind: MotorNumber) -> dict[str, list[SampledNumber]]:
+def motor_numbers(numbers: Sequence[SampledNumber], kind: ActuatorQuantity) -> dict[str, list[SampledNumber]]:
     """Return the actuator quantities of a kind, by load; the load of a speed is empty."""
     found: dict[str, list[SampledNumber]] = {}
     for each in numbers:
-        motor = each.claim.motor or Motor(MotorNumber.COORDINATE)
+        motor = each.claim.motor or Motor(ActuatorQuantity.COORDINATE)
         if motor.number is kind:
             found.setdefault(motor.load, []).append(each)
     return found

@@ -8,10 +8,10 @@ from typing import Protocol
 
 import numpy as np
 
-from ..checker.proof_file import Premises, Proof, ProofClaim, ProofError, Unproved, workspace_numbers
-from ..checker.workspace.statement import expected_claims, legs_numbers, robot_claims
+from ..checker.proof_file import Premises, Proof, ProofClaim, ProofError, Unproved, workspace_premise
+from ..checker.workspace.statement import expected_claims, legs_premise, robot_claims
 from ..statement.claims import ERRORS, REACH, REGULAR, Claim, ClaimKind, one_robot_name
-from ..statement.machine import INSIDE, legs_of, workspace_of_case
+from ..statement.fixed_robot import INSIDE, legs_of, workspace_of_case
 from ..statement.tolerance import second_order_name
 from .judgement import Judgement
 from .proof_record import Key, ProofRecord
@@ -56,8 +56,8 @@ def proof_of(
         if writer.proved.pop(other.label, None):
             unproved.append(Unproved(*other.label, f"the {missing[0].name} has no proof"))
     premises = Premises(
-        workspace=workspace_numbers(workspace_of_case(judged.case)),
-        legs=legs_numbers(legs_of(judged.case)),
+        workspace=workspace_premise(workspace_of_case(judged.case)),
+        legs=legs_premise(legs_of(judged.case)),
         quantities=tuple(quantities),
         leg_error=leg_error,
         joint_centre=judged.case.joint_centre_tolerance or 0.0,

@@ -9,7 +9,7 @@ from ...case.case import Case
 from ...case.pose import Free
 from ...case.workspace import LARGEST_TURN, Workspace
 from ...interruption import is_requested, one_call, seconds_left, why_stopped, within
-from ..statement.machine import workspace_of_case
+from ..statement.fixed_robot import workspace_of_case
 from .judge import judge_workspace
 from .judgement import Judgement
 from .robot.pose_box import PoseNumbers, scaled

@@ -12,7 +12,7 @@ from ...case.motors import Motor
 from ...case.task import Sense
 from ...evidence.singularities import SingularityKind
 from ..statement.claims import RANKS, Claim, ClaimKind
-from ..statement.machine import JointErrors
+from ..statement.fixed_robot import JointErrors
 from .robot.path_cover import Place
 from .robot.pose_box import PoseNumbers
 

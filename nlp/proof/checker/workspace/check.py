@@ -25,7 +25,7 @@ from ....errors import InputError, UncoveredError
 from ....path.path import ProgrammedPath
 from ....program.layout import Layout
 from ...statement.claims import ERRORS, REACH, Claim, ClaimKind
-from ...statement.machine import Legs, check_leg_error, workspace_of_case
+from ...statement.fixed_robot import Legs, check_leg_error, workspace_of_case
 from ...statement.motors import actuator_coordinates, in_path_motion
 from ...statement.posed_layout import extreme_program
 from ...statement.tolerance import Directions, length_of_one_robot, second_order_name
@@ -92,7 +92,7 @@ class CheckedClaim:
     bound: float | None = None
     limit: float | None = None
     is_refuted: bool = False
-    by_machine: bool = False
+    is_within_tolerance: bool = False
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ def check_path_proof(proof: Proof, case: Case, path: ProgrammedPath) -> Verified
     """Check a proof of a path, by proving each of its claims again.
 
     Args:
-        proof: proof whose path premises were compared with the path, see :func:`.path_premises.hold_path`.
+        proof: proof whose path premises were compared with the path, see :func:`.path_premises.check_path_premises`.
         case: case of the proof.
         path: the path.
 
@@ -237,12 +237,12 @@ class _Checker:
     def _rank(self, each: Claim, given: ProofClaim) -> CheckedClaim:
         """Check that J, or the constraint wrenches, keep their rank, or that J is singular between two points."""
         is_refuted, robots = given.reason == "singular", self.robot.within_tolerance
-        by_machine = is_refuted and any(len(side) > self._root.coordinates for side in given.sides)
-        if by_machine and robots is None:
+        is_within_tolerance = is_refuted and any(len(side) > self._root.coordinates for side in given.sides)
+        if is_within_tolerance and robots is None:
             raise ProofError("the claim is about the exact robot")
-        tolerance = self._tolerance if by_machine or not is_refuted else 0.0
+        tolerance = self._tolerance if is_within_tolerance or not is_refuted else 0.0
         # For six straight legs, bounds of the changes of rows prove larger boxes than error coordinates do.
-        has_errors = by_machine or self.robot.legs is None
+        has_errors = is_within_tolerance or self.robot.legs is None
         built = robots.symbols.built if robots is not None and tolerance and has_errors else None
         claim = rank_claim(self._case, self.robot.model, self._root, each.name, tolerance, built)
         if is_refuted:
@@ -250,7 +250,7 @@ class _Checker:
         else:
             self._show(claim, given.unpacked())
             claim.finish()
-        return CheckedClaim(*each.label, is_refuted=is_refuted, by_machine=by_machine)
+        return CheckedClaim(*each.label, is_refuted=is_refuted, is_within_tolerance=is_within_tolerance)
 
     def _program(self, expression: SX, sense: Sense, given: ProofClaim, layout: Layout) -> float:
         """Return the bound of an expression in the symbols of a layout, from a tree of ``certify``."""

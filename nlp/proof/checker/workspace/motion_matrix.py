@@ -39,7 +39,7 @@ from .....models.rows import independent_rows
 from ....case.case import Case
 from ....case.pose import Free
 from ....case.workspace import TurnKind
-from ...statement.machine import has_straight_legs
+from ...statement.fixed_robot import has_straight_legs
 from ..proof_file import ProofError
 from .forms import FormArithmetic
 from .path_root import PathRoot

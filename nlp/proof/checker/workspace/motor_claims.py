@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from .....models import FloatArray, WrenchKind
 from ....case.case import Case
 from ....case.loads import Motion
-from ....case.motors import Motor, MotorNumber
+from ....case.motors import ActuatorQuantity, Motor
 from ....case.task import Sense
 from .closed_loops import Enclosed
 from .forms import PRODUCT, UP, AffineMatrix, SparseMatrices, solved
@@ -59,9 +59,9 @@ class _Number(NamedTuple):
 
 def _number_of(motor: Motor, sense: Sense, bound: float) -> _Number:
     """Return the product for the claim that a bound is the largest, or the smallest, value of a quantity."""
-    if motor.number is MotorNumber.SPEED:
+    if motor.number is ActuatorQuantity.SPEED:
         return _Number((None,), bound)
-    if motor.number is MotorNumber.POWER:
+    if motor.number is ActuatorQuantity.POWER:
         return _Number((-1.0 if motor.is_backwards else 1.0, None), bound)
     return _Number((float(sense.sign),), sense.sign * bound)
 

@@ -30,7 +30,7 @@ from .....models import FloatArray
 from ....case.pose import Free
 from ....case.task import Sense
 from ....errors import UncoveredError
-from ...statement.machine import Legs
+from ...statement.fixed_robot import Legs
 from ...statement.tolerance import is_smooth
 from ..polynomials import UNIT
 from .closed_loops import Enclosed

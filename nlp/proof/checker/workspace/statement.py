@@ -16,7 +16,7 @@ from .....models.joints.model.closedform import closed_form
 from ....case.case import Case
 from ....case.checks import check_determined_joints
 from ....case.limits.legs import LegLength
-from ....case.motors import MotorNumber
+from ....case.motors import ActuatorQuantity
 from ....case.task import Sense
 from ....case.workspace import Workspace
 from ....errors import InputError
@@ -37,7 +37,7 @@ from ...statement.claims import (
     one_robot_name,
     searched_claims,
 )
-from ...statement.machine import Legs, legs_of
+from ...statement.fixed_robot import Legs, legs_of
 from ...statement.motors import in_motion, in_path_motion, motor_claims, speed_claims
 from ...statement.posed_layout import closed_layout, posed_layout, reach_claims
 from ...statement.tolerance import (
@@ -50,7 +50,7 @@ from ...statement.tolerance import (
     tolerance_layout,
 )
 from ..premises import exact
-from ..proof_file import PathPremises, Premises, ProofClaim, ProofError, workspace_numbers
+from ..proof_file import PathPremises, Premises, ProofClaim, ProofError, workspace_premise
 from .motion_matrix import Root, turned_rotation
 from .path_root import PathRoot
 from .pose_boxes import pose_root
@@ -269,13 +269,13 @@ def expected_along_path(case: Case, robot: RobotClaims, *, is_timed: bool) -> li
     ]
     if is_timed:
         of_loads = (each for each in motor_claims(in_path_motion(case)) if each.motor)
-        every += [*speed_claims(case), *(each for each in of_loads if _number_of(each) is not MotorNumber.SPEED)]
+        every += [*speed_claims(case), *(each for each in of_loads if _number_of(each) is not ActuatorQuantity.SPEED)]
     else:
         every += motor_claims(case)
     return [each for each in every if robot.legs is not None or each.kind is not ClaimKind.SPECTRUM]
 
 
-def _number_of(claim: Claim) -> MotorNumber | None:
+def _number_of(claim: Claim) -> ActuatorQuantity | None:
     """Return the actuator quantity of a claim; None for another claim."""
     return None if claim.motor is None else claim.motor.number
 
@@ -302,7 +302,7 @@ def leg_error_of(case: Case, leg_error: float) -> float:
     return leg_error + 2 * (case.joint_centre_tolerance or 0.0)
 
 
-def legs_numbers(legs: Legs | None) -> tuple[tuple[float, ...], ...]:
+def legs_premise(legs: Legs | None) -> tuple[tuple[float, ...], ...]:
     """Return joint centres (12, 3), base before platform; empty for a robot without six straight legs."""
     return () if legs is None else tuple(map(tuple, [*legs.base.tolist(), *legs.platform.tolist()]))
 
@@ -311,7 +311,7 @@ def refuse_other_premises(
     case: Case, workspace: Workspace, legs: Legs | None, leg_error: float, given: Premises
 ) -> None:
     """Refuse a proof whose file has other premises than the case; the check itself does not use them."""
-    if workspace_numbers(workspace) != given.workspace:
+    if workspace_premise(workspace) != given.workspace:
         raise ProofError("the proof is for another workspace than this case's")
     if given.leg_error != leg_error:
         stated = f"the proof is for leg errors of at most {exact(given.leg_error)} {case.units.length}"
@@ -321,7 +321,7 @@ def refuse_other_premises(
 
 def refuse_other_robot(case: Case, legs: Legs | None, given: Premises | PathPremises) -> None:
     """Refuse a proof whose file names other joint centres, or another joint-centre tolerance, than the case has."""
-    numbers = legs_numbers(legs)
+    numbers = legs_premise(legs)
     same = list(map(len, numbers)) == list(map(len, given.legs))
     if not same or not np.allclose(given.legs, numbers, rtol=0.0, atol=_SAME * np.abs(numbers).max(initial=0.0)):
         raise ProofError("the proof is for other joint centres than this case's")

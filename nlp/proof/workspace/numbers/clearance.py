@@ -19,7 +19,7 @@ from casadi import SX
 
 from .....models.arrays import FloatArray, values_at
 from ...enclosure.forms import Forms
-from ...statement.machine import Legs
+from ...statement.fixed_robot import Legs
 from ..robot.pose_box import polynomial_rotation
 from ..robot.posed_robot import Problem, steepest
 from .bound_search import Bounds, Number

@@ -22,7 +22,7 @@ from ...boxes.tree import TreeRecord
 from ...certificate.branch_and_bound import certify_program
 from ...certificate.certificate import Certificate, CertificateStatus
 from ...statement.claims import Claim
-from ...statement.machine import JointErrors
+from ...statement.fixed_robot import JointErrors
 from ...statement.posed_layout import extreme_program, varies
 from ..robot.pose_box import PoseNumbers
 from ..verdict import Outcome, Verdict, slack_of

@@ -35,7 +35,7 @@ from casadi import SX
 from .....models.arrays import FloatArray, values_at
 from ....evidence.closed_loops import inverses
 from ...enclosure.forms import Forms
-from ...statement.machine import LEGS, Legs
+from ...statement.fixed_robot import LEGS, Legs
 from ..ranks.krawczyk import bounds_of_inverses, by_centres
 from ..robot.posed_robot import Problem
 from .bound_search import Bounds, Number

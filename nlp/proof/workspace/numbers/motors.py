@@ -23,10 +23,10 @@ from casadi import SX
 
 from .....models import FloatArray, rate_relations
 from .....models.arrays import values_at
-from .....models.statics import freedoms_of
+from .....models.statics import degrees_of_freedom
 from ....case.case import Case
 from ....case.loads import Motion
-from ....case.motors import Motor, MotorNumber
+from ....case.motors import ActuatorQuantity, Motor
 from ....case.task import Sense
 from ....case.workspace import TurnKind
 from ....program.layout import robot_length
@@ -70,7 +70,7 @@ class Motors(Number):
         if rate_relations(case.model.actuators).shape[0]:
             raise NotJudgedError("relations between actuator rates, which the robot's loops impose, are not supported")
         motor, R = claims[0].motor or Motor(), posed.turned[0]
-        self._actuator, self._length, self._is_six = motor.place, problem.length, freedoms_of(case.model) == 6
+        self._actuator, self._length, self._is_six = motor.place, problem.length, degrees_of_freedom(case.model) == 6
         self._size = robot_length(case)
         self._numbers = [_parts_of(case, claim) for claim in claims]
         self._parts = list(dict.fromkeys(itertools.chain(*self._numbers)))
@@ -233,13 +233,13 @@ class Motors(Number):
 def _parts_of(case: Case, claim: Claim) -> list[_Part]:
     """Return the factors of the quantity of a claim."""
     motor, cases = claim.motor or Motor(), case.loading.cases
-    if motor.number is MotorNumber.SPEED:
+    if motor.number is ActuatorQuantity.SPEED:
         return [_Part()]
     load = next(k for k, each in enumerate(cases) if each.name == motor.load)
     sense = Sense.MIN if motor.is_backwards else claim.sense
     if not any(each.is_fixed for each, _ in cases[load].parts):
         sense = Sense.MAX  # loads of any direction give the same force in both directions
-    return [_Part(sense, load), *([_Part()] if motor.number is MotorNumber.POWER else [])]
+    return [_Part(sense, load), *([_Part()] if motor.number is ActuatorQuantity.POWER else [])]
 
 
 def path_twist(problem: Problem) -> SX:

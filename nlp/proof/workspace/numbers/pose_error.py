@@ -26,7 +26,7 @@ from casadi import SX
 from .....models import Dimension, FloatArray
 from ....evidence.closed_loops import Loops
 from ...statement.claims import ERRORS
-from ...statement.machine import Legs
+from ...statement.fixed_robot import Legs
 from ..robot.pose_box import PoseNumbers, cayley_rotation
 from ..verdict import Verdict
 from .bound_search import Goal, Minimum, smallest_values

@@ -12,13 +12,13 @@ import numpy as np
 
 from .....models import FloatArray, Model
 from ....case.case import Case
-from ....case.motors import Motor, MotorNumber
+from ....case.motors import ActuatorQuantity, Motor
 from ....case.task import Sense
 from ....errors import UncoveredError
 from ....interruption import seconds_left, within
 from ...boxes.tree import TreeRecord
 from ...statement.claims import Claim, ClaimKind, searched_claims
-from ...statement.machine import JointErrors, Legs, has_straight_legs, joint_centres
+from ...statement.fixed_robot import JointErrors, Legs, has_straight_legs, joint_centres
 from ...statement.motors import motor_claims
 from ..proof_record import ProofRecord
 from ..robot.path_cover import PathCover
@@ -162,14 +162,14 @@ def motor_extremes(
     claims = [each for each in motor_claims(subject.case) if with_all or each.limit is not None]
     known = dict(speeds or {})
     if speeds is not None:
-        claims = [each for each in claims if each.motor and each.motor.number is not MotorNumber.SPEED]
+        claims = [each for each in claims if each.motor and each.motor.number is not ActuatorQuantity.SPEED]
     alike = itertools.groupby(claims, lambda claim: claim.motor and claim.motor.whose)
     groups = [list(group) for _, group in alike]
     for left, group in zip(range(len(groups), 0, -1), groups, strict=True):
         actuator = group[0].motor.actuator if group[0].motor else ""
         with within(seconds_left() / (left + 1)):
             found = list(_motor_answers(subject, group, known.get(actuator, math.inf), record))
-        if group[0].motor and group[0].motor.number is MotorNumber.SPEED:
+        if group[0].motor and group[0].motor.number is ActuatorQuantity.SPEED:
             known[actuator] = found[0].bound
         yield from found
 
@@ -223,9 +223,9 @@ def _at_most_products(claims: Sequence[Claim], every: Sequence[Minimum], speed: 
     motors, forces, found = [claim.motor or Motor() for claim in claims], dict[Sense, float](), []
     for claim, motor, own in zip(claims, motors, every, strict=True):
         bound = own.bound
-        if motor.number is MotorNumber.FORCE:
+        if motor.number is ActuatorQuantity.FORCE:
             forces[claim.sense] = max(-bound, 0.0)
-        elif motor.number is MotorNumber.POWER:
+        elif motor.number is ActuatorQuantity.POWER:
             force = forces.get(Sense.MIN if motor.is_backwards else Sense.MAX, math.inf)
             most = force * speed * (1 + _ROUNDING) if math.isfinite(force) and math.isfinite(speed) else math.inf
             bound = max(bound, -most)

@@ -11,7 +11,7 @@ import numpy as np
 from .....models import FloatArray
 from ....case.task import Sense
 from ...statement.claims import Claim, length_claims
-from ...statement.machine import JointErrors
+from ...statement.fixed_robot import JointErrors
 from ...statement.tolerance import Directions
 from ..robot.pose_box import PoseNumbers
 from ..robot.posed_robot import steepest

@@ -32,7 +32,7 @@ from ....program.layout import Layout
 from ...boxes.tree import TreeRecord
 from ...enclosure.tape import compile_tape
 from ...statement.claims import Claim
-from ...statement.machine import JointErrors
+from ...statement.fixed_robot import JointErrors
 from ...statement.tolerance import (
     BuiltModel,
     ToleranceLayout,

@@ -32,7 +32,7 @@ from .....models.arrays import first_largest, values_at
 from .....models.newton import Linear, newton
 from ....evidence.closed_loops import inverses
 from ...enclosure.forms import Encloser
-from ...statement.machine import JointErrors
+from ...statement.fixed_robot import JointErrors
 from ..robot.posed_model import RankMatrix
 from ..robot.posed_robot import Problem
 from ..verdict import EVERYWHERE

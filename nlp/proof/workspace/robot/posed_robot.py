@@ -25,7 +25,7 @@ from ....case.case import Case
 from ....case.workspace import TurnKind
 from ....evidence.closed_loops import DEPENDENT, Loops, closed_from_home
 from ....program.layout import robot_length
-from ...statement.machine import INSIDE, JointErrors
+from ...statement.fixed_robot import INSIDE, JointErrors
 from ...statement.tolerance import BuiltModel
 from .path_cover import PathCover
 from .pose_box import PoseBox

@@ -23,7 +23,7 @@ from ....case.limits.legs import Actuator
 from ....case.workspace import TurnKind, Workspace
 from ....errors import CaseError, UncoveredError
 from ...boxes.search import Boxes, BoxResults, Order, Search, bisected, joined, some
-from ...statement.machine import workspace_of_case
+from ...statement.fixed_robot import workspace_of_case
 from ..ranks.loop_boxes import Examiner, Followed, LoopBoxes, LoopRule, loop_boxes_of, one_assembly
 from ..ranks.rank_rule import RankTest, is_polynomial
 from ..robot.pose_box import PoseBox, pose_box, scaled
@@ -46,13 +46,13 @@ _NAMES = {
 class Region(enum.Enum):
     """Verdict on a box of a slice."""
 
-    REGULAR = "proved regular"
-    BEYOND = "regular, beyond a singular pose"
-    OTHER_SIGN = "regular, with the other sign of the determinant"
+    REGULAR = "proved: full rank"
+    BEYOND = "full rank, but a singularity between here and the centre"
+    OTHER_SIGN = "full rank, opposite sign of the determinant"
     SINGULAR = "singular at every pose"
-    OPEN = "open: too close to a singular pose"
+    OPEN = "undecided: close to a singularity"
     UNREACHED = "out of reach (proved)"
-    UNKNOWN = "open: reach or loop closure is not proved"
+    UNKNOWN = "undecided: reach or loop closure"
 
 
 #: Order of the regions in arrays.
