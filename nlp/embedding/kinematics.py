@@ -23,7 +23,7 @@ from ...models.arrays import values_at
 from ...models.instance import length_of
 from ...models.newton import Linear, newton
 from ...models.rows import RANK_TOLERANCE, independent_rows
-from ...models.statics import DrivenJoint, driven_joints, freedoms_of, rows_about, statics_hindrance
+from ...models.statics import DrivenJoint, degrees_of_freedom, driven_joints, rows_about, statics_hindrance
 from ...models.wrench import WrenchKind
 from ..case.case import Case
 from ..case.controller import Controller
@@ -329,7 +329,7 @@ class Kinematics:
     @property
     def freedoms(self) -> int:
         """Number of degrees of freedom of the platform."""
-        return freedoms_of(self.case.model)
+        return degrees_of_freedom(self.case.model)
 
     def _independent_coordinates(self, slopes: FloatArray) -> tuple[int, ...]:
         """Return the indices of the independent coordinates x, y, z, a, b, c of the pose.
