@@ -242,7 +242,11 @@ def _limits(case: Case, bare: Case) -> tuple[Limits, list[LeftOut]]:
             Limits(limit).check(bare.as_limited)
             own, other = (limit.ranges(each.model) for each in (case, bare))
             if [each.dimension for each in own.values()] != [each.dimension for each in other.values()]:
-                raise CaseError(f"limits.{limit.name}", "is for another kind of actuators")
+                raise CaseError(
+                    f"limits.{limit.name}",
+                    "cannot be compared: actuators of this robot have another unit (length or angle) "
+                    "than those of the case",
+                )
         except CaseError as error:
             left_out.append(LeftOut(f"limits.{limit.name}", error.fault, limit.needs_legs))
         else:

@@ -215,15 +215,16 @@ def _follow(
 
 @lru_cache(maxsize=4)
 def _path_of(model: Model) -> _Path:
-    """Return the loop equations of a robot; the last robots are cached, as a search evaluates many points."""
+    """Return the loop equations of a robot, from a cache of the last four robots."""
     return _Path(model)
 
 
 class _Path:
     """Loop equations of a robot and their derivatives, as functions of rotation vector, position and unknowns.
 
-    These are one vector; its unknowns are divided by their sizes. The unit of length of the case may differ from that
-    of the robot file. A scaled robot has the same assembly modes, so the path uses the scale of the robot file.
+    Rotation vector, position and unknowns form one vector, in which unknowns are divided by their sizes. The unit of
+    length of the case may differ from that of the robot file. A scaled robot has the same assembly modes, so the path
+    uses the scale of the robot file.
 
     Args:
         model: model of the robot.

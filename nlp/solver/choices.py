@@ -52,9 +52,9 @@ def cost_of(solution: Solution) -> float:
 
 
 class _Part:
-    """An open part of the combinations: index ranges of values, and the solve with parameters free between their ends.
+    """An open group of combinations: index ranges of values, and the solution with parameters free between them.
 
-    The solve is None where the robot's loops cannot be closed at any of its starting points.
+    The solution is None if the robot's loops cannot be closed at any starting point.
     """
 
     def __init__(self, ranges: Ranges, relaxed: Solution | None) -> None:
@@ -145,7 +145,7 @@ class _Search:
         return exists(self._case, self._numbers, ranges)
 
     def _is_no_better(self, part: _Part) -> bool:
-        """Return whether no combination of a part is known to be better than the best one."""
+        """Return whether the bound of a group excludes a combination better than the best one."""
         best = math.inf if self._best is None else cost_of(self._best)
         return math.isfinite(best) and part.bound >= best - _BETTER * abs(best)
 
@@ -181,7 +181,7 @@ class _Search:
         return found
 
     def _nearest(self, part: _Part) -> Ranges:
-        """Return the combination nearest to the solved values of a part."""
+        """Return the combination nearest to the solved values of a group."""
         ranges = []
         for number, (first, behind) in zip(self._numbers, part.ranges, strict=True):
             at = _value_of(part.relaxed, number)
@@ -191,7 +191,10 @@ class _Search:
         return tuple(ranges)
 
     def _divided(self, part: _Part) -> tuple[Ranges, Ranges]:
-        """Return two halves of a part, split where a solved value is relatively farthest from any listed one."""
+        """Return two halves of a group of combinations.
+
+        The split is in the dimension whose solved value is relatively farthest from every value of the catalogue.
+        """
         farthest, cut = -1.0, (0, 1)
         for k, (number, (first, behind)) in enumerate(zip(self._numbers, part.ranges, strict=True)):
             if behind - first > 1:

@@ -202,7 +202,7 @@ def _entry(name: str, field: Field, kind: object) -> Entry:
     if field.mark is Mark.ABSENT:
         return Entry(name, field.key, kind, None)
     if not (isinstance(inner, type) and issubclass(inner, JsonObject)):
-        raise TypeError(f"only an object can stand inline, which {inner!r} is not")
+        raise TypeError(f"field {name}: an inline field must be a JsonObject, got {inner!r}")
     return Entry(name, field.key, kind, MISSING if inner is get_args(kind)[0] else None, inner)
 
 

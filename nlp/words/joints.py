@@ -150,8 +150,14 @@ def limb_part_table(case: Case, robot: RobotData) -> TextTable | None:
         share = 100 * each.constraints / total if total > 0 else 0.0
         cells = (number(each.F, total), number(each.actuation, total), number(each.constraints, total))
         rows.append((each.limb, *cells, Figure(f"{share:.3g}", share)))
-    headers = ("limb", f"F\n{unit}", f"actuation\n{unit}", f"constraints\n{unit}", "constraints\n% of F")
-    return TextTable(headers, tuple(rows), "actuation", "F by limb: actuation and constraints")
+    headers = (
+        "limb",
+        f"F\n{unit}",
+        f"actuation\n{unit}",
+        f"constraint wrenches\n{unit}",
+        "constraint wrenches\n% of F",
+    )
+    return TextTable(headers, tuple(rows), "actuation", "F by limb: actuation and constraint wrenches")
 
 
 def _singularity_lines(each: Singularity, robot: RobotData, units: Units) -> Iterator[Line]:

@@ -447,7 +447,9 @@ def test_the_smallest_f_at_the_worst_of_several_poses_is_refused(cli: Run, tmp_p
     poses = [{"position": [0, 0, ends(0.5, z)]} for z in (30.5, 40.5)]
     tables = tomllib.loads(PLATFORM) | {"pose": poses, "combine": {"over_poses": "worst"}}
     case, proof = str(case_file(tmp_path, tables)), str(tmp_path / "proof.json")
-    refusal_of(cli("certify", case, "--above", "1"), "--above: is not for the worst of several poses")
+    refusal_of(
+        cli("certify", case, "--above", "1"), "--above: cannot be used if the smallest F of several poses is maximised"
+    )
     assert cli("certify", case, "--proof", proof)[0] == 0
     assert "F being that of task 'one', at the worst of 2 poses" in cli("verify-proof", proof)[1]
     refusal_of(cli("verify-proof", proof, "--above", "1"))

@@ -355,7 +355,7 @@ def test_a_tree_of_a_program_proves_nothing_of_a_path() -> None:
     others = tuple(Unproved(*each, "") for each in expected)
     proof = Proof("", case.name, premises, (claim,), (), others)
     assert leg_lengths(*path.poses_at([0] * 99, np.linspace(0, 1, 99))).max() > 32.8
-    assert "'program' is no reason of a claim about a path" in rejected(proof, case)
+    assert "'program' is no known kind of proof for a claim about a path" in rejected(proof, case)
 
 
 @pytest.mark.parametrize("turns", [1, 8, 16, 41])
@@ -385,7 +385,7 @@ def test_a_singular_pose_of_a_path_is_proved_by_two_places() -> None:
         (((0.0,), (0.1,)), "opposite signs"),
         (((low,), (2.5,)), "not one of the workspace"),
         (((low,),), "no two poses"),
-        (((low,), (high, 0.0)), "about the exact robot"),
+        (((low,), (high, 0.0)), "the claim is about the robot without one"),
         (((low,), (1.5,)), "change continuously"),
     ):
         assert words in rejected(with_claim(given, "regular", "", sides=sides), case)

@@ -222,7 +222,11 @@ def test_a_wrong_result_is_refused_with_its_key(change: Callable[[Json], object]
 
 
 def test_a_file_that_is_no_result_is_refused(tmp_path: Path) -> None:
-    for content, fault in (("{", "is not valid JSON"), ("[1]", "must be an object"), ("{}", "schema: is missing")):
+    for content, fault in (
+        ("{", "is not valid JSON"),
+        ("[1]", r"must contain one JSON object, \{ ... \}"),
+        ("{}", "schema: is missing"),
+    ):
         with pytest.raises(InputError, match=fault):
             load_result(saved(tmp_path / "result.json", content))
     with pytest.raises(InputError, match="cannot be read"):

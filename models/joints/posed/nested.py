@@ -179,7 +179,7 @@ class MeasuredMotions(NamedTuple):
 def measured(
     motions: Motions, symbols: Sequence[SX], points: Sequence[ClosedPoint], size: SX
 ) -> tuple[MeasuredMotions, ...]:
-    """Return the values of motions at the closed configurations where all of them are finite.
+    """Return the values of motions at closed configurations; configurations with a non-finite value are omitted.
 
     Args:
         motions: loops and platform twists.

@@ -192,7 +192,10 @@ class PathJoints:
         return 0.0 if abs(value) < _DISTINCT else float(np.sign(value))
 
     def _cone(self, j: int) -> JointCone | None:
-        """Return the cone directions of a universal or spherical joint; links point to the platform."""
+        """Return the directions that a cone limit on a universal or spherical joint compares.
+
+        The direction of a link points to the platform.
+        """
         path, place = self._path, self._path.joints[j].point
         turn = self._limb.turn
         if path.cut.far is not None and path.rod is not None and j in (path.cut.joint, path.cut.far):

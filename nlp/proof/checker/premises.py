@@ -52,7 +52,7 @@ def check_minimum(case: Case) -> None:
     if len(case.tasks) > 1:
         raise InputError("above: is for a case with one task")
     if case.pose_count > 1 and case.over_poses is OverPoses.WORST and case.tasks[0].sense is Sense.MAX:
-        raise InputError("above: is not for the worst of several poses, where F is to be maximised")
+        raise InputError("above: cannot be used if the smallest F of several poses is maximised")
 
 
 def program_of(case: Case, statement: Statement) -> Nlp:

@@ -253,7 +253,7 @@ class _File:
 
 
 def _table_of(claim: ProofClaim) -> _ClaimTable:
-    """Return a claim with its tree packed."""
+    """Return the entry of a claim in a proof file, with its tree in packed form."""
     tree = claim.unpacked()
     own = {each.name: getattr(claim, each.name) for each in fields(claim) if each.name != "packed"}
     return _ClaimTable(**{**own, "tree": packed_text(tree)}, digest=digest_of(tree))
@@ -320,6 +320,6 @@ def _check_texts(found: _File, quantities: tuple[str, ...]) -> None:
 
 
 def _claim_of(table: _ClaimTable, source: str, number: int, budget: TreeBudget) -> ProofClaim:
-    """Return a claim with its tree packed."""
+    """Return a claim of a proof file; its tree stays in packed form until it is needed."""
     packed = PackedTree(table.tree, table.digest, source, f"{table.name} {table.sense}".rstrip(), number, budget)
     return ProofClaim(table.name, table.sense, table.reason, table.bound, table.graph, b"", table.sides, packed)

@@ -285,7 +285,7 @@ def compile_tape(function: ca.Function) -> Tape:
         if op == ca.OP_CONST:
             value = function.instruction_constant(index)
             if not math.isfinite(value):
-                raise UncoveredError(f"the constant {value}")
+                raise UncoveredError(f"a constant that is not finite ({value})")
             writer.put(target[0], _constant(value))
         elif op == ca.OP_INPUT:
             writer.put_input(target[0], source[1])

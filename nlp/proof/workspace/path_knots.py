@@ -209,7 +209,7 @@ def _robot_about(case: Case, cover: PathCover, workspace: Workspace) -> tuple[Pr
     if coordinates.numel() != len(problem.independent):
         freedoms = len(problem.independent)
         raise NotJudgedError(
-            f"it has {coordinates.numel()} actuators for {freedoms} degrees of freedom; both numbers must agree"
+            f"it has {coordinates.numel()} actuators for {freedoms} degrees of freedom; both numbers must be equal"
         )
     return problem, coordinates
 

@@ -67,10 +67,10 @@ def proof_of(
 
 
 class ClaimWriter(Protocol):
-    """Writer of the proofs of claims.
+    """Interface of classes that build the proofs of claims.
 
     Attributes:
-        proved: claims with a proof so far, by label.
+        proved: claims that have a proof so far, by label.
     """
 
     proved: dict[Key, ProofClaim]
@@ -103,7 +103,7 @@ def write_each(writer: ClaimWriter, expected: Sequence[Claim], judged: Iterable[
 
 
 class _Writer:
-    """Writer of the proofs of claims.
+    """Builder of one proof for each claim that the records of the searches prove.
 
     Args:
         judged: the verdicts.
@@ -111,8 +111,8 @@ class _Writer:
 
     Attributes:
         robot: the robot as the checker models it, with the symbols of the searches.
-        extremes: verdicts on quantities by label; the first one of two with one label.
-        proved: claims with a proof so far, by label.
+        extremes: verdicts on quantities by label; of two verdicts with the same label, the first.
+        proved: claims that have a proof so far, by label.
     """
 
     def __init__(self, judged: Judgement, record: ProofRecord) -> None:

@@ -55,11 +55,14 @@ _PATIENCE = 1.0
 
 @dataclass(frozen=True, eq=False)
 class SharedSums:
-    """Bounds of B shared boxes.
+    """Bounds of the form over B shared boxes: boxes of the variables that several limbs share.
+
+    The common part of the form depends only on shared variables. The tilt of a limb is a quadratic function of shared
+    variables that is moved from the limb to the common part.
 
     Attributes:
         limbs: bounds of each limb.
-        common: models of the common part with all tilts and best values, and the contracted boxes.
+        common: models of the common part plus the tilts and best values of all limbs, and the contracted boxes.
         sums: (B,) upper bounds from these models: the limbs' best values plus the maximum of the common part.
         bound: (B,) upper bounds: the smaller of ``sums`` and of the boxes' earlier bounds.
         is_possible: (B,) whether the common conditions may be satisfied and every limb has an open box.

@@ -71,6 +71,8 @@ _FIRSTS = tuple(each.name for each in ERRORS)
 _ALONG_PATH = ("regular", "singular", "boxes", "lengths")
 #: A tree with a single leaf.
 _WHOLE = bytes([Node.BOUNDED])
+#: Message about a proof with displaced joint centres of a claim about the nominal robot.
+_WITHOUT_TOLERANCE = "the proof of this claim needs a tolerance, and the claim is about the robot without one"
 
 
 @dataclass(frozen=True)
@@ -239,7 +241,7 @@ class _Checker:
         is_refuted, robots = given.reason == "singular", self.robot.within_tolerance
         is_within_tolerance = is_refuted and any(len(side) > self._root.coordinates for side in given.sides)
         if is_within_tolerance and robots is None:
-            raise ProofError("the claim is about the exact robot")
+            raise ProofError(_WITHOUT_TOLERANCE)
         tolerance = self._tolerance if is_within_tolerance or not is_refuted else 0.0
         # For six straight legs, bounds of the changes of rows prove larger boxes than error coordinates do.
         has_errors = is_within_tolerance or self.robot.legs is None
@@ -329,7 +331,7 @@ class _Checker:
             # Lengths of one robot at two poses, without the parts of its errors along c_b and c_p.
             about = [np.array(side, dtype=float) for side in given.sides]
             if robots is None:
-                raise ProofError("the claim is about the exact robot")
+                raise ProofError(_WITHOUT_TOLERANCE)
             if len(about) != 2 or any(side.shape != (3,) or not np.isfinite(side).all() for side in about):
                 raise ProofError("the claim has no two directions")
             directions = Directions(each.name, *about)
@@ -433,7 +435,7 @@ class _PathChecker(_Checker):
     def check(self, each: Claim, given: ProofClaim) -> CheckedClaim:
         """Check one claim; trees of ``certify`` are refused, as their boxes do not cover the whole path."""
         if given.reason not in _ALONG_PATH:
-            raise ProofError(f"'{given.reason}' is no reason of a claim about a path")
+            raise ProofError(f"'{given.reason}' is no known kind of proof for a claim about a path")
         return super().check(each, given)
 
     def _coordinate(self, motor: Motor | None) -> SX | None:

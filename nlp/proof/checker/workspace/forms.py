@@ -168,7 +168,7 @@ class FormArithmetic:
         self._arithmetic = PolynomialArithmetic(self.function)
 
     def __call__(self, lower: FloatArray, upper: FloatArray) -> Values:
-        """Return the expressions over boxes with ends (B, n)."""
+        """Return enclosures of the expressions over boxes with ends (B, n)."""
         given = () if self._given is None else self._given(lower, upper)
         return Values(self._arithmetic(lower.T, upper.T, given), lower.shape)
 

@@ -160,7 +160,7 @@ class ShortestTurns:
         return np.asarray(before * self.quaternions[segments] + after * self.quaternions[segments + 1])
 
     def _off(self, segments: NDArray[np.intp]) -> FloatArray:
-        """Return error bounds (B,) of these quaternions and velocities, from errors at both knots."""
+        """Return error bounds (B,) of quaternions and angular velocities over pieces, from errors at both knots."""
         return np.asarray(16 * np.maximum(self.off[segments], self.off[segments + 1]))
 
     def derivatives(self, segments: NDArray[np.intp], ends: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002

@@ -218,9 +218,10 @@ class PosedModel:
 
     @property
     def driven_rows(self) -> tuple[SX, SX]:
-        """A (m, n) and D (m, a) with ``A y = D u`` for the rates u of actuators, and the platform's twist first in y.
+        """Matrices A (m, n) and D (m, a) of the rate equations ``A y = D u``.
 
-        Without given actuators, the legs are the actuators; their rates belong to the rows of forces.
+        Here u has the rates of the actuators; y has the platform's twist, then any rates of passive joints. If the
+        robot states no actuators, the legs are the actuators: each force row has the rate of one leg.
         """
         limbs = self.limbs
         if limbs.actuators:
