@@ -156,7 +156,7 @@ class Command:
             self._function(**given)
 
     def read(self, words: list[str]) -> dict[str, Any] | None:
-        """Return the values of a command line by the names of the function's parameters; None where help is requested.
+        """Return the values of a command line by the names of the function's parameters; None if help is requested.
 
         Raises:
             InputError: an option or argument is missing, unknown, or has a value that is not allowed.

@@ -61,7 +61,7 @@ class Number:
 
     Attributes:
         option: name of the option.
-        least: smallest allowed number; numbers must then be below 1. None where the command checks the number.
+        least: smallest allowed number; numbers must then be below 1. None if the command checks the number.
     """
 
     def __init__(self, option: str, least: float | None = None) -> None:
@@ -330,7 +330,7 @@ class Outputs:
                 check_library("matplotlib", "pages")
 
     def __getitem__(self, name: str) -> str | None:
-        """Return the file of an option; None where it is not requested."""
+        """Return the file of an option; None if it is not requested."""
         return self._targets[name]
 
     def check(self, inputs: Mapping[Path, str]) -> None:
@@ -379,7 +379,7 @@ class Outputs:
 
 
 def _write(target: str, make: Callable[[], JsonObject | str | Figure | None], *, is_picture: bool) -> None:
-    """Write the content that a function returns into a file, or to standard output for ``-``."""
+    """Write a file, or standard output for ``-``; ``make`` returns the content."""
     from ..output.files import write_bytes, write_text
 
     if is_picture:
@@ -429,7 +429,7 @@ def show(items: Iterable[Line | TextTable], *, whole: bool) -> None:
 
 
 def console() -> Console | None:
-    """Return a console on standard output for lines and tables; None where standard output shows no styles."""
+    """Return a console on standard output for lines and tables; None if standard output shows no styles."""
     # With one of these variables, the console itself decides whether it shows styles.
     if not sys.stdout.isatty() and not os.environ.keys() & {"FORCE_COLOR", "TTY_COMPATIBLE"}:
         return None

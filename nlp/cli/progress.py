@@ -56,7 +56,7 @@ def spinner(first: str) -> Iterator[Callable[[str], None]]:
     from ..interruption import seconds_left
 
     class TimeLeft(ProgressColumn):
-        """Seconds until the end of the time."""
+        """Column with the remaining seconds of a time limit; empty without a time limit."""
 
         def render(self, task: Task) -> Text:
             left = task.fields.get("end", math.inf) - time.perf_counter()

@@ -174,7 +174,7 @@ def _named_points(chosen: Points, file: str | None) -> Iterator[None]:
 
 
 def _points_file(over: list[str]) -> str | None:
-    """Return the file of points that ``--over`` names; None where it states a grid.
+    """Return the file of points that ``--over`` names; None if it states a grid.
 
     Raises:
         InputError: a range, a list or another file is given as well.

@@ -63,7 +63,7 @@ def verify_proof(
     )
     for name in is_given:
         if is_given[name] and name not in own:
-            raise InputError(f"{name}: is no option for this kind of proof, which another command wrote")
+            raise InputError(f"{name}: does not apply to this kind of proof; allowed: {listing(sorted(own))}")
     if case is not None:
         loaded = options.read_changed_case(case, settings, of).file.case
     elif settings or of:

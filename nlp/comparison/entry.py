@@ -83,12 +83,12 @@ class Entry:
             optimum; None if unknown.
         tasks: tasks at the design; empty without an optimum.
         singularities: descriptions of singularities of the design.
-        fault: reason why there is no solution; else empty.
+        fault: reason why there is no solution; otherwise empty.
         certified: certificates; None if not requested or impossible.
-        certificate_fault: reason why there is no certificate; else empty.
+        certificate_fault: reason why there is no certificate; otherwise empty.
         judgement: judgement of the design over the workspace; None without a workspace or without a proof.
         outcome: verdict on ranks and limits over the workspace; None without a proof.
-        workspace_fault: reason why there is no verdict over the workspace; else empty.
+        workspace_fault: reason why there is no verdict over the workspace; otherwise empty.
         seconds: wall time.
         strokes: largest stroke by quantity: over the workspace from proved bounds, else over several poses.
     """

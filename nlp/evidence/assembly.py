@@ -57,7 +57,7 @@ class Assembly:
 
     Attributes:
         is_home: whether the path from home ends at the internal unknowns of the point.
-        nearness: smallest singular value of the loop equations on the path, as a part of its value at home; 0 where
+        nearness: smallest singular value of the loop equations on the path, as a fraction of its value at home; 0 if
             the path jumps or does not reach the pose.
         turned: names of the limbs in another working mode than at home: the path ends at other joint positions, and
             the actuators of the limb drive the platform in the opposite sense.
@@ -158,7 +158,7 @@ def _turned(model: Model, posture: Posture, differ: Sequence[bool]) -> tuple[str
 def unknowns_from_home(
     model: Model, parameters: FloatArray, pose: FloatArray, given: FloatArray | None = None
 ) -> FloatArray | None:
-    """Return the internal unknowns (u,) at the end of the path from home to a pose; None where the path ends early.
+    """Return the internal unknowns (u,) at the end of the path from home to a pose; None if the path ends early.
 
     Args:
         model: model of the robot.
@@ -179,7 +179,7 @@ def _follow(
 ) -> tuple[FloatArray | None, float]:
     """Return the unknowns (u,) at the end of the path from home, and the nearness to a singularity along it.
 
-    The unknowns are None where the path ends early. Free actuator coordinates move on the path to their given values.
+    The unknowns are None if the path ends early. Free actuator coordinates move on the path to their given values.
     """
     path = _path_of(model)
     dimensions = np.concatenate([np.zeros(0), *[item.typical for item in model.parameters]])
@@ -271,7 +271,7 @@ class _Path:
         return factor if float(np.abs(self._kernel(home, typical)[0]).max(initial=0.0)) <= _SIMILAR else 1.0
 
     def singular_values(self, z: FloatArray, parameters: FloatArray) -> FloatArray:
-        """Return the smallest singular values of the derivatives by the determined unknowns, without and with the pose.
+        """Return the smallest singular values of the Jacobian of the determined unknowns, without and with the pose.
 
         The array is empty without equations, or without such unknowns.
         """

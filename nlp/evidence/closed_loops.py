@@ -116,7 +116,7 @@ def inverses(matrices: FloatArray, zero: float | None = None) -> FloatArray:
 
 
 def closed_from_home(loops: Loops, z: FloatArray, pose: int) -> FloatArray | None:
-    """Return closed loops (n,) at a pose, or near it, in the home assembly mode; None where none are known.
+    """Return closed loops (n,) at a pose, or near it, in the home assembly mode; None if none are known.
 
     The unknowns are 0 at home. At another pose the equations then have residuals, which are reduced to 0 in steps.
 

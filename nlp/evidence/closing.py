@@ -66,7 +66,7 @@ def closed_in_place(nlp: Nlp, x: FloatArray) -> FloatArray | None:
         x: (n,) given point; its internal unknowns are not read.
 
     Returns:
-        (n,) the point; None where a constraint of the program, such as the home working mode, is violated.
+        (n,) the point; None if a constraint of the program, such as the home working mode, is violated.
     """
     own, target = list(nlp.program.places.inner), x.copy()
     target[own] = nlp.start[own]
@@ -97,7 +97,7 @@ def close_near(nlp: Nlp, first: FloatArray, x: FloatArray) -> FloatArray:
 
 
 def _with_unknowns_from_home(nlp: Nlp, x: FloatArray) -> FloatArray:
-    """Return a point (n,) with the unknowns at the end of the path from home; unchanged where the path ends early."""
+    """Return a point (n,) with the unknowns at the end of the path from home; unchanged if the path ends early."""
     model, found = nlp.program.model, x.copy()
     if model.generic is None or not model.unknowns:
         return found

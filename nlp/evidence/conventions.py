@@ -27,7 +27,7 @@ class Dependence:
     """Dependence of F on conventions, as parts of F.
 
     Attributes:
-        length: relative derivative ``(l / F) dF/dl`` with respect to the characteristic length; 0 where F does not
+        length: relative derivative ``(l / F) dF/dl`` with respect to the characteristic length; 0 if F does not
             depend on it.
         centre: largest relative change of F if all arbitrary centres move along their joint axes by the characteristic
             length, to either side; None if all centres are determined.

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 #: Singular values below this part of the largest are zero; a relative change below the second number is rounding.
 _ZERO, _STILL = 1e-9, 1e-9
-#: Smallest component of a feasible direction, as a part of the largest, at which a coordinate counts as moving.
+#: Smallest component of a feasible direction, as a fraction of the largest, at which a coordinate counts as moving.
 _MOVES = 1e-6
 #: Number of random poses for dependent coordinates, largest number of corners, steps to each pose, and the seed.
 _POSES, _MOST_CORNERS, _WAY, _SEED = 12, 32, 8, 0
@@ -170,7 +170,7 @@ def _misstated(case: Case, workspace: Workspace, k: int, stated: float, true: fl
 def independent_coordinates(case: Case, workspace: Workspace) -> list[int] | None:
     """Return the indices of the pose coordinates that the robot controls independently over a workspace.
 
-    These are all six for a robot with six degrees of freedom; None where the loops cannot be closed in the middle.
+    These are all six for a robot with six degrees of freedom; None if the loops cannot be closed in the middle.
     """
     if not _may_depend(case.model):
         return list(range(6))
@@ -196,7 +196,7 @@ class CompletedPoses(NamedTuple):
 def completed(
     case: Case, positions: FloatArray, rotations: FloatArray, which: NDArray[np.bool_]
 ) -> CompletedPoses | None:
-    """Return poses with their dependent coordinates computed; None where all coordinates are independent.
+    """Return poses with their dependent coordinates computed; None if all coordinates are independent.
 
     Args:
         case: case with fixed dimensions.

@@ -55,7 +55,7 @@ class ProgramEquations:
         return Equations(np.asarray(x, dtype=np.float64), residual, normals, is_defined)
 
     def linear(self, at: Equations) -> Linear | None:
-        """Return the equations to first order; None where they hold or are not defined."""
+        """Return the equations to first order; None if they hold or are not defined."""
         if np.max(np.abs(at.residual)) <= self._closed or not at.is_defined:
             return None
         return Linear(at.residual, at.normals[:, self._movable])
@@ -74,7 +74,7 @@ def gradient_sizes(gradients: FloatArray, longest: FloatArray, no_gradient: floa
 
     Args:
         gradients: (k, n) gradients in scaled variables.
-        longest: (k,) longest gradient of each constraint at a few points; 0 where there is none.
+        longest: (k,) longest gradient of each constraint at a few points; 0 if there is none.
         no_gradient: relative size below which a gradient counts as zero.
     """
     sizes = np.sqrt(np.einsum("ij,ij->i", gradients, gradients))

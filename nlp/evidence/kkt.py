@@ -67,7 +67,7 @@ class Linearisation:
         residual: (k,) signed residual ``expression - limit``, positive outside, scaled to the same distance.
         normals: (k, n) outward unit normals in scaled variables; for an equation, the gradient's direction.
         per_unit: (k,) change of the slack per unit by which a side's limit is relaxed.
-        noise: (k,) rounding error of the slack where narrow ranges make it notable; else 0.
+        noise: (k,) rounding error of the slack where narrow ranges make it notable; otherwise 0.
         rounding: rounding error of the stationarity conditions.
     """
 
@@ -231,7 +231,7 @@ class _Stationarity:
         self._mu, self._error = np.zeros(len(at.sides)), np.inf
 
     def linear(self, at: Linearisation) -> Linear | None:
-        """Return the conditions to first order; None where they hold to rounding, and after the last step."""
+        """Return the conditions to first order; None if they hold to rounding, and after the last step."""
         n, k = self._nlp.n, len(self._active)
         if not self._left:
             return None
@@ -248,7 +248,7 @@ class _Stationarity:
         return Linear(residual, matrix) if np.isfinite(matrix).all() and np.isfinite(residual).all() else None
 
     def moved(self, at: Linearisation, step: FloatArray) -> Linearisation | None:
-        """Return the program after a step; None where the step is too long, or the residual grows.
+        """Return the program after a step; None if the step is too long, or the residual grows.
 
         Where the step would cross a side, it ends on the side, which joins the active set.
         """

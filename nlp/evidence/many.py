@@ -68,9 +68,9 @@ class Verdicts:
     Attributes:
         is_strict: (N,) whether the point is clearly a strict local optimum.
         F: (N,) objective.
-        stationarity: (N,) largest scaled derivative of the Lagrangian; infinite where the active normals are dependent.
+        stationarity: (N,) largest scaled derivative of the Lagrangian; infinite if the active normals are dependent.
         feasibility: (N,) largest violation of a side, in half ranges.
-        curvature: (N,) smallest eigenvalue of the reduced Hessian; infinite where the active sides leave no direction,
+        curvature: (N,) smallest eigenvalue of the reduced Hessian; infinite if the active sides leave no direction,
             NaN where it is not computed.
         active: (N, k) whether each side of the program is active.
         multipliers: (N, k) scaled multipliers of the sides.

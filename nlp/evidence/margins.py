@@ -35,13 +35,13 @@ class Margin(JsonObject):
         name: name of the limit, with the leg, joint or pose.
         key: dotted key of the limit's value in the case, below limits.
         bound: side of the limit.
-        value: measured value; null where it is not finite.
+        value: measured value; null if it is not finite.
         limit: value of the limit in the case.
         margin: distance from the limit, positive where the limit is satisfied.
         unit: unit of value, limit and margin.
         active: whether the point lies on the limit.
         violated: whether the point violates the limit by more than rounding error.
-        cost: derivative of the optimal F with respect to the limit; null where the point is no optimum.
+        cost: derivative of the optimal F with respect to the limit; null if the point is no optimum.
         dimension: dimension of value, limit and margin, which are in radians for angles.
     """
 

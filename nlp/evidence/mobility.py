@@ -51,9 +51,9 @@ class Mobility:
     Attributes:
         freedoms: degrees of freedom of the platform with free actuators.
         constraint_rank: rank of the constraint wrenches.
-        actuator_rates: rate of each actuator for the program's task: rad or length per unit of time; infinite where the
+        actuator_rates: rate of each actuator for the program's task: rad or length per unit of time; infinite if the
             actuator cannot drive the platform, NaN where the motion does not determine it.
-        constrained: part of F from constraint wrenches, 0 to 1; 0 where the platform can make the motion.
+        constrained: part of F from constraint wrenches, 0 to 1; 0 if the platform can make the motion.
         parts: actuation and constraint part of F for each limb.
         singularities: all singularities at the point.
     """

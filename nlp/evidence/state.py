@@ -253,7 +253,7 @@ def _rank_and_free_twists(jacobian: FloatArray, centre: FloatArray) -> tuple[int
 
 
 def state_or_none(nlp: Nlp, x: FloatArray) -> RobotState | None:
-    """Return the state of the robot at a point (n,), or None where its equations have no finite value."""
+    """Return the state of the robot at a point (n,), or None if its equations have no finite value."""
     try:
         return evaluate(nlp, x)
     except EvaluationError:

@@ -157,7 +157,7 @@ def _refuse_foreign(folder: Path, target: str, files: Iterable[str]) -> None:
 
 
 def check_outputs(inputs: Mapping[Path, str], outputs: Mapping[str, str | None]) -> None:
-    """Refuse outputs that cannot be written, would overwrite an input, or are one file, before the work begins.
+    """Refuse, before the work begins, outputs that are not writable, overwrite an input, or share a file.
 
     Links are resolved first. Pipes and devices take any number of outputs.
 

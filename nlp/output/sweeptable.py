@@ -250,7 +250,7 @@ def _points(over: Over | None, points: Mapping[str, Sequence[float]] | None) -> 
             the columns have different lengths.
     """
     if (not over) == (not points):
-        raise InputError("a sweep needs either over or points, a mapping from names to values")
+        raise InputError("a sweep needs exactly one of over and points: a mapping from names to values")
     axes = axes_of(over) if over else axes_of(points or {}, "points", repeated=True)
     if over:
         return grid_of(tuple(axes), list(axes.values()))

@@ -172,7 +172,7 @@ def with_exact_level(nlp: Nlp, x: FloatArray) -> FloatArray:
 
 
 def with_wider_level(nlp: Nlp, x: FloatArray) -> Nlp | None:
-    """Return a program with wider bounds of its level if they may be active at a point (n,); else None.
+    """Return a program with wider bounds of its level if they may be active at a point (n,); otherwise None.
 
     The bounds are estimates, not limits of the case: a level on its bound is not an answer.
     """

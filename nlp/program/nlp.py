@@ -101,7 +101,7 @@ class Nlp(Whole):
         lower: (n,) lower bounds of the variables.
         upper: (n,) upper bounds, ``lower < upper``.
         start: (n,) first starting point.
-        g_lower: (c,) lower sides of the constraints, infinite where there is none.
+        g_lower: (c,) lower sides of the constraints, infinite if there is none.
         g_upper: (c,) upper sides of the constraints; equal to the lower ones for an equation.
         constant_limits: satisfied limits that depend on no variable, so that they are not constraints.
         families: limits on many pairs of values. Only the pairs in ``pairs`` are constraints; see :mod:`.pairs`.
@@ -110,7 +110,7 @@ class Nlp(Whole):
         pairs: family, first and second index of the pairs that are the program's last constraints.
         pair_count: number of constraints of these pairs.
         in_home_mode: True if a search of the whole box keeps to the home working mode of a robot given joint by joint.
-        size: positive size of the objective, if the objective does not consist of the robot's F; else None.
+        size: positive size of the objective, if the objective does not consist of the robot's F; otherwise None.
     """
 
     program: Program

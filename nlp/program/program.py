@@ -156,7 +156,7 @@ class Program(Whole):
         robots: the robot's expressions at each pose.
         model: symbolic model of the robot.
         places: places of the case's parameters, rotations, unknowns, twists, directions and epigraph.
-        objective_call: call that returns the objective, if it combines F of several poses; else None.
+        objective_call: call that returns the objective, if it combines F of several poses; otherwise None.
     """
 
     variables: tuple[Scalar, ...]

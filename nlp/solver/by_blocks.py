@@ -132,7 +132,7 @@ class _BlockResults:
 def from_best_blocks(
     nlp: Nlp, blocks: Blocks, ends: Sequence[FloatArray], best: float | None, better: float
 ) -> FloatArray | None:
-    """Return the point (n,) of the best blocks over all results, if it is better than the best optimum; else None.
+    """Return the point (n,) of the best blocks over all results, if it is better than the best optimum; otherwise None.
 
     Args:
         nlp: the nonlinear program.

@@ -80,9 +80,9 @@ class Certified(Whole, Shown, Answer):
     Attributes:
         solution: the solution.
         tasks: certificate of each task by itself.
-        combined: certificate of the combined program of several tasks; None where the method has none.
+        combined: certificate of the combined program of several tasks; None if the method has none.
         statement: description of the program that ``tree`` proves.
-        tree: nodes of the proof; None without ``with_proof``, and where nothing is proved.
+        tree: nodes of the proof; None without ``with_proof``, or if nothing is proved.
     """
 
     solution: Solution
@@ -383,7 +383,7 @@ def proof_of(certified: Certified, text: str) -> Proof:
 
 
 def _complete_tree(writer: TreeRecord | None, certificate: Certificate) -> bytes | None:
-    """Return the nodes of a complete proof; None where nothing is proved or recorded."""
+    """Return the nodes of a complete proof; None if nothing is proved or recorded."""
     complete = certificate.status in (CertificateStatus.PROVED, CertificateStatus.INFEASIBLE)
     # A program with a single point needs no search, and has no tree.
     return writer.tree() if writer is not None and complete and certificate.engine == ENGINE else None

@@ -45,7 +45,7 @@ class ChoiceProof(NamedTuple, Generic[Proved]):
     Attributes:
         best: certificates of the best combination.
         chosen: ranges of this combination.
-        certificate: certificate over all combinations; None where no program combines the tasks of the best one.
+        certificate: certificate over all combinations; None if no program combines the tasks of the best one.
     """
 
     best: Proved
@@ -125,7 +125,7 @@ def _together(
         found: certificates of the parts that cover all combinations.
         count: number of combinations.
         boxes: number of boxes examined in addition to those of these certificates.
-        unknown: reason why these certificates do not cover some combinations; empty where they cover all.
+        unknown: reason why these certificates do not cover some combinations; empty if they cover all.
     """
     possible = [each for each in found if each.status is not CertificateStatus.INFEASIBLE]
     bounds = [known.nlp.sign * each.bound for each in possible]

@@ -54,7 +54,7 @@ def cost_of(solution: Solution) -> float:
 class _Part:
     """An open part of the combinations: index ranges of values, and the solve with parameters free between their ends.
 
-    The solve is None where the robot's loops cannot be closed at any of its starting points.
+    The solve is None if the robot's loops cannot be closed at any of its starting points.
     """
 
     def __init__(self, ranges: Ranges, relaxed: Solution | None) -> None:

@@ -58,13 +58,13 @@ class ProgramSolution(Whole):
         status: outcome of the search; only :attr:`Status.OPTIMAL` stands for the best known point.
         nlp: the nonlinear program.
         x: (n,) the best point: optimal, or only reached, as the status says.
-        state: state of the robot at ``x``; None where its equations have no value.
+        state: state of the robot at ``x``; None if its loop equations have no solution.
         evidence: evidence of optimality at ``x``; None when nothing is free.
         starts: every start, in order.
         optima: distinct optima of converged starts, best first.
         seed: seed of the starting points.
         seconds: wall time.
-        relaxation: smallest known relaxation of the limits that makes an infeasible program feasible; empty where none
+        relaxation: smallest known relaxation of the limits that makes an infeasible program feasible; empty if none
             is known.
         better: objective of a feasible point that is better than every optimum, but at which no search converged; None
             for none.

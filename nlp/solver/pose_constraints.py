@@ -56,10 +56,10 @@ TIGHTER = 1e-3
 #: First words of the name of a claim about the reach of a limb; and smallest squared sine or cosine of the limb's reach
 #: in a constraint: for a quantity between 0 and 1, the limit 0 is tighter by this amount.
 REACH, _REACH = "reach limb ", TIGHTER
-#: Smallest determinant of J at a singular pose, as a part of that in the middle of the workspace.
+#: Smallest determinant of J at a singular pose, as a fraction of that in the middle of the workspace.
 _DETERMINANT = 1e-2
-#: Smallest determinant of J'J, as a part of that at the stated pose; the factor for each further singular pose; and the
-#: largest part. J'J has no sign, so the singular pose moves only a little: each further one must be farther away.
+#: Smallest determinant of J'J, as a fraction of that at the stated pose; factor for each further singular pose; largest
+#: fraction. J'J has no sign, so a singular pose moves only a little: each further singular pose must be farther away.
 _SQUARED, _MORE, _MOST = 1e-4, 4.0, 1e-2
 #: Bounds of reaches and determinants that hold for every proved design.
 _ABOVE = (0.0, math.inf)
@@ -82,7 +82,7 @@ class BindingPose(NamedTuple):
     Attributes:
         name: name of the claim.
         pose: pose in question; for a stroke, the pose of the shortest length.
-        longest: pose of the longest length, for a stroke; else None.
+        longest: pose of the longest length, for a stroke; otherwise None.
         errors: (m, 3) joint-centre errors of the robot within the tolerance; None for the exact robot.
     """
 
@@ -264,7 +264,7 @@ class PoseConstraints:
         return np.array([at_design(x) for x in points])
 
     def _claim(self, binding: BindingPose, problem: Problem, x: FloatArray) -> _PosedClaim | None:
-        """Return a claim as constraints; None without any, or where the loops of the design (n,) cannot be closed."""
+        """Return a claim as constraints; None without any, or if the loops of the design (n,) cannot be closed."""
         where = f" workspace pose {len(self._claims) + 1}"
         poses = []
         for pose in binding.poses:
@@ -286,7 +286,7 @@ class PoseConstraints:
     def _closed_pose(
         self, pose: PoseNumbers, errors: FloatArray | None, problem: Problem, x: FloatArray, where: str
     ) -> _ClosedPose | None:
-        """Return a robot at a pose; None where the loops of the design (n,) cannot be closed."""
+        """Return a robot at a pose; None if the loops of the design (n,) cannot be closed."""
         nlp, count, box = self._nlp, len(problem.free), problem.box
         y = box.coordinates(self._numbers(pose, x))
         start = _closed_at(problem, y)
@@ -466,7 +466,7 @@ def _are_alike(one: FloatArray, other: FloatArray, part: float) -> bool:
 
 
 def _problem(design: Case, workspace: Workspace) -> Problem | None:
-    """Return the problem of a design over its workspace; None where its loops cannot be closed in the middle."""
+    """Return the problem of a design over its workspace; None if its loops cannot be closed in the middle."""
     try:
         return build_problem(design, closed_form(design.model).model, pose_box(workspace))
     except NotJudgedError:

@@ -96,7 +96,7 @@ class _Confirmed:
         self._known: list[Start] = []
 
     def start(self, found: Screened, k: int) -> Start | None:
-        """Return the k-th start, or None where Ipopt must search from its starting point."""
+        """Return the k-th start, or None if Ipopt must search from its starting point."""
         if not found.converged[k]:
             return None
         n, iterations = self._nlp.n, int(found.iterations[k])
@@ -116,7 +116,7 @@ class _Confirmed:
         return start
 
     def _confirm(self, screened: SolverResult) -> Start | None:
-        """Return the start for an optimum of the search in C; None where it violates the program's conditions.
+        """Return the start for an optimum of the search in C; None if it violates the program's conditions.
 
         Ipopt's point counts unless Ipopt fails from there, or moves to a worse point.
         """

@@ -150,8 +150,8 @@ class SearchJournal(JournalFile):
 
     @property
     def words(self) -> str:
-        """Number of entries, and how to resume from them."""
-        return f"{self.count}: the same command goes on from there" if self._kept else "no search is done"
+        """Number of entries, and the way to resume, in words."""
+        return f"{self.count}: the same command continues from them" if self._kept else "no search is complete"
 
     @property
     def count(self) -> str:
@@ -192,7 +192,7 @@ def _vector(text: str, count: int) -> FloatArray:
     """
     values = [float(part) for part in text.split()]
     if len(values) != count:
-        raise ValueError(f"the entry belongs to another program: expected {count} values")
+        raise ValueError(f"the entry belongs to another nonlinear program: expected {count} values, got {len(values)}")
     return frozen_array(values, (count,))
 
 

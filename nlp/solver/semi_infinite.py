@@ -295,7 +295,7 @@ def faults_of(judged: Judgement) -> Iterator[BindingPose | None]:
 
 
 def _faults_of_numbers(extremes: Sequence[Verdict]) -> Iterator[BindingPose | None]:
-    """Yield a pose for each limited quantity that is not proved; None where it is undecided and has no pose."""
+    """Yield a pose for each limited quantity that is not proved; None if it is undecided and has no pose."""
     by_name = {(each.name, each.sense): each for each in extremes}
     for each in extremes:
         if not each.fails:

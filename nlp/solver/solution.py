@@ -96,7 +96,7 @@ class TaskOutcome:
         own: solution of the separate program of the task.
         unique: whether the separate optimum of the task is the only one.
         x: (n,) point of the task's optimal set that is combined with those of other tasks.
-        state: state of the robot at the solution's point, with this task's rates, at the first pose; None where the
+        state: state of the robot at the solution's point, with this task's rates, at the first pose; None if the
             loops cannot be closed.
         F: objective of the task at the solution's point; NaN where the loops cannot be closed.
         evidence: evidence at the solution's point for this task by itself; None when nothing is free.
@@ -127,7 +127,7 @@ class Combination:
         weights: weight of each task, scaled to sum to the number of tasks.
         violated: names of the bounds and constraints that the combined point violates.
         notices: sentences about scaled weights and optima that are not unique.
-        combined: solution of the combined program; None for an average, or where a task has no separate optimum.
+        combined: solution of the combined program; None for an average, or if a task has no separate optimum.
     """
 
     method: Method
@@ -182,7 +182,7 @@ class Rounding:
         after: objective of the rounded design, as a cost to be minimised; infinite without an answer.
         farther: number of additional multiples on each side of the nearest ones that were searched.
         numbers: rounded dimensions; their values are NaN without an answer.
-        choice: search over the multiples; None where each dimension has only one.
+        choice: search over the multiples; None if each dimension has only one.
     """
 
     step: float
@@ -212,9 +212,9 @@ class Solution(Whole, Shown, Answer):
         outcomes: outcome of each task.
         combination: combination of several tasks; None for one task.
         seconds: wall time.
-        workspace: proof that the design satisfies its limits over the workspace; None where no limit holds there, or
+        workspace: proof that the design satisfies its limits over the workspace; None if no limit holds there, or
             the program has no answer.
-        path: proof that the design satisfies its limits along the path; None where no limit holds there, or the program
+        path: proof that the design satisfies its limits along the path; None if no limit holds there, or the program
             has no answer.
         choice: search over listed parameter values, which the programs have fixed; None without such values.
         rounding: rounding of dimensions, which the programs have fixed; None without rounding.
@@ -312,7 +312,7 @@ class Solution(Whole, Shown, Answer):
 
     @property
     def state(self) -> RobotState | None:
-        """State of the robot at the point, with the rates of the first task; None where loops cannot be closed."""
+        """State of the robot at the point, with the rates of the first task; None if loops cannot be closed."""
         return self.outcomes[0].state
 
     @property

@@ -1,4 +1,4 @@
-"""Searches from many starting points, each corrected and judged by the program's conditions, and their distinct optima.
+"""Searches from many starting points: Newton corrections, optimality conditions, and distinct optima.
 
 The sides that the solver reports as active are fixed, and a few Newton steps bring the solver's point to rounding
 error. The first-order conditions of the program then decide on convergence, never the report of the solver.
@@ -177,7 +177,7 @@ def known_optimum(nlp: Nlp, stopped: FloatArray, known: list[Start]) -> Start | 
 
 
 def judge(nlp: Nlp, found: SolverResult) -> Start:
-    """Return the corrected last point of a solver, judged by the conditions of the program."""
+    """Return the last point of a local solver after Newton corrections, with its status by the conditions."""
     stopped = np.clip(found.x, nlp.lower, nlp.upper)
     raw = at = linearise(nlp, stopped)
     active = at.active()
@@ -250,7 +250,7 @@ class Optimum:
         F: objective.
         count: number of starts that converged to the optimum.
         x: (n,) one of its points.
-        spread: largest distance between its points along one variable, as a part of that variable's range: 0 for an
+        spread: largest distance between its points along one variable, as a fraction of that variable's range: 0 for an
             isolated optimum, up to 1 for a set of optima, which may have several pieces.
         evidence: evidence of optimality at ``x``.
         nlp: nonlinear program of the optimum.

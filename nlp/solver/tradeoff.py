@@ -42,7 +42,7 @@ class TradeoffPoint:
     Attributes:
         value: value, in the case's unit.
         solution: solution of the case with this value; its status says whether it is an answer.
-        certified: certificates of an answer; None where they were not requested.
+        certified: certificates of an answer; None if they were not requested.
     """
 
     value: float

@@ -48,7 +48,7 @@ def row_of(kind: type[Kind], line: str | bytes) -> Kind:
     """
     data, fields = json_tree(line), fields_of(kind)
     if not isinstance(data, list) or len(data) != len(fields):
-        raise ValueError("the line is not a row of this journal")
+        raise ValueError(f"expected a row of {len(fields)} values")
     return kind(*(value_of(of, value, name) for (name, of), value in zip(fields, data, strict=True)))
 
 

@@ -57,7 +57,7 @@ class Entry(NamedTuple):
         key: key in JSON.
         kind: annotation of the value.
         default: value where the key is missing; ``dataclasses.MISSING`` for a key that must be there.
-        inline: class of the value, where its own fields stand in its place; else None.
+        inline: class of the value, where its own fields stand in its place; otherwise None.
     """
 
     name: str

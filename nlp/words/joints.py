@@ -49,7 +49,7 @@ def reach_of(motion: ScrewMotion, size: float) -> float:
 
 
 def triple(values: Sequence[float], size: float) -> str:
-    """Return three numbers in parentheses, 0 where they are rounding error relative to a size."""
+    """Return three numbers in parentheses, 0 if they are rounding error relative to a size."""
     return f"({', '.join(number(value, size, digits=4) for value in values)})"
 
 

@@ -55,7 +55,7 @@ class Figure(str):
     """Text of a number, with its value for outputs that keep every digit.
 
     Attributes:
-        value: the number; 0 where it is below its error bound.
+        value: the number; 0 if it is below its error bound.
     """
 
     __slots__ = ("value",)
@@ -98,6 +98,6 @@ class TextTable:
 
 
 def in_part(name: str, items: Iterable[Line | TextTable]) -> Iterator[Line | TextTable]:
-    """Yield lines and tables as a part of a result, after the answer."""
+    """Yield lines and tables as one section of a result, after the answer."""
     for item in items:
         yield replace(item, part=name)

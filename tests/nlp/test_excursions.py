@@ -263,7 +263,7 @@ def test_what_is_no_box_in_world_coordinates_is_refused(changes: dict[str, Any],
 
 
 def test_a_free_pose_is_refused_where_one_machine_is_judged(tmp_path: Path, cli: Run) -> None:
-    words = "pose.position[2]: is free, but the workspace is about the pose: fix it with --set p_z=..., or use --of"
+    words = "pose.position[2]: must be fixed, as the workspace is relative to the pose: use --set p_z=... or --of"
     command = ("workspace", str(case_file(tmp_path, BASE)), "--set", "x1=0.8")
     refusal_of(cli(*command), words)
     code, out, err = cli(*command, "--set", "p_z=0.8", "--time", "5")

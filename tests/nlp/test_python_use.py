@@ -298,7 +298,7 @@ def test_the_arguments_of_the_first_version_still_work() -> None:
         ({"x1": []}, "x1: has no values"),
         ({"x1": 12}, "over x1: must be a list of numbers, got int 12"),
         ({"x1": "10:14:3"}, "over x1: must be a list of numbers, got str '10:14:3'"),
-        ({"x1": [12, 12]}, "over x1: has a value twice; each point must be another one"),
+        ({"x1": [12, 12]}, "over x1: contains a value twice; the values must be different"),
         ({"x1": [12, math.inf]}, "x1 = inf: must be a finite number"),
         ({"x9": [12, 13]}, "x9: cannot be set; allowed: x1, x2, x3, x4, p_x"),
     ],

@@ -356,7 +356,7 @@ REFUSALS = {
     ),
     "workspace of one pose": (
         above("workspace = { position = [0, 0, 30] }"),
-        "case.toml: workspace: is one pose: give at least one number as { min, max }",
+        "case.toml: workspace: is only one pose: give one coordinate or more as { min, max }",
     ),
     "crossed workspace": (
         above("workspace = { position = [0, 0, { min = 40, max = 30 }] }"),

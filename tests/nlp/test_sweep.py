@@ -184,8 +184,8 @@ def test_joints_are_no_design() -> None:
     assert [name for name in found.design if name.startswith("q") and name[1:2].isdigit()] == []
     assert set(found.design) == {"rb", "p_x", "p_y", "p_z", "q_x", "q_y", "q_z"}
     for arguments, words in (
-        ({}, "a sweep needs either over or points"),
-        ({"over": {"rb": (1, 1)}}, "has a value twice"),
+        ({}, "a sweep needs exactly one of over and points"),
+        ({"over": {"rb": (1, 1)}}, "contains a value twice"),
         ({"over": {"rb": (1, "a")}}, "rb = a: must be a finite number"),
         ({"over": {"rb": ()}}, "rb: has no values"),
         ({"points": {"rb": (1, 2), "rp": (1,)}}, "got rb 2, rp 1"),

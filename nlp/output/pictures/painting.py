@@ -51,7 +51,7 @@ def rate_colour_map() -> LinearSegmentedColormap:
 
 
 def largest_rate(drawing: Drawing) -> float:
-    """Return the largest rate of a drawing; 0 where F is 0, because the rates are then rounding errors."""
+    """Return the largest rate of a drawing; 0 if F is 0, because the rates are then rounding errors."""
     return max((abs(row.rate) for row in drawing.rows if not math.isnan(row.share)), default=0.0)
 
 
