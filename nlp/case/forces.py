@@ -19,7 +19,7 @@ from ...models.parts import Dimension
 from ...models.statics import DrivenJoint, Statics, degrees_of_freedom, driven_joints
 from .loads import LoadCase, Loading, Motion
 
-#: Smoothing of the norm of a vector at 0: the norm is too large by at most this part of a typical norm.
+#: Smoothing of the norm of a vector at 0: the norm is too large by at most this fraction of a typical norm.
 _SMOOTH = 1e-12
 
 

@@ -31,7 +31,7 @@ _MOST_SIGNS = 6
 _NONE = (0.0, 0.0, 0.0)
 #: A number or an expression.
 Length = TypeVar("Length", float, SX)
-#: Work below this part of the largest possible work of force and moment counts as zero.
+#: Work below this fraction of the largest possible work of force and moment counts as zero.
 _NO_WORK = 1e-9
 
 

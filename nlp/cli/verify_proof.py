@@ -41,7 +41,7 @@ def verify_proof(
     The claims are derived again from the case and the options: give the options of the command that wrote the proof.
     """
     from .. import __version__
-    from ..errors import InputError
+    from ..errors import InputError, listing
     from ..proof.checker.proof_file import LARGEST_PROOF, PathPremises, Statement, read_proof
     from ..system.reading import read_limited
     from ..words.text import Line
@@ -101,7 +101,7 @@ def _hold_path(
         InputError: a file cannot be read, or options for reading are given without a file.
         Exit: with status 1 where the proof is for another path.
     """
-    from ..errors import InputError
+    from ..errors import InputError, listing
     from ..path.options import PathOptions
     from ..path.reader import options_of, text_of_path
     from ..proof.checker.proof_file import ProofError

@@ -35,19 +35,19 @@ from .workingmode import Posture, names_of, turned_limbs
 _FIRST = 1 / 16
 _SHORTEST = 1 / 2048
 _STEPS = 11
-#: Largest change of pose and unknowns, of order 1, in a step: a larger one that stays in the shortest step is a jump.
+#: Largest change of scaled pose and unknowns in a step. A larger change, even in the shortest step, is a jump.
 _LARGE = 0.05
 #: Weight of a pose step relative to a step of the unknowns: the pose moves only where the unknowns do not suffice.
 _HEAVY = 1e-3
-#: Largest residual of closed loops; equations are of order 1.
+#: Largest residual of closed loops; equations have magnitudes of about 1.
 _CLOSED = 1e-10
 #: Largest residual of the loops at home after scaling the robot: rounding of its dimensions.
 _SIMILAR = 1e-7
-#: Singular values below this part of the largest are zero: such a loop is mobile at home too.
+#: Singular values below this fraction of the largest are zero: such a loop is mobile at home too.
 _ZERO = 1e-9
-#: A path is near a singularity where a singular value falls below this part of that at home.
+#: A path is near a singularity where a singular value falls below this fraction of that at home.
 NEAR_SINGULAR = 0.1
-#: Largest difference of an unknown of order 1 within one assembly mode: in another mode it is of order 0.1.
+#: Largest difference of an unknown of magnitude about 1 within one assembly mode: in another mode it is about 0.1.
 _SAME = 1e-4
 
 
@@ -245,7 +245,7 @@ class _Path:
         (residual,) = ca.Function("closure", own.all, [equations]).call(
             [own.parameters, z[6:] * sizes, rotation, z[3:6]]
         )
-        # With lengths of the robot's size, the singular values are those of equations of order 1.
+        # With lengths of the robot's size, the singular values are those of equations of magnitude about 1.
         outputs = [ca.densify(residual), ca.densify(ca.jacobian(residual, z))]
         self._kernel = Kernel(ca.Function("path", [z, own.parameters], outputs), tuple_of)
         self.scale = np.ones(z.numel())
@@ -304,6 +304,6 @@ def _sizes_of_unknowns(model: Model, parameters: FloatArray) -> FloatArray:
 
 
 def _size(model: Model) -> float:
-    """Return a length of the order of the robot's size, from its lengths and its home position."""
+    """Return a length comparable to the robot's size, from its lengths and its home position."""
     lengths = [value for item in model.parameters if item.dimension is Dimension.LENGTH for value in item.typical]
     return float(np.linalg.norm([*lengths, *model.home])) or length_of(model, model.typical.tolist())

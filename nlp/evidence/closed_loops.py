@@ -11,13 +11,13 @@ from casadi import SX
 
 from ...models.arrays import FloatArray, values_at
 
-#: Largest residual of a closed loop; equations are of order 1, and Newton's method ends at rounding.
+#: Largest residual of a closed loop; equations have magnitudes of about 1, and Newton's method ends at rounding.
 _CLOSED = 1e-10
 #: Steps of Newton's method.
 _STEPS = 15
 #: Steps from the joints at home, where the equations have residuals at another pose, to closed loops.
 _WAY = 40
-#: Singular values below this part of the largest are zero in a step of more coordinates than equations.
+#: Singular values below this fraction of the largest are zero in a step of more coordinates than equations.
 DEPENDENT = 1e-9
 
 
@@ -104,8 +104,8 @@ class Loops:
 def inverses(matrices: FloatArray, zero: float | None = None) -> FloatArray:
     """Return the inverses of matrices (B, k, k); NaN for singular ones.
 
-    With ``zero`` the result is pseudo-inverses (B, n, k) of matrices (B, k, n); singular values below this part of the
-    largest count as zero.
+    With ``zero`` the result is pseudo-inverses (B, n, k) of matrices (B, k, n); singular values below this fraction of
+    the largest count as zero.
     """
     good = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
     if zero is None:

@@ -31,7 +31,7 @@ from .closed_loops import Loops, closed_from_home
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Singular values below this part of the largest are zero; a relative change below the second number is rounding.
+#: Singular values below this fraction of the largest are zero; a relative change below the second number is rounding.
 _ZERO, _STILL = 1e-9, 1e-9
 #: Smallest component of a feasible direction, as a fraction of the largest, at which a coordinate counts as moving.
 _MOVES = 1e-6
@@ -43,7 +43,7 @@ _WIDER, _LEAST = 0.5, 1e-2
 #: Volumes with a smaller relative difference are equal: the first is taken. A fixed coordinate that comes first is
 #: taken if it has the second part of the largest volume.
 _TIE, _ENOUGH = 1e-9, 0.2
-#: Weight of a direction of the position, in parts of the robot's size, relative to a rotation in radians: most tasks
+#: Weight of a direction of the position, divided by the robot's size, relative to a rotation in radians: most tasks
 #: are positioning tasks.
 _POSITION = 3.0
 

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 _BLOCK = 256
 #: Components of a pose: the rotation column by column, then the position.
 _POSE = 12
-#: Attempts along a path: number of its steps, and largest correction of an extrapolated unknown of order 1 in a step.
+#: Attempts along a path: number of steps, and largest correction of a scaled, extrapolated unknown in a step.
 #: The last attempt has the step limit of :mod:`.assembly`, beyond which a step is a jump.
 _WAYS = ((4, 0.2), (16, 0.1), (64, 0.05))
 #: Between consecutive poses, one step is tried first.
@@ -162,7 +162,7 @@ def _rpy_rows(rpy: ArrayLike, count: int) -> FloatArray:
         k, column = large[0]
         angle = float(rows[k, column])
         words = f"{angle:.6g} rad = {math.degrees(angle):.1f} deg; angles are radians in Python"
-        raise InputError(f"rpy[{k}][{column}] = {angle:.6g}: must be at most 2 pi in size; {words}")
+        raise InputError(f"rpy[{k}][{column}] = {angle:.6g}: must be at most 2 pi in magnitude; {words}")
     return rows
 
 

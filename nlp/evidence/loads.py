@@ -33,7 +33,7 @@ from ..system.jsonvalues import (
 from .paths import velocities_at
 from .state import RobotState, evaluate
 
-#: Work rates of a limb's rows below this part of the largest count as zero.
+#: Work rates of a limb's rows below this fraction of the largest count as zero.
 _DRIVES = 1e-9
 
 

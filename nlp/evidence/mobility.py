@@ -24,7 +24,7 @@ from .singularities import (
 )
 from .state import RobotState
 
-#: A twist is feasible where the constraint part of F is below this part of F's size: the rates are then below 1e-6.
+#: A twist is feasible where the constraint part of F is below this fraction of F's size: the rates are then below 1e-6.
 _FEASIBLE = 1e-12
 
 

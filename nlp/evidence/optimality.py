@@ -31,7 +31,7 @@ from .singularities import is_passive_singular
 #: Scaled multiplier below which an active side is weakly active.
 STRONG = 1e-9
 #: Eigenvalue of the scaled reduced Hessian below which it counts as zero: over half a variable's range F then changes
-#: by less than this part of its size.
+#: by less than this fraction of its size.
 CURVED = 1e-8
 #: Length of the trial step along a flat direction, in half ranges: F must keep its value.
 _FLAT_STEP = 0.02
@@ -39,10 +39,10 @@ _FLAT_STEP = 0.02
 _DIRECTION_CHANGES = 4
 #: Cosine between two directions above which they count as equal.
 _SAME_DIRECTION = 0.999
-#: Flat directions from such steps are accurate to a few percent: singular values below this part of the largest do not
-#: belong to a separate direction.
+#: Flat directions from such steps are accurate to a few percent: singular values below this fraction of the largest
+#: one do not belong to a separate direction.
 _INDEPENDENT = 0.05
-#: For the same reason, components of a flat direction below this part of the largest are omitted.
+#: For the same reason, components of a flat direction below this fraction of the largest are omitted.
 _NEGLIGIBLE = 1e-2
 
 

@@ -31,11 +31,11 @@ from .paths import paths_at
 from .screwvalues import ScrewMotion, ScrewWrench, motion_of, wrench_of
 from .state import RobotState
 
-#: Screws of unit size are dependent if a singular value is below this part of the largest, as for the rank of J.
+#: Screws of unit size are dependent if a singular value is below this fraction of the largest, as for the rank of J.
 DEPENDENT = 1e-7
 #: Relative size below which motions that nested loops leave are rounding errors, and must not be scaled up.
 _NEGLIGIBLE = 1e-9
-#: Rates of dependent joints below this part of the largest are zero: such a joint is not among the dependent ones.
+#: Rates of dependent joints below this fraction of the largest are zero: such a joint is not among the dependent ones.
 _TAKES_PART = 1e-6
 
 
@@ -310,7 +310,7 @@ def _rank(columns: FloatArray) -> int:
 
 
 def _span_of(columns: FloatArray) -> FloatArray:
-    """Return an orthonormal basis (6, r) of the span of columns (6, n) of order 1."""
+    """Return an orthonormal basis (6, r) of the span of columns (6, n) of magnitude about 1."""
     left, values, _ = np.linalg.svd(columns)
     return np.asarray(left[:, : int(np.count_nonzero(values > _TAKES_PART * values.max(initial=1.0)))])
 

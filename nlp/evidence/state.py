@@ -31,10 +31,10 @@ from .paths import numbers_at
 
 #: Relative value, compared with F without cancellation, below which F is zero: the rates are then below 1e-6.
 ZERO_F = 1e-12
-#: Singular values below this part of the largest, with moments divided by their longest arm, count as zero. The part is
+#: Singular values below this fraction of the largest, with moments divided by their longest arm, are zero. The fraction is
 #: the square root of the rounding unit of double precision: points are known to rounding error only.
 ZERO_SINGULAR_VALUE = 1.5e-8
-#: Largest residual of a closed loop's equation, of order 1: in another assembly mode it is of order 0.1.
+#: Largest residual of a closed loop's equation, of magnitude about 1: in another assembly mode it is about 0.1.
 CLOSED = 1e-6
 
 

@@ -100,7 +100,7 @@ class _Machine:
         knots = np.array(self.knots).reshape(-1, 6)
         if not (np.abs(knots) <= LARGEST).all():
             line = self.lines[max(int(np.argmin((np.abs(knots) <= LARGEST).all(axis=1))) - 1, 0)]
-            raise InputError(f"{self.source}: line {line}: must be finite and at most {LARGEST:g} in size")
+            raise InputError(f"{self.source}: line {line}: must be finite and at most {LARGEST:g} in magnitude")
         knots[:, 3:] = np.radians(knots[:, 3:])
         path = ProgrammedPath(
             self.source,

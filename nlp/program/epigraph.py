@@ -286,7 +286,7 @@ class EpigraphBuilder:
         self._constraints: list[BoundedConstraint] = []
 
     def add(self, name: str, slack: Form, *inputs: SX) -> None:
-        """Add the constraint ``slack >= 0``, divided by the ceiling, so that its gradient is of order 1.
+        """Add the constraint ``slack >= 0``, divided by the ceiling, so that its gradient is of magnitude about 1.
 
         Args:
             name: name of the constraint.

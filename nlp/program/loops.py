@@ -26,7 +26,7 @@ _SPREAD = 0.6
 #: Largest number of Newton steps to a closed point, with only the unknowns and with all variables. From home six are
 #: enough.
 _STEPS = (11, 39)
-#: Largest residual of a closed point; equations are of order 1.
+#: Largest residual of a closed point; equations have magnitudes of about 1.
 _CLOSED = 1e-10
 #: Relative size below which singular values are zero in a step, so that rounding moves nothing.
 _DEPENDENT = 1e-9

@@ -226,7 +226,7 @@ class Nlp(Whole):
 
     @cached_property
     def rounding(self) -> float:
-        """Rounding error of the scaled objective and its derivatives: of order 1e-15, and larger for narrow ranges."""
+        """Rounding error of the scaled objective and its derivatives: about 1e-15, and larger for narrow ranges."""
         return _ROUNDINGS * float(np.finfo(float).eps) * self.objective_size / self.objective_scale
 
     @cached_property

@@ -2,7 +2,7 @@
 
 A program belongs to a *structure*: a robot with a set of free parameters. All fixed values of a case (dimensions, pose,
 twist) are arguments, so one program serves every start, task and point of a sweep. Variables are in the units of the
-case (radians for angles); division by :attr:`~.nlp.Nlp.scale` makes them of order 1.
+case (radians for angles); division by :attr:`~.nlp.Nlp.scale` makes them of magnitude about 1.
 
 CasADi's functions are evaluated on NumPy arrays in place, by kernels that keep the memory of arguments and results: the
 conversions of CasADi's general interface take twenty times as long as the functions of a parallel robot.

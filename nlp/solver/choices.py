@@ -34,7 +34,7 @@ def solve_choices(case: Case, solve_fixed: Callable[[Case], Solution], most: flo
     Args:
         case: the case.
         solve_fixed: function that solves a case without listed values.
-        most: largest number of solves; the search then ends with the best known combination.
+        most: largest number of solves, after which the search ends with the best known combination.
 
     Returns:
         The solution of the best combination, with the given case; without an answer where no combination has one.
@@ -52,7 +52,7 @@ def cost_of(solution: Solution) -> float:
 
 
 class _Part:
-    """An open part of the combinations: index ranges of values, and the solve with parameters free between their ends.
+    """Unsolved part of the combinations: index ranges of values, and the solve with parameters free in these ranges.
 
     The solve is None if the robot's loops cannot be closed at any of its starting points.
     """
@@ -191,7 +191,7 @@ class _Search:
         return tuple(ranges)
 
     def _divided(self, part: _Part) -> tuple[Ranges, Ranges]:
-        """Return two halves of a part, split where a solved value is relatively farthest from any listed one."""
+        """Return two halves of a part, split at the parameter whose solved value is farthest from any listed value."""
         farthest, cut = -1.0, (0, 1)
         for k, (number, (first, behind)) in enumerate(zip(self._numbers, part.ranges, strict=True)):
             if behind - first > 1:
@@ -223,7 +223,7 @@ def combinations_of(ranges: Ranges) -> Iterator[Ranges]:
 
 
 def _value_of(solution: Solution | None, number: CatalogueDimension) -> float:
-    """Return the value of a listed parameter at a solution; the middle of its values where the robot has none."""
+    """Return the value of a listed parameter at a solution; without a robot, the middle of the listed values."""
     state = None if solution is None else solution.outcomes[0].state
     if state is None:
         return (number.values[0] + number.values[-1]) / 2

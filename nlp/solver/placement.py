@@ -25,7 +25,7 @@ class Placement(NamedTuple):
 
     Attributes:
         nlp: the nonlinear program.
-        numbers: function that returns the pose (6,) of the frame at a point of the program, or of an extended one.
+        numbers: function that returns the pose (6,) of the frame at a point of the program or of an extended program.
         frame: frame as expressions; None if the frame is fixed.
     """
 

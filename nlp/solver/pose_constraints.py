@@ -138,7 +138,7 @@ class _ClosedPose:
 
 
 class _PosedClaim(NamedTuple):
-    """A claim as constraints of a program, and of its level if that is minimised, with the robot at its poses."""
+    """A claim as constraints of a program, and of a minimised epigraph variable, with the robot at its poses."""
 
     poses: tuple[_ClosedPose, ...]
     constraints: tuple[BoundedConstraint, ...]
@@ -151,14 +151,14 @@ class PoseConstraints:
     Args:
         nlp: nonlinear program without these constraints.
         case: the case.
-        middle: pose whose determinant of J is the reference; the middle of the workspace if left out.
+        middle: reference pose for the determinant of J; the middle of the workspace if left out.
         frame: frame in which poses are given; the world if left out.
     """
 
     def __init__(self, nlp: Nlp, case: Case, middle: PoseNumbers | None = None, frame: Frame | None = None) -> None:
         if middle is None:
             if case.workspace is None:
-                raise TypeError("case.workspace: expected a workspace where limits hold over it, got None")
+                raise TypeError("case.workspace: limits over a workspace need a workspace, got None")
             box = pose_box(case.workspace)
             middle = box.pose(0.5 * (box.lower + box.upper))
         self._nlp, self._case, self._middle, self._frame = nlp, case, middle, frame
@@ -264,7 +264,7 @@ class PoseConstraints:
         return np.array([at_design(x) for x in points])
 
     def _claim(self, binding: BindingPose, problem: Problem, x: FloatArray) -> _PosedClaim | None:
-        """Return a claim as constraints; None without any, or if the loops of the design (n,) cannot be closed."""
+        """Return a claim as constraints; None without constraints, or if the design (n,) cannot be assembled."""
         where = f" workspace pose {len(self._claims) + 1}"
         poses = []
         for pose in binding.poses:
@@ -438,9 +438,9 @@ class PoseConstraints:
 
 
 def with_margin(nlp: Nlp, part: float) -> Nlp:
-    """Return a program with limits at poses that are tighter than in the case by a part of their present margin.
+    """Return a program with limits at poses that are tighter than in the case by a fraction of the present margin.
 
-    With ``part`` 0 they are the limits of the case, and any poses give constraints that a valid design satisfies.
+    With ``part`` 0, the limits are those of the case, so that a valid design satisfies the constraints at any pose.
     """
     stated = [each.stated for each in nlp.program.constraints]
 
@@ -460,13 +460,13 @@ def _rows(robot: RobotInstance, length: float) -> SX:
 
 
 def _are_alike(one: FloatArray, other: FloatArray, part: float) -> bool:
-    """Return whether values (designs, constraints) are equal up to a small part of their size."""
+    """Return whether values (designs, constraints) are equal up to a small relative error."""
     most = part * _ALIKE * np.abs(other).max(initial=0.0)
     return one.shape == other.shape and bool(np.abs(one - other).max() <= most)
 
 
 def _problem(design: Case, workspace: Workspace) -> Problem | None:
-    """Return the problem of a design over its workspace; None if its loops cannot be closed in the middle."""
+    """Return the problem of a design over its workspace; None if the loops cannot be closed at its centre."""
     try:
         return build_problem(design, closed_form(design.model).model, pose_box(workspace))
     except NotJudgedError:

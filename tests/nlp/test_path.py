@@ -373,7 +373,7 @@ def test_what_is_not_read_is_refused_with_its_line_and_word(lines: str, word: st
         ("F1 G2 I1\nM2", "line 1, G2: depends on X of the point", PathOptions(), "mm"),
         ("G0 X1\nM2", "line 1: the unit of length is not known", AT_ZERO, "m"),
         ("G21 G0 X1\nM2", "unit of lengths, 'furlong', has no known length", AT_ZERO, "furlong"),
-        (f"G0 Y1\nX{'9' * 40}\nM2", "line 2: must be finite and at most 1e+30 in size", AT_ZERO, "mm"),
+        (f"G0 Y1\nX{'9' * 40}\nM2", "line 2: must be finite and at most 1e+30 in magnitude", AT_ZERO, "mm"),
     ],
 )
 def test_programs_without_a_path_are_refused(text: str, words: str, options: PathOptions, unit: str) -> None:

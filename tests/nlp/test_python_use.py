@@ -202,13 +202,13 @@ def test_components_poses_and_directions_have_names_too() -> None:
     assert math.hypot(*shown) == pytest.approx(1)
     several = ss.solve(ss.load_case("flight-simulator"), starts=1)
     assert several["pose2_p_x"] == several.case.poses[1].position[0]
-    with pytest.raises(ss.InputError, match=r"^p_x: no such number; allowed: x1, x2, x3, x4, pose1_p_x, pose1_p_y"):
+    with pytest.raises(ss.InputError, match=r"^p_x: no such parameter or coordinate; allowed: x1, x2, x3, x4, pose1_p_x, pose1_p_y"):
         _ = several["p_x"]
 
 
 def test_a_name_that_a_solution_does_not_have_is_refused(solution: ss.Solution) -> None:
     with pytest.raises(
-        ss.InputError, match=r"^x9: no such number; allowed: x1, x2, x3, x4, p_x, p_y, p_z, angle, axis$"
+        ss.InputError, match=r"^x9: no such parameter or coordinate; allowed: x1, x2, x3, x4, p_x, p_y, p_z, angle, axis$"
     ):
         _ = solution["x9"]
     with pytest.raises(TypeError, match="not iterable"):
@@ -289,10 +289,10 @@ def test_the_arguments_of_the_first_version_still_work() -> None:
 @pytest.mark.parametrize(
     ("over", "sentence"),
     [
-        ({}, "over: must have one number for a trade-off curve, got none"),
+        ({}, "over: must name exactly one parameter, bound or limit, got none"),
         (
             {"x1": [1, 2], "x2": [1]},
-            "over: must have one number for a trade-off curve, got x1, x2; sweep takes several",
+            "over: must name exactly one parameter, bound or limit, got x1, x2; use sweep for several",
         ),
         ([1, 2], "over: must be a mapping from names to values, such as {'x1': [10, 12, 14]}, got list"),
         ({"x1": []}, "x1: has no values"),
@@ -357,7 +357,7 @@ def test_inverse_takes_roll_pitch_and_yaw(tmp_path: pytest.TempPathFactory) -> N
         ({"rpy": [[0, 0, 0]] * 2}, "rpy: must be an array (N, 3) of roll, pitch and yaw for N = 1 poses, got (2, 3)"),
         (
             {"rpy": [[0, 0, 45]]},
-            "rpy[0][2] = 45: must be at most 2 pi in size; 45 rad = 2578.3 deg; angles are radians",
+            "rpy[0][2] = 45: must be at most 2 pi in magnitude; 45 rad = 2578.3 deg; angles are radians",
         ),
         (
             {"rotations": [[0, 0, 0.1]]},

@@ -30,11 +30,11 @@ from .constraint import BoundedConstraint, Call, Form, Reading, between
 from .interval import LowerLimit
 from .limit import PosedRobot
 
-#: Largest limit to which a constraint can be changed, in parts of the distance D beyond which it is 1: closer to D, the
+#: Largest limit to which a constraint can be changed, divided by the distance D beyond which it is 1: closer to D, the
 #: slope falls below an eighth of the slope at the original limit.
 _MOST = 0.9
 #: Regularisation of the division for parallel lines, relative to the squared lengths. The next two clampings correct
-#: the error in s: the squared distance is too large by at most a quarter of this part of a leg's squared length.
+#: the error in s: the squared distance is too large by at most a quarter of this fraction of a leg's squared length.
 _PARALLEL = 1e-10
 
 
