@@ -101,7 +101,7 @@ def _hold_path(
         InputError: a file cannot be read, or options for reading are given without a file.
         Exit: with status 1 where the proof is for another path.
     """
-    from ..errors import InputError, listing
+    from ..errors import InputError
     from ..path.options import PathOptions
     from ..path.reader import options_of, text_of_path
     from ..proof.checker.proof_file import ProofError

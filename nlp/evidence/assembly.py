@@ -56,7 +56,7 @@ class Assembly:
     """Assembly mode of the joints at a point, compared with home.
 
     Attributes:
-        is_home: whether the path from home ends at the internal unknowns of the point.
+        is_home: If true, the path from home ends at the internal unknowns of the point.
         nearness: smallest singular value of the loop equations on the path, as a fraction of its value at home; 0 if
             the path jumps or does not reach the pose.
         turned: names of the limbs in another working mode than at home: the path ends at other joint positions, and
@@ -164,7 +164,7 @@ def unknowns_from_home(
         model: model of the robot.
         parameters: (k,) components of all parameters, radians for angles.
         pose: (6,) rotation vector, radians, and position of the platform.
-        given: (u,) values of the unknowns; only free actuator coordinates are read. 0, as at home, if left out.
+        given: (u,) values of the unknowns, of which only free actuator coordinates are read; 0 (home) if left out.
     """
     return _follow(model, parameters, pose, np.zeros(len(model.unknowns)) if given is None else given)[0]
 

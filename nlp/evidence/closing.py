@@ -24,8 +24,8 @@ def closed_start(nlp: Nlp, others: Iterable[FloatArray] = ()) -> FloatArray:
 
     Args:
         nlp: the nonlinear program.
-        others: (n,) further points; where the loops cannot be closed at the program's start, the first of these at
-            which they can be closed replaces it.
+        others: (n,) further points. If the loops cannot be closed at the program's start, the first further point with
+            closed loops replaces it.
 
     Raises:
         EvaluationError: the loops cannot be closed at any of these points.
@@ -80,7 +80,7 @@ def closed_in_place(nlp: Nlp, x: FloatArray) -> FloatArray | None:
 
 
 def close_near(nlp: Nlp, first: FloatArray, x: FloatArray) -> FloatArray:
-    """Return a point near the given one at which the equations hold, with unknowns close to those of a first point.
+    """Return a point near ``x`` at which the equations hold, with unknowns close to those of ``first``.
 
     Args:
         nlp: the nonlinear program.

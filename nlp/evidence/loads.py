@@ -89,11 +89,11 @@ class HeldLoad(JsonObject):
 
     Attributes:
         name: name of the load.
-        pose: number of the pose, from 1 on; absent if there is only one pose.
-        wrench: force, then moment about the world origin, without the part of any direction.
+        pose: number of the pose, from 1; absent for a single pose.
+        wrench: force, then moment about the world origin, without the part of unknown direction.
         actuators: forces or torques of the actuators.
         constraints: constraint wrenches of the limbs; absent for a robot without constraints.
-        deflection: displacement of the platform; absent if the stiffness of an actuator is not known.
+        deflection: displacement of the platform; absent if the stiffness of an actuator is unknown.
     """
 
     name: str
@@ -114,10 +114,10 @@ class TopSpeed(JsonObject):
 
     Attributes:
         actuator: name of the actuator.
-        pose: number of the pose, from 1 on; absent if there is only one pose.
+        pose: number of the pose, from 1; absent for a single pose.
         value: largest speed.
         unit: unit of the speed.
-        dimension: dimension of the speed, in radians for an actuator that turns.
+        dimension: dimension of the speed; rotary actuators have radians.
     """
 
     actuator: str
@@ -144,7 +144,7 @@ class ActuatorLoading(JsonObject):
 
 
 class PoseLoads(NamedTuple):
-    """Forces of all load cases at a pose, with speeds and compliance, which do not depend on loads.
+    """Forces of all load cases at a pose; speeds and compliance, which do not depend on loads.
 
     Attributes:
         loads: load cases with their balance.
@@ -283,12 +283,12 @@ def _numbers(expression: SX, state: RobotState) -> FloatArray:
 
 
 def _about_world(wrench: FloatArray, position: FloatArray) -> FloatArray:
-    """Return a wrench (6,) about the world origin, from one about the platform's origin."""
+    """Return a wrench (6,) with its moment about the world origin, from a moment about the platform's origin."""
     return np.concatenate([wrench[:3], wrench[3:] + np.cross(position, wrench[:3])])
 
 
 def _constraints(nlp: Nlp, statics: Statics) -> "dict[str, FloatArray | None]":
-    """Return the matrix (6, m) from row forces to each limb's constraint wrench; None if it is not determined."""
+    """Return the matrix (6, m) from row forces to each limb's constraint wrench; None for an undetermined wrench."""
     model = nlp.program.model
     rows, driven = (np.array(ca.DM(each), dtype=np.float64) for each in (statics.rows, statics.driven))
     limbs = np.array([row.limb for row in model.frame_rows])

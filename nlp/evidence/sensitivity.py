@@ -43,7 +43,7 @@ class Sensitivity(JsonObject):
         unit: unit of the value.
         derivative: derivative of the optimal F with respect to the parameter; absent if it does not exist.
         hindrance: reason why the derivative does not exist, in words.
-        dimension: dimension of the parameter, in radians for an angle.
+        dimension: dimension of the parameter; angles are in radians.
     """
 
     name: str
@@ -92,7 +92,7 @@ def sensitivities(nlp: Nlp, x: FloatArray) -> list[Sensitivity]:
 
 
 def _can_follow(by_variable: FloatArray, by_argument: FloatArray) -> "NDArray[np.bool_]":
-    """Return whether the variables can follow each argument, (k,), so that the given functions keep their values.
+    """Return for each argument, (k,), whether the variables can follow it with unchanged values of the functions.
 
     Args:
         by_variable: (m, n) derivatives of the functions with respect to the variables.

@@ -88,7 +88,7 @@ class _Modes:
         model: model of the robot.
 
     Attributes:
-        limbs: names of the limbs that have a sense.
+        limbs: names of the limbs for which the sense is defined.
         home: matrices of these limbs at home.
     """
 
@@ -159,7 +159,7 @@ def _oriented(columns: FloatArray) -> FloatArray:
 
 
 def _sign_of(matrix: FloatArray) -> int:
-    """Return the sign of a determinant, 0 if it is nearly zero."""
+    """Return the sign of a determinant; 0 for a nearly zero determinant."""
     value = float(np.linalg.det(matrix))
     return 0 if abs(value) < _SINGULAR else int(np.sign(value))
 

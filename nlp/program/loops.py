@@ -1,4 +1,4 @@
-"""Loop equations that a program needs, without those that become dependent when a case fixes parameters.
+"""Independent loop equations of a nonlinear program: fixed parameters may make equations dependent.
 
 The equations of a model are independent if all dimensions and the pose are free. With fewer free parameters some may
 follow from others: the platform of a Delta with fixed rotation satisfies its rotation equations by itself. A local

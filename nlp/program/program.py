@@ -113,7 +113,7 @@ class RobotNumbers(NamedTuple):
         magnitude: (tasks, 1) upper bound on F without cancellation.
         loops: (k, 1) left sides of all loop equations of the model.
         driven: (m, a) work rate of each row for a unit rate of each actuator.
-        relations: (r, a) coefficients of the equations of the actuator rates only, which loops impose.
+        relations: (r, a) coefficients of the loop equations that involve only actuator rates.
         quantities: (n, 1) values of each quantity of the model, radians for angles.
     """
 
@@ -281,7 +281,7 @@ def design_indices(program: Program) -> tuple[int, ...]:
 
 
 def design_names(program: Program) -> frozenset[str]:
-    """Return the names of a design's variables and limits: all but those of joints and closed loops."""
+    """Return the names of a design's variables and limits, without names of joints and closed loops."""
     model = program.model
     inner = {program.variables[index].name for index in program.places.inner}
     names = {each.name for each in program.variables} | {each.name for each in program.constraints}

@@ -117,7 +117,7 @@ def unit_of_claim(case: Case, name: str, dimension: Dimension) -> str:
     Args:
         case: the case.
         name: name of the claim.
-        dimension: dimension of its quantity.
+        dimension: dimension of the quantity.
     """
     tasks = [k for k, task in enumerate(case.tasks) if name in ("F", f"F of {task.name}")]
     is_of_F = dimension is Dimension.NUMBER and tasks and not case.tasks[0].measure

@@ -255,7 +255,7 @@ class Solution(Whole, Shown, Answer):
         """
         numbers = shown_values(self.outcomes[0].own.nlp, self.x, self._state())
         if name not in numbers:
-            raise InputError(f"{name}: no such parameter or coordinate; {nearest(str(name), numbers)}")
+            raise InputError(f"{name}: no such value; {nearest(str(name), numbers)}")
         return numbers[name]
 
     @property

@@ -202,13 +202,13 @@ def test_components_poses_and_directions_have_names_too() -> None:
     assert math.hypot(*shown) == pytest.approx(1)
     several = ss.solve(ss.load_case("flight-simulator"), starts=1)
     assert several["pose2_p_x"] == several.case.poses[1].position[0]
-    with pytest.raises(ss.InputError, match=r"^p_x: no such parameter or coordinate; allowed: x1, x2, x3, x4, pose1_p_x, pose1_p_y"):
+    with pytest.raises(ss.InputError, match=r"^p_x: no such value; allowed: x1, x2, x3, x4, pose1_p_x, pose1_p_y"):
         _ = several["p_x"]
 
 
 def test_a_name_that_a_solution_does_not_have_is_refused(solution: ss.Solution) -> None:
     with pytest.raises(
-        ss.InputError, match=r"^x9: no such parameter or coordinate; allowed: x1, x2, x3, x4, p_x, p_y, p_z, angle, axis$"
+        ss.InputError, match=r"^x9: no such value; allowed: x1, x2, x3, x4, p_x, p_y, p_z, angle, axis$"
     ):
         _ = solution["x9"]
     with pytest.raises(TypeError, match="not iterable"):
