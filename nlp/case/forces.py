@@ -34,7 +34,7 @@ class CaseForces(NamedTuple):
             positive in the sense of the actuator's rate.
         spread: (a, 1) largest change of each actuator force by loads of unknown direction, times the magnitude of the
             divisor.
-        divisor: (1, 1) common divisor of the platform's motions by the actuators.
+        divisor: (1, 1) common divisor of the motions of the platform that the actuators drive.
     """
 
     case: LoadCase
@@ -164,7 +164,7 @@ def _speeds(model: Model, statics: Statics, motion: Motion, joints: Sequence[Dri
 
 
 def _size(vector: SX, typical: SX) -> SX:
-    """Return the norm of a vector (3, 1), smooth where it is 0; ``typical`` (1, 1) is a norm of its order."""
+    """Return the norm of a vector (3, 1), smooth where it is 0; ``typical`` (1, 1) is a typical norm."""
     return SX(0) if vector.is_zero() else ca.sqrt(ca.sumsqr(vector) + (_SMOOTH * typical) ** 2)
 
 

@@ -134,7 +134,7 @@ class Motion:
 
 
 class SignedLoad(NamedTuple):
-    """Load with the sign of its force and moment of known direction: 1, or -1 for the opposite load."""
+    """Load, and the sign of its force and moment of known direction: 1, or -1 for the opposite load."""
 
     load: Load
     sign: float

@@ -19,7 +19,7 @@ def verify_proof(
     proof: Annotated[str, Argument("PROOF", "Proof file of certify, workspace or path --proof.")],
     case: Annotated[
         str | None,
-        Argument("[CASE]", "The case that the proof must be about, - is stdin; the case in the proof if left out."),
+        Argument("[CASE]", "Case that the proof must prove, - is stdin; the case in the proof if left out."),
     ] = None,
     settings: options.SettingTexts = None,
     of: options.ResultFile = None,

@@ -131,7 +131,7 @@ class JournalFile:
         self._file.close()
 
     def remove(self) -> None:
-        """Remove the file, after its rows are in a result."""
+        """Remove the file, when a result contains its rows."""
         self.path.unlink(missing_ok=True)
         self._file.close()
 

@@ -203,8 +203,8 @@ def test_the_command_shows_ranges_and_pairs(cli: Run, tmp_path: Path) -> None:
     for options, words in (
         ("", "the table [path], or the file of a path"),
         (f"--range --of {out}", "is not a result of solve or evaluate"),
-        ("--range --along a.ngc", "--along: cannot be used with --range"),
-        ("--range --unit mm", "--unit: cannot be used with --range"),
+        ("--range --along a.ngc", "--along: conflicts with --range"),
+        ("--range --unit mm", "--unit: conflicts with --range"),
         ("--along a.ngc --most 1,1", "--most: needs --range"),
         ("--range --most 1,-1", "--most 1,-1: must be two positive"),
     ):

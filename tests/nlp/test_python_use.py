@@ -146,14 +146,14 @@ BAD = [
     ({"p_w": 1}, "p_w: cannot be set; did you mean 'p_z'?"),
     (
         {"limits.leg_lenght.max": 4},
-        "limits.leg_lenght: is nothing that 'stewart-gough' has; did you mean 'leg_length'?",
+        "limits.leg_lenght: no such limit for the robot 'stewart-gough'; did you mean 'leg_length'?",
     ),
     ({"p_z.max": 10}, "pose.position[2].min = 20.0: must be below max = 10 cm"),
-    ({"x2.max": 10}, "x2.max: cannot be set: x2 is not free"),
+    ({"x2.max": 10}, "x2.max: cannot be set: x2 is fixed"),
     ({"x2": -1}, "robot.parameters.x2 = -1.0: must be at least 0 cm"),
     ({"axis": [0, 0]}, "pose.rotation.axis: must have 3 entries, got 2"),
     ({"x2": math.nan}, "robot.parameters.x2 = nan: must be finite"),
-    ({"path.place.x": 1}, "path.place.x: cannot be set: the case has no path"),
+    ({"path.place.x": 1}, "path.place.x: cannot be set: the case has no table [path]"),
 ]
 
 
@@ -239,10 +239,13 @@ def test_rotations_and_translations_are_screws_of_pitch_0_and_infinity() -> None
     ("make", "sentence"),
     [
         (lambda: ss.Task.translation([0, 0, 0]), "task.direction = [0.0, 0.0, 0.0]: must not be zero"),
-        (lambda: ss.Task.translation([0, 1]), "task.direction: must be three finite numbers"),
+        (lambda: ss.Task.translation([0, 1]), "task.direction = [0.0, 1.0]: must be three finite numbers"),
         (lambda: ss.Task.rotation([0, 0, 0], [1, 2, 3]), "task.axis = [0.0, 0.0, 0.0]: must not be zero"),
-        (lambda: ss.Task.rotation([0, 0, 1], [1, 2]), "task.through: must be three finite numbers"),
-        (lambda: ss.Task.rotation([0, 0, 1], [1, 2, math.inf]), "task.through: must be three finite numbers"),
+        (lambda: ss.Task.rotation([0, 0, 1], [1, 2]), "task.through = [1.0, 2.0]: must be three finite numbers"),
+        (
+            lambda: ss.Task.rotation([0, 0, 1], [1, 2, math.inf]),
+            "task.through = [1.0, 2.0, inf]: must be three finite numbers",
+        ),
         (lambda: ss.Task.rotation([0, 0, 1], [1, 2, 3], sense="most"), "task.sense = \"most\": must be 'max' or 'min'"),
     ],
 )
@@ -414,11 +417,11 @@ def test_limits_are_stated_by_their_keys() -> None:
         ({"leg_length": (1, 2, 3)}, "limits.leg_length: must be (min, max), with None for no limit, or a mapping"),
         ({"leg_length": {"most": 3}}, "limits.leg_length.most: no such key; allowed: min, max"),
         ({"leg_length": (60, 20)}, "limits.leg_length.min = 60.0: must be below max = 20 cm"),
-        ({"leg_length": (None, None)}, "limits.leg_length: must have min, max, or both"),
+        ({"leg_length": (None, None)}, "limits.leg_length: is empty: it must have min, max, or both"),
         ({"leg_length": ("a", 3)}, "limits.leg_length.min: must be a number, got str 'a'"),
         (
             {"leg_lenght": (20, 60)},
-            "limits.leg_lenght: is nothing that 'stewart-gough' has; did you mean 'leg_length'?",
+            "limits.leg_lenght: no such limit for the robot 'stewart-gough'; did you mean 'leg_length'?",
         ),
         (
             {"leg_clearance": 4},
@@ -442,5 +445,5 @@ def test_wrong_limits_are_refused(stated: dict[str, tuple[float, float]], senten
 def test_what_is_no_limit_and_a_limit_given_twice_are_refused() -> None:
     with pytest.raises(ss.CaseError, match=r"limits: must be limits such as LegLength\(min=28\), or keys"):
         ss.Limits((20, 60))  # type: ignore[arg-type]
-    with pytest.raises(ss.CaseError, match=r"limits\.leg_length: is given more than once"):
+    with pytest.raises(ss.CaseError, match=r"limits\.leg_length: must be given once, got 2 limits"):
         ss.Limits(ss.LegLength(min=1), leg_length=(2, 3))

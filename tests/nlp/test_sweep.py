@@ -450,4 +450,4 @@ def test_an_unreachable_cluster(tmp_path: Path, cli: Run, monkeypatch: pytest.Mo
     out = tmp_path / "out.csv"
     code, _, err = cli("sweep", CASE, *OVER, "--dask", "tcp://127.0.0.1:9", "--out", str(out))
     assert (code, out.exists()) == (2, False)
-    assert "no Dask scheduler answers there" in err.splitlines()[-1]
+    assert "no Dask scheduler answers at this address" in err.splitlines()[-1]

@@ -206,7 +206,7 @@ class Constraint:
 
 @dataclass(frozen=True, eq=False)
 class BoundedConstraint:
-    """Constraint with its lower and upper bound."""
+    """Constraint with a lower and an upper bound."""
 
     constraint: Constraint
     lower: float
