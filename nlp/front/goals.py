@@ -81,7 +81,7 @@ def _read_goal(text: str, case: Case) -> Goal:
     if label.startswith(_LIMIT):
         return Goal(sense, label, key=label.removeprefix(_LIMIT))
     if case.tasks[0].measure:
-        raise InputError(f"--goal {text!r}: the case optimises {case.tasks[0].measure} instead of F")
+        raise InputError(f"--goal {text!r}: F is not the objective; the case optimises {case.tasks[0].measure}")
     names = [task.name for task in case.tasks]
     name = label.removeprefix(_TASK) if label != "F" else (names[0] if len(names) == 1 else "")
     if name not in names:
@@ -231,7 +231,7 @@ def _range(layout: Layout, goal: Goal) -> tuple[float, float]:
 
 
 def _moved(item: BoundedConstraint, goal: Goal, bound: float) -> BoundedConstraint:
-    """Return a constraint, with a goal's value as its bound if it belongs to the goal's limit."""
+    """Return a constraint; if it belongs to the limit of a goal, its bound is the value of the goal."""
     if not _is_of(item, goal):
         return item
     value = float(item.constraint.reading.to_value(SX(bound)))

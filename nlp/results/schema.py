@@ -221,7 +221,7 @@ def result_from_json(tables: object, source: str) -> Result:
     try:
         return _result(tables)
     except WrongValueError as error:
-        raise InputError(f"{source}: is no result of screwsynth: {error}") from None
+        raise InputError(f"{source}: is not a result of screwsynth: {error}") from None
 
 
 def _result(tables: object) -> Result:

@@ -34,7 +34,7 @@ def solve_choices(case: Case, solve_fixed: Callable[[Case], Solution], most: flo
     Args:
         case: the case.
         solve_fixed: function that solves a case without listed values.
-        most: largest number of solves; the search then ends with the best known combination.
+        most: largest number of solves, after which the search ends with the best known combination.
 
     Returns:
         The solution of the best combination, with the given case; without an answer where no combination has one.
@@ -226,7 +226,7 @@ def combinations_of(ranges: Ranges) -> Iterator[Ranges]:
 
 
 def _value_of(solution: Solution | None, number: CatalogueDimension) -> float:
-    """Return the value of a listed parameter at a solution; the middle of its values where the robot has none."""
+    """Return the value of a listed parameter at a solution; without a robot, the middle of the listed values."""
     state = None if solution is None else solution.outcomes[0].state
     if state is None:
         return (number.values[0] + number.values[-1]) / 2

@@ -419,7 +419,7 @@ def test_proofs_of_machines_with_settings_or_of_a_result(cli: Run, tmp_path: Pat
     code, _, err = cli("verify-proof", proof, free, "--set", "x2=11.6")
     assert (code, err) == (1, "rejected: the proof is for other joint centres than this case's\n")
     for option in (("--above", "1"), ("--all-assemblies",)):
-        refusal_of(cli("verify-proof", proof, *option), "is no option for this kind of proof")
+        refusal_of(cli("verify-proof", proof, *option), "does not apply to this kind of proof")
 
 
 def test_a_result_in_other_units_or_of_another_robot_is_refused(cli: Run, tmp_path: Path) -> None:

@@ -202,9 +202,9 @@ def test_the_command_shows_ranges_and_pairs(cli: Run, tmp_path: Path) -> None:
     assert "leg_length limb 3+ above 43 in: 54.63139 in" in shown
     for options, words in (
         ("", "the table [path], or the file of a path"),
-        (f"--range --of {out}", "is no result of solve or evaluate"),
-        ("--range --along a.ngc", "--along: cannot be used with --range"),
-        ("--range --unit mm", "--unit: cannot be used with --range"),
+        (f"--range --of {out}", "is not a result of solve or evaluate"),
+        ("--range --along a.ngc", "--along: conflicts with --range"),
+        ("--range --unit mm", "--unit: conflicts with --range"),
         ("--along a.ngc --most 1,1", "--most: needs --range"),
         ("--range --most 1,-1", "--most 1,-1: must be two positive"),
     ):

@@ -493,11 +493,9 @@ def test_the_commands_write_and_verify(cli: Run, tmp_path: Path) -> None:
     assert (code, "another path than that of" in said) == (1, True)
     refusal_of(cli("verify-proof", str(out), "--unit", "in"), "--along: is missing")
     refusal_of(
-        cli("verify-proof", str(out), "--leg-error", "0.1"), "--leg-error", "is no option for this kind of proof"
+        cli("verify-proof", str(out), "--leg-error", "0.1"), "--leg-error", "does not apply to this kind of proof"
     )
-    refusal_of(
-        cli("path", "hexapod-linuxcnc", "--range", "--proof", str(out)), "--proof", "cannot be used with --range"
-    )
+    refusal_of(cli("path", "hexapod-linuxcnc", "--range", "--proof", str(out)), "--proof", "conflicts with --range")
 
 
 def test_a_path_of_a_case_is_held_to_its_file(cli: Run, tmp_path: Path) -> None:
