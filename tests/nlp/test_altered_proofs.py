@@ -439,7 +439,9 @@ def test_errors_of_legs_are_refused_for_a_robot_without_six_legs(cli: Run, folde
     case, claim = str(saved(folder / "legless.toml", CRANKS)), ProofClaim("regular", "", "regular", tree=b"\x02")
     proof = Proof("", "legless", Premises((), (), (), 0.01), (claim,)).as_text()
     for command in (("workspace", case), ("verify-proof", str(saved(folder / "legless.json", proof)), case)):
-        refusal_of(cli(*command, *ERROR), "--leg-error 0.01: is only for six straight legs, which '6-rus' is not")
+        refusal_of(
+            cli(*command, *ERROR), "--leg-error 0.01: needs a robot with six straight legs, which '6-rus' is not"
+        )
 
 
 def test_the_smallest_f_at_the_worst_of_several_poses_is_refused(cli: Run, tmp_path: Path) -> None:
@@ -447,7 +449,10 @@ def test_the_smallest_f_at_the_worst_of_several_poses_is_refused(cli: Run, tmp_p
     poses = [{"position": [0, 0, ends(0.5, z)]} for z in (30.5, 40.5)]
     tables = tomllib.loads(PLATFORM) | {"pose": poses, "combine": {"over_poses": "worst"}}
     case, proof = str(case_file(tmp_path, tables)), str(tmp_path / "proof.json")
-    refusal_of(cli("certify", case, "--above", "1"), "--above: is not for the worst of several poses")
+    refusal_of(
+        cli("certify", case, "--above", "1"),
+        "--above: is not available for a case that maximises F at the worst of several poses",
+    )
     assert cli("certify", case, "--proof", proof)[0] == 0
     assert "F being that of task 'one', at the worst of 2 poses" in cli("verify-proof", proof)[1]
     refusal_of(cli("verify-proof", proof, "--above", "1"))
