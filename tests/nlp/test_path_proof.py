@@ -294,7 +294,7 @@ def test_a_bound_beyond_the_limit_is_rejected(proof: Proof) -> None:
     [
         (b"", "ends before every box"),
         (bytes([Node.BOUNDED] * 2), "ends before every box"),
-        (bytes([Node.BOUNDED] * 4), "has bytes left after every box"),
+        (bytes([Node.BOUNDED] * 4), "goes on after every box"),
         (bytes([Node.BOUNDED] * 2 + [Node.OUTSIDE]), "where a piece must be proved or cut"),
         (node_bytes(Node.HALF, 1) + bytes([Node.BOUNDED] * 4), "variable 1, which does not exist"),
         (node_bytes(Node.CUT, 0, value=1.5) + bytes([Node.BOUNDED] * 4), "cuts a box at 1.5, which is outside of it"),
@@ -316,12 +316,12 @@ def test_other_paths_are_rejected(proof: Proof) -> None:
     def carrying(given: Proof, **changes: object) -> Proof:
         return replace(given, premises=replace(premises, **changes))  # type: ignore[type-var, arg-type]
 
-    assert "segment 3 from" in rejected(carrying(lengths, text=edited(TIMED, ("4,3,4", "4,30,4"))), machine())
+    assert "segment 3 between" in rejected(carrying(lengths, text=edited(TIMED, ("4,3,4", "4,30,4"))), machine())
     assert "segment 2 from" in rejected(carrying(speeds, text=edited(TIMED, ("4,3,3", "4,3,2.02"))), machine())
     rows = TIMED.splitlines()
     swapped = "\n".join([*rows[:2], rows[3].replace(",3,3", ",3,0.1"), rows[2], rows[4]])
     assert "segment 1 from" in rejected(carrying(speeds, text=swapped), machine())
-    assert "has bytes left after every box" in rejected(carrying(lengths, text="\n".join(rows[:-1])), machine())
+    assert "goes on after every box" in rejected(carrying(lengths, text="\n".join(rows[:-1])), machine())
     assert "other joint centres" in rejected(carrying(lengths, legs=()), machine())
     assert "another joint-centre tolerance" in rejected(carrying(lengths, joint_centre=0.1), machine())
     assert "cannot be read" in rejected(carrying(lengths, text="x,y\n1,2"), machine())

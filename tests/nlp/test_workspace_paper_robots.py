@@ -181,7 +181,7 @@ def test_boxes_with_another_assembly_do_not_belong_together() -> None:
     lower, upper = whole.lower.copy(), whole.upper.copy()
     D = shown.assembly.dependent
     lower[0, D], upper[0, D] = lower[0, D] + 0.5, upper[0, D] + 0.5
-    with pytest.raises(ProofError, match="same assembly"):
+    with pytest.raises(ProofError, match="assembly mode of the start"):
         shown.assembly.refuse_apart(whole._replace(lower=lower, upper=upper))
 
 

@@ -143,7 +143,7 @@ class TreeReader:
             ProofError: further bytes remain.
         """
         if self.at != len(self._tree):
-            raise ProofError("the tree has bytes left after every box is closed")
+            raise ProofError("the tree goes on after every box is closed")
 
     def walk(self, lower: FloatArray, upper: FloatArray, inner: Set[Node]) -> Iterator[Leaf]:
         """Read the nodes of the tree of a box with ends (n,), and yield its leaves and faces.
