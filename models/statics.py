@@ -9,8 +9,8 @@ force or torque
 with moments about the platform's origin and v its velocity. The motions ``x_k`` span all platform motions. The rates of
 all actuators in a motion ``chi = X qdot`` are ``(X' S X)^-1 X' S chi`` for any weights S.
 
-``J x_k = d_k`` has a solution if the robot has as many actuators as degrees of freedom, for any number of rows of J. It
-is solved by the normal equations with one step of refinement, without a choice of rows.
+``J x_k = d_k`` has a solution if the robot has as many actuators as degrees of freedom, for any number of rows of J.
+The solution uses the normal equations with one step of refinement, without a choice of rows.
 """
 
 from __future__ import annotations

@@ -439,7 +439,9 @@ def test_errors_of_legs_are_refused_for_a_robot_without_six_legs(cli: Run, folde
     case, claim = str(saved(folder / "legless.toml", CRANKS)), ProofClaim("regular", "", "regular", tree=b"\x02")
     proof = Proof("", "legless", Premises((), (), (), 0.01), (claim,)).as_text()
     for command in (("workspace", case), ("verify-proof", str(saved(folder / "legless.json", proof)), case)):
-        refusal_of(cli(*command, *ERROR), "--leg-error 0.01: is only for six straight legs, which '6-rus' is not")
+        refusal_of(
+            cli(*command, *ERROR), "--leg-error 0.01: needs a robot with six straight legs, which '6-rus' is not"
+        )
 
 
 def test_the_smallest_f_at_the_worst_of_several_poses_is_refused(cli: Run, tmp_path: Path) -> None:
