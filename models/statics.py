@@ -180,7 +180,9 @@ def _without_zeros(relations: SX) -> SX:
 
 
 def posed_statics(model: Model, robot: RobotInstance) -> Statics:
-    """Return the platform motions for unit actuator rates at a pose, by minors for six rows of legs and couples.
+    """Return the platform motions for unit actuator rates at a pose.
+
+    If J has six rows, only of straight legs and couples, the motions are quotients of minors of J.
 
     Args:
         model: robot for which :func:`statics_hindrance` returns an empty text.

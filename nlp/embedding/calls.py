@@ -201,7 +201,7 @@ def _inputs_of_row(row: Wrench, legs: Sequence[LegInstance]) -> tuple[Form, SX]:
 
 
 def _calls_of_rows(robot: RobotInstance, rows: Sequence[tuple[Form, SX]]) -> list[InnerCall]:
-    """Return the calls for each row's rates, and the calls for F and its bound from the rates."""
+    """Return the calls for the rate, the term of F and the magnitude of each row, and for their sums."""
     tasks = robot.F.numel()
     at = robot.inputs.numel() - 6 * tasks
     length, calls = robot.inputs[at - 1], []

@@ -110,7 +110,7 @@ def judge_many(nlp: Nlp, x: FloatArray, numbers: Numbers) -> Verdicts:
     """Return the evidence of optimality at points of a program.
 
     Args:
-        nlp: nonlinear program with every constraint of its limits on pairs.
+        nlp: nonlinear program in which limits on pairs (of legs or poses) have a constraint for every pair.
         x: (N, n) the points.
         numbers: data of the program at the points.
     """

@@ -251,7 +251,7 @@ def _changes(
     reach: float,
     centre: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the changes (6, c) of dependent screw combinations by motions of joints, and their rates (n, k).
+    """Return changes (6, c) of dependent screw combinations as the joints ``before`` move, and the joint rates (n, k).
 
     Rates whose combination has no change are left out if other combinations change. An example is the spin of a rod
     between two ball joints, whose combination is also zero nearby.

@@ -214,7 +214,7 @@ def _range(layout: Layout, goal: Goal) -> tuple[float, float]:
     if not found:
         side = int(goal.sense is Sense.MIN)
         keys = sorted({item.constraint.keys[side] for item in layout.constraints} - {""})
-        fault = "is not a limit of the case that can be a goal in this sense"
+        fault = f"the case has no such limit that can be {'minimised' if side else 'maximised'}"
         raise InputError(f"--goal {goal.sense.value} {goal.label}: {fault}; allowed: {listing(keys)}")
     reading = found[0].constraint.reading
     if any(item.constraint.exact is not None or item.constraint.measure is not None for item in found):
@@ -226,7 +226,9 @@ def _range(layout: Layout, goal: Goal) -> tuple[float, float]:
         upper = [reading.from_value(item.upper) for item in found if math.isfinite(item.upper)]
         most = min([most, *upper])
     if not (math.isfinite(least) and math.isfinite(most) and least < most):
-        raise InputError(f"--goal {goal.label}: is unbounded in this direction; set the other end of the limit too")
+        raise InputError(
+            f"--goal {goal.label}: the range of this goal is infinite; set both .min and .max of the limit"
+        )
     return least, most
 
 

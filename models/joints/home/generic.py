@@ -130,7 +130,8 @@ def free_screws(joints: Sequence[Joint], values: SX) -> list[list[SX]]:
 def _rank(columns: FloatArray) -> int:
     """Return the rank of columns, each scaled to unit length.
 
-    Rounding leaves 1e-15. A limb close to a lower rank at each of several random points has this lower rank.
+    Rounding changes a zero singular value by about 1e-15, so small ones count as zero. A limb that is close to a lower
+    rank at several random points is taken to have that rank.
     """
     lengths = np.linalg.norm(columns, axis=0)
     nonzero = lengths > _ZERO_COLUMN * lengths.max(initial=0.0)

@@ -218,7 +218,9 @@ def drawing_of(
     """
     case, model = nlp.case, nlp.program.model
     if state is None:
-        raise EvaluationError(f"{case.source or case.name}: the robot does not exist at the point reached: no picture")
+        raise EvaluationError(
+            f"{case.source or case.name}: no picture: the robot has no configuration at the last point"
+        )
     linkage, posture = _posture(nlp, x, state, pose)
     chosen = case.tasks[task]
     twist = frozen_array(chosen.twist, (6,))

@@ -95,7 +95,9 @@ def _of_limbs(tree: bytes, form: StandardForm, bound: float) -> Iterator[_Block]
     """
     separation = separate(form)
     if separation is None or separation.shared:
-        raise ProofError("the tree is for limbs without shared variables, which this case does not have")
+        raise ProofError(
+            "the tree needs limbs that share no variables, but the limbs of this case share some or cannot be separated"
+        )
     reader, bounds, fault = (
         TreeReader(tree, 1),
         list[float](),

@@ -188,7 +188,10 @@ class SharedRule(Rule[SharedColumns]):
         return BoxResults(left, self.target, examined, is_better=self._incumbent.value > before, reasons=reasons)
 
     def record(self, boxes: Boxes[SharedColumns], found: BoxResults[SharedColumns], split: NDArray[np.intp]) -> None:
-        """Record bisections and leaves; limbs and common part share the margin up to the target."""
+        """Record bisections and leaves.
+
+        In a leaf, the difference between target and bound is divided equally among the limbs and the common part.
+        """
         if self._recorder is None or found.reasons is None:
             return
         sums, alive, emptied = found.reasons

@@ -65,9 +65,10 @@ def rank_claim(
 
 
 class RankClaim(LoopClaim):
-    """Claim that a sparse matrix of motion conditions (m, c) has no more degrees of freedom than claimed.
+    """Claim that the nullity of a sparse matrix of motion conditions (m, c) is at most a stated number.
 
-    For six straight legs, joint-centre errors change the rows; for other robots, the errors are coordinates.
+    Within a tolerance, joint-centre errors of six straight legs change the rows. For other robots, the errors are
+    further coordinates of the box.
     """
 
     def __init__(self, loops: PosedLoops, matrix: SX, nullity: int) -> None:
@@ -117,7 +118,8 @@ class RankClaim(LoopClaim):
     def _signs_at(self, y: FloatArray) -> list[int]:
         """Return the signs of the determinant at points (K, 6 + e); 0 where a sign is not proved.
 
-        If ``C M`` is near I, its determinant is positive: M has the sign of the determinant of C, in fractions.
+        C is an approximate inverse of the matrix M. If ``C M`` is proved near I, its determinant is positive, and det M
+        has the sign of det C, which is computed exactly in fractions.
         """
         matrices = self._matrices(self.closed(y, y))
         C = inverses(matrices.M)
