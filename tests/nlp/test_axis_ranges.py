@@ -206,7 +206,7 @@ def test_the_command_shows_ranges_and_pairs(cli: Run, tmp_path: Path) -> None:
         ("--range --along a.ngc", "--along: conflicts with --range"),
         ("--range --unit mm", "--unit: conflicts with --range"),
         ("--along a.ngc --most 1,1", "--most: needs --range"),
-        ("--range --most 1,-1", "--most 1,-1: must be two positive"),
+        ("--range --most 1,-1", "--most 1,-1: must be LENGTH,ANGLE: two positive numbers"),
     ):
         refusal_of(cli("path", "hexapod-linuxcnc", *options.split()), words)
     free = cli("path", "paper-4.1-helical", "--range")

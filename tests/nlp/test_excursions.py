@@ -293,13 +293,15 @@ def test_all_commands_take_the_workspace_at_the_pose_of_a_result(tmp_path: Path,
     assert high >= height + 0.1
     code, _, err = cli("verify-proof", proof, str(file), "--of", result, "--set", "p_z=0.8")
     assert (code, err) == (1, "rejected: the proof is for another workspace than this case's\n")
-    assert "scale  1" in output_of(cli("workspace", str(file), "--of", result, "--scale", "--time", "8"))
+    assert "largest proved box  1 times the workspace" in output_of(
+        cli("workspace", str(file), "--of", result, "--scale", "--time", "8")
+    )
     assert cli("path", str(file), "--range", "--of", result, "--time", "3")[::2] in ((0, ""), (1, ""))
     output_of(cli("codegen", str(file), "--out", str(tmp_path / "c"), "--no-measure"))
     assert cli("evaluate", str(file), "--of", result)[0] == 0
     other = case_file(tmp_path, BASE, "other.toml")
     code, out, err = cli("workspace", str(other), "--of", result)
-    assert (code, err) == (0, f"--of {result}: has the dimensions and the pose of the case 'base'\n")
+    assert (code, err) == (0, f"--of {result}: gives the dimensions and the pose of the case 'base'\n")
 
 
 def test_robots_are_compared_over_workspaces_about_their_own_poses() -> None:
