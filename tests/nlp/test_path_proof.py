@@ -317,10 +317,10 @@ def test_other_paths_are_rejected(proof: Proof) -> None:
         return replace(given, premises=replace(premises, **changes))  # type: ignore[type-var, arg-type]
 
     assert "segment 3 between" in rejected(carrying(lengths, text=edited(TIMED, ("4,3,4", "4,30,4"))), machine())
-    assert "segment 2 from" in rejected(carrying(speeds, text=edited(TIMED, ("4,3,3", "4,3,2.02"))), machine())
+    assert "segment 2 between" in rejected(carrying(speeds, text=edited(TIMED, ("4,3,3", "4,3,2.02"))), machine())
     rows = TIMED.splitlines()
     swapped = "\n".join([*rows[:2], rows[3].replace(",3,3", ",3,0.1"), rows[2], rows[4]])
-    assert "segment 1 from" in rejected(carrying(speeds, text=swapped), machine())
+    assert "segment 1 between" in rejected(carrying(speeds, text=swapped), machine())
     assert "goes on after every box" in rejected(carrying(lengths, text="\n".join(rows[:-1])), machine())
     assert "other joint centres" in rejected(carrying(lengths, legs=()), machine())
     assert "another joint-centre tolerance" in rejected(carrying(lengths, joint_centre=0.1), machine())

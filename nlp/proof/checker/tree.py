@@ -129,7 +129,7 @@ class TreeReader:
         """
         (number,) = self.read(1)
         if number not in allowed:
-            raise ProofError(f"the tree refers to {kind} {number}, which does not exist")
+            raise ProofError(f"the tree names {kind} {number}, which does not exist")
         return int(number)
 
     def number(self) -> float:
