@@ -210,7 +210,7 @@ def test_the_command_shows_ranges_and_pairs(cli: Run, tmp_path: Path) -> None:
     ):
         refusal_of(cli("path", "hexapod-linuxcnc", *options.split()), words)
     free = cli("path", "paper-4.1-helical", "--range")
-    refusal_of(free, "paper-4.1-helical", "pose: has free coordinates", "state it with --start")
+    refusal_of(free, "paper-4.1-helical", "pose: has free coordinates", "give this pose with --start")
 
 
 def test_without_time_nothing_is_claimed() -> None:
