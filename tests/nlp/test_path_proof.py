@@ -384,7 +384,7 @@ def test_a_singular_pose_of_a_path_is_proved_by_two_places() -> None:
     for sides, words in (
         (((0.0,), (0.1,)), "opposite signs"),
         (((low,), (2.5,)), "a pose is outside the workspace"),
-        (((low,),), "no two poses"),
+        (((low,),), "does not have two poses"),
         (((low,), (high, 0.0)), "the claim is about the robot without one"),
         (((low,), (1.5,)), "change continuously"),
     ):
