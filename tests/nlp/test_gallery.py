@@ -380,7 +380,7 @@ def test_results_have_f_by_limb_and_name_conventions() -> None:
     # The page shows notes and parts by limb.
     page = sn.report(sn.solve(starter("five-bar"), starts=1))
     assert "Note: member 1 resists with 5 wrenches or more" in page
-    assert "Actuation and constraints in F, limb by limb" in page
+    assert "Actuation and constraint parts of F by limb" in page
 
 
 def test_members_of_which_f_says_little_are_named() -> None:
