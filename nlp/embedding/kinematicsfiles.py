@@ -30,6 +30,8 @@ _POSES, _SEED, _NEAR, _FAR = 48, 3, 0.08, 0.6
 _REGULAR = 0.05
 #: Constants of C in double, and names of the coordinates of a pose.
 _NUMBER = re.compile(r"(?<![\w.])(\d+\.\d*(?:[eE][+-]?\d+)?)(?![\w.])")
+#: Macros of CasADi's.
+_MACRO = re.compile(r"^ *#define (\w+)", re.MULTILINE)
 #: Kind of an actuator coordinate, by whether the actuator turns.
 _KINDS = {True: "angle", False: "length"}
 _COORDINATES = ("x", "y", "z", "a", "b", "c")
@@ -121,10 +123,12 @@ def kinematics_files(case: Case, *, single: bool = False, coordinates: str = "po
         "-casadi.c": casadi_texts(functions.of_results, f"{kin}_CASADI")[".c"],
         "-newton.c": casadi_texts(functions.of_newton, f"{kin}_NEWTON")[".c"],
     }
-    head = (
-        f'#include "{file}.h"\n#if {kin.upper()}_SINGLE\n#include <tgmath.h>\n#endif\n#define casadi_real {kin}_real\n'
-    )
-    sources["-casadi.c"] = head + _NUMBER.sub(r"((casadi_real)\1)", sources["-casadi.c"])
+    sources["-casadi.c"] = _NUMBER.sub(r"((casadi_real)\1)", sources["-casadi.c"])
+    heads = {
+        "-casadi.c": f"#if {names['KIN']}_SINGLE\n#include <tgmath.h>\n#endif\n#define casadi_real {kin}_real\n",
+        "-newton.c": "#define casadi_real double\n",
+    }
+    sources = {end: _part(file, names["KIN"], heads[end], text) for end, text in sources.items()}
     names["libm"] = " ".join(each for each in _LIBM if re.search(rf"\b{each}\(", "".join(sources.values()))) or "none"
     files = {f"{file}{end}": fill_template(f"kinematics/kinematics{end}.in", names) for end in (".h", ".c")}
     return KinematicsFiles({**files, **{f"{file}{end}": text for end, text in sources.items()}}, names)
@@ -160,6 +164,17 @@ def combined_kinematics(case: Case) -> KinematicsFiles:
         "section": conventions,
     }
     return KinematicsFiles({**files, f"{program}.c": test}, {f"kinematics_{key}": text for key, text in texts.items()})
+
+
+def _part(file: str, KIN: str, head: str, text: str) -> str:
+    """Return a source of CasADi's with its own number type, after which its macros are undefined.
+
+    So a module of one source file can include all sources, with the mathematics library of its controller.
+    """
+    mathematics = f"#ifdef {KIN}_MATH\n#include {KIN}_MATH\n#else\n#include <math.h>\n#endif"
+    macros = dict.fromkeys(["casadi_real", *_MACRO.findall(text)])
+    ends = "".join(f"#undef {name}\n" for name in macros)
+    return f'#include "{file}.h"\n{head}{text.replace("#include <math.h>", mathematics)}\n{ends}'
 
 
 class _Functions(NamedTuple):
