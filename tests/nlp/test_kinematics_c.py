@@ -3,20 +3,24 @@
 import math
 import re
 import tomllib
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 from builders import Array, Run, output_of, refusal_of, saved, turn_about
-from generated import made, needs_compiler
+from generated import COMPILERS, STRICT, made, needs_compiler, run
 from kinematics_library import BAD_INPUT, LOOPS_OPEN, OK, OUT_OF_REACH, SINGULAR, Library, typical_case
 
 from screwsynth.models.catalog import gallery_names
 from screwsynth.nlp import Case, CaseError, case_text, inverse, load_case
 from screwsynth.nlp.case.controller import Controller
 from screwsynth.nlp.case.reader import case_from_tables
+from screwsynth.nlp.case.robotcase import read_robot_case
+from screwsynth.nlp.embedding.codegen import generate_c
 from screwsynth.nlp.embedding.kinematics import matrix_of_rpy
+from screwsynth.nlp.embedding.kinematicsfiles import generate_kinematics, kinematics_prefix
 
 pytestmark = needs_compiler
 
@@ -45,6 +49,27 @@ length = "mm"
 angle = "deg"
 zero = 20
 rpy = [0, 0, 90]
+"""
+#: The commonest printer: three upright carriages with two rods each.
+LINEAR = """
+name = "linear delta"
+home = [0, 0, "h"]
+length_unit = "mm"
+[dimensions]
+R = { typical = 130.25 }
+rp = { typical = 33 }
+L = { typical = 269 }
+w = { typical = 50 }
+[derived]
+h = "-sqrt(L^2 - R^2)"
+[[limb]]
+repeat = { count = 3 }
+points = { E = ["R + rp", 0, 0], A = ["rp", 0, "h"] }
+joints = [{ type = "P", at = "E", axis = "z", actuated = true }]
+branch = [
+    { joints = [{ type = "S", at = "E + w/2*y" }, { type = "S", at = "A + w/2*y" }] },
+    { joints = [{ type = "S", at = "E - w/2*y" }, { type = "S", at = "A - w/2*y" }] },
+]
 """
 ANKLE = """
 name = "ankle"
@@ -320,6 +345,68 @@ def test_coordinates_of_linuxcnc_follow_from_the_table_of_the_controller() -> No
     )
 
 
+def test_carriages_of_a_linear_delta_are_those_of_linuxcnc(tmp_path: Path) -> None:
+    # LinuxCNC's lineardeltakins with its default radius 130.25 and rod 269; its x axis is the negative y axis here.
+    saved(tmp_path / "linear.toml", LINEAR)
+    case = 'units.length = "mm"\nrobot.file = "linear.toml"\ncontroller.rpy = [0, 0, -90]\n'
+    case += "robot.parameters = { R = 130.25, rp = 33, L = 269, w = 50 }\n"
+    file = str(saved(tmp_path / "case.toml", case))
+    robot = Library(read_robot_case(file).case)
+    expected = {(0, 0, 0): [235.363415806280] * 3, (10, 20, 5): [250.165122927385, 228.684915278482, 238.552849858139]}
+    for place, heights in expected.items():
+        status, q = robot.motors(np.array(place, dtype=float), np.eye(3))
+        assert status == OK
+        np.testing.assert_allclose(q, heights, atol=1e-11)
+        status, position, _ = robot.forward(np.array(heights), *robot.home)
+        assert status == OK
+        np.testing.assert_allclose(position, place, atol=1e-9)
+
+
+#: Robots as modules of LinuxCNC control them: straight legs, cranks, and three translations.
+IN_MODULES = ("hexapod", "6-rss", "delta", "orthoglide")
+
+
+@pytest.mark.parametrize(("name", "single"), [*((each, False) for each in IN_MODULES), ("6-rss", True)])
+def test_all_sources_in_one_file_have_small_stack_frames(name: str, single: bool, tmp_path: Path) -> None:  # noqa: FBT001
+    case = typical_case(name)
+    files = generate_kinematics(case, "", single=single)
+    for file, text in files.items():
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    stem = next(file for file in files if file.endswith("-kinematics.c"))[:-2]
+    texts = [f'#include "{stem}{end}.c"\n' for end in ("", "-casadi", "-newton")]
+    (tmp_path / "whole.c").write_text("".join(texts), encoding="utf-8")
+    # The flag of LinuxCNC's build.
+    run(COMPILERS[0], *STRICT.split(), "-O2", "-Wframe-larger-than=2560", "-c", "whole.c", where=tmp_path)
+    # A library of mathematics that the controller names.
+    (tmp_path / "mathematics.h").write_text("#include <math.h>\n#define GIVEN 1\n", encoding="utf-8")
+    texts.append('#ifndef GIVEN\n#error "the header was not included"\n#endif\n')
+    (tmp_path / "whole.c").write_text("".join(texts), encoding="utf-8")
+    given = f'-D{kinematics_prefix(case.name).upper()}_MATH="mathematics.h"'
+    run(COMPILERS[0], *STRICT.split(), given, "-fsyntax-only", "whole.c", where=tmp_path)
+
+
+def test_names_of_solver_and_kinematics_differ(tmp_path: Path) -> None:
+    """In one folder, and of cases whose names continue each other."""
+    case = load_case("paper-4.1-helical")
+    names: list[str] = []
+    for title in ("kinematics", "kinematics kinematics"):
+        folder = tmp_path / title
+        folder.mkdir()
+        files = generate_c(replace(case, name=title))
+        for name, text in files.items():
+            (folder / name).write_text(text, encoding="utf-8")
+        made(folder, "CFLAGS=-std=c99", "library")
+        objects = sorted(each.name for each in folder.glob("*.o"))
+        assert any("-kinematics-newton" in each for each in objects)
+        shown = run("nm", "--defined-only", "--extern-only", *objects, where=folder)
+        names += [line.split()[-1] for line in shown.splitlines() if len(line.split()) == 3]
+        both = "".join(f'#include "{each}"\n' for each in files if each.endswith(".h"))
+        (folder / "both.c").write_text(f"{both}int main(void) {{ return 0; }}\n", encoding="utf-8")
+        run(COMPILERS[0], *STRICT.split(), "-c", "both.c", where=folder)
+    assert len(names) == len(set(names)) > 100
+    assert {each.partition("_")[0] for each in names} == {"screwsynth", "kinematics"}
+
+
 def test_a_turned_frame_and_other_units_keep_the_power_balance() -> None:
     robot = rotary(
         '[controller]\nlength = "mm"\nangle = "deg"\nsign = { "2" = -1 }\norigin = [0.001, 0.002, 0.003]\n'
@@ -348,8 +435,6 @@ def test_joint_coordinates_of_an_ankle_take_the_place_of_the_pose(cli: Run, tmp_
         cli("codegen", file, "--kinematics", "--coordinates", "ankle", "--out", str(out))
     )
     made(out, "test")
-    from screwsynth.nlp.case.robotcase import read_robot_case  # noqa: PLC0415 - after the command line
-
     robot = Library(read_robot_case(file).case, coordinates="ankle")
     for k in range(60):
         c = np.array([0.35 * math.sin(1.3 * k), 0.25 * math.sin(0.7 * k + 1)])
