@@ -16,7 +16,7 @@ from screwsynth.models.mechanism import Mechanism
 from screwsynth.models.mechanism.graph import MechanismJoint
 
 #: Steps from home, steps of Newton's method in each, and the largest residual of a closed loop.
-_PATH, _NEWTON, _CLOSED = 8, 40, 1e-13
+_PATH, _NEWTON, _CLOSED = 8, 40, 1e-12
 _INERTIA = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
 
 
