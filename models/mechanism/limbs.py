@@ -131,7 +131,10 @@ def _named(table: dict[str, Any], taken: set[str]) -> dict[str, Any]:
 
 
 def _outward(table: dict[str, Any], is_outward: bool) -> dict[str, Any]:
-    """Return a joint's table from the base side on; a reversed axis keeps the sign of the coordinate."""
+    """Return a joint's table in the order from base to platform.
+
+    For a joint stated in the other order, the axis is reversed, so that the coordinate keeps its sign.
+    """
     if is_outward:
         return table
     turned = dict(table)

@@ -54,7 +54,7 @@ def proof_text(
     Args:
         target: file name; ``-`` is standard output.
         judged: the verdicts.
-        record: record of the searches; None without a proof.
+        record: recorder of the searches; None without a proof.
         text: text of the case file.
         quantities: requested quantities.
         leg_error: largest error of a leg length.
@@ -102,7 +102,7 @@ def path_proof_text(
         target: file name; ``-`` is standard output.
         case: the case.
         judged: the verdicts.
-        record: record of the searches; None without a proof.
+        record: recorder of the searches; None without a proof.
         text: text of the case file.
         premises: premises about the path.
     """

@@ -174,7 +174,8 @@ def _check_writable(case: Case, *, is_rounded: bool) -> None:
         OptionError: a case file cannot represent the program.
     """
     if is_rounded:
-        raise OptionError("proof: no case file contains the rounded dimensions; give them with --set")
+        fault = "proof: a proof file refers to the dimensions of a case, and rounded dimensions are not in it"
+        raise OptionError(f"{fault}; give them with --set instead of rounding")
     if catalogue_dimensions(case):
         raise OptionError("proof: each combination of listed values is a separate program; give the values with --set")
     if case.is_optimised_everywhere:

@@ -102,7 +102,7 @@ class _Search:
         return replace(best, case=self._case, choice=choice)
 
     def _solve_all(self, everything: Ranges) -> list[Ranges]:
-        """Solve every combination; return the combinations that were not solved."""
+        """Solve one combination after the other until a stop is requested; return the combinations that are left."""
         left = [each for each in combinations_of(everything) if self._exists(each)]
         while left and not is_requested():
             self._solve_combination(left[0])

@@ -109,7 +109,7 @@ class SearchJournal(JournalFile):
         )
 
     def load_entry(self, place: int, line: bytes) -> None:
-        """Store an entry that is in the file."""
+        """Keep in memory an entry that was read from the file."""
         del place
         with suppress(ValueError):
             try:

@@ -362,7 +362,8 @@ class Solution(Whole, Shown, Answer):
             EvaluationError: there is no single program, as for an average.
         """
         if self.decided_by is None:
-            raise EvaluationError("an average of tasks has no combined program: outcomes has the separate programs")
+            fault = "an average of tasks has no combined program; solution.outcomes has the program of each task"
+            raise EvaluationError(fault)
         return self.decided_by
 
 

@@ -61,8 +61,8 @@ def model_words(name: str, model: Model | None, options: Sequence[ModelOption]) 
         if model.legs:
             words = f"{', '.join(leg.name for leg in model.legs)} (limits on leg lengths apply)"
             yield Line(words, label="straight legs")
-    words = "if f is the Euclidean norm of all wrench magnitudes, their power in the task is at most f sqrt(F)"
-    yield Line(words if not model.actuators else f"{words}; [[load]] gives actuator forces", label="forces")
+    words = "limb wrenches of magnitudes f_i have in the task a total power of at most sqrt(sum f_i^2) sqrt(F)"
+    yield Line(words if not model.actuators else f"{words}; for actuator forces state [[load]]", label="power")
     if model.quantities:
         rows = [(item.name, item.dimension.value, item.description) for item in model.quantities]
         yield TextTable(("quantity", "kind", "meaning"), tuple(rows))

@@ -207,7 +207,7 @@ def _limit_of(claim: VerdictData) -> str:
 
 
 def open_lines(claims: Sequence[VerdictData]) -> Iterator[Line]:
-    """Yield the undecided claims with their reasons; the first of them belong to the answer."""
+    """Yield the undecided claims with their reasons; those after the first few are in the part "undecided claims"."""
     found = [each for each in claims if each.outcome is Outcome.OPEN]
     for k, each in enumerate(found):
         reason = f": {each.reason}" if each.reason else ""

@@ -198,17 +198,17 @@ OF_ROBOTS = [
     (
         MIXED,
         '[[load]]\nname = "tool"\nmass = 2\ncentre = [1, 0, 0]',
-        f"load[0].mass = 2.0: load 'tool' {IDLE} a force along x or y, or a moment about z\n",
+        f'load[0].mass = 2.0: load "tool" {IDLE} a force along x or y, or a moment about z\n',
     ),
     (
         MIXED,
         f"{LOAD}[[load]]\nforce = [0, 0, 5]",
-        f"load[1].force = [0.0, 0.0, 5.0]: load 'load 2' {IDLE} a force along x or y, or a moment about z\n",
+        f"load[1].force = [0.0, 0.0, 5.0]: load 2 {IDLE} a force along x or y, or a moment about z\n",
     ),
     (
         MIXED,
         '[[load]]\nforce = [0, 0, 5]\nmoment = [1, 2, 0]\nframe = "platform"',
-        f"load[0]: load 'load 1' {IDLE} a force along x or y, or a moment about z\n",
+        f"load[0]: load 1 {IDLE} a force along x or y, or a moment about z\n",
     ),
     (MORE, "[limits]\nactuator_force = { max = 3 }", f"limits.actuator_force: {REDUNDANT}"),
 ]

@@ -112,7 +112,7 @@ FAULTS: list[tuple[str, str | bytes, str]] = [
     (AXIS, '"A - D"', "which has the name 'D', which is unknown; known are A, B, h, half, pi, rb, rp, x, y, z"),
     (LAST, 'at = "AA" }', "limb 1, joint 3 (S), at: is 'AA', which has the name 'AA', which is unknown; did you mean 'A'?"),
     (AXIS, '"unti(A - B)"', "which has the function 'unti', which is unknown; did you mean 'unit'?"),
-    ('name = "rps"', 'name = "r\\u0007s"', "name: has the character '\\x07'; allowed are letters, digits, signs and spaces"),
+    ('name = "rps"', 'name = "r\\u0007s"', "name: has the character '\\x07'; only printable characters are allowed"),
     ("repeat =", 'name = "a\\u001b[31m"\nrepeat =', "limb 1, name: has the character '\\x1b'"),
     (LAST, 'at = "A", name = "b\\u0000" }', "limb 1, joint 3 (S), name: is 'b\\x00'; letters, digits and _ are allowed, a letter"),
     (LAST, 'at = "A", name = "2:1" }', "limb 1, joint 3 (S), name: is '2:1'; letters, digits and _ are allowed, a letter first"),

@@ -247,8 +247,8 @@ def _coordinate(axis: JointAxis, value: SX) -> JointCoordinate:
 def limb_links(path: OpenedPath, labels: Mapping[int, str], frame: PathFrame) -> list[LimbLink]:
     """Return the links of a path, from the base on.
 
-    Of joints with a common centre at home, the one nearest the base is the end of links. A slide along the line
-    between its neighbours is not an end of a link: the link includes the travel of the slide.
+    Links end at joints; of several joints with a common centre at home, only at the joint nearest the base. A slide
+    along the line between its neighbours is not an end of a link: the link includes the travel of the slide.
 
     Args:
         path: the path.

@@ -101,7 +101,7 @@ def name_of(place: str, value: object) -> str:
     text = text_of(place, value)
     for letter in text:
         if not letter.isprintable():
-            raise RobotError(place, f"has the character {letter!r}; allowed are letters, digits, signs and spaces")
+            raise RobotError(place, f"has the character {letter!r}; only printable characters are allowed")
     return text
 
 

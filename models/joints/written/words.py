@@ -116,7 +116,7 @@ class LinkJointWords:
 
 @dataclass(frozen=True)
 class CouplingWords:
-    """Linear relation of joint coordinates: place, and factors by joint name."""
+    """Linear relation of joint coordinates: its place in the robot file, and the factor of each joint by name."""
 
     place: str
     factors: Mapping[str, Expression]

@@ -1,4 +1,4 @@
-"""Premises of a proof about a path: the text of its file, with the options that the file leaves open."""
+"""Premises of a proof about a path: the text of the path's file, with the reading options that the file leaves open."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def premises_of(
 
 
 def carried_path(case: Case, given: PathPremises) -> ProgrammedPath:
-    """Return the path that a proof contains.
+    """Return the path from the text and the reading options in a proof.
 
     Raises:
         ProofError: the proof has no readable path, or the case has no path.

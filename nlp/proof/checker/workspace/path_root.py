@@ -36,7 +36,7 @@ _STILL = 1e-9
 
 
 class PathRoot:
-    """Poses of a path.
+    """Root of the trees of a path: the box of the place along the path, and its poses.
 
     Args:
         case: case with fixed dimensions.
