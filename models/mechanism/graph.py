@@ -171,7 +171,7 @@ def _check_joint(joint: MechanismJoint, links: Iterable[str]) -> None:
         if name not in links:
             raise MechanismError(place, f"has the link {name!r}, which is unknown; links are {_listing(links)}")
     if joint.inner == joint.outer:
-        raise MechanismError(place, f"connects the link {joint.inner!r} to itself; two links are needed")
+        raise MechanismError(place, f"connects the link {joint.inner!r} to itself; two different links are needed")
     points = [joint.point] if joint.outer_point is None else [joint.point, joint.outer_point]
     if not all(np.isfinite(point).all() for point in points):
         raise MechanismError(place, "has a point that is not finite")

@@ -77,7 +77,7 @@ def generic_ranks(mechanism: Mechanism, seed: int = 0) -> RobotRanks:
     """
     ranks = [wrenches_of(each).ranks for each in closed_configurations(mechanism, seed=seed)]
     if not ranks:
-        raise MechanismError("", "no closed configuration near this one: check that the mechanism is mobile")
+        raise MechanismError("", "found no closed configuration near this one: check that the mechanism is mobile")
     passive = _most_frequent([each.passive for each in ranks])
     every = _most_frequent([each.all for each in ranks])
     # A limb with dependent joints has more wrenches than generic, and would raise the ranks.

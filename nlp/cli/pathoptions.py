@@ -61,7 +61,7 @@ class PathChoices(NamedTuple):
             try:
                 return [float(part) for part in text.split(",")]
             except ValueError:
-                raise InputError(f"{option} {text}: must be six numbers with commas: X,Y,Z,A,B,C") from None
+                raise InputError(f"{option} {text}: must be six numbers, separated by commas: X,Y,Z,A,B,C") from None
 
         found = dict(own.offsets)
         for each in self.offsets:

@@ -108,7 +108,7 @@ def in_place_of_case(path: ProgrammedPath, case: Case) -> ProgrammedPath:
     numbers = () if stated is None else stated.place
     fixed = [value for value in numbers if not isinstance(value, Free)]
     if stated is not None and stated.free:
-        fault = "is free, but a path needs one placement: fix it with --set, or give a result with --of"
+        fault = "is free, but a path needs one placement: set a value with --set, or give a result with --of"
         raise CaseError(f"path.place.{stated.free[0]}", fault, source=case.source)
     return placed(path, fixed)
 

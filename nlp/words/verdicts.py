@@ -172,7 +172,7 @@ def _room(each: VerdictData) -> float:
 
 def violating_robot(case: Case, name: str, machine: JointErrorsData) -> TextTable:
     """Return the joint-centre errors of the robot within the tolerance that violates a claim."""
-    unit, title = case.units.length, f"robot within the tolerance that violates: {name}"
+    unit, title = case.units.length, f"robot within the tolerance that violates: {quantity_words(name)}"
     if machine.centres is not None:
         off = [(each.joint, ", ".join(f"{part:.6g}" for part in each.error)) for each in machine.centres]
         return TextTable(("joint", f"error\n{unit}"), tuple(off), name="machine", title=title)

@@ -64,7 +64,7 @@ LIMB = ROBOT[ROBOT.index("[[limb]]") :]
 JOINTS = ROBOT[ROBOT.index("joints = ") :]
 AXIS, SECOND, LAST = '"A - B"', "limb 1, joint 2 (P), axis: is", 'at = "A" }'
 GRAMMAR = "which may have only numbers, names, + - * / ^, brackets and functions"
-NOT_A_NAME = "is not a name for a dimension: letters, digits and _ are allowed, a letter first"
+NOT_A_NAME = "cannot be the name of a dimension: letters, digits and _ are allowed, a letter first"
 DRIVEN = '{ type = "R", at = "B", axis = "y", actuated = true }'
 
 #: Text that is replaced, its replacement, and the sentence behind the name of the file.
@@ -82,7 +82,7 @@ FAULTS: list[tuple[str, str | bytes, str]] = [
     ('"R"', '"Pa", to = "B"', "limb 1, joint 1 (Pa), to: is the same point as at; a rod needs a nonzero length"),
     ('"R"', '"Pa", to = "B + y"', "limb 1, joint 1 (Pa), axis: is parallel to the rod from at to to; give the axis of its hinges"),
     (JOINTS, f'joints = [{DRIVEN}, {{ type = "S", at = "A" }}, {{ type = "S", at = "A" }}]', "limb 1, joint 3 (S), at: is the point of the preceding joint S too"),
-    (JOINTS, 'joints = [{ type = "S", at = "A" }, { type = "C", at = "B", axis = "x" }, { type = "P", at = "B", axis = "y" }]', "the robot: no limb resists the platform: each has six or more independent passive joints"),
+    (JOINTS, 'joints = [{ type = "S", at = "A" }, { type = "C", at = "B", axis = "x" }, { type = "P", at = "B", axis = "y" }]', "the robot: no limb resists any motion of the platform: each limb has six or more independent passive joints"),
     ("count = 1", "angles = [0, 120, 360]", "limb 1, repeat, angles: has 0 twice; each copy needs an angle of its own"),
     # A limb that ends nowhere, or has too much.
     (JOINTS, "", "limb 1, joints: is missing: a limb needs at least one joint"),
@@ -119,14 +119,14 @@ FAULTS: list[tuple[str, str | bytes, str]] = [
     ("[derived]", '"d\\u0001" = { typical = 1 }\n[derived]', f"d\\x01: {NOT_A_NAME}"),
     ("[derived]", '"a-b" = { typical = 1 }\n[derived]', f"a-b: {NOT_A_NAME}"),
     ("[derived]", '"\u03b1" = { typical = 1 }\n[derived]', f"\u03b1: {NOT_A_NAME}"),
-    ("[derived]", "sin = { typical = 1 }\n[derived]", "sin: is not a name for a dimension: expressions use it for something else"),
+    ("[derived]", "sin = { typical = 1 }\n[derived]", "sin: cannot be the name of a dimension: it is a function or a constant of expressions"),
     ('name = "rps"', "name = 3", "name = 3: must be text in quotes"),
     ('name = "rps"', 'name = "  "', 'name = "  ": must not be empty'),
     ("rp = {", "rb = {", "the file: is not valid TOML: Cannot overwrite a value (at line 5, column 23)"),
     ("half =", "rb =", "rb: is given twice"),
     ("[[limb]]", '[[limb]]\nname = "111"\njoints = [{ type = "S", at = "x" }]\n[[limb]]\nname = "11"', "limb: has two limbs with the name '111'"),
     ("B = [", "h = [", "limb 1, point h: has the name of a dimension"),
-    ("B = [", "x = [", "limb 1, x: is not a name for a point: expressions use it for something else"),
+    ("B = [", "x = [", "limb 1, x: cannot be the name of a point: it is a function or a constant of expressions"),
     ('half = "rb/2"', 'a = "b"\nb = "a"', "derived, a: is 'b', which uses 'b' before its definition; use names defined above"),
     ('half = "rb/2"', 'a = "a + 1"', "derived, a: is 'a + 1', which uses 'a' before its definition"),
     ("points = {", 'points = { D = "E", E = "D",', "limb 1, point D: is 'E', which uses 'E' before its definition"),
@@ -238,7 +238,7 @@ LINK_FAULTS: list[tuple[str, str, str]] = [
     ('axis = "z"', 'axis = "z"\npitch = 1', "joint motor (R), pitch: no such key"),
     ("actuated = true", "actuated = 1", "joint motor, actuated = 1: must be true or false"),
     ("points = {", "points = { s = [0, 0, 0],", "point s: has the name of a dimension"),
-    ("points = {", "points = { sin = [0, 0, 0],", "sin: is not a name for a point: expressions use it for something else"),
+    ("points = {", "points = { sin = [0, 0, 0],", "sin: cannot be the name of a point: it is a function or a constant of expressions"),
     ("name = ", "colour = 1\nname = ", "colour: no such key; allowed: schema, name, description, length_unit, home"),
     (LINKS[LINKS.index("[[joint]]") :], "", "joint: is missing; it must be one or more tables [[joint]]"),
     (LINKS, LINKS.replace("actuated = true", ""), "actuated: is given at no joint of the robot; write actuated = true"),
@@ -500,7 +500,7 @@ def test_the_default_home_is_written_too() -> None:
 
 def test_a_driven_limb_that_resists_nothing_is_refused_in_one_sentence(tmp_path: Path) -> None:
     hinges = [{"type": "C", "at": "z", "axis": "x"}, {"type": "P", "at": "z", "axis": "y"}]
-    with pytest.raises(ValueError, match="no limb resists the platform"):
+    with pytest.raises(ValueError, match="no limb resists any motion of the platform"):
         robot(name="floating", limb=[{"joints": [{"type": "S", "at": "0*x"}, *hinges]}])
     leg = {"points": {"B": (1, 0, 0), "A": (0.5, 0.4, 1)}, "repeat": {"count": 3}}
     leg["joints"] = [

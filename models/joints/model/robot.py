@@ -381,7 +381,9 @@ def model_of_home(
 def _check_carrying(builder: _Builder) -> None:
     """Refuse a robot without limbs that resist the platform, or without actuated joints."""
     if not (builder.wrenches or builder.members):
-        raise RobotError("", "no limb resists the platform: each has six or more independent passive joints")
+        raise RobotError(
+            "", "no limb resists any motion of the platform: each limb has six or more independent passive joints"
+        )
     if not builder.actuators:
         fault = "is given at no joint of the robot; write actuated = true at each joint that a motor drives"
         raise RobotError("actuated", fault)

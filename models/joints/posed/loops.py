@@ -57,7 +57,7 @@ class Loops(NamedTuple):
     Attributes:
         points: closed configurations.
         independent: indices of the independent loop equations.
-        free: indices of the free actuator coordinates among the unknowns, a largest independent set.
+        free: indices, among the unknowns, of the free actuator coordinates: as many independent ones as possible.
     """
 
     points: tuple[ClosedPoint, ...]
@@ -108,7 +108,7 @@ def examine_loops(
                 points.append(ClosedPoint(sample, values.ravel(), R, p.ravel()))
                 jacobians.append(found.slopes)
     if not points:
-        raise RobotError("", "no closed configuration near home: check that the mechanism is mobile")
+        raise RobotError("", "found no closed configuration near home: check that the mechanism is mobile")
     own_slopes = [each[:, 6 : 6 + len(unknowns)] for each in jacobians]
     return Loops(tuple(points), independent_rows(jacobians), _free(own_slopes, driven))
 

@@ -54,13 +54,13 @@ def plain(value: object) -> object:
 
 
 def check_names(names: Sequence[str] | Mapping[str, object], what: str, place: str = "") -> None:
-    """Refuse names that are not identifiers, or that expressions use for something else."""
+    """Refuse names that are not identifiers, or that are functions or constants of expressions."""
     for name in names:
         where = f"{place}, {name}" if place else name
         if not NAME.fullmatch(name):
-            raise RobotError(where, f"is not a name for {what}: letters, digits and _ are allowed, a letter first")
+            raise RobotError(where, f"cannot be the name of {what}: letters, digits and _ are allowed, a letter first")
         if name in CONSTANTS or name in FUNCTIONS:
-            raise RobotError(where, f"is not a name for {what}: expressions use it for something else")
+            raise RobotError(where, f"cannot be the name of {what}: it is a function or a constant of expressions")
         if list(names).count(name) > 1:
             raise RobotError(where, "is given twice")
 

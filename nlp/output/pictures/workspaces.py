@@ -93,7 +93,7 @@ class Kind(NamedTuple):
 
 
 def slices_figure(case: Case, slices: Sequence[Slice]) -> Figure:
-    """Return the slices as a Matplotlib figure; the ``gid`` of boxes is the text of their kind."""
+    """Return the slices as a Matplotlib figure; the ``gid`` of a box is the text of its verdict."""
     columns = min(_COLUMNS, len(slices))
     rows = -(-len(slices) // columns)
     entries, notes = slices_legend(case, slices), slices_notes(slices)

@@ -120,7 +120,7 @@ def start_of(robot: PosedRobot) -> FloatArray:
         (found,) = centre if is_closed else points.closed(centre, moving, steps=_FROM_HOME, zero=_ZERO)
         if is_home(robot, found):
             return np.asarray(found)
-    raise ProofError("no solution of the loop equations in the home assembly mode at the workspace centre")
+    raise ProofError("found no solution of the loop equations in the home assembly mode at the workspace centre")
 
 
 def is_home(robot: PosedRobot, z: FloatArray) -> bool:

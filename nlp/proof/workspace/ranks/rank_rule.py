@@ -15,7 +15,8 @@ centre of the box. Full column rank then means that the null space has d dimensi
 Joint-centre errors change polynomial entries, such as entries of rows of straight legs, one by one: let g_j be the
 derivative of an entry with respect to the error of centre j, and H its second derivatives with respect to all errors.
 The entry of a robot within the tolerance t differs from the entry of the nominal robot by at most
-``t sum_j |g_j| + t^2 / 2 sum |H|``. First derivatives are bounded over each box, second derivatives once over the workspace and all errors.
+``t sum_j |g_j| + t^2 / 2 sum |H|``. First derivatives are bounded over each box, second derivatives once over the
+workspace and all errors.
 """
 
 from __future__ import annotations

@@ -430,7 +430,10 @@ class SingularSearch:
     def _between(
         self, signs: DeterminantSigns, points: FloatArray, values: FloatArray | NDArray[np.int32]
     ) -> Singular | None:
-        """Return a singular pose between points (K, n) with computed determinants (K,), or between earlier points."""
+        """Return a singular pose between two points with determinants of opposite sign; None without such points.
+
+        The points are (K, n) with computed determinants (K,), or points of earlier calls.
+        """
         problem = self._problem
         for sign, known in self._signed.items():
             new = points[np.sign(values) == sign][:_SIGNED]

@@ -235,7 +235,9 @@ def build_problem(
         start = loops.all_closed(middle[:, None], range(count, len(middle)), zero=DEPENDENT)[:, 0]
         start = start if loops.is_closed(start) else None
     if start is None:
-        raise NotJudgedError("no solution of the loop equations in the home assembly mode at the workspace centre")
+        raise NotJudgedError(
+            "found no solution of the loop equations in the home assembly mode at the workspace centre"
+        )
     needed = _needed(loops, start, count)
     loops = loops.some(needed)
     dependent = _dependent(loops, start, posed.free, box)
