@@ -29,7 +29,7 @@ class MechanismError(ValueError):
     """Error of an inconsistent mechanism.
 
     Attributes:
-        place: link or joint in words; empty for the whole mechanism.
+        place: name of the link or joint with the fault, in words; empty for the whole mechanism.
         fault: description of the fault, as a clause.
     """
 
@@ -66,7 +66,7 @@ class MechanismJoint:
         name: unique name among the joints.
         kind: kind of the joint: ``R``, ``P``, ``H``, ``S`` or ``weld``.
         inner: name of the link on the base side.
-        outer: name of the other link; the coordinate is its motion relative to ``inner``.
+        outer: name of the other link; the joint coordinate is the motion of ``outer`` relative to ``inner``.
         point: (3,) centre of the joint, or point of its axis, in the world frame, length.
         axis: (3,) unit vector along the axis in the world frame; zero for ``S`` and ``weld``.
         pitch: translation per radian of an ``H`` joint, length.

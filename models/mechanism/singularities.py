@@ -1,4 +1,4 @@
-"""Generic ranks of a mechanism, and singularities by comparison of its ranks with them."""
+"""Generic ranks of a mechanism, and singularities: configurations with other ranks."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class SingularityType(enum.Enum):
 
 
 class MechanismSingularity(NamedTuple):
-    """Singularity: type, and number of the member from 0; None for the whole robot."""
+    """Singularity: its type, and the index of the singular member; None for the whole robot."""
 
     type: SingularityType
     member: int | None = None
@@ -98,7 +98,7 @@ def singularities_of(ranks: RobotRanks, generic: RobotRanks) -> tuple[MechanismS
 
     Args:
         ranks: ranks at the configuration.
-        generic: ranks at almost all configurations.
+        generic: generic ranks: those at almost all configurations.
     """
     found: list[MechanismSingularity] = []
     for k, passive in enumerate(ranks.passive):

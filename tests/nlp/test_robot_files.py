@@ -79,9 +79,9 @@ FAULTS: list[tuple[str, str | bytes, str]] = [
     (AXIS, '"(rb - 1)*x"', "limb 1, joint 2 (P), axis: is '(rb - 1)*x', which is zero; a direction is needed, at the typ"),
     ('axis = "y"', 'axis = "cross(A, 2*A)"', "limb 1, joint 1 (R), axis: is 'cross(A, 2*A)', which is zero; a direction is ne"),
     ('"R", at = "B", axis = "y"', '"U", at = "B", axes = ["x", "-2*x"]', "limb 1, joint 1 (U), axes: are parallel; two different"),
-    ('"R"', '"Pa", to = "B"', "limb 1, joint 1 (Pa), to: is the same point as at; a rod needs a nonzero length"),
-    ('"R"', '"Pa", to = "B + y"', "limb 1, joint 1 (Pa), axis: is parallel to the rod from at to to; give the axis of its hinges"),
-    (JOINTS, f'joints = [{DRIVEN}, {{ type = "S", at = "A" }}, {{ type = "S", at = "A" }}]', "limb 1, joint 3 (S), at: is the point of the preceding joint S too"),
+    ('"R"', '"Pa", to = "B"', "limb 1, joint 1 (Pa), to: is the same point as \"at\"; a rod needs a nonzero length"),
+    ('"R"', '"Pa", to = "B + y"', "limb 1, joint 1 (Pa), axis: is parallel to the rod from \"at\" to \"to\"; give the axis of its hinges"),
+    (JOINTS, f'joints = [{DRIVEN}, {{ type = "S", at = "A" }}, {{ type = "S", at = "A" }}]', "limb 1, joint 3 (S), at: is also the point of the preceding joint S"),
     (JOINTS, 'joints = [{ type = "S", at = "A" }, { type = "C", at = "B", axis = "x" }, { type = "P", at = "B", axis = "y" }]', "the robot: no limb resists any motion of the platform: each limb has six or more independent passive joints"),
     ("count = 1", "angles = [0, 120, 360]", "limb 1, repeat, angles: has 0 twice; each copy needs an angle of its own"),
     # A limb that ends nowhere, or has too much.

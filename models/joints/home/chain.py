@@ -38,12 +38,12 @@ class Joint:
     """Joint at home.
 
     Attributes:
-        place: limb and joint, for messages.
+        place: place in the robot file (limb and joint), for messages.
         type: letter of the joint type: ``R, P, H, C, U, S`` or ``Pa``.
         point: (3, 1) centre of the joint or point of its axis, length.
         axes: axes with one coordinate each, from the base side on; those of a spherical joint are along x, y and z.
         actuated: True if an actuator drives the joint.
-        name: name of the joint in the robot file; empty for none.
+        name: name of the joint in the robot file; empty for a joint without a name.
         parts: joints of the robot file that this joint replaces; empty for a joint of the robot file itself.
     """
 
@@ -134,7 +134,7 @@ class HomeRobot:
         home: (3, 1) origin of the platform frame, length.
         size: (1, 1) characteristic size of the robot, length; lengths are divided by this size.
         limbs: limbs of the robot.
-        graph: links and joints, for a robot given by these; None for a robot given limb by limb.
+        graph: links and joints, for a robot given by links and joints; None for a robot given limb by limb.
     """
 
     words: RobotWords
@@ -211,9 +211,9 @@ def _with_points(place: str, points: Mapping[str, VectorExpression], names: Mapp
     """Return the values of names and points, (3, 1) for each point.
 
     Args:
-        place: text before the point in messages.
+        place: beginning of the place in messages.
         points: points by name.
-        names: values of the names before.
+        names: values of the names that are defined before.
     """
     known = dict(names)
     for name, written in points.items():

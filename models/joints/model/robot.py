@@ -121,10 +121,10 @@ def robot(
 
 
 class _LimbModes(NamedTuple):
-    """Data of the sign of a limb's working mode.
+    """Data from which the sign of a limb's working mode is computed.
 
     Attributes:
-        place: index of the sign among all signs.
+        place: index of the sign among all signs of the model.
         limb: name of the limb.
         paths: opened paths of the limb.
         unknowns: range of the limb's unknowns in the model.
@@ -138,7 +138,7 @@ class _LimbModes(NamedTuple):
 
 @dataclass(eq=False)
 class _Builder(ResistingParts):
-    """Parts of a robot's model under construction."""
+    """Builder of a robot's model: unknowns, equations, rows, members and actuators, limb after limb."""
 
     frame: PathFrame
     wrenches: list[Wrench] = field(default_factory=list)
@@ -224,7 +224,7 @@ class _Builder(ResistingParts):
             self.positions.append(SX(0) if way is None else way)
 
     def add_modes(self) -> None:
-        """Add each limb's sign of the working mode after its joint signs, once free actuator coordinates are known."""
+        """Add the sign of each limb's working mode; the free actuator coordinates must be known."""
         for each in reversed(self.modes):
             own = self.unknowns[each.unknowns]
             self.signs[each.place : each.place] = mode_signs(each.limb, each.paths, own, self.frame)
@@ -314,7 +314,7 @@ def model_of_home(
         at_home: the robot.
         samples: (s, d) values of the dimensions at which ranks are measured.
         definition: tables of the robot file.
-        more: further parameters in its symbols, in addition to the dimensions.
+        more: parameters of the model in addition to the dimensions.
         legs: straight legs of the robot; None to derive them.
 
     Raises:

@@ -68,7 +68,7 @@ class Loops(NamedTuple):
 def examine_loops(
     frame: PathFrame, equations: Sequence[Closure], unknowns: Sequence[Unknown], driven: Sequence[int]
 ) -> Loops:
-    """Return closed configurations near home, with the independent loop equations and the free coordinates there.
+    """Return closed configurations near home, with the independent loop equations and the free actuator coordinates.
 
     Args:
         frame: common data of all paths of the robot.
@@ -146,7 +146,7 @@ def _is_independent(rows: FloatArray) -> bool:
 
 
 def _slopes(residual: SX, moving: SX, robot: HomeRobot) -> SX:
-    """Return the Jacobian with respect to pose, unknowns and dimensions, lengths relative to the robot's size."""
+    """Return the Jacobian of loop equations with respect to pose, unknowns and dimensions, in scaled lengths."""
     own = ca.jacobian(residual, robot.symbols)
     scales = [robot.size if item.kind.value == "length" else SX(1) for item in robot.words.dimensions.values()]
     scaled = [own[:, k] * scale for k, scale in enumerate(scales)]

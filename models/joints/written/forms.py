@@ -1,4 +1,4 @@
-"""Form checks of the values in a robot file; a fault is refused with its place."""
+"""Checks of the form of each value in a robot file; an error names the place of the value in the file."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ class RobotError(ModelError):
     """Error in a robot given joint by joint.
 
     Attributes:
-        place: limb, joint and key, such as ``limb 2, joint 1 (R), axis``; empty for the whole robot.
+        place: place in the robot file: limb, joint and key, such as ``limb 2, joint 1 (R), axis``; empty for the whole
+            robot.
         fault: description of the fault, with the value read and the values allowed.
     """
 
