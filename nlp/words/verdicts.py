@@ -203,7 +203,8 @@ def outcome_lines(claims: Sequence[VerdictData]) -> Iterator[Line]:
 
 def _limit_of(claim: VerdictData) -> str:
     """Return the name of the limit of a claim, without limb, joint or actuator."""
-    return claim.name.partition(" ")[0].partition(".")[0]
+    name = claim.name.partition(" ")[0]
+    return name if name.startswith("actuator.") else name.partition(".")[0]
 
 
 def open_lines(claims: Sequence[VerdictData]) -> Iterator[Line]:
