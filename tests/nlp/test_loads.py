@@ -420,7 +420,7 @@ def test_arrows_push_and_pull_the_platform_along_the_legs_to_one_scale() -> None
     # The arrows of legs and load together are no force.
     assert total + lengths["side"] == pytest.approx(np.zeros(3), abs=1e-9 * float(np.linalg.norm(lengths["side"])))
     assert {arrow.kind for arrow in drawing.forces.arrows} == {"load", "push", "pull"}
-    assert "load side" in drawing.forces.words
+    assert 'load "side"' in drawing.forces.words
 
 
 def test_torques_are_told_in_words_and_no_forces_have_no_arrows_and_no_scale() -> None:
@@ -487,7 +487,7 @@ def test_pictures_of_forces_have_no_rates_and_arrows_the_name_of_their_load() ->
     assert drawing.forces is not None
     (arrow,) = drawing.forces.arrows
     assert (arrow.kind, arrow.name, arrow.words) == ("load", "tool", "weight of tool: 19.62 N")
-    assert drawing.forces.words.startswith("weight of tool, actuator forces under load cut: longest arrow 19.62 N")
+    assert drawing.forces.words.startswith('weight of tool, actuator forces under load "cut": longest arrow 19.62 N')
     assert drawings_of(handling(), 1)[0].forces.words.startswith("load handling: longest arrow")
 
 
