@@ -488,7 +488,7 @@ def test_pictures_of_forces_have_no_rates_and_arrows_the_name_of_their_load() ->
     (arrow,) = drawing.forces.arrows
     assert (arrow.kind, arrow.name, arrow.words) == ("load", "tool", "weight of tool: 19.62 N")
     assert drawing.forces.words.startswith('weight of tool, actuator forces under load "cut": longest arrow 19.62 N')
-    assert drawings_of(handling(), 1)[0].forces.words.startswith("load handling: longest arrow")
+    assert drawings_of(handling(), 1)[0].forces.words.startswith('load "handling": longest arrow')
 
 
 def test_a_page_has_the_arrows_beside_the_legs_and_the_forces_of_each_pose() -> None:
