@@ -80,6 +80,8 @@ def _subject_lines(path: PathData) -> Iterator[Line]:
         words = ", ".join(f"{each.word} (line {each.line})" for each in path.idle[:_SHOWN])
         rest = len(path.idle) - _SHOWN
         yield Line(words + (f", and {rest} more" if rest > 0 else ""), label="ignored (no motion)")
+    for sentence in path.warnings or ():
+        yield Line(sentence, label="note", tone=Tone.CAUTION)
 
 
 def _other_faults(path: PathData, first: PathVerdictData | None) -> Iterator[Line]:

@@ -18,6 +18,10 @@ _OPTIONS = {
     "unit": "--unit",
     "start": "--start",
     "offsets": "--offset",
+    "flavour": "--flavour",
+    "end_of_file": "--end-of-file",
+    "part": "--part",
+    "macros": "--macro",
 }
 
 
@@ -51,6 +55,10 @@ def premises_of(
         legs=legs_numbers(legs_of(case)),
         joint_centre=case.joint_centre_tolerance or 0.0,
         with_angles=with_angles,
+        flavour=options.flavour,
+        end_of_file=options.end_of_file,
+        part=options.part,
+        macros=tuple(name.upper() for name in options.macros),
     )
 
 
@@ -62,7 +70,17 @@ def carried_path(case: Case, given: PathPremises) -> ProgrammedPath:
     """
     try:
         between = None if given.between is None else Between(given.between)
-        options = PathOptions(between, given.angles, given.unit, given.start, given.offsets)
+        options = PathOptions(
+            between,
+            given.angles,
+            given.unit,
+            given.start,
+            given.offsets,
+            flavour=given.flavour,
+            end_of_file=given.end_of_file,
+            part=given.part,
+            macros=given.macros,
+        )
         path = path_of_text(given.text, given.file, case.units, options)
     except (InputError, ValueError) as error:
         raise ProofError(f"the path in the proof cannot be read: {error}") from None
