@@ -56,8 +56,8 @@ class PathOptions:
         skips_deleted: If true, lines that begin with a slash are skipped, as by default in LinuxCNC.
         flavour: rules of reading a program: ``"linuxcnc"``, or ``"printer"`` for firmware of 3D printers.
         end_of_file: If true, the end of the file ends a program, as for printers; otherwise it needs M2, M30 or %.
-        part: number of the part of a printer's program that is the path, from 1; None for the only part. Homing and
-            macros divide a program into parts.
+        part: number of the part of a printer's program that is the path, from 1; None for the only part. Homing,
+            macros and motors off divide a program into parts.
         macros: names of a printer's macros that a program may call; their motions are not in the file.
 
     Raises:

@@ -1,8 +1,8 @@
 """G-code programs of 3D printers as tool paths, by the rules of Klipper and Marlin.
 
 Points, arcs and offsets are those of :mod:`.gcode`. Different are the feed, which all motions share, and dwells in
-milliseconds; motions of the extruder alone are dwells. After homing, and after macros, the position is unknown: they
-divide a program into parts, and one part is the path.
+milliseconds; motions of the extruder alone are dwells. After homing, macros and motors off the position is unknown:
+they divide a program into parts, and one part is the path.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .gcode import Interpreter
 from .merging import joined_to_previous
 from .options import PathOptions
 from .path import Kind, ProgrammedPath
-from .printerwords import ACTED, STILL, command_of, is_closed, refuse
+from .printerwords import ACTED, MOTORS_OFF, STILL, command_of, is_closed, refuse
 from .words import WordError
 
 _POSITION = "XYZ"
@@ -128,11 +128,13 @@ class _Printer(Interpreter):
         if name in STILL:
             self._check_retraction(name, words)
             self._note(name)
+            if name in MOTORS_OFF and (not words or not words.keys().isdisjoint(_POSITION)):
+                self._lose_position()
         elif name in ACTED:
             self._act_on(name, words)
         elif name in self.macros and not is_closed(name):
             self.feed = 0.0
-            self._lose_position(name)
+            self._hide(name)
         else:
             raise refuse(name)
 
@@ -145,7 +147,7 @@ class _Printer(Interpreter):
         elif name in ("G17", "G18", "G19"):
             self.plane = int(name[1:])
         elif name == "G28":
-            self._lose_position(name)
+            self._hide(name)
         elif name == "G4":
             self._dwell(words)
         elif name == "G92":
@@ -217,9 +219,13 @@ class _Printer(Interpreter):
     def _place(self) -> _Place:
         return _Place(len(self.knots) // 6, len(self.lines), len(self.planes))
 
-    def _lose_position(self, name: str) -> None:
-        """Begin a part after motions that are not in the file; before any motion, a stated start remains."""
+    def _hide(self, name: str) -> None:
+        """Make motions that are not in the file."""
         self.hidden.setdefault(name, [self.line, 0])[1] += 1
+        self._lose_position()
+
+    def _lose_position(self) -> None:
+        """Begin a part at an unknown position; before any motion, a stated start remains."""
         if self.options.start is not None and not self.parts and not self.has_motion:
             return
         self._close_part()
@@ -250,8 +256,7 @@ class _Printer(Interpreter):
                 for k, (first, last) in enumerate(self.parts[:_SHOWN], 1)
             )
             more = f", and {count - _SHOWN} more" if count > _SHOWN else ""
-            names = " and ".join(list(self.hidden)[:_SHOWN])
-            cause = f"{names} divide{'s' * (len(self.hidden) == 1)} the path into {count} parts" if names else "1 part"
+            cause = f"the path has {count} part{'s' * (count > 1)} between homing, macros and motors off"
             fault = f"there is no part {chosen}; {cause}" if chosen > count else cause
             raise InputError(f"{self.source}: {fault}: {shown}{more}; choose one of them with --part")
         self.part = chosen

@@ -35,6 +35,9 @@ ACTED = frozenset({
 })  # fmt: skip
 #: Those of them whose other words have no effect on the path, and without any words.
 _HOMING, _ALONE = "G28", frozenset({"G17", "G18", "G19", "G21", "G90", "G91", "M82", "M83"})
+#: Commands after which the motors of the named axes, or all motors, hold nothing.
+MOTORS_OFF = frozenset({"M18", "M84"})
+_LETTER = re.compile("[A-Z]")
 _MESH = "bed levelling changes the heights of the path by values that the file does not state"
 _OFFSET = "offsets of coordinates are not supported; program the coordinates without them"
 _PARKED = "the firmware moves the robot to a position that the file does not state; program the motion"
@@ -72,7 +75,7 @@ class Command(NamedTuple):
 
     Attributes:
         name: name, such as ``G1``; empty for a line without a command.
-        words: values of the other letters; empty for commands that are not acted on.
+        words: values of the other letters; empty for commands that ignore them.
     """
 
     name: str
@@ -101,8 +104,8 @@ def command_of(line: str) -> Command:
     if command not in ACTED:
         if command not in _TEXTS and ("{" in text or "[" in text):
             raise _placeholder(text)
-        if command not in STILL:
-            return Command(command, {})
+        if command in MOTORS_OFF:
+            return Command(command, dict.fromkeys(_LETTER.findall(head[3]), 0.0))
         return Command(command, _words_of(head[3], command) if command in ("G10", "M207") else {})
     words = {} if command == _HOMING else _words_of(head[3], command)
     if words and command in _ALONE:

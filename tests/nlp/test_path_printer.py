@@ -360,7 +360,7 @@ TWO = "G28\nG1 X0 Y0 Z0 F600\nG1 X5\nG2 I2\nG28 Z0\nG1 X7 Y7\nG1 X9 Z1\nG1 Y2\nG
 
 
 def test_homing_divides_a_program_into_parts_and_one_is_chosen() -> None:
-    with pytest.raises(InputError, match=r"2 parts: 1 \(lines 3 to 4\), 2 \(lines 8 to 9\); .* --part"):
+    with pytest.raises(InputError, match=r"2 parts between .*: 1 \(lines 3 to 4\), 2 \(lines 8 to 9\); .* --part"):
         program(TWO)
     with pytest.raises(InputError, match="there is no part 3"):
         program(TWO, part=3)
@@ -370,6 +370,15 @@ def test_homing_divides_a_program_into_parts_and_one_is_chosen() -> None:
         np.testing.assert_allclose(path.knots[0, :3], start)
         np.testing.assert_allclose(path[1].pose_at(0.5).positions, middle, atol=1e-12)
         assert f"part {part} of 2 of the program" in " ".join(path.warnings)
+
+
+def test_motors_without_current_lose_the_position() -> None:
+    for off, parts in (("M84", 2), ("M18 X Y", 2), ("M84 E", 1), ("M84 S30", 1)):
+        text = f"{BEGIN}G1 X1\n{off}\nG1 X2 Y0 Z0\nG1 X3\nM84"
+        if parts == 2:
+            with pytest.raises(InputError, match="the path has 2 parts"):
+                program(text)
+        assert len(program(text, part=1)) == 1  # one merged line, or the first part
 
 
 def test_macros_are_read_only_by_name_and_lose_position_and_feed() -> None:
@@ -389,7 +398,7 @@ def test_macros_are_read_only_by_name_and_lose_position_and_feed() -> None:
 
 def test_a_file_without_an_end_or_a_motion_says_so() -> None:
     assert "no M84" in program(f"{BEGIN}G1 X1").warnings[-1]
-    assert "no M84" in program(f"{BEGIN}M84\nG1 X1").warnings[-1]
+    assert "no M84" in program(f"{BEGIN}M84 E\nM18 S60\nG1 X1").warnings[-1]
     with pytest.raises(InputError, match="there is no path: the start of X and Y and Z is not known"):
         program("G28\nM84")
 
