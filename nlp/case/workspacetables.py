@@ -151,7 +151,7 @@ class PathTable(Table):
             units: units of the file.
             has_limits: If true, a solve must satisfy the limits along the whole path.
         """
-        given, stated = dict(self), self.place
+        given, stated = dict(self) | {"macros": tuple(self.macros)}, self.place
         given["place"] = tuple(
             0.0 if stated is None else internal_value(getattr(stated, name), units, dimension)
             for name, dimension in PLACE.items()

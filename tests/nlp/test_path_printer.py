@@ -471,7 +471,7 @@ def test_case_and_commands_read_a_printers_file_and_its_proof(cli: Run, tmp_path
 def test_a_case_states_the_flavour_of_its_path(tmp_path: Path) -> None:
     keys = {"file": "part.gcode", "flavour": "printer", "macros": ["START_PRINT"], "part": 1, "end_of_file": True}
     case = case_of("hexapod-linuxcnc", path=keys)
-    assert case.path == PathFile(**keys)  # type: ignore[arg-type]
+    assert case.path == PathFile("part.gcode", flavour="printer", macros=("START_PRINT",), part=1, end_of_file=True)
     assert case_from(case.to_toml()).path == case.path
     saved(tmp_path / "part.gcode", "START_PRINT\nG1 X0 Y0 Z500 F600\nG1 X9\nEND")
     folder = {"folder": str(tmp_path), "file": "part.gcode"}
