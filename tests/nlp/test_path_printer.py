@@ -382,7 +382,7 @@ def test_motors_without_current_lose_the_position() -> None:
 
 
 def test_macros_are_read_only_by_name_and_lose_position_and_feed() -> None:
-    text = "START_PRINT BED=60\nG1 X1 Y2 Z3\nG1 X2\nG1 X3 F600\nEND_PRINT"
+    text = "G1 F900\nSTART_PRINT BED=60\nG1 X1 Y2 Z3\nG1 X2\nG1 X3 F600\nEND_PRINT"
     path = program(text, macros=["start_print", "END_PRINT"])
     np.testing.assert_allclose(path.knots[0, :3], (1, 2, 3))
     assert np.isnan(path.durations[0])
