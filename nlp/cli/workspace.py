@@ -43,7 +43,7 @@ def workspace(
     The case states the box of poses under [workspace]. Quantities without a limit are bounded for information.
     """
     from ..interruption import Milestone, answer_after, seconds_left, within
-    from ..proof.statement.machine import workspace_of_case
+    from ..proof.statement.fixed_robot import workspace_of_case
     from ..results.workspace import scale_data, workspace_of
     from ..words.poses import evaluate_command
     from .proofs import proof_record, proof_text

@@ -32,7 +32,7 @@ from ..solver.status import Status
 from ..system.jsonvalues import finite_or_none
 from ..units import rate_unit
 from ..words.comparison import comparison_columns, comparison_lines
-from ..words.designs import DesignDetails, Designs, DrawnDesign, Join, PageWords, free_numbers
+from ..words.designs import DesignDetails, Designs, DrawnDesign, Join, PageWords, design_values
 from ..words.text import Line, TextTable, Tone
 from .compare import Comparison, part_of
 from .entry import Entry, TaskFit, driven_wrenches
@@ -47,7 +47,7 @@ def entry_sentences(entry: Entry) -> list[str]:
     """Return sentences on missing results of a robot, and on results that cannot be compared."""
     found = []
     if entry.fault:
-        found.append(f"The case contradicts itself with this robot: {entry.fault}.")
+        found.append(f"The case is inconsistent with this robot: {entry.fault}.")
     elif not entry.has_answer:
         found.append(_no_answer(entry))
     for fit in entry.tasks:
@@ -280,7 +280,7 @@ def _drawn(case: Case, entry: Entry, solution: Solution) -> DrawnDesign:
     elif not entry.keeps_limits:
         words += ", does not satisfy all limits"
     outcome, nlp = solution.outcomes[0], solution.outcomes[0].own.nlp
-    numbers, active = free_numbers(nlp, outcome.x), _active(entry)
+    numbers, active = design_values(nlp, outcome.x), _active(entry)
     return DrawnDesign(entry.contender.label, words, numbers, active, nlp, outcome.x, outcome.state)
 
 

@@ -15,7 +15,7 @@ from ..results.explorations import FrontGoalData, FrontPointData, FrontResult
 from ..results.objective import unit_of_objective
 from ..results.point import head_data, stated_pose_notice, versions
 from ..system.jsonvalues import finite_or_none
-from ..words.designs import SEPARATOR, Cell, Column, ColumnKind, Designs, DrawnDesign, Join, PageWords, free_numbers
+from ..words.designs import SEPARATOR, Cell, Column, ColumnKind, Designs, DrawnDesign, Join, PageWords, design_values
 from ..words.text import Line
 from .front import Front, FrontPoint
 from .goals import Goal
@@ -200,7 +200,7 @@ def _drawn(front: Front, point: FrontPoint) -> DrawnDesign:
     return DrawnDesign(
         ", ".join(f"{goal.label} = {value:.6g}{unit}" for goal, value, unit in pairs),
         f"optimum of {front.goals[point.program.optimised].label}",
-        free_numbers(solution.nlp, solution.x),
+        design_values(solution.nlp, solution.x),
         tuple(f"{side.name} {side.bound}" for side in sides if side.name in names),
         solution.nlp,
         solution.x,

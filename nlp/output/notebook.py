@@ -11,9 +11,9 @@ from rich.console import Console
 
 from ...models import Dimension, FloatArray, Model, component_names
 from ..case.case import Case
-from ..case.choices import listed_numbers, within_ranges
+from ..case.choices import catalogue_dimensions, within_ranges
 from ..case.limits.limits import Limits
-from ..case.pose import HERE, Free, Value
+from ..case.pose import NO_DISPLACEMENT, Free, Value
 from ..errors import CaseError, EvaluationError, InputError
 from ..evidence.state import evaluate
 from ..program.formulation import formulate_each
@@ -166,9 +166,9 @@ def _drawings_at_start(case: Case) -> list[Drawing]:
         EvaluationError: the robot does not exist there.
     """
     # Limits and further poses do not change the drawing, but take time.
-    numbers = listed_numbers(case)
+    numbers = catalogue_dimensions(case)
     case = within_ranges(case, numbers, tuple((0, 1) for _ in numbers))
-    plain = replace(case, limits=Limits(), displacements=(HERE,), further=(), joint_centre_tolerance=None)
+    plain = replace(case, limits=Limits(), displacements=(NO_DISPLACEMENT,), further=(), joint_centre_tolerance=None)
     try:
         nlps = formulate_each(plain)
     except CaseError as error:

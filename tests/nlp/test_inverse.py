@@ -12,7 +12,7 @@ from robot_gallery import random_displacements, random_twist, table
 
 from screwsynth.nlp import Case, Free, InputError, Rotation, Task, build_model, evaluate, formulate, inverse, load_case
 from screwsynth.nlp.evidence.closing import closed_start
-from screwsynth.nlp.proof.statement.machine import joint_centres
+from screwsynth.nlp.proof.statement.fixed_robot import joint_centres
 from screwsynth.nlp.units import Units
 
 TASK = Task(np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2]))

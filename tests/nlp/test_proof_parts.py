@@ -35,9 +35,9 @@ from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.checker.premises import fingerprint
 from screwsynth.nlp.proof.checker.proof_file import ProofClaim
 from screwsynth.nlp.proof.checker.tree import Node
+from screwsynth.nlp.proof.statement.fixed_robot import Legs
 from screwsynth.nlp.proof.statement.form import without_ties
 from screwsynth.nlp.proof.statement.limb_separation import separate
-from screwsynth.nlp.proof.statement.machine import Legs
 from screwsynth.nlp.proof.statement.signs import is_nowhere_positive
 from screwsynth.nlp.proof.statement.standard_form import Condition, StandardForm, standard_form
 from screwsynth.nlp.proof.workspace.ranks import ranks

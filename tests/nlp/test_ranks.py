@@ -29,7 +29,7 @@ from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.evidence.dependent import with_dependent
 from screwsynth.nlp.proof.enclosure.forms import ULP, Encloser, Forms
 from screwsynth.nlp.proof.enclosure.tape import compile_tape
-from screwsynth.nlp.proof.statement.machine import legs_of
+from screwsynth.nlp.proof.statement.fixed_robot import legs_of
 from screwsynth.nlp.proof.statement.tolerance import built_model
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal
 from screwsynth.nlp.proof.workspace.numbers.jacobian_numbers import SingularValues

@@ -25,7 +25,7 @@ from screwsynth.models.joints.model.closedform import closed_form
 from screwsynth.nlp import Case, CaseError, Outcome, Sense, build_model, json_data, judge_workspace
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.enclosure.forms import Forms
-from screwsynth.nlp.proof.statement.machine import Legs, joint_centres
+from screwsynth.nlp.proof.statement.fixed_robot import Legs, joint_centres
 from screwsynth.nlp.proof.statement.tolerance import built_model, is_smooth
 from screwsynth.nlp.proof.workspace.numbers import expressions
 from screwsynth.nlp.proof.workspace.numbers import within_tolerance as tolerance

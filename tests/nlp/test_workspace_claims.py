@@ -23,7 +23,7 @@ from screwsynth.nlp.case.limits.singular_values import SmallestSingularValue
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.output.pictures.workspaces import drawing_at, slices_legend
-from screwsynth.nlp.proof.statement.machine import legs_of
+from screwsynth.nlp.proof.statement.fixed_robot import legs_of
 from screwsynth.nlp.proof.workspace import judge
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.judgement import Judgement
@@ -37,7 +37,7 @@ from screwsynth.nlp.proof.workspace.slices.slices import slices_of
 from screwsynth.nlp.proof.workspace.verdict import Verdict
 from screwsynth.nlp.results.claims import refuted_claims, worst_claim
 from screwsynth.nlp.results.workspace import WorkspaceResult, workspace_of
-from screwsynth.nlp.words.claims import claim_words, seeing_lines
+from screwsynth.nlp.words.claims import claim_words, violation_lines
 from screwsynth.nlp.words.workspace import verdict_words
 
 Value = TypeVar("Value")
@@ -147,7 +147,7 @@ def changed(value: Value, **parts: object) -> Value:
 
 def counted(result: WorkspaceResult) -> tuple[int, int]:
     """Refuted claims of the verdict's words, and those of the list of commands."""
-    lines = list(seeing_lines(result, lambda _: "command"))
+    lines = list(violation_lines(result, lambda _: "command"))
     shown = {
         each.words.partition(":")[0] + each.words.partition("limit ")[2].partition(";")[0]
         for each in lines

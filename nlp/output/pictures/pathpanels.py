@@ -12,9 +12,9 @@ import numpy as np
 from ....models import Dimension, FloatArray
 from ....models.statics import driven_joints
 from ...case.forces import dimension_of_speed
-from ...case.motors import MotorNumber
+from ...case.motors import ActuatorQuantity
 from ...case.task import Sense
-from ...path.sampling import Way, WayKind, way_of
+from ...path.sampling import Progress, ProgressKind, progress_of
 from ...proof.workspace.judgement import Judgement
 from ...proof.workspace.path_samples import PathSamples, SampledNumber, motor_numbers
 from ...proof.workspace.verdict import Outcome
@@ -126,7 +126,7 @@ class PathPicture:
     judged: Judgement
     samples: PathSamples
     result: PathResult
-    way: Way
+    way: Progress
     at: FloatArray
     label: str
     panels: tuple[PathPanel, ...]
@@ -187,8 +187,8 @@ class PathPicture:
 
 def path_picture(judged: Judgement, samples: PathSamples, result: PathResult) -> PathPicture:
     """Return the content of the charts of a judged path."""
-    way = way_of(judged.path)
-    units = {WayKind.TIME: ", s", WayKind.LENGTH: f", {judged.case.units.length}", WayKind.SEGMENTS: ""}
+    way = progress_of(judged.path)
+    units = {ProgressKind.TIME: ", s", ProgressKind.LENGTH: f", {judged.case.units.length}", ProgressKind.SEGMENTS: ""}
     panels = (*_coordinates(judged, samples), *_speeds(judged, samples), *_forces(judged, samples))
     least = 100 * samples.least if len(samples.keys) else np.zeros(0)
     return PathPicture(
@@ -223,8 +223,8 @@ def _coordinates(judged: Judgement, samples: PathSamples) -> Iterator[PathPanel]
 
 
 def _speeds(judged: Judgement, samples: PathSamples) -> Iterator[PathPanel]:
-    """Yield charts of actuator speeds: along a path with times, or else the largest ones in the case's motions."""
-    units, every = judged.case.units, motor_numbers(samples.numbers, MotorNumber.SPEED).get("", [])
+    """Yield charts of actuator speeds: along a timed path, or otherwise the largest speeds in the case's motions."""
+    units, every = judged.case.units, motor_numbers(samples.numbers, ActuatorQuantity.SPEED).get("", [])
     limited = {each.claim.motor.actuator: each.limit for each in every if each.claim.motor and each.limit is not None}
     timed = [(k, each) for k, each in enumerate(driven_joints(judged.case.model)) if k < samples.speeds.shape[1]]
     if np.isfinite(samples.speeds).any():
@@ -241,7 +241,7 @@ def _speeds(judged: Judgement, samples: PathSamples) -> Iterator[PathPanel]:
 
 def _forces(judged: Judgement, samples: PathSamples) -> Iterator[PathPanel]:
     """Yield charts of the actuator forces under each load."""
-    found = motor_numbers(samples.numbers, MotorNumber.FORCE)
+    found = motor_numbers(samples.numbers, ActuatorQuantity.FORCE)
     for load, every in list(found.items())[:_LOADS]:
         yield from _of_motors(judged, every, f"forces, load {load}")
 
@@ -265,7 +265,7 @@ def _of_motors(judged: Judgement, every: Sequence[SampledNumber], title: str) ->
 
 
 def _without_peaks(panel: PathPanel) -> PathPanel:
-    """Return a chart whose curves have gaps where they are much larger than usual."""
+    """Return a chart whose curves have gaps at values far above the typical ones."""
     sizes = np.abs(np.concatenate([each.values for each in panel.curves]))
     sizes = sizes[np.isfinite(sizes)]
     if not sizes.size:
@@ -277,7 +277,7 @@ def _without_peaks(panel: PathPanel) -> PathPanel:
     return panel._replace(curves=tuple(kept), is_cut=True)
 
 
-def _marks(result: PathResult, way: Way) -> Iterator[PathMark]:
+def _marks(result: PathResult, way: Progress) -> Iterator[PathMark]:
     """Yield the first violations, in the order of the path."""
     faults = [(each.fault, each.name) for each in checked_claims(result) if each.fault is not None]
     ordered = sorted(faults, key=lambda each: (each[0].segment, each[0].parameter))
@@ -288,8 +288,8 @@ def _marks(result: PathResult, way: Way) -> Iterator[PathMark]:
         yield PathMark(at, own[0][0].line, place, tuple(name for _, name in own))
 
 
-def _bands(samples: PathSamples, result: PathResult, way: Way) -> Iterator[PathBand]:
-    """Yield the segments that are not proved, as far as they are known."""
+def _bands(samples: PathSamples, result: PathResult, way: Progress) -> Iterator[PathBand]:
+    """Yield the known segments without a proof."""
     state = np.zeros(len(way.knots) - 1, dtype=int)
     state[samples.points.segments[samples.is_apart]] = 1
     for each in checked_claims(result):

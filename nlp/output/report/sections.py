@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from ...case.case import Case
-from ...case.choices import listed_numbers
+from ...case.choices import catalogue_dimensions
 from ...case.pose import sizes_of_turn
 from ...evidence.optimality import CURVED, Evidence
 from ...results.data import CertificateData, CombinedData, CombinedResult, SolveResult
@@ -233,7 +233,7 @@ def _case(report: Report) -> Markup:
         internal.add(program.places.epigraph.level)
     free = () if first.nlp.is_fixed else enumerate(program.variables)
     names = [variable.name for k, variable in free if k not in internal]
-    chosen = [each.name for each in listed_numbers(case)]
+    chosen = [each.name for each in catalogue_dimensions(case)]
     if chosen:
         lines.append(f"Variables with listed values: {', '.join(chosen)}.")
     if names:

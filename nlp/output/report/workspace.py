@@ -16,7 +16,7 @@ from ...words.claims import claim_words
 from ...words.numbers import number
 from ...words.poses import pose_words
 from ...words.text import TextTable
-from ...words.verdicts import machine_lines
+from ...words.verdicts import tolerance_lines
 from ...words.workspace import verdict_words, workspace_summary
 from ..pictures.figures import picture
 from ..pictures.workspaces import Kind, drawing_at, slice_images, slices_legend, slices_notes
@@ -43,7 +43,7 @@ class WorkspaceReport:
         text: text of the case file.
         result: verdicts over the workspace.
         slices: slices of the workspace; empty for a robot without slices.
-        command: function from a pose to the command that shows it.
+        command: function that returns the command for a pose.
     """
 
     case: Case
@@ -88,7 +88,7 @@ def _verdicts(report: WorkspaceReport) -> Markup:
 
 
 def _refuted(report: WorkspaceReport) -> Markup:
-    """Return each violated claim with its pose and a command that shows it; empty without any."""
+    """Return each violated claim with its pose and a command for the pose."""
     return join_markup(
         refuting_place(claim_words(claim), pose_words(report.case, claim.pose), report.command(claim.pose))
         for claim in refuted_claims(report.result)
@@ -106,11 +106,11 @@ def _dimensions(report: WorkspaceReport) -> Markup:
         names = case.component_names(item)
         rows += [(name, number(value, largest), unit) for name, value in zip(names, values, strict=True)]
     table = html_table(TextTable(("", "value", "unit"), tuple(rows), "dimensions"), "Dimensions", id="dimensions")
-    return join_markup([table, paragraphs(machine_lines(case, report.result.joint_centre))])
+    return join_markup([table, paragraphs(tolerance_lines(case, report.result.joint_centre))])
 
 
 def _robot(report: WorkspaceReport) -> Markup:
-    """Return a picture of the robot at the worst pose, or a sentence with the reason why there is none."""
+    """Return a picture of the robot at the worst pose, or a sentence with the reason for the missing picture."""
     worst = worst_claim(report.result, report.case.tasks[0].sense)
     if worst is None:
         return Markup("")
