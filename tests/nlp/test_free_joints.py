@@ -195,7 +195,7 @@ def test_rows_are_in_every_answer(tmp_path: Path, cli: Run) -> None:
     assert "joint.3:1,0.2" in table.read_text()
     page = tmp_path / "page.html"
     output_of(cli("report", file, "--out", str(page)))
-    assert "3 numbers are free: joint.1:1, joint.2:1, joint.3:1." in page.read_text(encoding="utf-8")
+    assert "3 variables: joint.1:1, joint.2:1, joint.3:1." in page.read_text(encoding="utf-8")
 
 
 def test_the_robot_of_a_result_has_its_rails(tmp_path: Path, cli: Run) -> None:

@@ -185,7 +185,7 @@ def test_the_command_line_rejects_what_is_damaged_or_altered(cli: Run, tmp_path:
         (("--time", "0"), "--time"),
         (("--above", "inf"), "--above"),
         (("--proof", "-", "--json", "-"), "standard output"),
-        (("--proof", "/nowhere/p.json"), "no folder"),
+        (("--proof", "/nowhere/p.json"), "is not a folder"),
     ],
 )
 def test_wrong_input_to_certify_is_one_sentence(cli: Run, arguments: tuple[str, ...], fault: str) -> None:

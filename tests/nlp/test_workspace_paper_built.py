@@ -377,14 +377,19 @@ def test_a_singular_machine_within_the_tolerance_is_on_paper() -> None:
     assert design == (*machine[:6], *[0.0] * 36)
     for sides, fault in (
         ((design, design), "not have opposite signs"),
-        ((design, (*machine[:6], *(2.0 * part for part in machine[6:]))), "more than the tolerance"),
+        (
+            (design, (*machine[:6], *(2.0 * part for part in machine[6:]))),
+            "the error of a joint centre exceeds the tolerance",
+        ),
         ((design, (*[9.0] * 6, *machine[6:])), "outside the workspace"),
         ((design, machine[:-3]), "does not have two poses"),
         ((design[:6], machine), "does not have two poses"),
     ):
         assert fault in rejected(changed(given, "regular", sides=sides), case_of(text))
     smaller = text.replace("joint_centre = 0.8", "joint_centre = 0.1")
-    assert "more than the tolerance" in rejected(stating(given, joint_centre=0.1), case_of(smaller))
+    assert "the error of a joint centre exceeds the tolerance" in rejected(
+        stating(given, joint_centre=0.1), case_of(smaller)
+    )
 
 
 def test_the_commands_say_which_machines_a_proof_is_about(cli: Run, tmp_path: Path) -> None:
@@ -393,7 +398,7 @@ def test_the_commands_say_which_machines_a_proof_is_about(cli: Run, tmp_path: Pa
     file = saved(tmp_path / "machine.toml", head + tail[tail.index("[workspace]") :])
     output_of(cli("workspace", str(file), "--gap", "0.3", "--proof", str(target)))
     out = unbroken(output_of(cli("verify-proof", str(target), str(file))))
-    assert "for every machine whose joint centres are off by at most 0.02 in" in out
+    assert "for every robot whose joint centres are off by at most 0.02 in" in out
     content = json.loads(target.read_text(encoding="utf-8"))
     content["case"] = edited(content["case"], ("joint_centre = 0.02", "joint_centre = 0.002"))
     code, _, err = cli("verify-proof", str(saved(target, json.dumps(content))))

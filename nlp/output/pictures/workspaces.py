@@ -57,7 +57,7 @@ def drawing_at(case: Case, claim: PosedClaim) -> Drawing:
             raise
         # Dependent coordinates of the pose belong to the other robot: the nominal design's loops do not close there.
         raise EvaluationError(
-            "cannot be drawn: the worst pose was found for joint centres displaced within the tolerance, and the "
+            "the worst pose was found for joint centres displaced within the tolerance, and the "
             "nominal robot does not reach it"
         ) from None
     x = closed_start(nlp)
