@@ -65,6 +65,8 @@ class _Printer(Interpreter):
         self.extruder = 0.0
         self.is_relative_extruder = self.is_ended = self.has_motion = False
         self.factor = 1.0
+        #: Factors of feeds, with their first lines.
+        self.factors: dict[str, int] = {}
         #: Feed of each segment with the factor of M220; NaN for a segment that is no line.
         self.feeds = array("d")
         self.begin = _Place(0, 0, 0)
@@ -94,8 +96,14 @@ class _Printer(Interpreter):
             found.append(f"{name} (line {line}{more}): its motions are not in the file and are not checked")
         if len(self.hidden) > _SHOWN:
             found.append(f"motions of {len(self.hidden) - _SHOWN} more macros are not checked")
+        if self.factors:
+            shown = ", ".join(f"{name} (line {line})" for name, line in list(self.factors.items())[:_SHOWN])
+            more = f", and {len(self.factors) - _SHOWN} more" if len(self.factors) > _SHOWN else ""
+            found.append(f"{shown}{more}: later feeds are multiplied by this percentage")
         if len(self.parts) > 1:
             found.append(f"part {self.part} of {len(self.parts)} of the program; the other parts are not checked")
+        if not all(map(math.isnan, self.seconds)):
+            found.append("times are those of the programmed feeds; accelerations of the firmware make a print longer")
         if not self.is_ended:
             found.append("no M84 after the last motion: the file may be cut off")
         return tuple(found)
@@ -176,7 +184,7 @@ class _Printer(Interpreter):
         if words.keys() != {"S"} or words["S"] <= 0:
             raise WordError("M220", "is supported only with a percentage above 0, S")
         self.factor = words["S"] / 100
-        self._note(f"M220 S{words['S']:g}")
+        self.factors.setdefault(f"M220 S{words['S']:g}", self.line)
 
     def _check_retraction(self, name: str, words: dict[str, float]) -> None:
         """Refuse a retraction that lifts the tool, and offsets of tools.

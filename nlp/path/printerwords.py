@@ -38,11 +38,15 @@ _HOMING, _ALONE = "G28", frozenset({"G17", "G18", "G19", "G21", "G90", "G91", "M
 #: Commands after which the motors of the named axes, or all motors, hold nothing.
 MOTORS_OFF = frozenset({"M18", "M84"})
 _LETTER = re.compile("[A-Z]")
-_MESH = "bed levelling changes the heights of the path by values that the file does not state"
+_MESH = (
+    "bed levelling changes the heights of the path by values that the file does not state; remove the line to check"
+    " the path without them"
+)
 _OFFSET = "offsets of coordinates are not supported; program the coordinates without them"
 _PARKED = "the firmware moves the robot to a position that the file does not state; program the motion"
-_SIZES = "it changes the dimensions of the robot or the scale of its axes, which the case states"
-_STATES = "it restores values that the file does not state"
+_SIZES = "it changes the dimensions of the robot or the scale of its axes; state them in the case, and remove the line"
+_SKEW = "skew correction changes the path by values that the file does not state; remove the line"
+_STATES = "it restores values that the file does not state; write these values as commands"
 _REFUSED: Mapping[str, str] = {
     **dict.fromkeys(("G29", "G42", "G80", "G81", "M320", "M420", "M421", "M557", "M558"), _MESH),
     **dict.fromkeys(("BED_MESH_CALIBRATE", "BED_MESH_PROFILE", "BED_MESH_OFFSET"), _MESH),
@@ -53,8 +57,9 @@ _REFUSED: Mapping[str, str] = {
     **dict.fromkeys(("M401", "M402", "M24"), _PARKED),
     **dict.fromkeys(("M92", "M350", "M579", "M665", "M666", "M667", "M669"), _SIZES),
     **dict.fromkeys(("M501", "M502", "RESTORE_GCODE_STATE"), _STATES),
-    **dict.fromkeys(("G5", "G5.1", "G6"), "splines and direct motor steps are not supported"),
-    "G20": "programs of printers are in millimetres",
+    **dict.fromkeys(("G5", "G5.1", "G6"), "splines and direct motor steps are not supported; program G1, G2 or G3"),
+    "G20": "programs of printers are in millimetres; convert the file",
+    **dict.fromkeys(("M852", "SET_SKEW", "SKEW_PROFILE"), _SKEW),
     "G38.2": "probing ends at a point that the file does not state",
     "M808": "loops are not supported; expand the program",
 }
@@ -119,7 +124,7 @@ def refuse(name: str) -> WordError:
     if name in _REFUSED:
         return WordError(name, _REFUSED[name])
     if name[0] == "T" and name[1:].isdigit():
-        return WordError(name, "only the tool T0 is supported: other tools have offsets that the file does not state")
+        return WordError(name, "only the tool T0 is supported: offsets of other tools are not in the file")
     if name[0] in "GM" and name[1:].replace(".", "").isdigit():
         return WordError(name, "this command is not known; if it moves nothing, remove it")
     return WordError(

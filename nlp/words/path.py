@@ -65,7 +65,7 @@ def path_summary(
         yield from _other_faults(path, wrong)
         yield from open_lines(limited)
     yield from _knot_lines(path, case.units.length)
-    if path.time is not None or path.knots is not None:
+    if path.actuators and (path.time is not None or path.knots is not None):
         yield _actuator_table(path)
     yield from in_part("smallest margins", tightest_table(limited, TIGHTEST_ALONG))
     yield from in_part("all quantities", along_table(case, path.claims))
