@@ -14,7 +14,7 @@ from ..results.rounding import ordered, robot_size, settled, task_F
 from ..solver.status import Status
 from ..units import Units, objective_unit
 from .joints import convention_lines, joint_lines, motion_words, reach_of, screw_words, triple
-from .numbers import number, per_words, residual, rounded_to
+from .numbers import number, per_words, quantity_words, residual, rounded_to
 from .objective import objective_words
 from .text import Line, Tone
 
@@ -272,7 +272,7 @@ def violation_lines(sides: Sequence[ViolationData]) -> Iterator[Line]:
     for side in sides[:_VIOLATIONS]:
         wanted = {"min": "at least", "max": "at most", "equal": "exactly"}[side.bound]
         value, limit = (f"{each:.6g} {side.unit or ''}".rstrip() for each in (side.value, side.limit))
-        yield Line(f"violated: {side.name} = {value}, must be {wanted} {limit}", tone=Tone.FAULT)
+        yield Line(f"violated: {quantity_words(side.name)} = {value}, must be {wanted} {limit}", tone=Tone.FAULT)
 
 
 def better_line(starts: StartsData) -> Line | None:
