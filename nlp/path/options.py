@@ -8,7 +8,7 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from fractions import Fraction
 
 from ..errors import InputError, listing, nearest
@@ -88,6 +88,19 @@ class PathOptions:
                 raise InputError(f"offset {name!r}: no such coordinate system; {nearest(name, names)}")
             if len(numbers) != 6 or not all(math.isfinite(number) for number in numbers):
                 raise InputError(f"{name} = {listing(map(str, numbers))}: must be six finite numbers: X, Y, Z, A, B, C")
+
+    @classmethod
+    def stated_in(cls, given: object) -> PathOptions:
+        """Return the options that a case or the premises of a proof state, with equal names.
+
+        Raises:
+            InputError: an option has no meaning in the flavour of the program.
+            ValueError: the interpolation is unknown.
+        """
+        names = (each.name for each in fields(cls) if each.name not in ("between", "skips_deleted"))
+        between: str | None = getattr(given, "between", None)
+        options = {name: getattr(given, name) for name in names}
+        return cls(None if between is None else Between(between), **options)
 
     def _check_flavour(self) -> None:
         """Refuse options without a meaning in the flavour.

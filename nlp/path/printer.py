@@ -34,13 +34,7 @@ _SHOWN = 5
 
 
 def read_printer_program(lines: Iterable[str], source: str, units: Units, options: PathOptions) -> ProgrammedPath:
-    """Return the tool path of a printer's G-code program.
-
-    Args:
-        lines: lines of the program.
-        source: name of the program, for messages.
-        units: units of the case.
-        options: choices that the program leaves open.
+    """Return the tool path of a printer's G-code program; the arguments are those of :func:`.gcode.read_program`.
 
     Raises:
         InputError: the program contains an unsupported command, makes no motion, or has several parts.

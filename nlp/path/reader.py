@@ -149,19 +149,8 @@ def options_of(stated: PathFile) -> PathOptions:
     Raises:
         CaseError: an option has no meaning in the flavour of the program.
     """
-    between = None if stated.between is None else Between(stated.between)
     try:
-        return PathOptions(
-            between,
-            stated.angles,
-            stated.unit,
-            stated.start,
-            stated.offsets,
-            flavour=stated.flavour,
-            end_of_file=stated.end_of_file,
-            part=stated.part,
-            macros=stated.macros,
-        )
+        return PathOptions.stated_in(stated)
     except InputError as error:
         raise CaseError("path", str(error)) from None
 
