@@ -18,7 +18,14 @@ from robot_files import Robot, every_joint
 import screwsynth.models
 from screwsynth.models import Model, robot
 
-GALLERY = {path.stem: path for path in sorted((Path(screwsynth.models.__file__).parent / "robots").glob("*.toml"))}
+ROBOTS = {path.stem: path for path in sorted((Path(screwsynth.models.__file__).parent / "robots").glob("*.toml"))}
+#: Tables of the robots that are given by links and joints; the others have limbs.
+NETWORKS = {
+    name: tables
+    for name, path in ROBOTS.items()
+    if "limb" not in (tables := tomllib.loads(path.read_text(encoding="utf-8")))
+}
+GALLERY = {name: path for name, path in ROBOTS.items() if name not in NETWORKS}
 SPECIAL = {path.stem: path for path in sorted((Path(__file__).parent / "special").glob("*.toml"))}
 FILES = GALLERY | SPECIAL
 LENGTH = 0.7

@@ -226,12 +226,25 @@ def test_a_pentapod_has_rank_five_without_the_limb_that_takes_out_the_turn_about
     assert not turned.closed.any()
 
 
+def test_a_differential_waist_has_the_motors_of_its_couplings() -> None:
+    case, d = built("differential-waist", ratio=0.8)
+    _, angles = around((0, 0, 0), [0, 0, 0, 30, 30, 30])
+    axes = np.eye(3)
+    turns = np.array([rotation(p * axes[1]) @ rotation(r * axes[0]) @ rotation(y * axes[2]) for r, p, y in angles])
+    found = inverse(case, np.zeros((COUNT, 3)), turns)
+    assert found.closed.all()
+    roll, pitch, yaw = angles.T
+    expected = np.column_stack([roll - pitch, roll + pitch, yaw / d["ratio"] - roll])
+    np.testing.assert_allclose(found.coordinates, expected, rtol=0, atol=SAME)
+
+
 #: Motions that each robot can make at home, about the platform's origin: angular velocity, velocity.
 MOTIONS: dict[str, Array] = {
     "linear-delta": np.eye(6)[3:],
     "rotary-delta": np.eye(6)[3:],
     "five-bar-plotter": np.eye(6)[3:5],
     "ankle": np.eye(6)[:2],
+    "differential-waist": np.eye(6)[:3],
     "servo-hexapod": np.eye(6),
     "pentapod": np.eye(6)[[0, 1, 3, 4, 5]],
 }

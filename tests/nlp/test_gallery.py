@@ -40,7 +40,7 @@ TASKS = {
     "five-bar-plotter": (2, "translation along x"),
     "ankle": (2, "rotation about y"),
     "pentapod": (5, "translation along z"),
-    "spherical-3-rrr": (3, "rotation about z"),
+    **dict.fromkeys(("spherical-3-rrr", "differential-waist"), (3, "rotation about z")),
     "tricept": (3, "rotation about x"),
 }
 #: Robots whose platform never turns, or whose task is possible without a rotation alone; and that turn about one axis.

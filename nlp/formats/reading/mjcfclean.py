@@ -11,12 +11,16 @@ from .xmltext import LARGEST_FILE, read_xml
 
 #: Elements that remain, by the element that holds them; of a body's children those of ``body``.
 _KEPT = {
-    "mujoco": ("compiler", "default", "worldbody", "equality"),
+    "mujoco": ("compiler", "default", "worldbody", "tendon", "equality"),
     "default": ("default", "joint", "site", "equality"),
     "worldbody": ("body", "frame", "site", "replicate"),
     "body": ("body", "frame", "site", "replicate", "joint", "freejoint"),
-    "equality": ("connect", "weld", "joint"),
+    "tendon": ("fixed",),
+    "fixed": ("joint",),
+    "equality": ("connect", "weld", "joint", "tendon"),
 }
+#: Attributes that remain of fixed tendons and of their joints.
+_TENDON = {"fixed": ("name",), "joint": ("joint", "coef")}
 #: Settings of the compiler that change where bodies and joints are.
 _COMPILER = ("angle", "eulerseq", "coordinate", "autolimits")
 #: Attributes that name something that is left out, or whose length depends on it.
@@ -46,12 +50,14 @@ class CleanModel(NamedTuple):
     Attributes:
         root: elements that MuJoCo compiles without any further file.
         driven: names of the joints that actuators drive, in order.
+        tendons: names of the fixed tendons that actuators drive, in order.
         keyframes: names of the model's keyframes, or their numbers from 1 on; of these the wanted one alone remains.
         notes: sentences about what was left out.
     """
 
     root: Element
     driven: tuple[str, ...]
+    tendons: tuple[str, ...]
     keyframes: tuple[str, ...]
     notes: tuple[str, ...]
 
@@ -73,10 +79,13 @@ def clean_model(main: Element, path: Path, keyframe: str = "") -> CleanModel:
         fault = f"attaches {element.get('model', 'another model')!r}; write the model as one file first"
         raise InputError(f"{source}: {fault}")
     notes: list[str] = []
-    driven = _driven_joints(root, notes)
+    fixed = _without_other_tendons(root)
+    driven, tendons = _driven(root, fixed, notes)
     for element in root.iter("equality"):
-        other = [each for each in element if each.tag not in _KEPT["equality"]]
+        other = [each for each in element if each.tag not in _KEPT["equality"] or not _ties(each, fixed)]
         notes += [f"the equality {each.get('name', '(unnamed)')} of the kind {each.tag} was left out" for each in other]
+        for each in other:
+            element.remove(each)
     if any(True for tag in ("composite", "flexcomp", "flex") for _ in root.iter(tag)):
         notes.append("soft bodies were left out")
     result = Element("mujoco", {key: value for key, value in root.attrib.items() if key == "model"})
@@ -88,7 +97,7 @@ def clean_model(main: Element, path: Path, keyframe: str = "") -> CleanModel:
             raise InputError(f"{source}: --keyframe {keyframe}: no such keyframe; {hint}")
         attributes = {key: value for key, value in keys[keyframe].attrib.items() if key in _KEYFRAME}
         SubElement(SubElement(result, "keyframe"), "key", attributes)
-    return CleanModel(result, driven, tuple(keys), tuple(dict.fromkeys(notes)))
+    return CleanModel(result, driven, tendons, tuple(keys), tuple(dict.fromkeys(notes)))
 
 
 class _Files:
@@ -132,21 +141,45 @@ class _Files:
         return list(self.expanded(root, (*chain, path)))
 
 
-def _driven_joints(root: Element, notes: list[str]) -> tuple[str, ...]:
-    """Return the joints that actuators drive; actuators of anything else become notes."""
+def _without_other_tendons(root: Element) -> set[str]:
+    """Remove fixed tendons without a name, or of a joint that the model lacks; return the names of the others."""
+    sections = [*root.iter("worldbody")]
+    joints = {joint.get("name") for section in sections for joint in section.iter("joint")}
+    kept: set[str] = set()
+    for section in root.iter("tendon"):
+        for each in section.findall("fixed"):
+            name = each.get("name", "")
+            if name and all(joint.get("joint") in joints for joint in each.iterfind("joint")):
+                kept.add(name)
+            else:
+                section.remove(each)
+    return kept
+
+
+def _ties(equality: Element, fixed: set[str]) -> bool:
+    """Return whether an equality is none of tendons, or one of fixed tendons alone."""
+    names = [equality.get(key) for key in ("tendon1", "tendon2")]
+    return equality.tag != "tendon" or all(name in fixed for name in names if name is not None)
+
+
+def _driven(root: Element, fixed: set[str], notes: list[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the joints, and the fixed tendons, that actuators drive; actuators of anything else become notes."""
     driven: list[str] = []
+    tendons: list[str] = []
     for section in root.iter("actuator"):
         for each in section:
             joint = each.get("joint") or each.get("jointinparent")
             if joint:
                 driven.append(joint)
+            elif each.get("tendon") in fixed:
+                tendons.append(each.get("tendon", ""))
             else:
                 on = next((f"{words} {each.get(key)!r}" for key, words in _TRANSMISSIONS.items() if each.get(key)), "")
                 fault = f"acts on {on}, which is not read" if on else "acts on nothing that is read"
                 notes.append(
                     f"the actuator {each.get('name', 'without a name')!r} {fault}; --actuated names what it drives"
                 )
-    return tuple(dict.fromkeys(driven))
+    return tuple(dict.fromkeys(driven)), tuple(dict.fromkeys(tendons))
 
 
 def _copy_children(given: Element, result: Element, kind: str, copies: int, source: str) -> None:
@@ -155,6 +188,8 @@ def _copy_children(given: Element, result: Element, kind: str, copies: int, sour
         if child.tag not in _KEPT[kind]:
             continue
         attributes = {key: value for key, value in child.attrib.items() if key not in _DROPPED}
+        if kind in ("tendon", "fixed"):
+            attributes = {key: value for key, value in attributes.items() if key in _TENDON[child.tag]}
         if child.tag == "compiler":
             attributes = {key: value for key, value in attributes.items() if key in _COMPILER}
         inner_copies = copies
