@@ -10,7 +10,7 @@ import pytest
 from builders import Array, case_from, starter_text
 
 from screwsynth.models import robot_function
-from screwsynth.nlp import Case, InversePoses, Task, inverse
+from screwsynth.nlp import Case, InversePoses, Task, inverse, result_of, solve
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.units import Units
 
@@ -263,7 +263,10 @@ def test_rates_are_differences_of_positions(name: str) -> None:
         np.testing.assert_allclose(rates, slope, rtol=0, atol=1e-7 * max(1.0, float(np.abs(rates).max())))
 
 
-@pytest.mark.parametrize("name", [*MOTIONS, "five-bar-pen"])
+@pytest.mark.parametrize(
+    "name",
+    ["five-bar-pen", *(pytest.param(each, marks=pytest.mark.slow) if each == "pentapod" else each for each in MOTIONS)],
+)
 def test_the_box_of_a_starter_is_proved(name: str) -> None:
     before, table = starter_text(name).split("# [workspace]")
     table, after = table.split("\n\n", 1)
@@ -271,3 +274,44 @@ def test_the_box_of_a_starter_is_proved(name: str) -> None:
     case = case_from(f"{before}[workspace]{table}\n\n{after}")
     case = replace(case, parameters={item.name: item.typical for item in case.model.parameters})
     assert judge_workspace(case).is_proved
+
+
+def with_torques(text: str) -> str:
+    """A starter whose objective is what its comments offer for motors with cranks."""
+    first = "# F is about "
+    before, offer = text.replace('sense = "max" ', 'sense = "min" ').split(first)
+    offer, after = offer.split("\n\n", 1)
+    sentence, *lines = offer.split("\n")
+    return f"{before}{first}{sentence}\n" + "\n".join(line.removeprefix("# ") for line in lines) + f"\n\n{after}"
+
+
+#: Robots with cranks and rods, and with other limbs behind their motors.
+CRANKS = {
+    **dict.fromkeys(("6-rss", "delta", "rotary-delta", "ankle", "servo-hexapod"), "the forces of the rods"),
+    **dict.fromkeys(
+        ("five-bar-plotter", "spherical-3-rrr", "differential-waist"), "the limbs with their motors locked"
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CRANKS)
+def test_a_starter_of_cranks_says_what_f_is_about_and_offers_torques(name: str) -> None:
+    text = starter_text(name)
+    assert f"# F is about {CRANKS[name]}. The torque of a motor also depends on its crank" in text
+    solution = solve(case_from(with_torques(text)), starts=1)
+    assert solution.status.is_answer
+    (load,) = result_of(solution).robot.loading.loads
+    assert float(np.abs(load.forces).max()) == pytest.approx(solution.F, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["linear-delta", "6-ups", "pentapod", "hexapod"])
+def test_a_starter_of_slides_has_no_torques(name: str) -> None:
+    assert "[objective]" not in starter_text(name)
+
+
+@pytest.mark.parametrize(
+    ("name", "angles"), [("ankle", "roll pitch"), ("pentapod", "roll pitch"), ("3-rps", "roll pitch yaw")]
+)
+def test_a_starters_workspace_has_the_angles_that_the_robot_changes(name: str, angles: str) -> None:
+    (line,) = [each for each in starter_text(name).splitlines() if each.startswith("# rotation = { roll")]
+    assert [name for name in ("roll", "pitch", "yaw") if f"{name} = {{" in line] == angles.split()
