@@ -15,7 +15,7 @@ from collections.abc import Callable
 import numpy as np
 
 from screwsynth.nlp import Case, Rotation, Task, build_model, inverse, load_case
-from screwsynth.nlp.proof.statement.machine import joint_centres
+from screwsynth.nlp.proof.statement.fixed_robot import joint_centres
 
 CLOSED, STEPS, REPEATS = 1e-10, 20, 3
 #: Robots given joint by joint, with the motions that their platforms can make: shares of a small displacement.

@@ -1,4 +1,4 @@
-"""Symbolic robots, and the screw algebra in which they are written."""
+"""Symbolic robot models and screw algebra."""
 
 from importlib import import_module
 from typing import TYPE_CHECKING
@@ -148,16 +148,15 @@ __all__ = [
 ]
 
 
-#: The modules of names that most runs do not need: each is imported when its name is first used.
+#: Names that most runs do not need, with their modules: imported at first use.
 _JOINTS = {"RobotError": ".joints.written.forms", "robot": ".joints.model.robot"}
 
 
 def __getattr__(name: str) -> object:
-    """Return a name of :mod:`.joints`."""
     if name not in _JOINTS:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    found: object = getattr(import_module(_JOINTS[name], __name__), name)
-    return found
+    value: object = getattr(import_module(_JOINTS[name], __name__), name)
+    return value
 
 
 def __dir__() -> list[str]:

@@ -1,11 +1,10 @@
-"""Rates of actuators: the equations ``J chi = D qdot`` and ``B qdot = 0`` of a limb of any topology.
+"""Velocity equations of the actuators, ``J chi = D qdot`` and ``B qdot = 0``, of a limb of any topology.
 
-Each row of ``J`` has a work rate in the platform's twist ``chi``, and one in a unit rate of each actuator: ``D``. Loops
-that more actuators drive than they have freedoms demand ``B qdot = 0`` of the actuators alone. The limb lets the
-platform make the twists for which both equations have a solution: with ``Z`` a basis of the rates that ``B`` allows,
-those in which the wrenches ``n'J`` with ``n'D Z = 0`` do no work. They are the constraints. The rates are the least
-squares solution of the first equation among those of the second. Where both have a solution of no motion, the rates of
-the actuators that take part in it are undetermined.
+``D`` holds the work rate of each row of ``J`` for a unit rate of each actuator. Nested loops with more actuators than
+degrees of freedom add equations ``B qdot = 0`` of the actuator rates only. With ``Z`` a basis of the null space of
+``B``, the constraint wrenches are the combinations ``n'J`` with ``n'D Z = 0``. The actuator rates are the least-squares
+solution of the first equation subject to the second. They are undetermined where ``D qdot = 0`` and ``B qdot = 0`` have
+a nonzero solution.
 """
 
 from __future__ import annotations
@@ -29,17 +28,17 @@ if TYPE_CHECKING:
 
 Flags: TypeAlias = NDArray[np.bool_]
 
-#: Rates below this part of the largest are rounding errors of a solution: such an actuator takes no part.
+#: Relative size of a rate below which it is a rounding error of the null-space basis.
 _TAKES_PART = 1e-6
 
 
 class Velocities(NamedTuple):
-    """Numbers of a robot's velocity equations.
+    """Matrices of a robot's velocity equations ``J chi = D qdot`` and ``B qdot = 0``.
 
     Attributes:
         jacobian: (m, 6) ``J``: the rows of a :class:`~.instance.RobotInstance`, force, then moment about the origin.
         driven: (m, a) ``D``: work rate of each row for a unit rate of each actuator.
-        relations: (r, a) ``B``.
+        relations: (r, a) ``B``: coefficients of the equations of the actuator rates only.
     """
 
     jacobian: FloatArray
@@ -49,14 +48,14 @@ class Velocities(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """The actuators of a limb at a point, with rates of order 1: those of angles are times a length of the robot's.
+    """Actuation of a limb at a point, in actuator rates of order 1 (rates of angles times a length of the robot).
 
     Attributes:
-        works: (m, a) ``D`` on the rates that ``B`` allows, and 0 on those orthogonal to them.
-        driving: (r, m) orthonormal combinations of rows by which the actuators drive.
-        constraints: (k, m) the others, which do no work in the actuated joints.
-        idle: (a, d) orthonormal rates of no motion.
-        is_zero: (a,) whether an actuator can move while the platform and all other actuators stand still.
+        works: (m, a) ``D`` restricted to the rates that ``B`` allows; 0 for rates orthogonal to these.
+        driving: (r, m) orthonormal combinations of rows in which the actuators do work.
+        constraints: (k, m) orthonormal combinations of rows that do no work in the actuated joints.
+        idle: (a, d) orthonormal actuator rates with which the platform does not move.
+        is_zero: (a,) True for an actuator that can move while the platform and all other actuators stand still.
     """
 
     works: FloatArray
@@ -68,33 +67,32 @@ class Drive:
     _inverse: FloatArray
 
     def rates(self, resisted: FloatArray) -> FloatArray:
-        """Return the rates (a,) that leave least of the work rates (m,) of the rows.
+        """Return the actuator rates (a,) that fit the work rates (m,) of the rows best, by least squares.
 
-        They are infinite for an actuator that cannot drive the platform, and otherwise not a number where they are
-        undetermined.
+        A rate is infinite for an actuator that cannot drive the platform, and NaN where it is undetermined.
         """
-        found = self._unit * (self._inverse @ resisted)
-        found[self.is_undetermined] = np.nan
-        return np.where(self.is_zero, np.inf, found)
+        rates = self._unit * (self._inverse @ resisted)
+        rates[self.is_undetermined] = np.nan
+        return np.where(self.is_zero, np.inf, rates)
 
     @property
     def is_undetermined(self) -> Flags:
-        """Whether each actuator (a,) has a rate of no motion."""
+        """True for each actuator (a,) whose rate is undetermined."""
         return np.asarray(np.linalg.norm(self.idle, axis=1) > _TAKES_PART)
 
     def driven_part(self, resisted: FloatArray) -> FloatArray:
-        """Return the part (m,) of the rows' work rates that the actuators can move with."""
+        """Return the component (m,) of the rows' work rates that the actuators can follow."""
         return np.asarray(self.driving.T @ (self.driving @ resisted))
 
 
 def drive_of(driven: FloatArray, relations: FloatArray, unit: FloatArray, size: float) -> Drive:
-    """Return the actuators of a limb.
+    """Return the actuation of a limb.
 
     Args:
-        driven: (m, a) ``D``.
-        relations: (r, a) ``B``; rows of zeros say nothing.
-        unit: (a,) rates that move the platform with a velocity of order 1.
-        size: of the rows, for unit forces 1: smaller work rates are measured by it.
+        driven: (m, a) ``D``, work rates of the rows for unit actuator rates.
+        relations: (r, a) ``B``; rows of zeros have no effect.
+        unit: (a,) actuator rates that move the platform with a velocity of order 1.
+        size: magnitude of the rows, 1 for unit forces; the rank tolerance is relative to it.
     """
     scaled = relations * unit
     sizes = np.linalg.norm(scaled, axis=1, keepdims=True)
@@ -114,7 +112,14 @@ def drive_of(driven: FloatArray, relations: FloatArray, unit: FloatArray, size: 
 
 
 class PathScrews(NamedTuple):
-    """A path of joints with its screws (6, k), loops (m, k) and the centre (3,) of its member, length, at a point."""
+    """Screws of a path of joints at a point.
+
+    Attributes:
+        path: symbolic screws of the path.
+        screws: (6, k) screws of its joints.
+        loops: (m, k) matrix of its loop equations.
+        centre: (3,) centre of its member, length.
+    """
 
     path: JointScrews
     screws: FloatArray
@@ -123,28 +128,29 @@ class PathScrews(NamedTuple):
 
 
 def expressions_of_paths(paths: Sequence[JointScrews]) -> list[SX]:
-    """Return the expressions of paths, from the values of which :func:`paths_of` makes them at a point."""
+    """Return the expressions of paths whose values :func:`paths_of` takes."""
     return [ca.densify(part) for each in paths for part in (each.all, each.loops, each.centre)]
 
 
 def paths_of(paths: Sequence[JointScrews], values: Sequence[FloatArray]) -> list[PathScrews]:
-    """Return paths at a point from the values of their expressions."""
+    """Return the screws of paths at a point from the values of :func:`expressions_of_paths`."""
     thirds = zip(paths, values[::3], values[1::3], values[2::3], strict=True)
     return [PathScrews(path, screws, loops, np.ravel(centre)) for path, screws, loops, centre in thirds]
 
 
 def with_loops(model: Model, velocities: Velocities, paths: Sequence[PathScrews], length: float) -> Velocities:
-    """Return velocity equations with the loops of nested members as they are at the point.
+    """Return velocity equations in which the equations of nested loops are evaluated at the point.
 
-    With ``L_p`` the loops' columns of passive joints, and ``L_a`` of actuators, ``B`` is what ``L_p`` cannot close of
-    ``L_a``. The expressions of a model have the rank of ``L_p`` at almost all points. Where it is smaller at the point,
-    the loops demand more of the actuators, and a rate may be determined that others leave free. The expressions of the
-    member's rows are 0 / 0 there: the rows follow from the motions that the loops allow at the point instead.
+    Let ``L_p`` and ``L_a`` be the columns of passive and of actuated joints in the loop equations. ``B`` is the
+    component of ``L_a`` outside the column space of ``L_p``. The expressions of a model assume the rank that ``L_p``
+    has at almost all points. Where the rank is smaller, ``B`` has more rows, so further actuator rates may be
+    determined. The expressions of the member's rows are 0 / 0 there, so these rows are computed from the motions that
+    the loops allow at the point.
 
     Args:
         model: the robot.
-        velocities: at the point.
-        paths: members of nested loops.
+        velocities: velocity equations at the point.
+        paths: screws of the members with nested loops.
         length: characteristic length.
     """
     names = [(each.limb, each.name) for each in model.actuators]
@@ -153,7 +159,7 @@ def with_loops(model: Model, velocities: Velocities, paths: Sequence[PathScrews]
         return velocities
     jacobian, driven, relations = (part.copy() for part in velocities)
     relations[:, [k for k, (limb, _) in enumerate(names) if limb in nested]] = 0.0
-    found = [relations]
+    blocks = [relations]
     for each, screws, loops, centre in paths:
         own = [names.index((each.limb, each.joints[k].removeprefix(f"{each.limb}:"))) for k in each.driven]
         rows = [k for k, row in enumerate(model.frame_rows) if row.member == each.member]
@@ -170,17 +176,17 @@ def with_loops(model: Model, velocities: Velocities, paths: Sequence[PathScrews]
         demanded[:, own] = left[:, rank:].T @ by_actuators
         least = np.zeros(len(names))
         least[own] = RANK_TOLERANCE * np.abs(by_actuators).max(axis=0, initial=0.0)
-        found.append(np.where(np.abs(demanded) > least, demanded, 0.0))
-    return Velocities(jacobian, driven, np.vstack(found))
+        blocks.append(np.where(np.abs(demanded) > least, demanded, 0.0))
+    return Velocities(jacobian, driven, np.vstack(blocks))
 
 
 def _resisting_rows(screws: FloatArray, rates: FloatArray, centre: FloatArray, length: float) -> FloatArray:
     """Return the rows (6, 6) of a member's projector: force, then moment about the world origin.
 
     Args:
-        screws: (6, k) of its passive joints.
-        rates: (k, n) orthonormal rates of these that its loops allow.
-        centre: (3,) of the member, length.
+        screws: (6, k) screws of the passive joints of the member.
+        rates: (k, n) orthonormal rates of these joints that the loops allow.
+        centre: (3,) centre of the member, length.
         length: characteristic length.
     """
     velocities = screws[3:] + np.cross(screws[:3].T, centre).T
@@ -195,7 +201,13 @@ def _resisting_rows(screws: FloatArray, rates: FloatArray, centre: FloatArray, l
 
 
 class LimbDrive(NamedTuple):
-    """The actuators of a limb of a model: indices of its rows and of its actuators, and how these drive it."""
+    """Actuation of a limb of a model.
+
+    Attributes:
+        rows: indices of the rows of the limb.
+        actuators: indices of the actuators of the limb.
+        drive: actuation of the limb.
+    """
 
     rows: list[int]
     actuators: list[int]
@@ -203,12 +215,12 @@ class LimbDrive(NamedTuple):
 
 
 def limb_drive(model: Model, velocities: Velocities, centre: FloatArray, limb: str) -> LimbDrive:
-    """Return the actuators of a limb of a model.
+    """Return the actuation of a limb of a model.
 
     Args:
         model: the robot.
-        velocities: at a point.
-        centre: (3,) the platform's origin there, length.
+        velocities: velocity equations at a point.
+        centre: (3,) origin of the platform frame at that point, length.
         limb: name of the limb.
     """
     J = velocities.jacobian
@@ -223,12 +235,12 @@ def limb_drive(model: Model, velocities: Velocities, centre: FloatArray, limb: s
 
 
 def rates_expression(driven: SX, relations: SX, resisted: SX) -> SX:
-    """Return the rates (a, n) of a limb's actuators for work rates (m, n) of its rows, where they are determined.
+    """Return the actuator rates (a, n) of a limb for work rates (m, n) of its rows, where they are determined.
 
     Args:
-        driven: (m, a) ``D``.
-        relations: (r, a) ``B`` of full rank.
-        resisted: (m, n).
+        driven: (m, a) ``D``, work rates of the rows for unit actuator rates.
+        relations: (r, a) ``B``, of full rank.
+        resisted: (m, n) work rates of the rows in n twists.
     """
     if not relations.shape[0]:
         return ca.inv_minor(driven.T @ driven) @ (driven.T @ resisted)

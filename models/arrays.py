@@ -1,4 +1,4 @@
-"""The numeric array type of the package, read-only arrays for frozen values, and values at many points."""
+"""Numeric arrays: their type, read-only copies, and values of CasADi functions at many points."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 FloatArray: TypeAlias = "NDArray[np.float64]"
 
-#: Sizes that differ by less than this part are the same: rounding must not choose among them.
+#: Relative difference below which two sizes count as equal, so that rounding does not choose between them.
 _TIE = 1e-6
 
 
@@ -23,7 +23,7 @@ def frozen_array(values: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
 
     Args:
         values: numbers that can be arranged as an array.
-        shape: the shape that the array must have.
+        shape: required shape of the array.
 
     Raises:
         ValueError: the values have another shape.
@@ -39,21 +39,21 @@ def frozen_vector(values: Sequence[float] | FloatArray) -> FloatArray:
     """Return a read-only copy of a vector (n,) of any length as float64.
 
     Args:
-        values: (n,) numbers.
+        values: (n,) components of the vector.
 
     Raises:
-        ValueError: the values are no vector.
+        ValueError: the values do not form a vector.
     """
     return frozen_array(values, (len(values),))
 
 
 def buffer_on(function: ca.Function, inputs: Sequence[FloatArray], outputs: Sequence[FloatArray]) -> tuple[Any, Any]:
-    """Return CasADi's buffer of a dense function, and its evaluation, which function, buffer and arrays must outlive.
+    """Return CasADi's buffer of a dense function and its evaluator; keep function, buffer and arrays while it is used.
 
     Args:
         function: the function.
         inputs: memory of each input, column after column.
-        outputs: that of each result.
+        outputs: memory of each result, column after column.
     """
     buffer: Any
     buffer, evaluate = function.buffer()
@@ -67,11 +67,11 @@ def buffer_on(function: ca.Function, inputs: Sequence[FloatArray], outputs: Sequ
 def values_at(function: ca.Function, *points: FloatArray) -> list[FloatArray]:
     """Return the results (P, rows, columns) of a CasADi function, dense, at P points.
 
-    NumPy's memory is read and written: CasADi's own matrices go through lists of Python's numbers.
+    The function reads and writes NumPy's memory, because CasADi's own matrices are converted through Python lists.
 
     Args:
-        function: of vectors, made of ``SX``.
-        points: (P, n) for each of them.
+        function: function of vectors, made of ``SX``.
+        points: (P, n) values of each argument.
     """
     count = len(points[0])
     arguments = [np.ascontiguousarray(each, dtype=np.float64) for each in points]
@@ -85,5 +85,5 @@ def values_at(function: ca.Function, *points: FloatArray) -> list[FloatArray]:
 
 
 def first_largest(sizes: FloatArray) -> NDArray[np.intp]:
-    """Return the index of the first of the largest sizes along the last axis, up to rounding."""
+    """Return the index along the last axis of the first entry that is largest up to rounding."""
     return np.asarray(np.argmax(sizes >= (1 - _TIE) * sizes.max(axis=-1, keepdims=True), axis=-1))

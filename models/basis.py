@@ -1,10 +1,9 @@
-"""Rows of the Jacobian as results state them: an orthonormal basis of each member's wrenches, not its projector.
+"""Rows of the Jacobian in results: an orthonormal basis of each member's wrenches in place of its projector.
 
-Scaled coordinates of a wrench about a member's centre are its force, then its moment about the centre in parts of the
-characteristic length. The basis has the wrenches that do no work in the member's actuated joints first: pure couples,
-then forces through the centre, then the others. Behind them are those by which the actuators drive the platform. Each
-of these spaces has a basis that follows from the space alone: another one would follow from rounding, and differ from
-one unit of length to another.
+The scaled coordinates of a wrench about a member's centre are its force, and its moment about the centre divided by the
+characteristic length. The basis begins with the constraint wrenches: pure couples, then forces through the centre, then
+the rest. The actuation wrenches follow. The basis of each of these spaces depends on the space only, so that results
+depend neither on rounding nor on the unit of length.
 """
 
 from __future__ import annotations
@@ -20,12 +19,12 @@ from .model import Model
 from .rows import rank_of
 from .wrench import WrenchKind
 
-#: Components of unit wrenches below this are zero: rounding leaves about 1e-12 of a limb that is nearly singular.
+#: Components of unit wrenches below this are zero: rounding errors of a nearly singular limb are about 1e-12.
 _ZERO = 1e-9
 
 
 class Basis(NamedTuple):
-    """An orthonormal basis (d, size) of a member's wrenches in scaled coordinates, and the kind of each."""
+    """Orthonormal basis (d, size) of a member's wrenches in scaled coordinates, with the kind of each wrench."""
 
     rows: FloatArray
     kinds: tuple[WrenchKind, ...]
@@ -35,15 +34,15 @@ def basis_of_member(projector: FloatArray, actuation: FloatArray, dimension: int
     """Return a basis of a member's wrenches.
 
     Args:
-        projector: (size, size) or, with columns in other coordinates, (size, k) of the same column space.
-        actuation: (size, a) parts of the actuated joints' screws that the member resists, in scaled coordinates.
-        dimension: of the space.
+        projector: (size, size) projector on the wrenches, or (size, k) matrix with the same column space.
+        actuation: (size, a) components of the actuated joints' screws that the member resists, in scaled coordinates.
+        dimension: dimension of the space of wrenches.
     """
     space = np.linalg.svd(projector)[0][:, :dimension].T
     driven = _span(actuation.T @ space.T @ space) if actuation.size else np.zeros((0, space.shape[1]))
     works = driven @ actuation
     if works.size:
-        # A wrench of actuation does positive work in the joint that it drives most.
+        # The sign of an actuation wrench is such that it does positive work in the joint that drives it most.
         most = np.take_along_axis(works, first_largest(np.abs(works))[:, None], axis=1)
         driven = driven * np.where(most < 0, -1.0, 1.0)
     constraints = space - (space @ driven.T) @ driven
@@ -57,14 +56,14 @@ def basis_of_member(projector: FloatArray, actuation: FloatArray, dimension: int
 
 
 def reporting_matrix(model: Model, velocities: Velocities, centre: FloatArray) -> FloatArray:
-    """Return the matrix (r, m) that turns the rows of a :class:`~.instance.RobotInstance` into those of results.
+    """Return the matrix (r, m) that converts the rows of a :class:`~.instance.RobotInstance` to the rows of results.
 
-    The rows of the robot's wrenches stay as they are; those of a member's projector become a basis.
+    The rows of single wrenches stay unchanged; the rows of a member's projector become a basis.
 
     Args:
         model: the robot.
-        velocities: at a point.
-        centre: (3,) the platform's origin there, length.
+        velocities: velocity equations at a point.
+        centre: (3,) origin of the platform frame at that point, length.
     """
     count = len(model.wrenches)
     matrix = np.zeros((len(model.rows), len(velocities.jacobian)))
@@ -81,7 +80,7 @@ def reporting_matrix(model: Model, velocities: Velocities, centre: FloatArray) -
 
 
 def constraint_rows(model: Model, velocities: Velocities, centre: FloatArray) -> FloatArray:
-    """Return wrenches (k, 6) of all limbs that do no work in their actuated joints: constraints on a free robot.
+    """Return the constraint wrenches (k, 6) of all limbs, which do no work in actuated joints.
 
     The arguments are those of :func:`reporting_matrix`.
     """
@@ -93,28 +92,28 @@ def constraint_rows(model: Model, velocities: Velocities, centre: FloatArray) ->
 
 
 def rank_of_rows(rows: FloatArray, centre: FloatArray, length: float) -> int:
-    """Return the rank of wrenches (m, 6) with moments about a centre (3,) in parts of a length."""
+    """Return the rank of wrenches (m, 6), with moments about a centre (3,) divided by a length."""
     if not len(rows):
         return 0
     values = np.linalg.svd(np.array(homogenised(rows, centre, length)), compute_uv=False)
     return rank_of(values, max(1.0, float(values[0])))
 
 
-def is_apart(rows: FloatArray, own: Flags, centre: FloatArray, length: float) -> bool:
-    """Return whether the wrenches of a limb are independent of all others, so that statics determines them.
+def is_apart(rows: FloatArray, of_limb: Flags, centre: FloatArray, length: float) -> bool:
+    """Return True if the wrenches of a limb are independent of all others, so that statics determines them.
 
     Args:
         rows: (m, 6) wrenches of all limbs.
-        own: (m,) whether each is of the limb.
-        centre: (3,) of moments, which count in parts of the length.
-        length: the length.
+        of_limb: (m,) True for each wrench of the limb.
+        centre: (3,) reference point of moments, length.
+        length: divisor of the moments.
     """
-    parts = [rank_of_rows(rows[each], centre, length) for each in (own, ~own)]
+    parts = [rank_of_rows(rows[each], centre, length) for each in (of_limb, ~of_limb)]
     return sum(parts) == rank_of_rows(rows, centre, length)
 
 
 def _split(rows: FloatArray, part: slice) -> tuple[FloatArray, FloatArray]:
-    """Return orthonormal bases of the combinations of rows in which some components are zero, and of the rest."""
+    """Return orthonormal bases of the row combinations with zero components in ``part``, and of their complement."""
     if not len(rows):
         return rows, rows
     left, values, _ = np.linalg.svd(rows[:, part])
@@ -124,16 +123,14 @@ def _split(rows: FloatArray, part: slice) -> tuple[FloatArray, FloatArray]:
 
 
 def _span(rows: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of the span of rows."""
     _, values, right = np.linalg.svd(rows)
     return settled_basis(right[: int(np.count_nonzero(values > _ZERO * max(1.0, float(values.max(initial=0.0)))))])
 
 
 def settled_basis(rows: FloatArray) -> FloatArray:
-    """Return the orthonormal basis (k, n) that follows from the space of orthonormal rows (k, n) alone.
+    """Return an orthonormal basis (k, n) of the span of orthonormal rows (k, n) that depends on the span only.
 
-    Each vector is the coordinate axis nearest to the rest of the space, projected into it: the first of equally near
-    ones.
+    Each vector is the projection of the coordinate axis nearest to the rest of the space; ties take the first axis.
     """
     projector, found = rows.T @ rows, np.zeros(rows.shape)
     for vector in found:
@@ -144,7 +141,6 @@ def settled_basis(rows: FloatArray) -> FloatArray:
 
 
 def _kind(row: FloatArray) -> WrenchKind:
-    """Return the kind of a wrench in scaled coordinates."""
     if len(row) == 3 or not np.abs(row[3:]).max() > _ZERO:
         return WrenchKind.FORCE
     return WrenchKind.WRENCH if np.abs(row[:3]).max() > _ZERO else WrenchKind.COUPLE

@@ -1,4 +1,4 @@
-"""Robots by name: the shipped ones, and those that other packages offer.
+"""Robots by name: those of this package, and those of other packages.
 
 Another package offers a robot by an entry point in the group ``screwsynth.models``: its name is the robot's name in
 case files, its object is a function that takes the robot's options as keyword arguments and returns a
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
 
 
 class UnknownModelError(KeyError):
-    """Error of a name that no robot has."""
+    """Error of a robot name that is unknown."""
 
 
 class AmbiguousModelError(LookupError):
-    """Error of a name that robots of several packages have."""
+    """Error of a robot name that several packages define."""
 
 
 RobotFunction = Callable[..., Model]
@@ -40,35 +40,35 @@ SHIPPED: Mapping[str, RobotFunction] = MappingProxyType(
 )
 
 
-#: Folder of the robots that are given joint by joint, one robot file each.
+#: Folder of the robot files of this package, one for each robot given joint by joint.
 _GALLERY = Path(__file__).parent / "robots"
 
 
 def model_names() -> tuple[str, ...]:
-    """Return the names of all robots on this machine, the shipped ones first, without importing any robot."""
+    """Return the names of all installed robots, those of this package first, without importing any robot."""
     shipped = (*SHIPPED, *gallery_names())
     return (*shipped, *sorted({offer.point.name for offer in _offers()} - set(shipped)))
 
 
 def gallery_names() -> tuple[str, ...]:
-    """Return the names of the shipped robots that are given joint by joint, in order."""
+    """Return the names of this package's robots that are given joint by joint, in order."""
     return tuple(sorted(path.stem for path in _GALLERY.glob("*.toml")))
 
 
 def gallery_description(name: str) -> str | None:
-    """Return what a robot of the gallery is, without building it; None where no robot of the gallery has the name."""
+    """Return the description of a robot of the gallery without building it; None for an unknown name."""
     return gallery_tables(name)["description"] if name in gallery_names() else None
 
 
 def gallery_tables(name: str) -> dict[str, Any]:
-    """Return the tables of the robot file of a robot of the gallery, one of :func:`gallery_names`."""
+    """Return the tables of the robot file of a robot of the gallery, by one of the names of :func:`gallery_names`."""
     import tomllib  # noqa: PLC0415 - most runs do not need it
 
     return tomllib.loads((_GALLERY / f"{name}.toml").read_text(encoding="utf-8"))
 
 
 def definition_of(model: Model) -> dict[str, object]:
-    """Return the tables of the file of a robot given joint by joint, under its own name; none where none are known."""
+    """Return the tables of the robot file of a robot given joint by joint, under its own name; empty if unknown."""
     found = model.options.get("definition")
     if isinstance(found, Mapping):
         return dict(found)
@@ -78,24 +78,24 @@ def definition_of(model: Model) -> dict[str, object]:
 
 @cache
 def gallery_robot(name: str) -> Model:
-    """Return a shipped robot that is given joint by joint.
+    """Return a robot of this package that is given joint by joint.
 
     Args:
         name: one of :func:`gallery_names`.
 
     Raises:
-        UnknownModelError: there is no such robot.
+        UnknownModelError: the name is unknown.
     """
     from .joints.model.robot import robot  # noqa: PLC0415 - most runs do not need it
 
     if name not in gallery_names():
         raise UnknownModelError(name)
-    # A case file names the robot by its file, and people by its own name.
+    # Case files use the file's name of the robot, and people its own name.
     return replace(robot(**(gallery_tables(name) | {"name": name})), options={})
 
 
 def robot_function(name: str) -> RobotFunction:
-    """Return the function that builds the named robot. Another package cannot replace a shipped robot.
+    """Return the function that builds the named robot. Another package cannot replace a robot of this package.
 
     Args:
         name: the robot's name in case files.
@@ -141,7 +141,7 @@ def _offers() -> list[_Offer]:
             package = distribution.name if points else ""  # slow to read
         except Exception:  # noqa: S112 - another package's files may be broken in any way
             continue
-        if package not in seen:  # the first on the path is the one that is imported
+        if package not in seen:  # Python imports the first on the path
             offers += [_Offer(package or "a package without a name", point) for point in points]
             seen.update([package] if points else [])
     return offers

@@ -1,4 +1,4 @@
-"""Robots with errors of their joint centres as further parameters: machines as they are built."""
+"""Robots with joint-centre errors as further parameters: robots as they are built."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ from .parts import Dimension, Parameter
 
 @dataclass(frozen=True, eq=False)
 class Centre:
-    """A joint centre that may be off.
+    """Joint centre with an error.
 
     Attributes:
-        name: of the joint, such as ``2:3``, or of a leg and its plate.
-        error: (3, 1) symbols of its error, length: in the world frame at home, or in that of the leg's plate.
+        name: label of the joint, such as ``2:3``; or name of a leg and its plate.
+        error: (3, 1) symbols of the joint-centre error, length: in the world frame at home, or in the frame of the
+            leg's plate.
     """
 
     name: str
@@ -27,11 +28,11 @@ class Centre:
 
 @dataclass(frozen=True, eq=False)
 class DisplacedRobot:
-    """A robot whose joint centres may be off.
+    """Robot with joint-centre errors.
 
     Attributes:
-        model: the robot; the errors are its last parameters, in order.
-        centres: one for each of these parameters.
+        model: the robot; the joint-centre errors are its last parameters, in the order of ``centres``.
+        centres: joint centre of each of these parameters.
     """
 
     model: Model
@@ -44,12 +45,12 @@ def error_parameter(centre: Centre) -> Parameter:
 
 
 def displaced_legs(model: Model) -> DisplacedRobot:
-    """Return a robot that is given by its rows, with errors of the joint centres of its legs.
+    """Return a robot given by its rows, with joint-centre errors of its legs.
 
-    Measures of other things than its legs are left out.
+    Its quantities are those of the legs only.
 
     Args:
-        model: the robot, with its rows as built.
+        model: the robot, with its rows ``built``.
     """
     centres = [
         Centre(name, error)

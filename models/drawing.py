@@ -1,6 +1,6 @@
-"""The drawing of a robot as symbols: points, links, joints, circles, directions, marks; without colours or widths.
+"""Drawing of a robot as symbols: points, links, joints, circles, directions and marks, without colours or widths.
 
-The outline of a plate has the corners of the convex hull of the joints on it, in order around it.
+The corners of a plate's outline are those of the convex hull of its joints, in order.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from casadi import SX
 from .arrays import FloatArray
 from .values import dataclass
 
-#: Points nearer to each other, or to an edge, than this part of the plate's size are one, or on the edge.
+#: Distance below which two points coincide, or a point lies on an edge, relative to the size of the plate.
 _NEAR = 1e-9
 
 
 class Body(enum.Enum):
-    """Body that a part of the drawing moves with."""
+    """Body with which a part of the drawing moves."""
 
     BASE = "base"
     PLATFORM = "platform"
@@ -50,11 +50,11 @@ class Link:
     Attributes:
         start: name of the first point.
         end: name of the second one.
-        body: the body that the link moves with.
-        limb: name of the limb that the link is part of, if any.
+        body: the body with which the link moves.
+        limb: name of the limb to which the link belongs; None for a link of no limb.
         kind: bar, rod or rail.
-        row: index, among the rows of the limb, of the one that the link carries alone; None for a link that carries
-            others too.
+        row: index among the rows of the limb, if the link carries the force of this row only; None if it carries
+            several.
     """
 
     start: str
@@ -78,7 +78,7 @@ class JointKind(enum.Enum):
 
     @property
     def words(self) -> str:
-        """Its name for people."""
+        """Name of the joint kind, for people."""
         return self.name.lower()
 
 
@@ -88,12 +88,12 @@ class JointSymbol:
 
     Attributes:
         name: unique within the drawing: limb and number, such as ``1:2``.
-        kind: of the joint; a parallelogram has a symbol at each of its four hinges.
-        place: (3, 1) in world coordinates, length.
-        axes: each (3, 1) in world coordinates, of any length but zero; none for a spherical joint.
-        body: the body that the joint is drawn with.
-        limb: name of the limb that the joint is part of, if it has a wrench.
-        is_actuated: whether an actuator drives the joint.
+        kind: kind of the joint; a parallelogram has a symbol at each of its four hinges.
+        place: (3, 1) position in world coordinates, length.
+        axes: (3, 1) vector along each axis in world coordinates, of any length but zero; none for a spherical joint.
+        body: the body with which the joint moves.
+        limb: name of the limb to which the joint belongs, if the limb has a wrench.
+        is_actuated: True if an actuator drives the joint.
     """
 
     name: str
@@ -107,13 +107,13 @@ class JointSymbol:
 
 @dataclass(frozen=True, eq=False)
 class Circle:
-    """A circle that joints lie on, in world coordinates.
+    """Circle through joints, in world coordinates.
 
     Attributes:
-        centre: (3, 1) length.
-        through: (3, 1) a point of the circle, length.
+        centre: (3, 1) centre of the circle, length.
+        through: (3, 1) point of the circle, length.
         normal: (3, 1) normal of the circle's plane, of any length but zero.
-        body: the body that the circle moves with.
+        body: the body with which the circle moves.
     """
 
     centre: SX
@@ -127,11 +127,11 @@ class Direction:
     """A named direction at a point, such as a joint's axis.
 
     Attributes:
-        name: unique within the drawing; the name of a parameter where the direction is that parameter.
-        origin: (3, 1) world coordinates, length.
-        vector: (3, 1) in world coordinates, of any length but zero.
-        body: the body that the direction moves with.
-        limb: name of the limb that the direction is part of, if any.
+        name: unique name within the drawing; the name of the parameter if the direction is a parameter.
+        origin: (3, 1) start in world coordinates, length.
+        vector: (3, 1) direction in world coordinates, of any length but zero.
+        body: the body with which the direction moves.
+        limb: name of the limb to which the direction belongs; None for a direction of no limb.
     """
 
     name: str
@@ -142,7 +142,7 @@ class Direction:
 
 
 class MarkKind(enum.Enum):
-    """Kind of quantity that a mark shows."""
+    """Kind of quantity shown by a mark."""
 
     LENGTH = "length"
     ANGLE = "angle"
@@ -156,14 +156,14 @@ class MarkKind(enum.Enum):
 
 @dataclass(frozen=True, eq=False)
 class Mark:
-    """A parameter's place in the drawing, which shows the length, angle or point that the parameter measures.
+    """Mark of a parameter in the drawing: the length, angle or point that the parameter measures.
 
     Attributes:
         parameter: name of the parameter.
         kind: length, angle or point.
-        points: each (3, 1) in world coordinates: start and end of a length; vertex, start and end of an angle; the
-            point itself.
-        body: the body that the mark moves with.
+        points: (3, 1) positions in world coordinates: start and end of a length; vertex, start and end of an angle; or
+            the point.
+        body: the body with which the mark moves.
     """
 
     parameter: str
@@ -177,12 +177,12 @@ class Scene:
     """The drawing of a robot.
 
     Attributes:
-        points: its named points.
-        links: straight links between them.
+        points: named points of the drawing.
+        links: straight links between points.
         circles: circles, such as those of joint centres.
         directions: directions at points, such as axes.
-        marks: marks of where parameters are measured.
-        joints: joints, in the place of the round dots at the ends of links that a drawing without joints has.
+        marks: marks of parameters.
+        joints: symbols of joints; a drawing without them has round dots at the ends of links.
     """
 
     points: tuple[Point, ...] = ()
@@ -194,7 +194,7 @@ class Scene:
 
     @property
     def expressions(self) -> tuple[tuple[str, SX], ...]:
-        """Every (3, 1) expression of the drawing with a name for messages, in the order of the fields."""
+        """All (3, 1) expressions of the drawing with names for messages, in the order of the fields."""
         return (
             *((f"point {point.name}", point.position) for point in self.points),
             *((f"circle {i} {name}", part) for i, circle in enumerate(self.circles) for name, part in _vectors(circle)),
@@ -204,10 +204,9 @@ class Scene:
         )
 
     def faults(self, limbs: Iterable[str], parameters: Iterable[str]) -> Iterable[str]:
-        """Yield a sentence for every contradiction between the drawing and the rest of the model.
+        """Yield a sentence for every inconsistency between the drawing and the rest of the model.
 
-        Contradictions are ends of links, limbs and parameters that do not exist, and marks with a wrong number of
-        points.
+        Faults are unknown ends of links, unknown limbs and parameters, and marks with a wrong number of points.
 
         Args:
             limbs: names of the model's limbs.
@@ -217,27 +216,26 @@ class Scene:
         for link in self.links:
             for end in (link.start, link.end):
                 if end not in points:
-                    yield f"a link ends at {end!r}, which is no point of the drawing"
+                    yield f"a link ends at {end!r}, which is not a point of the drawing"
         owned = [("link", link) for link in self.links] + [("direction", each) for each in self.directions]
         for kind, item in [*owned, *(("joint", each) for each in self.joints)]:
             if item.limb is not None and item.limb not in limbs:
                 yield f"a {kind} belongs to limb {item.limb!r}, which has no wrench"
         for mark in self.marks:
             if mark.parameter not in parameters:
-                yield f"a mark shows {mark.parameter!r}, which is no parameter"
+                yield f"a mark shows {mark.parameter!r}, which is not a parameter"
             if len(mark.points) != mark.kind.size:
                 yield f"the mark of {mark.parameter!r} should have {mark.kind.size} points, got {len(mark.points)}"
 
 
 def _vectors(circle: Circle) -> tuple[tuple[str, SX], ...]:
-    """Return the three (3, 1) vectors of a circle with their names."""
     return ("centre", circle.centre), ("through", circle.through), ("normal", circle.normal)
 
 
 def outline(points: FloatArray) -> list[int]:
-    """Return the indices of the corners of the convex hull of points (n, 3) in their plane of least squares.
+    """Return the indices of the corners of the convex hull of points (n, 3) in their least-squares plane.
 
-    Points on a line have two corners, its ends; points at one place have one.
+    Collinear points have two corners, the ends; coincident points have one.
     """
     middle = points - points.mean(axis=0)
     size = float(np.abs(middle).max(initial=0.0))

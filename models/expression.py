@@ -1,10 +1,9 @@
-"""The language of a robot's numbers: ``rb + arm*cos(tilt)``, ``E + w/2*y``, ``cross(y, A - E)``.
+"""Expression language for dimensions and points in robot files: ``rb + arm*cos(tilt)``, ``E + w/2*y``.
 
 An expression consists of numbers, names, ``+ - * / ^``, brackets, and the functions of :data:`FUNCTIONS`. Values are
-scalars or vectors; ``x``, ``y`` and ``z`` are the unit vectors of the world frame. Python's parser only makes a tree
-of the text; each node of the tree is accepted here by its type, and anything else is refused, so that a text can
-neither reach an attribute nor call anything but these functions. A :class:`Language` gives such a tree its value, also
-for other texts with functions of their own.
+scalars or vectors; ``x``, ``y`` and ``z`` are the unit vectors of the world frame. Python's parser builds the syntax
+tree only. Each node type is accepted explicitly and all others are refused, so that a text can neither reach an
+attribute nor call other functions. A :class:`Language` also evaluates other texts with functions of their own.
 """
 
 from __future__ import annotations
@@ -21,27 +20,27 @@ from typing import NamedTuple, TypeAlias
 import casadi as ca
 from casadi import SX
 
-#: Longest text of an expression. The longest that a person writes has a few hundred letters.
+#: Largest length of an expression; expressions written by people have at most a few hundred characters.
 _LONGEST = 2000
-#: Deepest nesting of an expression: far below the depth at which Python's own recursion ends.
+#: Deepest nesting of an expression, far below Python's recursion limit.
 _DEEPEST = 60
-#: Largest size of a constant power: with larger ones, numbers of any machine leave the range of doubles.
+#: Largest absolute value of a constant power; larger powers of robot dimensions leave the range of doubles.
 LARGEST_POWER = 100.0
-#: Characters of expressions. Python would take a text behind # for a comment, and other letters for those of names.
+#: Allowed characters. Python would read ``#`` as a comment, and accept other letters in names.
 _CHARACTERS = re.compile(r"[A-Za-z0-9_+\-*/^(),. ]*")
-#: Numbers of Python that are none here: 0x10, 1_000, 1j.
+#: Python's number formats that are not allowed here: 0x10, 1_000, 1j.
 _OTHER_NUMBERS = re.compile(r"\b[0-9]+(_|[xXbBoOjJ])")
 
 
 class ExpressionError(ValueError):
-    """Error of a text that is no expression; the message is a clause about the text."""
+    """Error of a text that is not an expression; the message is a clause about the text."""
 
 
 class UnknownNameError(ExpressionError):
-    """Error of a name that is not known.
+    """Error of an unknown name in an expression.
 
     Attributes:
-        name: the name.
+        name: the unknown name.
     """
 
     def __init__(self, name: str, hint: str) -> None:
@@ -50,10 +49,10 @@ class UnknownNameError(ExpressionError):
 
 
 class NoValueError(ExpressionError):
-    """Error of an expression whose value is a constant that is not finite.
+    """Error of an expression with a constant value that is not finite.
 
     Attributes:
-        values: values of the names in the operation that has no value, one number or three each.
+        values: values of the names in the failing operation, one or three numbers each.
     """
 
     def __init__(self, fault: str, values: Mapping[str, tuple[float, ...]]) -> None:
@@ -75,9 +74,9 @@ def _only(function: Callable[..., SX], *, scalars: bool, fault: str) -> Callable
 _of_numbers = partial(_only, scalars=True, fault="needs a number here, not a vector")
 _of_vectors = partial(_only, scalars=False, fault="needs a vector here, not a number")
 
-#: Functions by name, each with its number of arguments.
+#: Functions by name, with their numbers of arguments.
 Functions: TypeAlias = Mapping[str, tuple[int, Callable[..., SX]]]
-#: Those of robot files.
+#: Functions of robot files.
 FUNCTIONS: Functions = MappingProxyType(
     {
         "sin": (1, _of_numbers(ca.sin)),
@@ -92,7 +91,7 @@ FUNCTIONS: Functions = MappingProxyType(
         "unit": (1, _of_vectors(lambda vector: vector / ca.norm_2(vector))),
     }
 )
-#: Names that every expression knows.
+#: Names with a value in every expression.
 CONSTANTS: Mapping[str, SX] = MappingProxyType(
     {"x": SX([1, 0, 0]), "y": SX([0, 1, 0]), "z": SX([0, 0, 1]), "pi": SX(math.pi)}
 )
@@ -102,11 +101,11 @@ def evaluate(written: str | float, names: Mapping[str, SX]) -> SX:
     """Return the value of an expression, (1, 1) or (3, 1).
 
     Args:
-        written: its text, or a number.
-        names: values of the names that it may use, beside those of :data:`CONSTANTS`.
+        written: text of the expression, or a number.
+        names: values of the names that the expression may use in addition to :data:`CONSTANTS`.
 
     Raises:
-        ExpressionError: the text is no expression, or its value is a constant that is not finite.
+        ExpressionError: the text is not an expression, or its value is a constant that is not finite.
     """
     if not isinstance(written, str):
         return _number(written)
@@ -117,12 +116,12 @@ def evaluate(written: str | float, names: Mapping[str, SX]) -> SX:
     return ca.densify(value)
 
 
-#: What arguments must be where a function of constants has no finite value.
+#: Required arguments of functions that have no finite value for other ones.
 _ALLOWED = {"sqrt": "must be at least 0", "unit": "must not be 0"}
 
 
 def _no_value(tree: ast.expr, names: Mapping[str, SX]) -> NoValueError:
-    """Return the error of an expression without a finite value: it names the first operation that has none."""
+    """Return the error of an expression without a finite value, which names the first failing operation."""
     node = next((each for each in _operations(tree) if not _LANGUAGE.value(each, names).is_regular()), tree)
     parts, fault = [node], f"{_written(node)} is not finite"
     match node:
@@ -174,16 +173,16 @@ def _tree(text: str) -> ast.expr:
             warnings.simplefilter("ignore")  # Python's advice on texts such as 1if: they are refused below
             return ast.parse(text.strip().replace("^", "**"), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise ExpressionError("is no expression of numbers, names, + - * / ^ and functions") from None
+        raise ExpressionError("is not an expression of numbers, names, + - * / ^ and functions") from None
 
 
 class Language(NamedTuple):
-    """What expressions may call, and how far they may go.
+    """Functions that expressions may call, and the limits of their size.
 
     Attributes:
-        functions: the functions.
-        deepest: most operations in each other.
-        largest_power: largest size of a constant power.
+        functions: functions by name.
+        deepest: largest nesting depth of operations.
+        largest_power: largest absolute value of a constant power.
     """
 
     functions: Functions
@@ -194,15 +193,15 @@ class Language(NamedTuple):
         """Return the value of a node, (1, 1) or (3, 1).
 
         Args:
-            node: of a syntax tree.
-            names: values of the names that it may use.
-            depth: of the node in the tree.
+            node: node of a syntax tree.
+            names: values of the names that the node may use.
+            depth: depth of the node in the tree.
 
         Raises:
-            ExpressionError: the node is none of this language.
+            ExpressionError: the language does not allow the node.
         """
         if depth > self.deepest:
-            raise ExpressionError(f"has more than {self.deepest} operations in each other")
+            raise ExpressionError(f"has more than {self.deepest} nested operations")
         match node:
             case ast.Constant(value=value):
                 return _number(value)
@@ -222,7 +221,6 @@ class Language(NamedTuple):
         raise ExpressionError("may have only numbers, names, + - * / ^, brackets and functions")
 
     def _operation(self, operator: ast.operator, first: SX, second: SX) -> SX:
-        """Return the value of an operation."""
         match operator:
             case ast.Add() | ast.Sub():
                 if first.shape != second.shape:
@@ -245,7 +243,6 @@ class Language(NamedTuple):
         raise ExpressionError("may have only the operations + - * / ^")
 
     def _call(self, name: str, arguments: list[SX]) -> SX:
-        """Return the value of a function."""
         if name not in self.functions:
             raise ExpressionError(f"has the function {name!r}, which is unknown; {_hint(name, self.functions)}")
         count, function = self.functions[name]
@@ -259,7 +256,6 @@ _LANGUAGE = Language(FUNCTIONS, _DEEPEST, LARGEST_POWER)
 
 
 def _number(value: object) -> SX:
-    """Return a number as an expression."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ExpressionError("may have only numbers, names, + - * / ^, brackets and functions")
     try:
@@ -272,7 +268,7 @@ def _number(value: object) -> SX:
 
 
 def _hint(name: str, known: Mapping[str, object]) -> str:
-    """Return a clause about the names that are known."""
+    """Return a clause about the known names."""
     import difflib  # noqa: PLC0415 - only messages need it
 
     near = difflib.get_close_matches(name, known, 1)

@@ -1,8 +1,8 @@
-"""A hexapod given by twelve joint centres, any coordinate of which a case fixes or frees.
+"""Hexapod given by twelve joint centres, each coordinate of which a case fixes or frees.
 
-Letters: ``base_i`` is the centre of leg i's base joint in the world frame, ``platform_i`` the centre of its platform
-joint in the platform frame. With a symmetry some legs are given and the others are their images, in the frame of the
-base and in the frame of the platform: the numbers of the given legs move all.
+``base_i`` is the centre of leg i's base joint in the world frame, ``platform_i`` the centre of its platform joint in
+the platform frame. With a symmetry, some legs are given and the others are their images in both frames: the coordinates
+of the given legs determine all.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ Symmetry: TypeAlias = Literal["none", "mirror", "threefold", "threefold-mirror"]
 
 
 class _Image(NamedTuple):
-    """A leg as the image of a given leg: a reflection in the plane y = 0 or none, then a rotation about z.
+    """Image of a given leg: an optional reflection in the plane y = 0, then a rotation about z.
 
     Attributes:
         of: index of the given leg.
-        thirds: number of thirds of a turn.
-        mirrored: whether the leg is reflected first.
+        thirds: rotation in thirds of a turn.
+        mirrored: True if the leg is reflected first.
     """
 
     of: int
@@ -38,8 +38,8 @@ class _Image(NamedTuple):
     mirrored: bool = False
 
 
-#: The six legs of each symmetry, in order around the plates: legs 1 and 2, 3 and 4, 5 and 6 are pairs about the
-#: azimuths 0, 120 and 240 degrees.
+#: Six legs of each symmetry, in order around the plates: legs 1 and 2, 3 and 4, 5 and 6 are pairs at the azimuths 0,
+#: 120 and 240 degrees.
 _IMAGES: Mapping[str, tuple[_Image, ...]] = MappingProxyType(
     {
         "none": tuple(_Image(i) for i in range(6)),
@@ -61,12 +61,12 @@ def hexapod(*, symmetry: Symmetry = "none") -> Model:
     """Return a robot with six legs between twelve joint centres, given by their coordinates.
 
     Args:
-        symmetry: ``none``: all legs are given. ``mirror``: legs 1, 3 and 4 are given, and 2, 6 and 5 are their
-            reflections in the plane y = 0. ``threefold``: legs 1 and 2 are given, and the others are turned by 120 and
-            240 degrees about z. ``threefold-mirror``: leg 1 is given, leg 2 is its reflection, and both are turned.
+        symmetry: ``none``: all legs are given. ``mirror``: legs 1, 3 and 4 are given; legs 2, 6 and 5 are their
+            reflections in the plane y = 0. ``threefold``: legs 1 and 2 are given; the other legs are rotated by 120 and
+            240 degrees about z. ``threefold-mirror``: leg 1 is given, leg 2 is its reflection, and both are rotated.
 
     Raises:
-        ModelError: there is no such symmetry.
+        ModelError: the symmetry is unknown.
     """
     if symmetry not in _IMAGES:
         raise ModelError(f"model 'hexapod': symmetry must be one of {', '.join(_IMAGES)}, got {symmetry!r}")
@@ -105,14 +105,13 @@ def hexapod(*, symmetry: Symmetry = "none") -> Model:
 
 
 def _joint(plate: str, i: int, radius: float, half_angle: float) -> Parameter:
-    """Return the parameter of a given joint; the arguments are those of :func:`_typical_joint`, and the plate."""
     name = f"{plate}_{i + 1}"
     words = f"{plate} joint of leg {i + 1}"
     return Parameter(name, SX.sym(name, 3), Dimension.LENGTH, words, _typical_joint(i, radius, half_angle))
 
 
 def _placed(joint: SX, image: _Image) -> SX:
-    """Return the joint (3, 1) of a leg from that of the given leg."""
+    """Return the joint centre (3, 1) of a leg as the image of that of the given leg."""
     if image == _Image(image.of):
         return joint
     x, y, z = joint[0], -joint[1] if image.mirrored else joint[1], joint[2]
@@ -121,11 +120,11 @@ def _placed(joint: SX, image: _Image) -> SX:
 
 
 def _typical_joint(i: int, radius: float, half_angle: float) -> tuple[float, float, float]:
-    """Return a joint of an octahedral arrangement, pairs at 0, 120 and 240 degrees, to a tenth of a length unit.
+    """Return a joint centre of an octahedral layout with pairs at 0, 120 and 240 degrees, rounded to 0.1 length units.
 
     Args:
         i: index of the leg.
-        radius: of the joints' circle, length.
+        radius: radius of the joints' circle, length.
         half_angle: half of the angle between the joints of a pair, degrees.
     """
     azimuth = math.radians(120 * (i // 2) + half_angle * (1 if i % 2 else -1))

@@ -1,12 +1,12 @@
-"""A model with other expressions or numbers in place of its symbols: its rows, their rates and F at one pose.
+"""Model with expressions or numbers in place of its symbols: rows, work rates and F at one pose.
 
-F is written here and nowhere else. For rows ``L_i = (f_i, m_i) / sqrt(square_i)`` and a twist ``chi = (omega, v)``
+F is defined only here. For rows ``L_i = (f_i, m_i) / sqrt(square_i)`` and a twist ``chi = (omega, v)``
 
     F = sum_i (L_i ^ chi)^2,        L_i ^ chi = m_i . omega + f_i . v            (equations 5 and 14)
 
-with moments about the world origin. A row that is a couple is multiplied by the characteristic length, so that its work
-rate has the unit of the others. A :class:`~.member.Member` adds ``|P x(chi)|^2``, the same sum over any orthonormal
-basis of its wrenches; its rows here are all rows of ``P``, which are not independent.
+with moments about the world origin. The row of a couple is multiplied by the characteristic length, so that its work
+rate has the unit of the other rows. A :class:`~.member.Member` adds ``|P x(chi)|^2``: the sum of squared work rates of
+any orthonormal basis of its wrenches. Its rows here are all rows of ``P``, which are dependent.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from .values import dataclass
 from .whole import expressions_of, with_expressions
 from .wrench import Wrench, WrenchKind
 
-#: A matrix or vector of symbols or of numbers.
+#: Matrix or vector of symbols or numbers.
 Matrix = TypeVar("Matrix", SX, FloatArray)
 
 
@@ -37,11 +37,11 @@ class Substitution:
 
     Attributes:
         parameters: (n, 1) components of all parameters, in the model's order.
-        unknowns: (u, 1) internal unknowns, in the model's order.
+        unknowns: (u, 1) unknowns of the closure equations, in the model's order.
         rotation: (3, 3) ``R``, platform to world coordinates.
         position: (3, 1) ``p``, origin of the platform frame in the world frame, length.
-        reference: (n,) values of the parameters at which the sizes of loop equations are taken; None for the
-            expressions in place of the parameters.
+        reference: (n,) values of the parameters that determine the sizes of loop equations; None for the values of
+            ``parameters``.
     """
 
     parameters: SX
@@ -52,7 +52,7 @@ class Substitution:
 
     @classmethod
     def identity(cls, model: Model) -> Substitution:
-        """Return the model's own symbols, so that nothing is replaced."""
+        """Return the symbols of the model, so that nothing is replaced."""
         return cls(
             model.symbols,
             ca.vertcat(SX(0, 1), *[item.symbol for item in model.unknowns]),
@@ -72,8 +72,8 @@ class LegInstance:
 
     Attributes:
         name: the limb's name.
-        base: (3, 1) centre of its base joint in the world frame, length.
-        platform: (3, 1) centre of its platform joint in the platform frame, length.
+        base: (3, 1) centre of the leg's base joint in the world frame, length.
+        platform: (3, 1) centre of the leg's platform joint in the platform frame, length.
         span: (3, 1) vector from base joint to platform joint in the world frame, length.
     """
 
@@ -91,27 +91,27 @@ class RobotInstance:
         parameters: (n, 1) components of all parameters, in the model's order.
         rotation: (3, 3) ``R``, platform to world coordinates.
         position: (3, 1) ``p``, origin of the platform frame in the world frame, length.
-        jacobian: (m, 6) unit wrenches ``J``, force, then moment about the world origin; couple rows multiplied by the
-            characteristic length. The rows of the model's wrenches, then all rows of its members' projectors.
+        jacobian: (m, 6) unit wrenches ``J``, force, then moment about the world origin; rows of couples times the
+            characteristic length. Rows of single wrenches come first, then all rows of the members' projectors.
         rates: (m, tasks) work rates ``L_i ^ chi_j``.
         F: (tasks, 1) objective of each task (equation 14).
-        squares: (w, 1) squared length of the direction of each of the model's wrenches; 0 for a limb of zero length.
-        magnitude: (tasks, 1) F without cancellation, never below F; see :func:`magnitude`.
-        quantities: (n, 1) values of each of the model's quantities.
+        squares: (w, 1) squared length of the direction of each single wrench; 0 for a limb of zero length.
+        magnitude: (tasks, 1) upper bound on F without cancellation; see :func:`magnitude`.
+        quantities: (n, 1) values of each quantity of the model.
         legs: the model's legs.
-        closure: (c, 1) left sides of the closure equations, zero where the loops are closed.
-        rows: the rows before normalisation.
-        inputs: (k, 1) all that these depend on: parameters, unknowns, rotation column after column, position,
-            characteristic length, twists.
-        loops: (k, 1) left sides of all loop equations, those beyond the closure included.
-        driven: (m, a) work rate of each row for a unit rate of each of the model's actuators.
-        relations: (r, a) factors of the actuators' rates in the equations that loops demand of these alone.
-        signs: (s, 1) numbers that are positive in home's assembly.
-        distances: (d, 1) left sides of the equations that follow from those of the loops.
-        joints: the joints of the model's limbs.
-        links: their links.
+        closure: (c, 1) left sides of the closure equations; zero where the loops are closed.
+        rows: rows before normalisation.
+        inputs: (k, 1) all arguments: parameters, unknowns, rotation column by column, position, characteristic length,
+            twists.
+        loops: (k, 1) left sides of all loop equations, including those that are not in ``closure``.
+        driven: (m, a) work rate of each row for a unit rate of each actuator.
+        relations: (r, a) coefficients of the equations of the actuator rates only, which loops impose.
+        signs: (s, 1) expressions that are positive in the home assembly mode.
+        distances: (d, 1) left sides of equations that follow from the loop equations.
+        joints: joints of the model's limbs.
+        links: links of the model's limbs.
         size: (1, 1) characteristic size of the robot, length.
-        reference: values of the parameters at which the sizes of the loop equations are taken; None for expressions.
+        reference: values of the parameters that determine the sizes of the loop equations; None for ``parameters``.
     """
 
     parameters: SX
@@ -143,9 +143,9 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
 
     Args:
         model: the model.
-        substitution: the expressions that replace its symbols.
-        length: (1, 1) characteristic length, by which couple rows are multiplied.
-        twists: (6, 1) each, angular velocity, then velocity of the platform's point at the world origin.
+        substitution: expressions that replace the symbols of the model.
+        length: (1, 1) characteristic length, factor of the rows of couples.
+        twists: (6, 1) each: angular velocity, then velocity of the platform point at the world origin.
     """
     given = (
         (model.wrenches, model.members, model.actuators, model.closure, model.loops, model.distances),
@@ -158,11 +158,11 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
     found, (signs, quantities, joints, links), ends, size = replaced
     rows, members, actuators, *equations = found
 
-    def left_sides(own: Sequence[Closure], replaced: Sequence[Closure]) -> SX:
-        """Return the left sides (k, 1) of equations, of order 1."""
+    def left_sides(parts: Sequence[Closure], replaced: Sequence[Closure]) -> SX:
+        """Return the left sides (k, 1) of equations, scaled to order 1."""
         sizes = ca.vertcat(SX(0, 1), *[each.size for each in replaced])
         sides = ca.vertcat(SX(0, 1), *[each.expression for each in replaced])
-        return sides / sizes_at(model, own, substitution.reference, sizes)
+        return sides / sizes_at(model, parts, substitution.reference, sizes)
 
     closure, loops, distances = map(left_sides, (model.closure, model.loops, model.distances), equations)
     return RobotInstance(
@@ -197,13 +197,13 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
 def sizes_at(
     model: Model, parts: Sequence[Closure | Unknown], reference: tuple[float, ...] | None, otherwise: SX
 ) -> SX:
-    """Return the sizes (k, 1) of loop equations or unknowns at values of the parameters.
+    """Return the sizes (k, 1) of loop equations or unknowns for values of the parameters.
 
     Args:
         model: the model.
         parts: the k equations or unknowns.
-        reference: (n,) values of the parameters, which a robot of literal numbers has none of; None for no reference.
-        otherwise: (k, 1) the sizes where there is no reference, or where a size has no positive value there.
+        reference: (n,) values of the parameters, empty for a robot of literal numbers; None for no reference.
+        otherwise: (k, 1) sizes if there is no reference, or where a size is not positive there.
     """
     if reference is None or not parts:
         return otherwise
@@ -217,11 +217,12 @@ def sizes_at(
 def length_of(model: Model, values: Sequence[float]) -> float:
     """Return the characteristic size of a robot, length.
 
-    Tolerances on lengths, areas and products of lengths are relative to this size. So no result depends on the unit.
+    Tolerances on lengths, areas and products of lengths are relative to this size, so that results do not depend on the
+    unit.
 
     Args:
         model: robot.
-        values: (n,) values of its parameters.
+        values: (n,) values of the robot's parameters.
     """
     function = ca.Function("size", [Substitution.identity(model).parameters], [ca.densify(_size_of(model))])
     found = float(function(list(values)))
@@ -229,7 +230,6 @@ def length_of(model: Model, values: Sequence[float]) -> float:
 
 
 def _size_of(model: Model) -> SX:
-    """Return the characteristic size (1, 1) of a robot, length, in the symbols of its parameters."""
     if model.size is not None:
         return model.size
     lengths = [ca.vec(item.symbol) for item in model.parameters if item.dimension is Dimension.LENGTH]
@@ -240,9 +240,9 @@ def jacobian(rows: Sequence[Wrench], length: SX, members: Sequence[Member] = ())
     """Return the Jacobian (m, 6): unit wrenches, force, then moment about the world origin; couples times the length.
 
     Args:
-        rows: wrenches.
+        rows: single wrenches.
         length: (1, 1) characteristic length.
-        members: members, whose rows follow: those of the projector, 3 or 6 each.
+        members: members; the 3 or 6 rows of each projector follow the single wrenches.
     """
     own = [_row_factor(row, length) * ca.vertcat(row.force, row.moment).T / ca.sqrt(row.square) for row in rows]
     unit_twists = ca.vertcat(ca.horzcat(SX(3, 3), SX.eye(3)), ca.horzcat(SX.eye(3), SX(3, 3)))
@@ -250,7 +250,7 @@ def jacobian(rows: Sequence[Wrench], length: SX, members: Sequence[Member] = ())
 
 
 def rates(rows: Sequence[Wrench], twist: SX, length: SX, members: Sequence[Member] = ()) -> SX:
-    """Return the work rates ``L_i ^ chi``, (m, 1), in a twist (6, 1); couples times the length."""
+    """Return the work rates ``L_i ^ chi``, (m, 1), in a twist (6, 1); those of couples times the length."""
     own = [_scaled_rate(row, twist, length) / ca.sqrt(row.square) for row in rows]
     return ca.vertcat(SX(0, 1), *own, *[resistance(member, twist, length) for member in members])
 
@@ -259,10 +259,10 @@ def driven(rows: Sequence[Wrench], actuators: Sequence[Actuator], length: SX, me
     """Return the work rates (m, a) of the rows of :func:`jacobian` for a unit rate of each actuator.
 
     Args:
-        rows: wrenches.
+        rows: single wrenches.
         actuators: the actuators.
         length: (1, 1) characteristic length.
-        members: members, whose rows follow.
+        members: members; the rows of their projectors follow the single wrenches.
     """
     found = SX(len(rows) + sum(member.size for member in members), len(actuators))
     for k, actuator in enumerate(actuators):
@@ -286,26 +286,26 @@ def objective(rows: Sequence[Wrench], twist: SX, length: SX, members: Sequence[M
     the former is smoother and has tighter interval enclosures.
 
     Args:
-        rows: wrenches.
-        twist: (6, 1) angular velocity, then velocity of the platform's point at the world origin.
-        length: (1, 1) characteristic length, by which couple rows are multiplied.
-        members: members of limbs, each of which adds ``|P x|^2``.
+        rows: single wrenches.
+        twist: (6, 1) angular velocity, then velocity of the platform point at the world origin.
+        length: (1, 1) characteristic length, factor of the rows of couples.
+        members: members of limbs; each adds ``|P x|^2``.
     """
     own = sum((_scaled_rate(row, twist, length) ** 2 / row.square for row in rows), SX(0))
     return own + sum((ca.sumsqr(resistance(member, twist, length)) for member in members), SX(0))
 
 
 def magnitude(rows: Sequence[Wrench], twist: SX, position: SX, length: SX, members: Sequence[Member] = ()) -> SX:
-    """Return F without cancellation, (1, 1): ``sum (|m_i| |omega| + |f_i| |v|)^2``, never below F.
+    """Return an upper bound on F without cancellation, (1, 1): ``sum (|m_i| |omega| + |f_i| |v|)^2``.
 
-    Moments and velocity are taken at the platform's origin, so that the number does not depend on where the world's
-    origin is. A member adds the same bound of ``|x|^2`` about its centre.
+    Moments and velocity refer to the platform's origin, so that the bound does not depend on the world's origin. A
+    member adds the bound of ``|x|^2`` about its centre.
 
     Args:
-        rows: wrenches.
-        twist: (6, 1) angular velocity, then velocity of the platform's point at the world origin.
+        rows: single wrenches.
+        twist: (6, 1) angular velocity, then velocity of the platform point at the world origin.
         position: (3, 1) origin of the platform frame in the world frame, length.
-        length: (1, 1) characteristic length, by which couple rows are multiplied.
+        length: (1, 1) characteristic length, factor of the rows of couples.
         members: members of limbs.
     """
     omega, v = twist[:3], twist[3:]
@@ -332,11 +332,11 @@ def magnitude(rows: Sequence[Wrench], twist: SX, position: SX, length: SX, membe
 
 
 def homogenised(jacobian: Matrix, centre: Matrix, length: float) -> tuple[Matrix, ...]:
-    """Return the columns of a Jacobian made homogeneous: moments about a point, divided by a length.
+    """Return the columns of a homogeneous Jacobian: moments about a point, divided by a length.
 
     Args:
-        jacobian: (m, 6) rows force, then moment about the world origin; symbols or numbers.
-        centre: (3,) or, as symbols, (3, 1) the point in the world frame, length.
+        jacobian: (m, 6) rows, force, then moment about the world origin; symbols or numbers.
+        centre: (3,) or, as symbols, (3, 1) reference point in the world frame, length.
         length: divisor of the moments, length.
 
     Returns:

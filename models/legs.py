@@ -1,4 +1,4 @@
-"""Platforms on extensible legs: rows, quantities and drawing from the joint centres of the legs."""
+"""Platforms on extensible legs: rows, quantities and drawing from the joint centres."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from .wrench import Wrench, force_along
 
 @dataclass(frozen=True, eq=False)
 class LeggedPlatform:
-    """The parts of a model that legs between a base and a platform determine.
+    """Parts of a model that follow from legs between base and platform.
 
     Attributes:
-        legs: the legs, in drawing order around the plates.
+        legs: legs in order around the plates.
         wrenches: one row for each leg.
-        built: the same rows with the errors of the legs' joint centres.
-        quantities: length of each leg, and its angles against the normals of base and platform.
-        scene: points at joint centres and platform origin, links along legs and outlines of both plates.
+        built: rows with joint-centre errors of the legs.
+        quantities: length of each leg, and its angles with the normals of base and platform.
+        scene: drawing: points at joint centres and platform origin, links along legs, outlines of both plates.
     """
 
     legs: tuple[Leg, ...]
@@ -39,8 +39,8 @@ def legged_platform(legs: Sequence[Leg], pose: PoseSymbols) -> LeggedPlatform:
     ``d`` through ``b`` (equation 10), and its work rate in a twist is the rate of change of the leg's length.
 
     Args:
-        legs: at least one, in drawing order around the plates.
-        pose: symbols of the platform's pose.
+        legs: one or more legs, in order around the plates.
+        pose: symbols of the pose.
     """
     R, p = pose.rotation, pose.position
     names = tuple(leg.name for leg in legs)
@@ -73,15 +73,14 @@ def legged_platform(legs: Sequence[Leg], pose: PoseSymbols) -> LeggedPlatform:
 
 
 def _leg_rows(legs: Sequence[Leg], pose: PoseSymbols) -> tuple[Wrench, ...]:
-    """Return the row of each leg at a pose."""
     spans = (pose.position + pose.rotation @ leg.platform - leg.base for leg in legs)
     return tuple(force_along(leg.name, leg.base, span) for leg, span in zip(legs, spans, strict=True))
 
 
 def angle_between(axis: SX, span: SX) -> SX:
-    """Return the angle in radians, (1, 1), of a leg or link (3, 1) against a plate's normal or another axis (3, 1).
+    """Return the angle, (1, 1), radians, between a leg or link (3, 1) and a plate's normal or another axis (3, 1).
 
-    Unlike the arc cosine, the angle is accurate and has a derivative for a leg that is nearly along the axis.
+    Unlike the arc cosine, the result is accurate and differentiable for a leg nearly parallel to the axis.
     """
     return ca.atan2(ca.norm_2(ca.cross(axis, span)), ca.dot(axis, span))
 
@@ -90,9 +89,9 @@ def _scene(legs: Sequence[Leg], ends: Sequence[SX], pose: PoseSymbols) -> Scene:
     """Return the drawing of legs and plates.
 
     Args:
-        legs: the legs, in drawing order around the plates.
-        ends: (3, 1) each, centres of the platform joints in the world frame, length.
-        pose: symbols of the platform's pose.
+        legs: legs in order around the plates.
+        ends: (3, 1) centre of each platform joint in the world frame, length.
+        pose: symbols of the pose.
     """
     base = [Point(f"B{leg.name}", leg.base, Body.BASE) for leg in legs]
     platform = [Point(f"A{leg.name}", end, Body.PLATFORM) for leg, end in zip(legs, ends, strict=True)]

@@ -1,8 +1,8 @@
-"""Joints and links of a robot given joint by joint, as limits and pictures read them: motions from home, and segments.
+"""Joints and links of a robot given joint by joint, for limits and pictures: motions from home, and segments.
 
-A joint's coordinates are 0 at home: the angle of a rotation, and the displacement of a slide. Where the loop of a limb
-is opened, the angle is no unknown of the program, and follows from the displacements of the two bodies of the joint. It
-is then given by its sine and cosine.
+The coordinates of a joint are 0 at home: angle of a rotation, displacement of a prismatic joint. Where the loop of a
+limb is opened, the angle is not an unknown of the program: its sine and cosine follow from the displacements of the two
+bodies that the joint connects.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from .values import dataclass
 
 @dataclass(frozen=True, eq=False)
 class JointCoordinate:
-    """A coordinate of a joint, from home.
+    """Coordinate of a joint, 0 at home.
 
     Attributes:
-        part: name among the joint's coordinates, such as ``first``; empty for the only one.
-        dimension: angle or length.
-        value: (1, 1) the coordinate itself, radians or length; or the sine of the angle, times a positive number.
-        cosine: (1, 1) its cosine, times the same number; None where ``value`` is the coordinate itself.
+        part: name of the coordinate within the joint, such as ``first``; empty if it is the only coordinate.
+        dimension: dimension of the coordinate: angle or length.
+        value: (1, 1) coordinate in radians or length; or sine of the angle times a positive factor.
+        cosine: (1, 1) cosine of the angle times the same factor; None if ``value`` is the coordinate itself.
     """
 
     part: str
@@ -33,19 +33,19 @@ class JointCoordinate:
 
     @property
     def measured(self) -> SX:
-        """The coordinate itself (1, 1), an angle within half a turn."""
+        """Coordinate (1, 1); an angle within half a turn."""
         return self.value if self.cosine is None else ca.atan2(self.value, self.cosine)
 
 
 @dataclass(frozen=True, eq=False)
 class JointCone:
-    """The directions between which the cone of a universal or spherical joint is measured.
+    """Directions that define the cone angle of a universal or spherical joint.
 
     Attributes:
-        link: (3, 1) current unit direction of a link that ends at the joint, from the base to the platform.
-        home: (3, 1) the same at home.
+        link: (3, 1) current unit direction, from the base to the platform, of a link that ends at the joint.
+        home: (3, 1) direction of this link at home.
         other: (3, 3) rotation from home of the body on the other side of the joint.
-        turn: (3, 3) rotation of the limb from the one that the robot file writes.
+        turn: (3, 3) rotation of this limb relative to the limb that the robot file describes.
     """
 
     link: SX
@@ -56,17 +56,17 @@ class JointCone:
 
 @dataclass(frozen=True, eq=False)
 class LimbJoint:
-    """A joint of a limb, as the robot file writes it.
+    """Joint of a limb as in the robot file.
 
     Attributes:
         label: limb and place of the joint from the base on, such as ``2:3``.
-        name: that the robot file gives it; empty for none.
+        name: name of the joint in the robot file; empty for none.
         limb: name of the limb.
-        type: its letter, ``R, P, H, C, U, S`` or ``Pa``.
-        coordinates: its coordinates from home, the base side first; none of a spherical joint, and none where they are
-            not known.
+        type: letter of the joint type: ``R, P, H, C, U, S`` or ``Pa``.
+        coordinates: coordinates of the joint from home, from the base side on; empty for a spherical joint, and where
+            they are not known.
         cone: directions of a universal or spherical joint; None for other joints, and where they are not known.
-        unknown: reason why coordinates or cone are not known, as a clause; empty where they are.
+        unknown: reason why coordinates or cone are not known, as a clause; empty if they are known.
     """
 
     label: str
@@ -78,7 +78,7 @@ class LimbJoint:
     unknown: str = ""
 
     def is_called(self, joint: str) -> bool:
-        """Return whether a limit on ``joint`` means this one: its label, its name, or limb and name, ``2:ball``."""
+        """Return True if a limit on ``joint`` refers to this joint: by label, name, or limb and name (``2:ball``)."""
         path = self.label.rpartition(":")[0]
         return joint == self.label or (
             self.name != "" and joint in {self.name, f"{path}:{self.name}", f"{self.limb}:{self.name}"}
@@ -87,12 +87,12 @@ class LimbJoint:
 
 @dataclass(frozen=True, eq=False)
 class LimbLink:
-    """A link of a limb as the segment between the centres of two joints.
+    """Link of a limb: segment between the centres of two joints.
 
     Attributes:
-        name: labels of the joints at its ends, such as ``1:2 to 1:3``.
-        ends: the joints' places; two links with a place in common share a joint.
-        start: (3, 1) current place of the joint nearer the base, length.
+        name: labels of the joints at both ends, such as ``1:2 to 1:3``.
+        ends: positions of both joints; two links with a common position share a joint.
+        start: (3, 1) current position of the joint nearer the base, length.
         span: (3, 1) vector to the other joint.
     """
 

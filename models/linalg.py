@@ -1,4 +1,4 @@
-"""Linear algebra that NumPy lacks: least squares by blocks, damped and non-negative ones, and reduced echelon form."""
+"""Linear algebra beyond NumPy: block-wise, damped and non-negative least squares; reduced echelon form."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from .arrays import FloatArray, first_largest
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: An entry of a basis below this part of the largest is rounding error.
+#: Relative size of an entry of a basis below which it is a rounding error.
 _NEGLIGIBLE = 1e-9
-#: Numbers of rows and columns, together, from which on a matrix is taken apart into blocks.
+#: Sum of rows and columns from which on a matrix is split into blocks.
 _LARGE = 160
 
 
 def least_squares(A: FloatArray, b: FloatArray, rcond: float | None = None, damping: float = 0.0) -> FloatArray:
-    """Return the shortest of ``argmin |A y - b|^2 + damping |y|^2``, (k,); block by block, where a large A has blocks.
+    """Return the least-norm minimiser (k,) of ``|A y - b|^2 + damping |y|^2``; a large A is solved block by block.
 
     Args:
         A: (n, k) matrix, possibly rank deficient.
         b: (n,) vector.
-        rcond: part of the largest singular value, of a block, below which others count as zero; rounding for None.
-        damping: 0 or more.
+        rcond: relative size, in a block, below which singular values count as zero; None for rounding.
+        damping: damping factor, at least 0.
     """
     found = np.zeros(A.shape[1])
     for rows, columns in _blocks(A):
@@ -40,7 +40,7 @@ def least_squares(A: FloatArray, b: FloatArray, rcond: float | None = None, damp
 
 
 def nonnegative_least_squares(A: FloatArray, b: FloatArray) -> FloatArray:
-    """Return ``argmin |A y - b|`` over ``y >= 0``, (k,); of a large matrix block by block, where it has blocks.
+    """Return ``argmin |A y - b|`` over ``y >= 0``, (k,); a large A is solved block by block.
 
     Args:
         A: (n, k) matrix, possibly rank deficient.
@@ -53,9 +53,9 @@ def nonnegative_least_squares(A: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def _blocks(A: FloatArray) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-    """Return rows and columns of the blocks of a matrix, to which other rows and columns have zeros alone.
+    """Return the row and column indices of the diagonal blocks of a matrix.
 
-    A small matrix is one block: taking it apart would take longer than it saves.
+    A small matrix is one block, because splitting would take longer than it saves.
     """
     n, k = A.shape
     if n + k < _LARGE:
@@ -63,7 +63,7 @@ def _blocks(A: FloatArray) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
     filled = A != 0
     columns = np.arange(k)
     while True:
-        # Each row takes the least number of its columns, and each column that of its rows.
+        # Each row takes the least label of its columns, and each column that of its rows.
         rows = np.where(filled, columns, k).min(axis=1, initial=k)
         following = np.minimum(columns, np.where(filled, rows[:, None], k).min(axis=0, initial=k))
         if np.array_equal(following, columns):
@@ -110,7 +110,7 @@ def _nonnegative(A: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def echelon_basis(vectors: FloatArray) -> FloatArray:
-    """Return a basis of the span of vectors with few entries that are not zero, by Gauss-Jordan elimination.
+    """Return a sparse basis of the span of vectors, by Gauss-Jordan elimination.
 
     Args:
         vectors: (k, n) rows, k >= 1, none of them nearly zero.
@@ -124,7 +124,7 @@ def echelon_basis(vectors: FloatArray) -> FloatArray:
         rest = np.abs(rows[done:])
         if rest.max() <= _NEGLIGIBLE:
             break
-        # The first of equally large entries, so that rounding does not choose among them.
+        # The first of equally large entries, so that rounding does not choose.
         i, j = divmod(int(first_largest(rest.ravel())), rows.shape[1])
         rows[[done, done + i]] = rows[[done + i, done]]
         rows[done] /= rows[done, j]

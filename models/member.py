@@ -1,11 +1,10 @@
-"""Members: parts of a limb that resist the platform with a whole space of wrenches, and the projector on that space.
+"""Wrench space of a limb member with locked actuators, and the projector onto it.
 
-With all actuators locked, a member lets the platform move in the span of the screws of its passive joints, and resists
-every other motion with the wrenches reciprocal to these screws. In *scaled coordinates* about the member's centre
-``c``, with a length ``l``, a twist is ``x = (v + w x c, l w)`` and a wrench ``y = (f, (m - c x f)/l)``, so that their
-work rate is the plain product ``y . x``. A member resists a twist with ``r = P x``, where ``P`` projects orthogonally
-on the complement of the passive screws: ``|r|^2`` is the sum of the squared work rates of any orthonormal basis of the
-member's wrenches, and no basis is needed.
+With all actuators locked, a member allows platform motions in the span of its passive joint screws. It resists all
+others with the wrenches reciprocal to these screws. In *scaled coordinates* about the member's centre ``c``, with a
+length ``l``, a twist is ``x = (v + w x c, l w)`` and a wrench ``y = (f, (m - c x f)/l)``; their work rate is ``y . x``.
+With ``P`` the orthogonal projector on the complement of the passive screws, ``|P x|^2`` is the sum of squared work
+rates of any orthonormal basis of the wrenches, so that no basis is needed.
 """
 
 from __future__ import annotations
@@ -23,21 +22,22 @@ from .wrench import WrenchKind
 
 @dataclass(frozen=True, eq=False)
 class Member:
-    """A part of a limb that resists the platform with the wrenches reciprocal to passive screws.
+    """Part of a limb that resists the platform with all wrenches reciprocal to its passive screws.
 
     Attributes:
         limb: name of the limb.
-        centre: (3, 1) its centre in the world frame, length: rotations about it cost only as ``l`` times their rate.
-        screws: (6, n) current screws of its passive joints as twists, the world's origin as reference; those of the
-            spherical joint at the centre are left out of a pinned member.
-        rank: of the screws, for almost all dimensions and poses. In a pinned member, of their velocities of the centre.
-        kinds: kind of each wrench of a basis, for almost all dimensions and poses: ``6 - rank`` of them, or
-            ``3 - rank`` of a pinned member.
-        is_pinned: whether a spherical joint at the centre leaves forces through the centre only.
-        slide: (3, 1) current unit axis along which the centre could as well lie elsewhere, because it is any point of
-            the last passive joint's; None for a centre that the joints or the user determine.
-        name: its name where the limb has several members; empty for the limb's.
-        groups: of dependent screws, one after the other; without any they are taken all at once.
+        centre: (3, 1) centre of the member in the world frame, length; reference point of scaled coordinates.
+        screws: (6, n) current screws of the passive joints as twists about the world origin; without the spherical
+            joint at the centre of a pinned member.
+        rank: rank of the screws, for almost all dimensions and poses; for a pinned member, of their velocities of the
+            centre.
+        kinds: kind of each wrench of a basis, for almost all dimensions and poses: ``6 - rank`` wrenches, or ``3 -
+            rank`` of a pinned member.
+        is_pinned: True if a spherical joint at the centre transmits only forces through the centre.
+        slide: (3, 1) current unit axis of the last passive joint, if the centre is an arbitrary point of it; None for a
+            centre that the joints or the user determine.
+        name: name of the member if the limb has several; empty for the name of the limb.
+        groups: groups of dependent screws, processed one after the other; empty to process all at once.
     """
 
     limb: str
@@ -52,27 +52,27 @@ class Member:
 
     @property
     def label(self) -> str:
-        """Its name; that of the limb where the limb has no other member."""
+        """Name of the member; name of the limb if it has no other member."""
         return self.name or self.limb
 
     @property
     def size(self) -> int:
-        """Number of scaled coordinates: 3 for a pinned member, whose wrenches are forces through its centre, else 6."""
+        """Number of scaled coordinates: 3 for a pinned member (forces through its centre), else 6."""
         return 3 if self.is_pinned else 6
 
     @property
     def kind(self) -> WrenchKind:
-        """Kind of the rows of its projector."""
+        """Kind of the rows of the member's projector."""
         return WrenchKind.FORCE if self.is_pinned else WrenchKind.WRENCH
 
 
 class _Powers(NamedTuple):
-    """The recursion of Faddeev and LeVerrier after as many steps as a matrix has ranks.
+    """Faddeev-LeVerrier recursion after a number of steps equal to the rank.
 
     Attributes:
-        last, before: (m, m) its matrices after the last step, and before it.
+        last, before: (m, m) matrices of the last step and of the step before.
         coefficient: (1, 1) the last coefficient.
-        scale: (1, 1) of ``A A'``, which is divided by it.
+        scale: (1, 1) divisor of ``A A'``.
     """
 
     last: SX
@@ -82,9 +82,9 @@ class _Powers(NamedTuple):
 
 
 def _powers(matrix: SX, rank: int) -> _Powers:
-    """Return the recursion for ``A A'`` of a matrix (m, n) of a rank."""
+    """Return the Faddeev-LeVerrier recursion for ``A A'`` of a matrix (m, n) of given rank."""
     gram = matrix @ matrix.T
-    scale = ca.trace(gram)  # a multiple of the identity's size keeps the coefficients of order 1
+    scale = ca.trace(gram)  # the trace keeps the coefficients of order 1
     gram = gram / scale
     size = gram.shape[0]
     last, before, coefficient = SX.eye(size), SX.eye(size), SX(1)
@@ -98,9 +98,9 @@ def _powers(matrix: SX, rank: int) -> _Powers:
 def pseudo_inverse(matrix: SX, rank: int) -> SX:
     """Return the pseudo-inverse (n, m) of a matrix (m, n) whose rank does not change.
 
-    It is Decell's formula ``A^+ = -A' N_(r-1)/c_r`` with the recursion of Faddeev and LeVerrier for ``A A'`` (H. P.
-    Decell, "An application of the Cayley-Hamilton theorem to generalized matrix inversion", SIAM Review 7 (1965) 526).
-    One step ``X (2 I - A X)`` of Newton's method squares its relative error, which one row does not have.
+    Decell's formula ``A^+ = -A' N_(r-1)/c_r`` with the Faddeev-LeVerrier recursion for ``A A'`` (H. P. Decell, "An
+    application of the Cayley-Hamilton theorem to generalized matrix inversion", SIAM Review 7 (1965) 526). One step ``X
+    (2 I - A X)`` of Newton's method squares the relative error; a single row needs none.
     """
     if rank == 0:
         return SX(matrix.shape[1], matrix.shape[0])
@@ -113,10 +113,10 @@ def scaled_twists(twists: SX, centre: SX, length: SX, size: int) -> SX:
     """Return twists in scaled coordinates about a centre, (size, n).
 
     Args:
-        twists: (6, n) angular velocity, then velocity at the world's origin.
-        centre: (3, 1) length.
+        twists: (6, n) angular velocity, then velocity at the world origin.
+        centre: (3, 1) reference point, length.
         length: (1, 1) characteristic length.
-        size: 6, or 3 for the velocity of the centre alone.
+        size: 6, or 3 for only the velocity of the centre.
     """
     columns = []
     for k in range(twists.shape[1]):
@@ -127,21 +127,21 @@ def scaled_twists(twists: SX, centre: SX, length: SX, size: int) -> SX:
 
 
 def resisted_parts(columns: SX, rank: int, vectors: SX, groups: Sequence[ColumnGroup] = ()) -> SX:
-    """Return the parts (size, k) of vectors (size, k) that are orthogonal to the span of columns (size, n).
+    """Return the components (size, k) of vectors (size, k) orthogonal to the span of columns (size, n).
 
-    Independent columns are made orthogonal one after the other without square roots, and their parts subtracted from
-    the vectors themselves: the difference of two squares would lose a small result. Dependent columns have the
-    projector ``P = N_r / c_r`` of Faddeev and LeVerrier's recursion for ``M = sum a a'``, which chooses no columns:
-    ``N_0 = I``, ``c_k = -tr(M N_(k-1))/k``, ``N_k = M N_(k-1) + c_k I``. It is exact for every rank that does not
-    change, but its relative error is up to that of rounding over ``c_r``, the product of the squared singular values in
-    parts of the largest one. So groups whose ranks add up are made orthogonal one after the other too.
+    Independent columns are orthogonalised one by one without square roots, and their components subtracted from the
+    vectors: a difference of squares would lose small results. Dependent columns use the projector ``P = N_r / c_r`` of
+    the Faddeev-LeVerrier recursion for ``M = sum a a'``, which selects no columns: ``N_0 = I``, ``c_k = -tr(M
+    N_(k-1))/k``, ``N_k = M N_(k-1) + c_k I``. It is exact for constant rank, but its relative error is up to that of
+    rounding over ``c_r``, the product of the squared relative singular values. Groups with ranks that add up are
+    therefore orthogonalised one after the other.
 
     Args:
         columns: (size, n) spanning vectors.
-        rank: of the columns.
-        vectors: (size, k).
-        groups: of the columns, with ranks that add up to that of all; if left out, independent columns are taken one by
-            one, and dependent ones all at once.
+        rank: rank of the columns.
+        vectors: (size, k) vectors.
+        groups: groups of columns with ranks that add up to the total rank; if empty, independent columns are processed
+            one by one, dependent columns all at once.
     """
     n, k = columns.shape[1], vectors.shape[1]
     if not groups:
@@ -150,7 +150,7 @@ def resisted_parts(columns: SX, rank: int, vectors: SX, groups: Sequence[ColumnG
     for group in groups:
         own = parts[:, [k + j for j in group.columns]]
         if not group.rank:
-            # The columns are 0, but where loops from which they follow lose their rank: there the parts have no value.
+            # The columns vanish, except where their loops lose rank; there the components have no value.
             parts -= own @ (own.T @ parts)
         elif len(group.columns) == 1:
             square = ca.sumsqr(own)
@@ -162,12 +162,12 @@ def resisted_parts(columns: SX, rank: int, vectors: SX, groups: Sequence[ColumnG
 
 
 def resistance(member: Member, twists: SX, length: SX) -> SX:
-    """Return ``P x``, (size, n), of a member for twists (6, n)."""
+    """Return the components ``P x``, (size, n), of twists (6, n) that a member resists."""
     if member.is_pinned:
         velocities = (scaled_twists(each, member.centre, length, member.size) for each in (member.screws, twists))
         return resisted_parts(next(velocities), member.rank, next(velocities), member.groups)
-    # In parts of the length, axes of rotations have the same components in every unit of length, and cancel alike. The
-    # size of a translation means nothing for the span.
+    # Divided by the length, rotation axes have the same components in every unit of length. The magnitude of a
+    # translation has no effect on the span.
     columns = [
         ca.vertcat(column[:3] if column[3:].is_zero() else column[:3] / length, column[3:])
         for column in ca.horzsplit(scaled_twists(member.screws, member.centre, SX(1), member.size))

@@ -1,8 +1,8 @@
 """The :class:`Model` that a robot function returns, frozen and checked once.
 
-A model is symbolic throughout. It gives the unit wrenches that the robot's limbs apply to the platform as expressions
-of its parameters, of the pose and, for robots given joint by joint, of internal unknowns that closure equations
-determine. A model contains no values, bounds of variables, tasks or solvers; these come from a case.
+A model is symbolic: it gives the unit wrenches of the limbs as expressions of the parameters, the pose and, for robots
+given joint by joint, the unknowns that the closure equations determine. Values, bounds, tasks and solvers come from a
+case.
 """
 
 from __future__ import annotations
@@ -40,40 +40,39 @@ from .wrench import RowLabel, Wrench, WrenchKind
 
 
 class ModelError(ValueError):
-    """Error in a robot function: its model contradicts itself. The message names the robot and the fault."""
+    """Error of an inconsistent model. The message names the robot and the fault."""
 
 
 @dataclass(frozen=True, eq=False)
 class Model(Whole, Shown):
-    """A parallel robot as symbols and expressions.
+    """Parallel robot as symbols and expressions.
 
     Attributes:
-        name: the name in case files.
+        name: name of the robot in case files.
         description: one sentence for people.
-        options: the options with which the robot function was called.
-        legs: the legs between joint centres, for limits on joints, plates and clearances; empty for other limbs.
-        built: the rows with the legs' errors added to the joint centres, for manufacturing tolerances; empty for a
-            robot that does not give them.
+        options: options of the robot function for this model.
+        legs: legs between joint centres, for limits on joints, plates and clearances; empty for other limbs.
+        built: rows with joint-centre errors of the legs, for manufacturing tolerances; empty for a robot without them.
         parameters: dimensions that a case fixes or frees.
-        pose: symbols of the platform's pose.
-        home: (3,) a sensible platform position for the typical values of the parameters, length.
-        wrenches: the rows of the Jacobian, any number of them.
-        members: parts of limbs that resist with a whole space of wrenches; their rows follow those of ``wrenches``.
+        pose: symbols of the pose.
+        home: (3,) platform position for a starter case with the typical parameters, length.
+        wrenches: rows of single wrenches, any number of them.
+        members: limb members, which resist with a space of wrenches; their rows follow those of ``wrenches``.
         quantities: named quantities for results and limits.
-        scene: the drawing.
-        unknowns: internal unknowns; empty for robots whose rows follow from parameters and pose.
-        closure: the independent equations that determine the unknowns, but for free positions of driven joints.
-        loops: all equations of closed loops, which hold where the robot is assembled; empty for the closure alone.
-        signs: of home's assembly of its joints, where these are known.
-        distances: equations that follow from those of the loops, and help a search of a whole box.
-        actuators: the actuated joints of a robot given joint by joint; empty for one given by its rows.
-        joint_screws: screws of the joints of its limbs, where they are known.
-        joints: the joints of its limbs, as limits read them.
-        links: the links of its limbs as segments.
-        remarks: sentences for the user on what may be a mistake in a robot that is given joint by joint.
-        generic: its ranks at almost all dimensions and poses; None for a robot given by its rows.
-        structure: the structure of each path of joints; empty for a robot given by its rows.
-        length_unit: unit of the parameters' typical lengths, such as ``m``; empty for proportions in any unit.
+        scene: drawing of the robot.
+        unknowns: unknowns of the closure equations; empty for robots with rows that follow from parameters and pose.
+        closure: independent equations that determine the unknowns, given the free actuator coordinates.
+        loops: all loop equations; empty if they are those of ``closure``.
+        signs: expressions that are positive in the home assembly mode, where they are known.
+        distances: equations that follow from the loop equations and speed up searches over boxes.
+        actuators: actuated joints of a robot given joint by joint; empty for a robot given by its rows.
+        joint_screws: screws of the limbs' joints, where they are known.
+        joints: joints of the limbs, for limits.
+        links: links of the limbs, as segments.
+        remarks: sentences for the user on possible mistakes in a robot given joint by joint.
+        generic: ranks at almost all dimensions and poses; None for a robot given by its rows.
+        structure: structure of each path of joints; empty for a robot given by its rows.
+        length_unit: unit of the typical lengths, such as ``m``; empty for proportions in any unit.
         size: (1, 1) characteristic size of the robot, length; None for the norm of the parameters that are lengths.
 
     Raises:
@@ -155,17 +154,17 @@ class Model(Whole, Shown):
 
     @property
     def rank(self) -> int:
-        """Rank of J at almost all dimensions and poses: below six, the structure is singular at all of them."""
+        """Rank of J at almost all dimensions and poses; below six, all poses are singular."""
         return min(len(self.rows), 6) if self.generic is None else self.generic.jacobian
 
     @property
     def free_joints(self) -> tuple[str, ...]:
-        """Labels of the driven joints whose positions the pose does not determine."""
+        """Labels of the actuated joints with free actuator coordinates."""
         return tuple(each.joint for each in self.unknowns if each.is_free)
 
     @property
     def has_couples(self) -> bool:
-        """Whether a row has a couple that counts, so that F depends on a characteristic length."""
+        """True if F depends on the characteristic length, because a row has a couple that does work."""
         return any(row.kind is not WrenchKind.FORCE for row in self.rows)
 
 
@@ -175,9 +174,9 @@ def _model_error(model: Model, fault: str) -> ModelError:
 
 
 def _check_names(model: Model) -> None:
-    """Refuse a model without wrenches, names that appear twice and unknowns without finite bounds."""
+    """Refuse a model without wrenches, repeated names and unknowns without finite bounds."""
     if not (model.wrenches or model.members):
-        raise _model_error(model, "it has no wrenches, so it has no Jacobian")
+        raise _model_error(model, "it has no wrenches, so there is no Jacobian")
     names = [name for parameter in model.parameters for name in parameter.components]
     names += [unknown.name for unknown in model.unknowns] + [equation.name for equation in model.closure]
     names += [quantity.name for quantity in model.quantities]
@@ -238,15 +237,15 @@ def _check_shapes(model: Model) -> None:
 
 
 def _check_symbols(model: Model) -> None:
-    """Refuse expressions in place of symbols, symbols with two meanings and symbols that are not declared."""
+    """Refuse expressions in place of symbols, symbols with two meanings and undeclared symbols."""
     declared = [parameter.symbol for parameter in model.parameters] + [unknown.symbol for unknown in model.unknowns]
     declared += [model.pose.rotation, model.pose.position]
     for symbol in declared:
         if not symbol.is_valid_input():
-            raise _model_error(model, f"{symbol} is an expression where a symbol must stand")
+            raise _model_error(model, f"{symbol} is an expression; a symbol is required")
     scalars = ca.vertcat(*[ca.vec(symbol) for symbol in declared])
     if len({scalars[i].element_hash() for i in range(scalars.numel())}) < scalars.numel():
-        raise _model_error(model, "a symbol stands for two things")
+        raise _model_error(model, "a symbol is used for two parameters or unknowns")
     others = [getattr(model, each.name) for each in fields(model) if each.name not in ("legs", "built")]
     used = expressions_of((*others, *((leg.base, leg.platform) for leg in model.legs)))
     known = {scalars[i].element_hash() for i in range(scalars.numel())}
@@ -262,8 +261,8 @@ def _check_references(model: Model) -> None:
     """Refuse legs, built rows and drawings that do not match the rows of the model."""
     for leg in model.legs:
         if leg.name not in model.limbs:
-            raise _model_error(model, f"leg {leg.name!r} is no limb: it has no wrench")
-    # Where the legs are the actuators, the rows of forces are theirs, one by one.
+            raise _model_error(model, f"leg {leg.name!r} is not a limb: it has no wrench")
+    # Where the legs are the actuators, the force rows are those of the legs, in order.
     names = [leg.name for leg in model.legs]
     forces = [row.limb for row in model.wrenches if row.kind is WrenchKind.FORCE and row.limb in names]
     if not model.actuators and forces != names:
@@ -271,6 +270,6 @@ def _check_references(model: Model) -> None:
     if model.built and [(row.limb, row.kind) for row in model.built] != [
         (row.limb, row.kind) for row in model.wrenches
     ]:
-        raise _model_error(model, "the rows of the built machine are not those of the designed one")
+        raise _model_error(model, "the rows with joint-centre errors do not match the rows without")
     for fault in model.scene.faults(model.limbs, [parameter.name for parameter in model.parameters]):
         raise _model_error(model, fault)

@@ -1,7 +1,7 @@
-"""Newton's method with least-norm steps, for equations in a vector of numbers or in a point of any other kind.
+"""Newton's method with least-norm steps, for vectors and for points of any other set.
 
-All equations of one point are solved here: closed loops, conditions of stationarity, joints in line with each other.
-Loops of many poses at once are closed by ``Loops.all_closed`` of :mod:`screwsynth.nlp`, in the home assembly mode.
+All equations of single points are solved here: closed loops, stationarity conditions, aligned joints.
+``Loops.all_closed`` of :mod:`screwsynth.nlp` closes the loops of many poses at once, in the home assembly mode.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ P = TypeVar("P")
 
 
 class Linear(NamedTuple):
-    """Equations at a point, to first order.
+    """Linearised equations at a point.
 
     Attributes:
-        residual: (m,) left sides, which are zero where the equations hold.
-        slopes: (m, n) their derivatives by the coordinates of a step.
-        damping: added to the squares of the singular values: 0 for a full step.
+        residual: (m,) left sides, zero at a solution.
+        slopes: (m, n) derivatives of the left sides with respect to the coordinates of a step.
+        damping: term added to the squared singular values: 0 for a full step.
     """
 
     residual: FloatArray
@@ -35,10 +35,10 @@ class Linear(NamedTuple):
 
 
 class Equations(Protocol[P]):
-    """Equations, and the set in which their point moves: it need not be a space of vectors."""
+    """Equations, and the set in which the point moves, not necessarily a vector space."""
 
     def linear(self, at: P) -> Linear | None:
-        """Return the equations at a point to first order; None where the search ends, as where they hold."""
+        """Return the linearised equations at a point; None to end the iteration, as at a solution."""
 
     def moved(self, at: P, step: FloatArray) -> P | None:
         """Return the point after a step (n,); None to refuse the step."""
@@ -52,16 +52,16 @@ def newton(
     zeros: Sequence[float | None] = (None,),
     parts: Sequence[float] = (1.0,),
 ) -> P:
-    """Return the point at which Newton's method with least-norm steps ends.
+    """Return the last point of Newton's method with least-norm steps.
 
-    That is where the equations end the search, where they refuse each trial of a step, or after a number of steps.
+    The iteration ends where ``linear`` returns None, where every trial of a step is refused, or after ``steps`` steps.
 
     Args:
         equations: equations of the point.
         at: first point.
         steps: largest number of steps.
-        zeros: parts of the largest singular value below which others are zero, one for each trial; None for rounding.
-        parts: parts of the step, one for each further trial with the same singular values.
+        zeros: relative sizes below which singular values count as zero, one for each trial; None for rounding.
+        parts: fractions of the step, one for each further trial with the same singular values.
     """
     for _ in range(steps):
         linear = equations.linear(at)
@@ -77,12 +77,12 @@ def newton(
 
 
 class Point(NamedTuple):
-    """A vector of numbers, with equations there.
+    """Vector with the values of equations.
 
     Attributes:
-        z: (n,) the numbers.
+        z: (n,) vector.
         residual: (m,) left sides of the equations.
-        slopes: (m, n or more) their derivatives.
+        slopes: (m, n or more) derivatives of the left sides.
     """
 
     z: FloatArray
@@ -91,19 +91,19 @@ class Point(NamedTuple):
 
     @property
     def error(self) -> float:
-        """Size of the largest left side; infinite where one, or a derivative, is no finite number."""
+        """Largest absolute left side; infinite if it or a derivative is not finite."""
         is_defined = np.isfinite(self.residual).all() and np.isfinite(self.slopes).all()
         return float(np.abs(self.residual).max(initial=0.0)) if is_defined else float("inf")
 
 
 class VectorEquations:
-    """Equations in a vector, of which some numbers move, by full steps that are shortest in parts of their sizes.
+    """Equations in a vector with some fixed components, solved by full steps that are shortest in scaled components.
 
     Args:
         values: function of a vector (n,), which returns left sides (m,) or (m, 1), and derivatives (m, n or more).
-        closed: largest left side where the equations hold.
-        moving: indices of the numbers that move; all if left out.
-        size: size of each number that moves; 1 if left out.
+        closed: largest left side at a solution.
+        moving: indices of the variable components; all by default.
+        size: scale of each variable component; 1 by default.
     """
 
     def __init__(
@@ -116,12 +116,12 @@ class VectorEquations:
         self._values, self._closed, self._moving, self._size = values, closed, moving, size
 
     def at(self, z: FloatArray) -> Point:
-        """Return a vector (n,) with the equations there."""
+        """Return a vector (n,) with the values of the equations."""
         residual, slopes = self._values(z)
         return Point(z, residual.ravel(), slopes)
 
     def linear(self, at: Point) -> Linear | None:
-        """Return the equations to first order; None where they hold or are not defined."""
+        """Return the linearised equations; None at a solution, or where they are not defined."""
         if not self._closed < at.error < np.inf:
             return None
         return Linear(at.residual, at.slopes[:, : len(at.z)][:, self._moving] * self._size)

@@ -1,4 +1,4 @@
-"""The parts of a model: parameters, unknowns, closure equations, the pose, quantities and legs."""
+"""Parts of a model: parameters, unknowns, closure equations, pose, quantities and legs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _AXES = ("x", "y", "z")
 
 
 class Dimension(enum.Enum):
-    """Physical dimension of a number, which decides its unit in a case."""
+    """Physical dimension of a quantity, which determines its unit in a case."""
 
     LENGTH = "length"
     ANGLE = "angle"
@@ -30,31 +30,31 @@ class Dimension(enum.Enum):
 
 
 def component_names(name: str, size: int) -> tuple[str, ...]:
-    """Return the names of a quantity's scalars: its own name for one scalar, ``name_x, name_y, name_z`` for a vector.
+    """Return the names of a quantity's components: ``name`` for a scalar, ``name_x, name_y, name_z`` for a vector.
 
     Args:
         name: name of the quantity.
-        size: number of its scalars, 1 to 3.
+        size: number of components, 1 to 3.
     """
     return (name,) if size == 1 else tuple(f"{name}_{axis}" for axis in _AXES[:size])
 
 
 @dataclass(frozen=True, eq=False)
 class Parameter:
-    """A dimension of the robot that a case fixes or frees.
+    """Dimension of the robot that a case fixes or frees.
 
     Attributes:
-        name: the name in case files.
+        name: name of the parameter in case files.
         symbol: (1, 1) or (3, 1) CasADi symbol.
-        dimension: length, angle (radians) or plain number.
+        dimension: length, angle (radians) or dimensionless number.
         description: a few words for people.
-        typical: a sensible value of each component for a starter case, in some length unit and radians.
-        lower: least value with which the robot exists.
-        upper: largest such value.
-        is_direction: whether the parameter is a unit vector. A fixed one is normalised; a free one has its unit length
-            as an equation of the program.
-        starter: value of each component in a starter case, where the robot is singular at its typical values; None for
-            the typical value.
+        typical: value of each component in a starter case, in some length unit and radians.
+        lower: smallest value for which the robot exists.
+        upper: largest value for which the robot exists.
+        is_direction: True for a unit vector. A fixed unit vector is normalised; for a free one, unit length is an
+            equation of the program.
+        starter: value of each component in a starter case, if the robot is singular at its typical values; None for
+            ``typical``.
     """
 
     name: str
@@ -69,27 +69,28 @@ class Parameter:
 
     @property
     def components(self) -> tuple[str, ...]:
-        """Name of each scalar."""
+        """Name of each component."""
         return component_names(self.name, self.symbol.numel())
 
 
 @dataclass(frozen=True, eq=False)
 class Unknown:
-    """An internal unknown, such as a passive joint's position, that the closure equations determine.
+    """Unknown that the closure equations determine, such as a passive joint coordinate.
 
-    A robot with more actuators than its platform has degrees of freedom has driven joints that the pose does not
-    determine. As many of their positions as are independent are *free*: the closure equations determine the other
-    unknowns from the parameters, the pose and these positions.
+    A robot with more actuators than degrees of freedom has free actuator coordinates, which the pose does not
+    determine. The closure equations determine the other unknowns from the parameters, the pose and a set of independent
+    free coordinates.
 
     Attributes:
-        name: unique within the model.
+        name: unique name within the model.
         symbol: (1, 1) CasADi symbol.
-        dimension: length, angle (radians) or plain number.
+        dimension: length, angle (radians) or dimensionless number.
         description: a few words for people.
-        lower: finite bound from which on the program searches the assembly, in parts of ``size``.
-        upper: finite bound up to which it does.
-        size: (1, 1) expression of the parameters of the order of the unknown: 1, or a length of the robot's.
-        joint: label, such as ``2:3``, of the driven joint whose free position it is; empty for a determined unknown.
+        lower: finite lower bound of the search for assembly modes, in parts of ``size``.
+        upper: finite upper bound of this search, in parts of ``size``.
+        size: (1, 1) order of magnitude of the unknown as an expression of the parameters: 1, or a length of the robot.
+        joint: label, such as ``2:3``, of the actuated joint, for a free actuator coordinate; empty for a determined
+            unknown.
     """
 
     name: str
@@ -103,21 +104,21 @@ class Unknown:
 
     @property
     def is_free(self) -> bool:
-        """Whether the pose and the closure equations leave it free."""
+        """True for a free actuator coordinate."""
         return bool(self.joint)
 
 
 @dataclass(frozen=True, eq=False)
 class Closure:
-    """An equation of the robot's closed loops: ``expression == 0``.
+    """Loop equation ``expression == 0``.
 
-    A program divides the equation by its size at one point of the case: divided by the expression itself, the equation
-    and its derivatives would be longer.
+    A program divides the equation by the value of ``size`` at one point of the case: dividing by the expression would
+    lengthen the equation and its derivatives.
 
     Attributes:
-        name: unique within the model.
+        name: unique name within the model.
         expression: (1, 1) left side of the equation.
-        size: (1, 1) positive expression of the parameters, by which the equation becomes a number of order 1.
+        size: (1, 1) positive expression of the parameters that scales the equation to order 1.
     """
 
     name: str
@@ -126,19 +127,19 @@ class Closure:
 
     @property
     def scaled(self) -> SX:
-        """Left side of the equation (1, 1), of order 1."""
+        """Left side of the equation (1, 1), scaled to order 1."""
         return self.expression / self.size
 
 
 @dataclass(frozen=True, eq=False)
 class AssemblySign:
-    """A number that is positive in home's assembly of a robot's joints, where the loops are closed.
+    """Expression that is positive in the home assembly mode, where the loops are closed.
 
     Attributes:
-        name: unique within the model.
+        name: unique name within the model.
         limb: name of the limb.
-        value: (1, 1) expression; its size has no meaning.
-        is_mode: whether the joints hold together where it is negative too, in another working mode than home's.
+        value: (1, 1) expression; only its sign has a meaning.
+        is_mode: True if a negative value is another working mode; False if it is no assembly.
     """
 
     name: str
@@ -162,13 +163,13 @@ class PoseSymbols:
 
 @dataclass(frozen=True, eq=False)
 class Quantity:
-    """A named quantity of the robot, one number for each limb or joint, that a case may limit.
+    """Named quantity of the robot, one value for each limb or joint, that a case may limit.
 
     Attributes:
-        name: the name in results and limits, such as ``leg_length``.
-        owners: name of the limb or joint to which each number belongs, in order.
+        name: name in results and limits, such as ``leg_length``.
+        owners: name of the limb or joint of each value, in order.
         values: (n, 1) expressions.
-        dimension: length, angle (radians) or plain number.
+        dimension: length, angle (radians) or dimensionless number.
         description: a few words for people.
     """
 
@@ -181,17 +182,16 @@ class Quantity:
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """A straight leg between two passive joints, driven along its own axis; a limb is any chain to the platform.
+    """Straight leg between two passive joints, actuated along its line.
 
     Attributes:
-        name: name of the limb that the leg is.
-        base: (3, 1) centre of its base joint in the world frame, length.
-        platform: (3, 1) centre of its platform joint in the platform frame, length.
-        base_error: (3, 1) symbols of the error of the joint centre on the base in the machine as it is built, in the
-            frame of that centre, length.
-        platform_error: (3, 1) those of the centre on the platform.
-        centres: names of both centres in a :class:`~.displaced.DisplacedRobot`: labels of joints of a limb given joint
-            by joint; empty for the name of the leg and its plate.
+        name: name of the limb.
+        base: (3, 1) centre of the leg's base joint in the world frame, length.
+        platform: (3, 1) centre of the leg's platform joint in the platform frame, length.
+        base_error: (3, 1) symbols of the joint-centre error on the base, in the frame of that centre, length.
+        platform_error: (3, 1) symbols of the joint-centre error on the platform, in the frame of that centre, length.
+        centres: names of both joint centres in a :class:`~.displaced.DisplacedRobot`: labels of joints of a limb given
+            joint by joint; empty for the name of the leg and its plate.
     """
 
     name: str
@@ -209,24 +209,25 @@ class Leg:
 
     @property
     def built(self) -> Leg:
-        """The leg between joint centres with their errors."""
+        """Leg with joint-centre errors."""
         return Leg(self.name, self.base + self.base_error, self.platform + self.platform_error)
 
 
 @dataclass(frozen=True, eq=False)
 class Actuator:
-    """An actuated joint of a limb given joint by joint.
+    """Actuated joint of a limb given joint by joint.
 
     Attributes:
-        name: unique within the model.
-        limb: name of the limb that it is part of.
-        members: labels of the members that it moves.
-        screws: (6, k) the platform's twist for its unit rate, as each of these members demands it while the other
-            actuators stand still, up to the twists that the member allows; the world's origin is the reference.
-        dimension: length for a slide or a parallelogram, angle for a rotation.
-        relations: (r, 1) its factors in the equations that loops demand of the actuators' rates alone: all actuators of
-            a robot have as many. There are none but where more actuators drive nested loops than these have freedoms.
-        joint: label of its joint, such as ``2:3``.
+        name: unique name within the model.
+        limb: name of the limb with the joint.
+        members: labels of the members that the actuator moves.
+        screws: (6, k) platform twist about the world origin for a unit rate of this actuator while the others stand
+            still, one column for each member, up to the twists that the member allows.
+        dimension: length for a prismatic joint or a parallelogram, angle for a revolute joint.
+        relations: (r, 1) coefficients of the actuator in the equations of the actuator rates only, which loops impose:
+            the same number for all actuators of a robot; none unless nested loops have more actuators than degrees of
+            freedom.
+        joint: label of the joint, such as ``2:3``.
     """
 
     name: str
@@ -238,33 +239,33 @@ class Actuator:
     joint: str = ""
 
     def screw_in(self, member: str) -> SX | None:
-        """Return its screw (6, 1) as a member demands it, by the member's label; None where it does not move it."""
+        """Return the actuator's screw (6, 1) for a member, by its label; None if the member does not move."""
         return self.screws[:, self.members.index(member)] if member in self.members else None
 
 
 def rate_relations(actuators: Sequence[Actuator]) -> SX:
-    """Return the factors (r, a) of the actuators' rates in the equations that loops demand of these alone."""
+    """Return the coefficients (r, a) of the equations of the actuator rates only, which loops impose."""
     return ca.horzcat(*[each.relations for each in actuators]) if actuators else SX(0, 0)
 
 
 @dataclass(frozen=True, eq=False)
 class JointScrews:
-    """Current screws of a limb's joints, whose ranks tell a limb's singularities.
+    """Current screws of a limb's joints, whose ranks show singularities of the limb.
 
-    Nested loops leave no joint a screw of its own. The columns of one of their members are motions of the platform by
-    rates of joints along a tree of links, of which its loops allow those with ``L q = 0``.
+    With nested loops, the columns are platform motions for unit joint rates along a spanning tree of links; the loops
+    allow the rates with ``L q = 0``.
 
     Attributes:
         limb: name of the limb.
         joints: label of the joint of each column, such as ``2:3``.
-        all: (6, k) screws of all its joints from base to platform as twists, the world's origin as reference.
+        all: (6, k) screws of all joints from base to platform, as twists about the world origin.
         driven: indices of the columns of actuated joints.
-        passive_rank: rank of the motions by passive joints, at almost all dimensions and poses.
-        all_rank: rank of the motions by all joints there.
+        passive_rank: rank of the platform motions by passive joints, at almost all dimensions and poses.
+        all_rank: rank of the platform motions by all joints, at almost all dimensions and poses.
         member: name of the member of nested loops; empty for a path of joints.
-        loops: (m, k) ``L`` of nested loops, without a unit for rates of order 1.
-        loop_rank: of the columns of passive joints in ``L``, at almost all dimensions and poses.
-        centre: (3, 1) of the member, length.
+        loops: (m, k) matrix ``L`` of nested loops, dimensionless for rates of order 1.
+        loop_rank: rank of the passive columns of ``L``, at almost all dimensions and poses.
+        centre: (3, 1) centre of the member, length.
     """
 
     limb: str
@@ -280,7 +281,7 @@ class JointScrews:
 
     @property
     def is_nested(self) -> bool:
-        """Whether the columns are motions along a tree of links with nested loops."""
+        """True if the columns are motions along a spanning tree of links with nested loops."""
         return bool(self.member)
 
     @property
@@ -290,11 +291,12 @@ class JointScrews:
 
 
 class PlatformMotions(NamedTuple):
-    """Motions that a platform can make at a configuration.
+    """Motions of the platform at a configuration.
 
     Attributes:
-        rotation: (3, 3) platform to world coordinates.
-        twists: (6, f) basis of them: angular velocity, then velocity of the platform's origin, in the world frame.
+        rotation: (3, 3) rotation from platform to world coordinates.
+        twists: (6, f) basis of the motions: angular velocity, then velocity of the platform's origin, in the world
+            frame.
     """
 
     rotation: FloatArray
@@ -307,12 +309,11 @@ class GenericRanks:
 
     Attributes:
         jacobian: rank of all rows.
-        constraints: rank of the wrenches that do no work in the actuated joints: the platform has six freedoms less
-            this rank.
-        idle: dimension of the actuators' rates with which the platform does not move.
-        undetermined: names of the actuators that have such a rate.
-        motions: of the platform at some of these configurations; empty where it has six freedoms.
-        is_shared: whether limbs share all constraints, so that statics does not determine those of any limb.
+        constraints: rank of the constraint wrenches; the platform has six degrees of freedom less this rank.
+        idle: dimension of the space of actuator rates with which the platform does not move.
+        undetermined: names of the actuators with undetermined rates.
+        motions: motions of the platform at some of these configurations; empty for six degrees of freedom.
+        is_shared: True if limbs share all constraints, so that statics determines those of no limb.
     """
 
     jacobian: int
@@ -325,20 +326,20 @@ class GenericRanks:
 
 @dataclass(frozen=True)
 class PathStructure:
-    """Structure of a path of joints from base to platform, for almost all dimensions and poses.
+    """Structure of a path of joints from base to platform, at almost all dimensions and poses.
 
     Attributes:
         limb: name of the limb.
-        name: of the path: that of the limb, with the number of the branch where there are several.
-        joints: letters of its joints from base to platform, an actuated one with a star.
-        opened: the place at which its loop is opened, in words.
-        wrenches: dimension of the wrenches with which it resists the platform, actuators locked: of ``W``.
-        constraints: dimension of those that do no work in its actuated joints: of ``C``.
-        unknowns: number of its joint variables that are unknowns and that no path before it has.
-        equations: number of its loop equations.
-        kept: number of those that do not follow from others.
-        nested: names of its joints where it is no path of a limb, but has nested loops, coupled joints, or a passive
-            joint before branches; else empty.
+        name: name of the path: that of the limb, with the number of the branch if there are several.
+        joints: letters of the joints from base to platform, with a star for an actuated joint.
+        opened: place at which the loop is opened, in words.
+        wrenches: dimension of the space ``W`` of the path's wrenches on the platform with locked actuators.
+        constraints: dimension of the space ``C`` of constraint wrenches, which do no work in actuated joints.
+        unknowns: number of joint coordinates that are unknowns and belong to no earlier path.
+        equations: number of loop equations of the path.
+        kept: number of loop equations that do not follow from others.
+        nested: names of the joints, for nested loops, coupled joints or a passive joint before branches; empty for a
+            path of a limb.
     """
 
     limb: str

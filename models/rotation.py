@@ -1,9 +1,9 @@
-"""Rotation matrices: symbolic, from three sets of coordinates; numeric, back to axis and angle.
+"""Rotation matrices: symbolic from three sets of coordinates, and numeric to axis and angle.
 
-Choice of coordinates: the vector part ``q`` of a unit quaternion is smooth without trigonometry for every angle below
-180 degrees, and turns a limit on the angle into one ball, ``|q|^2 <= sin^2(angle_max / 2)``. The Cayley vector
-``tan(angle / 2) n`` is smooth on the same set and unbounded. Axis and angle (equation 9) serve where the axis is held
-fixed: as variables together they are redundant, and singular at zero angle.
+The vector part ``q`` of a unit quaternion is smooth without trigonometric functions for every angle below 180 degrees,
+and turns a limit on the angle into a ball, ``|q|^2 <= sin^2(angle_max / 2)``. The Cayley vector ``tan(angle / 2) n`` is
+smooth on the same set and unbounded. Axis and angle (equation 9) are for a fixed axis: as variables together they are
+redundant, and singular at zero angle.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def matrix_from_cayley(c: SX) -> SX:
 
 
 def turn_about(about: int, cosine: SX, sine: SX, scale: SX | float = 1.0) -> SX:
-    """Return the rotation matrix (3, 3) about a coordinate axis times a scale, by which its cosine and sine are too."""
+    """Return the rotation matrix (3, 3) about a coordinate axis, times a scale; cosine and sine include the scale."""
     i, j = (about + 1) % 3, (about + 2) % 3
     matrix = SX.eye(3) * scale
     matrix[i, i] = matrix[j, j] = cosine
@@ -69,7 +69,7 @@ def matrix_from_axis_angle(axis: SX, angle: SX) -> SX:
 
 
 class AxisAngle(NamedTuple):
-    """A rotation: unit axis (3,), and angle in radians."""
+    """Rotation by unit axis (3,) and angle, radians."""
 
     axis: FloatArray
     angle: float

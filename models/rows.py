@@ -1,4 +1,4 @@
-"""Ranks: independent rows of a matrix that varies, and groups of columns with independent spans."""
+"""Ranks of matrices that vary: independent rows, and groups of columns with independent spans."""
 
 from __future__ import annotations
 
@@ -12,13 +12,12 @@ from .arrays import FloatArray
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Rows that are left with less than this part of the longest depend on the others: rounding leaves 1e-14.
+#: Relative length below which the remainder of a row is zero, so that the row is dependent: rounding leaves 1e-14.
 DEPENDENT = 1e-8
-#: Singular values below this part of those of unit size are zero: a closed loop is known to the root of rounding at
-#: worst.
+#: Relative size below which singular values are zero: at worst, a closed loop is known to the root of rounding.
 RANK_TOLERANCE = 1e-7
-#: Products of unit vectors that differ by less than this are the same, and columns depend on each other by more: those
-#: that are independent, with singular values above ``RANK_TOLERANCE``, do so by 1e-16 over the smallest one at most.
+#: Tolerance on products of unit vectors, and on the dependence of columns. Independent columns, with singular values
+#: above ``RANK_TOLERANCE``, depend by at most 1e-16 over the smallest one.
 _SAME = 1e-9
 
 
@@ -30,7 +29,7 @@ class ColumnGroup(NamedTuple):
 
 
 def rank_of(values: NDArray[np.floating[Any]], scale: float | None = None) -> int:
-    """Return the number of singular values that are not zero, measured by the largest one or by a given scale."""
+    """Return the number of nonzero singular values, relative to the largest or to a given scale."""
     reference = float(values.max(initial=0.0)) if scale is None else scale
     return int(np.count_nonzero(values > RANK_TOLERANCE * reference))
 
@@ -38,11 +37,11 @@ def rank_of(values: NDArray[np.floating[Any]], scale: float | None = None) -> in
 def independent_rows(jacobians: Sequence[FloatArray]) -> tuple[int, ...]:
     """Return the indices of independent rows, in order.
 
-    Each matrix gives a set, by pivoted orthogonalisation. Of the largest sets it is the one whose smallest singular
-    value over all matrices is largest.
+    Each matrix gives a set, by pivoted orthogonalisation. Of the largest sets, the set with the largest smallest
+    singular value over all matrices is returned.
 
     Args:
-        jacobians: (c, n) each: the same rows at different points, one or more.
+        jacobians: (c, n) each, at least one: the same rows at different points.
     """
     sets = {tuple(sorted(_pivoted(each))) for each in jacobians}
     most = max(map(len, sets))
@@ -55,7 +54,7 @@ def independent_rows(jacobians: Sequence[FloatArray]) -> tuple[int, ...]:
 
 
 def _pivoted(jacobian: FloatArray) -> list[int]:
-    """Return the indices of rows in the order of modified Gram-Schmidt with the longest remaining row first."""
+    """Return the indices of rows in the order of pivoted modified Gram-Schmidt."""
     left = jacobian.copy()
     order: list[int] = []
     longest = 0.0
@@ -72,20 +71,20 @@ def _pivoted(jacobian: FloatArray) -> list[int]:
 
 
 def column_groups(matrices: Sequence[FloatArray], rank: int) -> tuple[ColumnGroup, ...]:
-    """Return groups of the columns of a matrix that varies, whose ranks add up wherever that of the matrix is the same.
+    """Return groups of columns with ranks that add up at every point where the varying matrix has its full rank.
 
-    First come rotations whose axes keep their angles to each other, one by one: such columns are independent
-    everywhere. Then come the smallest groups that depend on no column of another group, beyond those before. Where the
-    whole matrix keeps its rank each of them does, so that nothing is singular at a point for the choice of a column.
-    Columns that are zero are in the first group: they are more where the loops that hold their joints are singular.
+    First come rotations with axes at constant angles to each other, one by one: such columns are independent
+    everywhere. Then come the smallest groups that depend on no column of another group, beyond those before. Each group
+    keeps its rank where the whole matrix does, so that the choice of columns causes no singularity. Columns that are
+    zero are in the first group: there are more of them where the loops of their joints are singular.
 
     Args:
-        matrices: (size, n) each, velocities and, where the size is 6, rotations of order 1: the same columns at
-            different points.
-        rank: of the matrix; other points than those of this rank say nothing.
+        matrices: (size, n) each: the same columns at different points, velocities and, if the size is 6, rotations of
+            order 1.
+        rank: rank of the matrix; points with another rank are ignored.
 
     Returns:
-        The groups; none where they are not known, or there would be one alone.
+        Groups of columns; empty if they are not known, or there would be only one.
     """
     unit = [each / np.where((own := np.linalg.norm(each, axis=0)) > _SAME, own, np.inf) for each in matrices]
     regular = [k for k, each in enumerate(unit) if _rank(each) == rank]
@@ -96,7 +95,7 @@ def column_groups(matrices: Sequence[FloatArray], rank: int) -> tuple[ColumnGrou
     bases = [np.linalg.qr(unit[k][:, first])[0] for k in regular]
     beyond = [(unit[k] - base @ (base.T @ unit[k]))[:, rest] for k, base in zip(regular, bases, strict=True)]
     joined = np.any([_dependence(each) > _SAME for each in beyond], axis=0)
-    for _ in rest:  # columns that are joined through others
+    for _ in rest:  # columns that are connected through others
         joined = joined @ joined | joined
     sets = dict.fromkeys(tuple(np.flatnonzero(row).tolist()) for row in joined if row.any())
     groups = [ColumnGroup((k,), 1) for k in first]
@@ -105,13 +104,13 @@ def column_groups(matrices: Sequence[FloatArray], rank: int) -> tuple[ColumnGrou
         return ()
     zero = tuple(k for k in rest if not any(k in each.columns for each in groups))
     if any(unit[k][:, zero].any() for k in regular):
-        return ()  # columns in the span of several rotations are in no group with one of them
+        return ()  # columns in the span of several rotations belong to no single one
     groups[0] = ColumnGroup((*groups[0].columns, *zero), groups[0].rank)
     return tuple(groups) if len(groups) > 1 else ()
 
 
 def _fixed_rotations(matrices: Sequence[FloatArray]) -> list[int]:
-    """Return the indices of the most rotations among columns (6, n), independent and always at the same angles."""
+    """Return the indices of the largest set of independent rotations at constant angles among columns (6, n)."""
     products = np.array([each[3:].T @ each[3:] for each in matrices])
     is_same = np.ptp(products, axis=0) < _SAME
     most: list[int] = []
@@ -131,6 +130,6 @@ def _rank(columns: FloatArray) -> int:
 
 
 def _dependence(columns: FloatArray) -> FloatArray:
-    """Return how much columns depend on each other, (n, n): the sizes of the projector on the rows."""
+    """Return the dependence (n, n) of columns on each other: absolute entries of the projector on the row space."""
     right = np.linalg.svd(columns, full_matrices=False)[2][: _rank(columns)]
     return np.asarray(np.abs(right.T @ right))

@@ -27,8 +27,8 @@ from .values import dataclass
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-#: A direction part shorter than this times the moment part is rounding error: the pitch is infinite. The ratio of the
-#: two lengths is about the distance of the axis from the origin, and no machine is 1e12 of its own length units away.
+#: Relative length of the direction part below which it is a rounding error and the pitch is infinite. The ratio of both
+#: lengths is about the distance of the axis from the origin, and no robot is 1e12 length units away.
 _INFINITE_PITCH = 1e-12
 
 
@@ -42,7 +42,7 @@ class Screw:
             the axis then has a direction but no position.
         pitch: translation per rotation (twist) or couple per force (wrench), length; ``math.inf`` for a pure
             translation or a pure couple.
-        intensity: magnitude, at least 0: of the direction part, or of the moment part when the pitch is infinite.
+        intensity: magnitude, at least 0: of the direction part, or of the moment part if the pitch is infinite.
     """
 
     axis: FloatArray
@@ -62,7 +62,7 @@ def unit_vector(vector: ArrayLike) -> FloatArray:
     """
     v = frozen_array(vector, (3,))
     if not (np.isfinite(v).all() and v.any()):
-        raise ValueError("a direction must be finite and not zero")
+        raise ValueError("a direction must be finite and nonzero")
     scaled = v / np.abs(v).max()
     return frozen_array(scaled / np.linalg.norm(scaled), (3,))
 
@@ -155,7 +155,7 @@ def reciprocal_product(wrenches: ArrayLike, twist: ArrayLike) -> FloatArray:
         () or (m,) array, force * length / time.
 
     Raises:
-        ValueError: the twist has not six numbers.
+        ValueError: the twist does not have six numbers.
     """
     rows = np.asarray(wrenches, dtype=np.float64)
     omega, v = np.split(frozen_array(twist, (6,)), 2)
@@ -168,7 +168,7 @@ def moved_screw(screw: ArrayLike, rotation: ArrayLike, translation: ArrayLike) -
     Args:
         screw: (6,) twist or wrench ``(s, s_o)``.
         rotation: (3, 3) rotation matrix ``R``.
-        translation: (3,) ``t``, length.
+        translation: (3,) translation ``t``, length.
 
     Returns:
         (6,) read-only array, ``(R s, R s_o + t x R s)``.
@@ -187,7 +187,7 @@ class Displacement(NamedTuple):
 
     Attributes:
         rotation: (3, 3) ``Q``.
-        translation: (3,) ``t``, length.
+        translation: (3,) translation ``t``, length.
     """
 
     rotation: FloatArray
@@ -195,7 +195,7 @@ class Displacement(NamedTuple):
 
     @property
     def is_identity(self) -> bool:
-        """Whether every point stays in its place."""
+        """True if every point stays in its place."""
         return bool(np.array_equal(self.rotation, np.eye(3)) and not self.translation.any())
 
     @classmethod
@@ -212,8 +212,8 @@ def screw_displacement(screw: Screw, amount: float) -> Displacement:
     """Return the finite screw motion about an axis.
 
     Args:
-        screw: its axis, point and pitch count, and not its intensity.
-        amount: angle about the axis, radians; for an infinite pitch the way along it, length.
+        screw: screw with axis, point and pitch; its intensity has no effect.
+        amount: angle about the axis, radians; translation along it, length, for an infinite pitch.
     """
     s = screw.axis
     if math.isinf(screw.pitch):

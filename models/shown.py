@@ -1,8 +1,7 @@
 """Values that a notebook shows as a table and a drawing.
 
-Modules of robots do not import drawings, nor those of solutions tables. The function that makes HTML of a value is
-therefore found by the entry point ``html`` of the group ``screwsynth.views``, as robots of other packages are by
-theirs, and loaded when a notebook first shows a value.
+The modules of robots and solutions do not import drawings and tables. A notebook finds the function that makes the HTML
+by the entry point ``html`` of the group ``screwsynth.views``, when it first shows a value.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache
 
-#: Returns a value as HTML; None where it has no such form.
+#: Function that returns a value as HTML; None for a value without such a form.
 View = Callable[[object], str | None]
 
 GROUP = "screwsynth.views"
@@ -20,14 +19,14 @@ class Shown:
     """A value with a table and a drawing in a notebook."""
 
     def _repr_html_(self) -> str | None:
-        """Return the value as HTML; None without the package that draws, so that a notebook shows its ``repr``."""
+        """Return the value as HTML; None if no drawing package is installed, so that a notebook shows its ``repr``."""
         view = _view()
         return None if view is None else view(self)
 
 
 @cache
 def _view() -> View | None:
-    """Return the function that makes HTML of a value; None where no installed package offers one."""
+    """Return the function that makes HTML of a value; None if no installed package offers one."""
     from importlib.metadata import entry_points  # noqa: PLC0415 - slow to import, and only notebooks need it
 
     for point in entry_points(group=GROUP, name="html"):

@@ -1,16 +1,16 @@
-"""Statics and rates of actuators: the platform's motion by one actuator alone, and forces by virtual work.
+"""Statics and actuator rates: platform motion for a unit rate of one actuator, and forces by virtual work.
 
-With ``J chi = D qdot`` for the rows of J and the actuators' rates, the motion ``x_k`` of the platform by a unit rate of
-actuator k alone is the solution of ``J x_k = d_k``. A load W does the work ``W . x_k`` in it, and the constraint
-wrenches do none, so that the actuator holds the load with the force, or the torque,
+With ``J chi = D qdot``, the platform motion for a unit rate of actuator k only is the solution of ``J x_k = d_k``. A
+load W does the work ``W . x_k`` in it, and constraint wrenches do none, so the actuator balances the load with the
+force or torque
 
     tau_k = -(W . x_k),        W . x = force . v + moment . omega            (virtual work)
 
-with moments about the platform's origin and v its velocity. The motions span those that the platform can make. The
-rates of all actuators in such a motion ``chi = X qdot`` are ``(X' S X)^-1 X' S chi`` for any weights S.
+with moments about the platform's origin and v its velocity. The motions ``x_k`` span all platform motions. The rates of
+all actuators in a motion ``chi = X qdot`` are ``(X' S X)^-1 X' S chi`` for any weights S.
 
-``J x_k = d_k`` has a solution wherever the robot has as many actuators as freedoms, however many rows J has. It is
-found from the normal equations, with one step of refinement, in which no row is chosen.
+``J x_k = d_k`` has a solution if the robot has as many actuators as degrees of freedom, for any number of rows of J. It
+is solved by the normal equations with one step of refinement, without a choice of rows.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from .wrench import WrenchKind
 
 
 class DrivenJoint(NamedTuple):
-    """An actuator: its name, its limb, and its dimension, a length or an angle."""
+    """Actuator: name, limb, and dimension (length or angle)."""
 
     name: str
     limb: str
@@ -44,28 +44,28 @@ def driven_joints(model: Model) -> tuple[DrivenJoint, ...]:
     return tuple(DrivenJoint(each.name, each.name, Dimension.LENGTH) for each in model.legs)
 
 
-def freedoms_of(model: Model) -> int:
-    """Return the freedoms of a robot's platform with free actuators, for almost all dimensions and poses."""
+def degrees_of_freedom(model: Model) -> int:
+    """Return the degrees of freedom of the platform with free actuators, at almost all dimensions and poses."""
     if model.generic is not None:
         return 6 - model.generic.constraints
     return 6 - sum(row.kind is not WrenchKind.FORCE for row in model.wrenches)
 
 
 def statics_hindrance(model: Model) -> str:
-    """Return why loads do not determine the forces of a robot's actuators, as a clause; empty where they do."""
-    count, freedoms = len(driven_joints(model)), freedoms_of(model)
+    """Return the reason why loads do not determine the actuator forces, as a clause; empty if they do."""
+    count, freedoms = len(driven_joints(model)), degrees_of_freedom(model)
     if not count:
         return "its actuators are not known"
     if not freedoms:
         return "its platform cannot move"
     if count > freedoms:
-        surplus = f"it has {_counted(count, 'actuator')} for {_counted(freedoms, 'freedom')}"
-        apart = "which can move while its platform stands still: forces of such robots are not computed"
-        against = "so that they can load each other with forces that no load determines"
+        surplus = f"it has {_counted(count, 'actuator')} for {_counted(freedoms, 'degree')} of freedom"
+        apart = "which can move while the platform stands still: actuator forces of such robots are not computed"
+        against = "so internal forces between actuators are not determined by the load"
         return f"{surplus}, {apart if model.generic is not None and model.generic.idle else against}"
     if count < freedoms:
-        held = f"{_counted(freedoms, 'freedom')} of its platform"
-        return f"its {_counted(count, 'actuator')} {'do' if count > 1 else 'does'} not hold the {held}"
+        held = f"{_counted(freedoms, 'degree')} of freedom of its platform"
+        return f"its {_counted(count, 'actuator')} {'do' if count > 1 else 'does'} not control the {held}"
     if model.rank < 6:
         return "its platform can move with locked actuators"
     return ""
@@ -76,15 +76,15 @@ def _counted(count: int, word: str) -> str:
 
 
 class Statics(NamedTuple):
-    """Motions of a robot's platform by its actuators at one pose, and what follows from them by virtual work.
+    """Platform motions for unit actuator rates at one pose, with the actuator forces and rates by virtual work.
 
     Attributes:
-        numerators: (6, a) motion of the platform by a unit rate of each actuator alone, times the divisor: angular
-            velocity, then velocity of the platform's origin, in the world frame.
-        divisor: (1, 1) number that is 0 where the rows are dependent; 1 for motions that are no quotients.
-        rows: (m, 6) the rows of J for such motions.
+        numerators: (6, a) platform motion for a unit rate of each actuator, times the divisor: angular velocity, then
+            velocity of the platform's origin, in the world frame.
+        divisor: (1, 1) divisor, 0 where the rows are dependent; 1 for motions that are not quotients.
+        rows: (m, 6) rows of J about the platform's origin: moment, then force.
         driven: (m, a) work rates of the rows for a unit rate of each actuator.
-        factors: of ``J'J`` for them.
+        factors: factors of ``J'J`` of these rows.
     """
 
     numerators: SX
@@ -95,17 +95,17 @@ class Statics(NamedTuple):
 
     @property
     def motions(self) -> SX:
-        """Motion (6, a) of the platform by a unit rate of each actuator alone."""
+        """Platform motion (6, a) for a unit rate of each actuator."""
         return self.numerators / self.divisor
 
     def rates(self, length: SX) -> SX:
-        """Return the rates (a, 6) of all actuators in a motion that the platform can make.
+        """Return the matrix (a, 6) from a possible platform motion to the rates of all actuators.
 
-        Of a platform with fewer than six freedoms other factors say the same of these motions. They are those with the
-        least size, with angular velocities times a length.
+        For a platform with fewer than six degrees of freedom the matrix is not unique: it is the one of least norm,
+        with angular velocities times a length.
 
         Args:
-            length: (1, 1) the length.
+            length: (1, 1) factor of angular velocities, length.
         """
         weights = ca.vertcat(SX.ones(3) * length**2, SX.ones(3))
         motions = self.motions
@@ -113,31 +113,31 @@ class Statics(NamedTuple):
         return _solved(_factors(motions.T @ weighted), weighted.T)
 
     def compliance(self, stiffness: SX) -> SX:
-        """Return the motion (6, 6) of the platform for a unit of each component of a load: its moment, then its force.
+        """Return the compliance (6, 6): platform displacement for unit components of a load, moment, then force.
 
-        Links and joints are rigid: the actuators alone give way.
+        Links and joints are rigid; only the actuators are elastic.
 
         Args:
-            stiffness: (a, 1) force, or torque, of each actuator by its displacement.
+            stiffness: (a, 1) stiffness of each actuator: force or torque per displacement.
         """
         motions = self.motions
         return motions @ (motions / ca.repmat(stiffness.T, 6, 1)).T
 
     def row_forces(self, load: SX) -> SX:
-        """Return forces (m, 1) of the rows that hold a load (6, 1), force and moment about the platform's origin.
+        """Return the row forces (m, 1) that balance a load (6, 1), force and moment about the platform's origin.
 
-        Where the rows are not independent, they are those with the least sum of squares.
+        For dependent rows, they are the forces with the least sum of squares.
         """
         return -self.rows @ _solved(self.factors, ca.vertcat(load[3:], load[:3]))
 
 
 def statics_of(model: Model, jacobian: SX, driven: SX, position: SX) -> Statics:
-    """Return the motions of a robot's platform by its actuators at a pose.
+    """Return the platform motions for unit actuator rates at a pose.
 
     Args:
-        model: the robot, of which :func:`statics_hindrance` says nothing.
-        jacobian: (m, 6) that of a :class:`~.instance.RobotInstance` at the pose: expressions or numbers.
-        driven: (m, a) that of the instance, or numbers.
+        model: robot for which :func:`statics_hindrance` returns an empty text.
+        jacobian: (m, 6) Jacobian of a :class:`~.instance.RobotInstance` at the pose: expressions or numbers.
+        driven: (m, a) work rates of its rows for unit actuator rates: expressions or numbers.
         position: (3, 1) origin of the platform frame in the world frame, length.
     """
     rows = rows_about(jacobian, position)
@@ -149,20 +149,20 @@ def statics_of(model: Model, jacobian: SX, driven: SX, position: SX) -> Statics:
 
 
 def rows_about(jacobian: SX, position: SX) -> SX:
-    """Return rows (m, 6) for motions of the platform: moment about its origin (3, 1), then force."""
+    """Return rows (m, 6) about the platform's origin (3, 1): moment, then force."""
     force, moment = jacobian[:, :3], jacobian[:, 3:]
     return ca.horzcat(moment - ca.horzcat(*[ca.cross(position, each.T) for each in ca.vertsplit(force)]).T, force)
 
 
 def inverse_rates(model: Model, robot: RobotInstance) -> SX:
-    """Return the rates (a, 6) of all actuators by the platform's angular velocity and its origin's velocity.
+    """Return the inverse Jacobian (a, 6): actuator rates for the platform's angular velocity and origin's velocity.
 
-    They are the least squares solution of ``D qdot = J chi`` for each limb, which is exact in every motion that the
-    platform can make. Unlike :meth:`Statics.rates` it also exists where J is singular, and for any number of actuators.
+    Least-squares solution of ``D qdot = J chi`` for each limb, exact in every possible platform motion. Unlike
+    :meth:`Statics.rates` it also exists where J is singular, and for any number of actuators.
 
     Args:
         model: the robot.
-        robot: the robot at a pose.
+        robot: robot at a pose.
     """
     rows, joints = rows_about(robot.jacobian, robot.position), driven_joints(model)
     driven, relations = (robot.driven, robot.relations) if model.actuators else (_of_legs(model), SX(0, len(joints)))
@@ -175,31 +175,31 @@ def inverse_rates(model: Model, robot: RobotInstance) -> SX:
 
 
 def _without_zeros(relations: SX) -> SX:
-    """Return the relations (r, a) that a limb's actuators have a part in."""
+    """Return the rows of relations (r, a) with a nonzero coefficient."""
     return relations[[k for k in range(relations.shape[0]) if not relations[k, :].is_zero()], :]
 
 
 def posed_statics(model: Model, robot: RobotInstance) -> Statics:
-    """Return the motions of a robot's platform by its actuators at a pose, by minors where it has six rows of legs.
+    """Return the platform motions for unit actuator rates at a pose, by minors for six rows of legs and couples.
 
     Args:
-        model: the robot, of which :func:`statics_hindrance` says nothing.
+        model: robot for which :func:`statics_hindrance` returns an empty text.
         robot: the robot at the pose.
     """
     found = statics_of(model, robot.jacobian, robot.driven, robot.position)
-    # Rows of a robot given joint by joint may be forces of constraints.
+    # Rows of a robot given joint by joint may be constraint forces.
     quotient = None if model.actuators else _quotient_of_minors(robot)
     return found if quotient is None else found._replace(numerators=quotient[0], divisor=quotient[1])
 
 
 def _quotient_of_minors(robot: RobotInstance) -> tuple[SX, SX] | None:
-    """Return the motions of a robot with six rows, of straight legs and couples, as numerators (6, a) and a divisor.
+    """Return the platform motions of a robot with six rows of straight legs and couples: numerators (6, a) and divisor.
 
-    They are those of :func:`statics_of` without the pivots of a factored matrix: polynomials of spans and joint centres
-    over the determinant of the rows, with which a search of a whole box has bounds. None for other robots.
+    The motions of :func:`statics_of` without the pivots of a factorisation: polynomials of spans and joint centres over
+    the determinant of the rows, which a search over a box can bound. None for other robots.
 
     Args:
-        robot: the robot at a pose.
+        robot: robot at a pose.
     """
     legs = {leg.name: leg for leg in robot.legs}
     if len(robot.rows) != 6 or robot.jacobian.shape[0] != 6 or not legs:
@@ -215,7 +215,7 @@ def _quotient_of_minors(robot: RobotInstance) -> tuple[SX, SX] | None:
             turning.append(row.moment)
             sliding.append(SX.zeros(3))
     driven = [k for k, row in enumerate(robot.rows) if row.kind is WrenchKind.FORCE]
-    if len(driven) == 3:  # the couples alone keep the platform from turning
+    if len(driven) == 3:  # the couples prevent all rotations
         f = [sliding[k] for k in driven]
         crossed = [ca.cross(f[(k + 1) % 3], f[(k + 2) % 3]) for k in range(3)]
         volume = ca.dot(f[0], crossed[0])
@@ -228,7 +228,7 @@ def _quotient_of_minors(robot: RobotInstance) -> tuple[SX, SX] | None:
 
 
 def _cofactors(matrix: SX) -> SX:
-    """Return the cofactors (6, 6) of a matrix (6, 6), from minors of its first and of its last three columns."""
+    """Return the cofactors (6, 6) of a matrix (6, 6), by minors of its first and last three columns."""
     rows, found = range(6), SX(6, 6)
     blocks = (matrix[:, :3], matrix[:, 3:])
     thirds = [{s: ca.det(block[list(s), :]) for s in _subsets(rows, 3)} for block in blocks]
@@ -240,7 +240,7 @@ def _cofactors(matrix: SX) -> SX:
             value = SX(0)
             for s in _subsets(others, 2):
                 rest = tuple(i for i in others if i not in s)
-                # Laplace's expansion: the two rows belong to the block without its column, in front or behind.
+                # Laplace expansion: the two rows belong to the block without its column, in front or behind.
                 sign = (-1) ** (others.index(s[0]) + others.index(s[1]) + (1 if half == 0 else 7))
                 value += sign * pairs[s] * thirds[1 - half][rest]
             found[k, 3 * half + c] = (-1) ** (k + 3 * half + c) * value

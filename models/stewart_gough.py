@@ -1,13 +1,13 @@
 """The 6-6 Stewart-Gough platform with its joints in pairs on two circles (Fig. 3).
 
-Letters: ``x1``, ``x2`` radii of the base and platform circle; ``x3``, ``x4`` half of the angle between the joints of
-a pair, seen from the centre, on the base and on the platform. Pair ``k = 1, 2, 3`` of the base is centred on azimuth
-``120 (k - 1)`` degrees. Half angle 0 makes a triangle (the joints of a pair coincide), 30 degrees a regular hexagon.
+``x1``, ``x2``: radii of the base and platform circles. ``x3``, ``x4``: half of the central angle between the joints of
+a pair, on the base and on the platform. Pair ``k = 1, 2, 3`` of the base is centred on azimuth ``120 (k - 1)`` degrees.
+Half angle 0 gives a triangle (the joints of a pair coincide), 30 degrees a regular hexagon.
 
 The paper draws the platform pairs above the base pairs (``aligned``): leg ``k+`` joins base joint ``k+`` at azimuth
-``120 (k - 1) + x3`` to platform joint ``k+`` at ``120 (k - 1) + x4``, and leg ``k-`` likewise with minus signs. In the
-``octahedral`` layout, usual in machines, the platform pairs are rotated by 60 degrees and each leg goes to the nearer
-pair: leg ``k+`` ends at platform azimuth ``120 (k - 1) + 60 - x4``.
+``120 (k - 1) + x3`` to platform joint ``k+`` at ``120 (k - 1) + x4``, and leg ``k-`` with minus signs. In the
+``octahedral`` layout, usual in built robots, the platform pairs are rotated by 60 degrees and each leg goes to the
+nearer pair: leg ``k+`` ends at platform azimuth ``120 (k - 1) + 60 - x4``.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def stewart_gough(*, layout: Literal["aligned", "octahedral"] = "aligned") -> Mo
         layout: ``aligned`` as in the paper, or ``octahedral``.
 
     Raises:
-        ModelError: there is no such layout.
+        ModelError: the layout is unknown.
     """
     if layout not in ("aligned", "octahedral"):
         raise ModelError(f"model 'stewart-gough': layout must be 'aligned' or 'octahedral', got {layout!r}")
@@ -81,7 +81,6 @@ def stewart_gough(*, layout: Literal["aligned", "octahedral"] = "aligned") -> Mo
 
 
 def _point_on_circle(radius: SX, azimuth: SX | float) -> SX:
-    """Return a point (3, 1) of a circle about the origin, in the plane z = 0, at an azimuth in radians."""
     return ca.vertcat(radius * ca.cos(azimuth), radius * ca.sin(azimuth), 0)
 
 
@@ -94,7 +93,7 @@ def _marks(
         body: the plate.
         R: (3, 3) orientation of the plate in the world frame.
         p: (3, 1) centre of the plate in the world frame, length.
-        radius: (1, 1) of the joints' circle, length.
+        radius: (1, 1) radius of the joints' circle, length.
         half_angle: (1, 1) half of the angle between the joints of a pair, radians.
         centre: azimuth of the first pair, radians.
         names: names of the parameters for radius and half angle.

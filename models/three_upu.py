@@ -1,13 +1,13 @@
 """The 3-UPU robot: three extensible limbs between universal joints (Section 4.4).
 
-Letters, for limb ``i``: ``s_i`` the direction of the limb from its base joint to its platform joint; ``u1_i``, ``u2_i``
-unit vectors along the two axes of its upper universal joint, orthogonal to each other, in platform coordinates; ``u_i``
-their common normal. A limb applies a force along ``s_i`` and a couple about ``u_i``, which resists rotation about
-``u_i`` (equations 16 to 18), so the Jacobian has three rows of force and three of couple.
+For limb ``i``: ``s_i`` is the direction from its base joint to its platform joint; ``u1_i``, ``u2_i`` are orthogonal
+unit vectors along the axes of its upper universal joint, in platform coordinates; ``u_i`` is their common normal. A
+limb applies a force along ``s_i`` and a couple about ``u_i`` (equations 16 to 18), so the Jacobian has three rows of
+forces and three of couples.
 
-The joints lie on two circles at azimuths 0, 120 and 240 degrees. Two known machines fix the first axis on the platform:
+The joints lie on two circles at azimuths 0, 120 and 240 degrees. Two known robots fix the first axis on the platform:
 radially (``snu``, the robot of Seoul National University that Park showed in 2001) and tangentially (``tsai``, Tsai's
-translational robot). In a real limb the second axis is also perpendicular to the limb, which both machines respect.
+translational robot). In a real limb the second axis is also perpendicular to the limb, as in both of these robots.
 """
 
 from __future__ import annotations
@@ -35,14 +35,13 @@ def three_upu(
     """Return the 3-UPU robot (Section 4.4).
 
     Args:
-        axes: axes of the upper universal joints. ``free`` makes the axes parameters ``u1_i`` and ``u2_i``, orthogonal
-            within a limb. ``limb`` makes the first axes parameters and takes the second perpendicular to the first and
-            to the limb. ``snu`` and ``tsai`` fix the first axes radially or tangentially, with the second as in
-            ``limb``.
-        azimuth: ``free`` makes the azimuth of the first limb a parameter, about which all limbs turn together.
+        axes: axes of the upper universal joints. ``free``: both axes are parameters ``u1_i`` and ``u2_i``, orthogonal
+            within a limb. ``limb``: the first axis is a parameter, the second is perpendicular to it and to the limb.
+            ``snu`` and ``tsai``: the first axis is radial or tangential, the second as in ``limb``.
+        azimuth: ``free`` makes the azimuth of the first limb a parameter; all limbs rotate with it.
 
     Raises:
-        ModelError: there is no such choice of axes, or of the azimuth.
+        ModelError: the value of ``axes`` or ``azimuth`` is unknown.
     """
     if axes not in ("free", "limb", "snu", "tsai"):
         raise ModelError(f"model 'three-upu': axes must be 'free', 'limb', 'snu' or 'tsai', got {axes!r}")
@@ -53,7 +52,9 @@ def three_upu(
     pose = PoseSymbols()
     parameters = [
         Parameter("base_radius", base_radius, Dimension.LENGTH, "radius of the base's joint circle", (50.0,), 0.0),
-        Parameter("platform_radius", platform_radius, Dimension.LENGTH, "radius of the platform's", (25.0,), 0.0),
+        Parameter(
+            "platform_radius", platform_radius, Dimension.LENGTH, "radius of the platform's joint circle", (25.0,), 0.0
+        ),
     ]
     if azimuth == "free":
         parameters.append(Parameter("azimuth", turned, Dimension.ANGLE, "azimuth of the first limb", (0.0,)))
@@ -147,7 +148,7 @@ def _tangential(k: int) -> SX:
 def _tilted(direction: SX) -> SX:
     """Return a horizontal unit vector (3, 1) tilted upwards.
 
-    With all axes in the platform's plane the three couples are about one normal, and the robot is singular.
+    If all axes lie in the platform's plane, the three couples are parallel and the robot is singular.
     """
     return 0.8 * direction + SX([0.0, 0.0, 0.6])
 

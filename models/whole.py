@@ -1,9 +1,8 @@
-"""Values that are one whole, because symbols connect their parts: walked, pickled and copied.
+"""Values with parts that share symbols: expressions, pickles and copies.
 
-The expressions of a value are those of its parts, in the order of their fields. A CasADi symbol is known by its
-identity: two expressions that are pickled one by one lose the symbols that they share, and CasADi itself pickles none
-outside a context that is global to the process. A :class:`Whole` is therefore pickled with everything in it at once:
-all its expressions in one piece, in which shared symbols stay shared, and everything else beside it.
+A CasADi symbol is known by its identity: expressions that are pickled one by one lose shared symbols, and CasADi
+pickles none outside a context that is global to the process. A :class:`Whole` is therefore pickled at once: all its
+expressions in one piece, in which shared symbols stay shared, and everything else in another.
 """
 
 from __future__ import annotations
@@ -25,14 +24,14 @@ Value = TypeVar("Value")
 
 
 def expressions_of(value: object) -> list[SX]:
-    """Return all expressions of a value and its parts: of data classes, tuples and dicts."""
+    """Return all expressions of a value and its parts: data classes, tuples and dicts, in the order of their fields."""
     if isinstance(value, SX):
         return [value]
     return [expression for part in _parts(value).values() for expression in expressions_of(part)]
 
 
 def with_expressions(value: Value, expressions: Iterator[SX]) -> Value:
-    """Return a value with the next expressions of an iterator in the place of those of :func:`expressions_of`."""
+    """Return a value with its expressions, as of :func:`expressions_of`, replaced by the next ones of an iterator."""
     parts = {key: with_expressions(part, expressions) for key, part in _parts(value).items()}
     found: Any = value
     if isinstance(value, SX):
@@ -48,7 +47,7 @@ def with_expressions(value: Value, expressions: Iterator[SX]) -> Value:
 
 
 def _parts(value: object) -> dict[Any, object]:
-    """Return the parts of a value: fields, items of a dict, or elements of a tuple by their places."""
+    """Return the parts of a value: fields, items of a dict, or elements of a tuple by index."""
     if isinstance(value, tuple):
         return dict(enumerate(value))
     if isinstance(value, dict):
@@ -57,10 +56,10 @@ def _parts(value: object) -> dict[Any, object]:
 
 
 class Whole:
-    """A frozen dataclass that is pickled, and copied deeply, as a whole; values that it caches are left out.
+    """Frozen dataclass that is pickled and deep-copied as a whole, without cached values.
 
-    Its fields may hold symbols, read-only arrays and mappings, and other values of this kind. A pickle is for the
-    version of the package that made it.
+    Its fields may hold symbols, read-only arrays and mappings, and other values of this kind. A pickle is valid only
+    for the version of the package that made it.
     """
 
     def __reduce_ex__(self, protocol: object) -> tuple[Any, ...]:
@@ -70,15 +69,15 @@ class Whole:
         return _unpacked, (content.getvalue(), _packed_expressions(pickler.expressions))
 
     def __copy__(self) -> Self:
-        """Return the value itself, which nothing can change."""
+        """Return the value itself, which is immutable."""
         return self
 
 
 class _Pickler(pickle.Pickler):
-    """A pickler that keeps expressions out of the pickle, in a list.
+    """Pickler that collects expressions in a list outside the pickle.
 
     Attributes:
-        expressions: every expression, once.
+        expressions: all expressions, each once.
     """
 
     def __init__(self, file: io.BytesIO) -> None:
@@ -87,7 +86,7 @@ class _Pickler(pickle.Pickler):
         self._places: dict[int, int] = {}
 
     def persistent_id(self, value: object) -> int | None:
-        """Return the place of an expression in the list; None for any other value."""
+        """Return the index of an expression in the list; None for any other value."""
         if not isinstance(value, SX):
             return None
         if id(value) not in self._places:
@@ -96,7 +95,7 @@ class _Pickler(pickle.Pickler):
         return self._places[id(value)]
 
     def reducer_override(self, value: object) -> Any:  # noqa: ANN401 - a tuple, or the constant NotImplemented
-        """Return how a value is built again, where Python's own rules would change it."""
+        """Return the reduction of a value where Python's own rules would change it."""
         if isinstance(value, Whole):
             state = {item.name: getattr(value, item.name) for item in fields(value)}  # type: ignore[arg-type]
             return object.__new__, (type(value),), state
@@ -115,18 +114,16 @@ class _Unpickler(pickle.Unpickler):
         self._expressions = expressions
 
     def persistent_load(self, place: Any) -> SX:  # noqa: ANN401 - pickle's own signature
-        """Return the expression at a place of the list."""
         expression: SX = self._expressions[place]
         return expression
 
 
 def _unpacked(content: bytes, expressions: str) -> object:
-    """Return a value from its pickle and its expressions."""
     return _Unpickler(io.BytesIO(content), _unpacked_expressions(expressions)).load()
 
 
 def _packed_expressions(expressions: list[SX]) -> str:
-    """Return expressions as one text; empty where there are none."""
+    """Return expressions as one text; empty for no expressions."""
     if not expressions:
         return ""
     serializer = ca.StringSerializer()
@@ -136,7 +133,6 @@ def _packed_expressions(expressions: list[SX]) -> str:
 
 
 def _unpacked_expressions(text: str) -> list[SX]:
-    """Return the expressions of a text."""
     if not text:
         return []
     found: list[SX] = ca.StringDeserializer(text).unpack()
@@ -144,11 +140,10 @@ def _unpacked_expressions(text: str) -> list[SX]:
 
 
 def _read_only_mapping(values: dict[Any, Any]) -> MappingProxyType[Any, Any]:
-    """Return a mapping that cannot be changed; the type itself has no name by which pickle finds it."""
+    """Return a read-only mapping; pickle needs this function because the type has no importable name."""
     return MappingProxyType(values)
 
 
 def _read_only(array: FloatArray) -> FloatArray:
-    """Return an array that can no longer be changed."""
     array.flags.writeable = False
     return array

@@ -12,7 +12,7 @@ from .values import dataclass
 
 
 class WrenchKind(enum.Enum):
-    """Kind of wrench that a row of the Jacobian stands for."""
+    """Kind of wrench of a row of the Jacobian."""
 
     FORCE = "force"
     COUPLE = "couple"
@@ -24,8 +24,8 @@ class RowLabel(NamedTuple):
 
     Attributes:
         limb: name of the limb that applies the wrench.
-        kind: of the wrench.
-        member: name of the limb's member that applies it: the limb's, with a number where the limb has several.
+        kind: kind of the wrench.
+        member: name of the member that applies the wrench: that of the limb, with a number if the limb has several.
     """
 
     limb: str
@@ -42,12 +42,12 @@ class Wrench:
     vectors.
 
     Attributes:
-        limb: name of the limb that applies it.
-        kind: a force along a line, or a constraint couple; rows that are neither belong to members.
-        force: (3, 1) in world coordinates, of any length but zero; zero for a couple.
-        moment: (3, 1) about the world origin; the direction of the couple for a couple.
+        limb: name of the limb that applies the wrench.
+        kind: force along a line, or constraint couple; rows of other kinds belong to members.
+        force: (3, 1) force in world coordinates, of any length but zero; zero for a couple.
+        moment: (3, 1) moment about the world origin; direction of a couple.
         square: (1, 1) squared length of ``force``, or of ``moment`` for a couple.
-        member: name of the member that applies it, where the limb has several; empty for the limb itself.
+        member: name of the member that applies the wrench, if the limb has several; empty for the limb itself.
     """
 
     limb: str
@@ -76,7 +76,7 @@ def force_along(limb: str, point: SX, direction: SX) -> Wrench:
     Args:
         limb: name of the limb.
         point: (3, 1) any point of the line in the world frame, length.
-        direction: (3, 1) along the line towards the platform in the world frame, of any length but zero.
+        direction: (3, 1) direction along the line towards the platform in the world frame, of any length but zero.
     """
     return Wrench(limb, WrenchKind.FORCE, direction, ca.cross(point, direction), ca.sumsqr(direction))
 
@@ -86,7 +86,7 @@ def couple_about(limb: str, direction: SX) -> Wrench:
 
     Args:
         limb: name of the limb.
-        direction: (3, 1) in world coordinates, of any length but zero.
+        direction: (3, 1) direction of the couple in world coordinates, of any length but zero.
     """
     return Wrench(limb, WrenchKind.COUPLE, SX.zeros(3), direction, ca.sumsqr(direction))
 
@@ -94,5 +94,5 @@ def couple_about(limb: str, direction: SX) -> Wrench:
 def reason_for_zero_row(row: Wrench) -> str:
     """Return the reason why a row has zero direction and so no unit wrench, as a clause for messages."""
     if row.kind is WrenchKind.COUPLE:
-        return f"the couple of limb {row.limb!r} has no direction: the axes that it is normal to coincide"
+        return f"the couple of limb {row.limb!r} has no direction: the two axes that it must be normal to coincide"
     return f"limb {row.limb!r} has zero length: its two joints coincide"

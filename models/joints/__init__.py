@@ -1,11 +1,10 @@
-"""Robots given joint by joint: limbs as chains of joints become the rows, unknowns and loop equations of a model.
+"""Robots given joint by joint: from chains of joints to rows, unknowns and loop equations of a model.
 
-The small language of a robot's numbers is :mod:`screwsynth.models.expression`. A robot passes four stages, each of
-which imports only those before it: ``written`` (as it is written), ``home`` (at home), ``posed`` (at any pose), and
-``model`` (its model).
+Dimensions and points are expressions of :mod:`screwsynth.models.expression`. A robot passes four stages, each of which
+imports only earlier ones: ``written`` (as it is written), ``home`` (at home), ``posed`` (at any pose), and ``model``
+(its model).
 
-The model is imported from ``model.robot`` itself, or as :func:`screwsynth.models.robot`: an import of one module, or of
-the kinds of faults, does not load them all.
+Import the model from ``model.robot`` or as :func:`screwsynth.models.robot`: this package itself loads no module.
 """
 
 from ..expression import ExpressionError

@@ -1,12 +1,12 @@
 """Robots of any topology in numbers: links and joints as a graph, at one configuration.
 
 The modules in order, each of which imports only those before it: ``topology`` (connected parts, bridges, spanning
-trees), ``graph`` (links, joints and couplings, and a mechanism that contradicts itself), ``motions`` (links and screws
-at any coordinates), ``descent`` (joints moved until equations hold), ``closing`` (closed loops at a pose or at
-positions of the actuators), ``decomposition`` (limbs, branches, and parts that resist the platform), ``limbs`` (tables
-of a robot file), ``freedoms`` (twists that joints allow), ``centre`` (a member's), ``wrenches`` (resistance, F, rates
-and ranks), ``singularities`` (ranks against generic ones). Mechanisms from robot files are made where these are read,
-in :mod:`screwsynth.models.joints.home.mechanisms`.
+trees), ``graph`` (links, joints and couplings, and checks of a mechanism), ``motions`` (links and screws at any
+coordinates), ``descent`` (joints moved until equations are satisfied), ``closing`` (closed loops at a pose or at
+actuator coordinates), ``decomposition`` (limbs, branches, and parts that resist the platform), ``limbs`` (tables of a
+robot file), ``mobility`` (twists that joints allow), ``centre`` (centre of a member), ``wrenches`` (wrenches, F, rates
+and ranks), ``singularities`` (ranks compared with generic ones). Mechanisms of robot files are made in
+:mod:`screwsynth.models.joints.home.mechanisms`.
 """
 
 from importlib import import_module
@@ -46,8 +46,8 @@ __all__ = [
 
 
 def __getattr__(name: str) -> object:
-    """Return ``mechanism_of``, which reads robot files and needs symbols, when it is first used."""
+    """Return ``mechanism_of``, imported at first use because it reads robot files and needs symbols."""
     if name != "mechanism_of":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    found: object = import_module("..joints.home.mechanisms", __name__).mechanism_of
-    return found
+    function: object = import_module("..joints.home.mechanisms", __name__).mechanism_of
+    return function

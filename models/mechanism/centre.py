@@ -1,8 +1,8 @@
-"""Centre of a member: the point about which its couples are measured, by the rules of robots given joint by joint.
+"""Centre of a member: reference point of its couples, by the rules of robots given joint by joint.
 
-In this order: the mean of the passive joints on the platform where there are several; the passive spherical joint, or
-the common point of three passive hinges that follow each other, nearest the platform; that of two hinges; the point of
-the last passive joint; without one that of the last joint. A nested loop between two hinges ends their row.
+In this order: the mean of several passive joints on the platform; the passive spherical joint, or the common point of
+three successive passive hinges, nearest the platform; that of two hinges; the point of the last passive joint; without
+one, that of the last joint. A nested loop between two hinges ends their sequence.
 """
 
 from __future__ import annotations
@@ -18,18 +18,17 @@ from .graph import Mechanism, MechanismJoint
 from .motions import size_of
 from .topology import Classes, bridges_between
 
-#: Axes meet where their distance, in parts of the mechanism's size, or the sine of their angle, is below this: rounding
-#: leaves 1e-15, also at configurations that Newton's method closed.
+#: Distance of intersecting axes, relative to the mechanism's size, and sine of the angle of parallel ones: rounding
+#: leaves 1e-15, also after Newton's method.
 _MEET = 1e-9
 
 
 class CentreRule(NamedTuple):
-    """Joints that give a member's centre.
+    """Joints that determine a member's centre.
 
     Attributes:
-        joints: indices.
-        is_meeting: whether the centre is the point where the axes of the two joints meet; else it is the mean of the
-            joints' points.
+        joints: indices of the joints.
+        is_meeting: True if the centre is the intersection of two axes; False if it is the mean of the joints' points.
     """
 
     joints: tuple[int, ...]
@@ -45,14 +44,14 @@ def centre_of(mechanism: Mechanism, rule: CentreRule) -> FloatArray:
 
 
 def meeting_point(one: MechanismJoint, other: MechanismJoint) -> FloatArray:
-    """Return the point (3,) of the first axis that is nearest to the second, which is not parallel."""
+    """Return the point (3,) of the first axis that is nearest to the second, non-parallel axis."""
     normal = np.cross(one.axis, other.axis)
     along = float(np.cross(other.point - one.point, other.axis) @ normal) / float(normal @ normal)
     return np.asarray(one.point + along * one.axis)
 
 
 def centre_rule(mechanism: Mechanism, member: MemberGraph) -> CentreRule:
-    """Return the joints that give the centre of a member."""
+    """Return the joints that determine the centre of a member."""
     if len(member.on_platform) > 1:
         return CentreRule(member.on_platform)
     joints = mechanism.joints
@@ -76,7 +75,7 @@ def centre_rule(mechanism: Mechanism, member: MemberGraph) -> CentreRule:
 
 
 class _Ends(NamedTuple):
-    """Bodies of base and platform, and those that each joint of a member is between."""
+    """Bodies of base and platform, and the two bodies of each joint of a member."""
 
     base: str
     platform: str
@@ -84,7 +83,7 @@ class _Ends(NamedTuple):
 
 
 def _ends(mechanism: Mechanism, member: MemberGraph) -> _Ends:
-    """Return the bodies of a member, with welded links as one."""
+    """Return the bodies of a member, with welded links merged."""
     welds = [(joint.inner, joint.outer) for joint in mechanism.joints if joint.kind == "weld"]
     classes = Classes([link.name for link in mechanism.links], welds)
     own = [mechanism.joints[k] for k in member.joints]
@@ -93,14 +92,14 @@ def _ends(mechanism: Mechanism, member: MemberGraph) -> _Ends:
 
 
 def _last(mechanism: Mechanism, member: MemberGraph) -> tuple[int, ...]:
-    """Return the last joint that every path from base to platform has; without one, the joints on the platform."""
+    """Return the last joint common to all paths from base to platform; without one, the joints on the platform."""
     base, platform, edges = _ends(mechanism, member)
     common = bridges_between(base, platform, edges).bridges[-1:]
     return tuple(member.joints[k] for k in common or [k for k, edge in enumerate(edges) if platform in edge])
 
 
 def _rows(mechanism: Mechanism, member: MemberGraph) -> list[list[int]]:
-    """Return the passive joints that every path from base to platform has, in rows that follow each other directly."""
+    """Return the passive joints common to all paths from base to platform, in sequences of directly successive ones."""
     base, platform, edges = _ends(mechanism, member)
     path = bridges_between(base, platform, edges)
     rows: list[list[int]] = [[]]
@@ -116,7 +115,7 @@ def _rows(mechanism: Mechanism, member: MemberGraph) -> list[list[int]]:
 
 
 def _meet(joints: Sequence[MechanismJoint], size: float) -> bool:
-    """Return whether the axes of hinges meet in one point."""
+    """Return True if the axes of hinges intersect in one point."""
     if any(joint.kind != "R" for joint in joints):
         return False
     if float(np.linalg.norm(np.cross(joints[0].axis, joints[1].axis))) < _MEET:

@@ -1,8 +1,8 @@
-"""A mechanism with closed loops at a pose of its platform, at positions of its actuators, or at both.
+"""Closure of a mechanism's loops at a pose of its platform, at actuator coordinates, or at both.
 
-From the stated configuration, pose and actuators move along a straight line to those wanted. At each step Newton's
-method with damped least-norm steps and a line search closes the loops. Steps are halved where it does not converge, or
-where a joint moves farther than a step should.
+From the stated configuration, pose and actuators move along a straight line to the requested ones. At each step,
+Newton's method with damped least-norm steps and a line search closes the loops. Steps are halved if it does not
+converge, or if a joint moves too far.
 """
 
 from __future__ import annotations
@@ -18,33 +18,33 @@ from .descent import CLOSED, Descent
 from .graph import Mechanism, MechanismError, MechanismJoint, MechanismLink
 from .motions import Coordinates, Equations, Motions, Placed, moved, rotation_matrix, rotation_vector
 
-#: First and shortest step of the path, as parts of its length.
+#: First and shortest step of the path, relative to its length.
 _FIRST = 1 / 8
 _SHORTEST = 1 / 1024
-#: Largest number of Newton steps at each point of the path, and the parts of one that are tried.
+#: Largest number of Newton steps at each point of the path, and the step lengths of the line search.
 _STEPS = 40
 _PARTS = [0.5**k for k in range(12)]
-#: Steps that leave more than this part of the residual lead nowhere: no solution is near.
+#: Ratio of residuals above which the iteration stops: no solution is near.
 _STUCK = 0.999
-#: Newton's method goes on until the residual is below this, or no longer falls.
+#: Residual below which Newton's method stops; it also stops when the residual no longer falls.
 _EXACT = 2e-16
-#: Singular values of the derivatives below this part of the largest are zero: those of dependent loops, and of rods
-#: that turn about themselves, are rounding errors.
+#: Relative size below which singular values of the derivatives are zero: those of dependent loops, and of rods that
+#: spin freely, are rounding errors.
 _ZERO = 1e-9
-#: Largest change of a coordinate of order 1 in a step: a larger one may be a jump to another assembly.
+#: Largest change of a coordinate of order 1 in a step: a larger one may be a jump to another assembly mode.
 _LARGE = 0.6
 
 
 @dataclass(frozen=True, eq=False)
 class ClosedMechanism:
-    """A mechanism whose loops are closed.
+    """Mechanism with closed loops.
 
     Attributes:
-        mechanism: at the configuration found; places, axes and ranges of its joints are stated there.
-        coordinates: of each joint R, P and H, counted from the configuration at the start, radians or length.
-        residual: largest error of a loop, radians or parts of the mechanism's size.
-        nearness: smallest singular value of the loops' derivatives on the path, as a part of that at its start. Values
-            that are zero on the whole path do not count. Near 0, the path comes close to a singularity of the joints.
+        mechanism: mechanism at the closed configuration, in which positions, axes and ranges of its joints are stated.
+        coordinates: coordinate of each joint R, P and H from the start configuration, radians or length.
+        residual: largest error of a loop, radians or relative to the mechanism's size.
+        nearness: smallest singular value of the loops' derivatives along the path, relative to its start; values that
+            are zero everywhere do not count. Near 0, the path comes close to a singularity of the joints.
         points: number of closed configurations on the path.
     """
 
@@ -62,14 +62,14 @@ def close(
     rotation: FloatArray | None = None,
     actuators: Mapping[str, float] | None = None,
 ) -> ClosedMechanism:
-    """Return a mechanism with its loops closed, from the stated configuration on.
+    """Return a mechanism with closed loops, followed from the stated configuration.
 
     Args:
         mechanism: the mechanism.
-        position: (3,) origin of the platform's frame in the world, length; None to leave the pose open.
-        rotation: (3, 3) of the platform's frame in the world; None for that of the stated configuration.
-        actuators: coordinates of joints by name, radians or length from the stated configuration. Joints that are not
-            named move as the loops need; without a pose, actuators that are not named stay.
+        position: (3,) origin of the platform frame in the world frame, length; None for a free pose.
+        rotation: (3, 3) rotation of the platform frame in the world frame; None for the stated one.
+        actuators: joint coordinates by name, radians or length from the stated configuration. Other joints move as the
+            loops require; without a pose, other actuators stay at rest.
 
     Raises:
         MechanismError: a name is unknown, or the loops do not close there.
@@ -84,7 +84,9 @@ def close(
     path = _Path(motions, held, pose)
     at, values = path.closed(motions.stated, 0.0)
     if at is None:
-        raise MechanismError("", f"its loops are open by {values[0]:.3g} as stated, and could not be closed near there")
+        raise MechanismError(
+            "", f"its loops are open by {values[0]:.3g} at the stated configuration, with no closed one nearby"
+        )
     spectra = [values]
     done, step = 0.0, 1.0 if pose is None and not any(held.values()) else _FIRST
     while done < 1.0:
@@ -95,7 +97,7 @@ def close(
             step = (part - done) / 2
             continue
         if found is None:
-            fault = f"its loops do not close at the pose or actuators wanted: after {100 * done:.0f} % of the way there"
+            fault = f"its loops do not close at the requested pose or actuators: after {100 * done:.0f} % of the way"
             raise MechanismError("", f"{fault} they stay open by {values[0]:.3g}")
         at, done, step = found, part, 2 * step
         spectra.append(values)
@@ -108,15 +110,15 @@ def closed_near(
     position: FloatArray,
     rotation: FloatArray,
 ) -> ClosedMechanism | None:
-    """Return a mechanism with its loops closed near coordinates and a pose of the platform; None where they do not.
+    """Return a mechanism with loops closed near joint coordinates and a platform pose; None if they do not close.
 
-    The pose is kept where the loops allow it, and else left as little as closing needs.
+    The pose is kept if the loops allow it, and else changed as little as possible.
 
     Args:
         mechanism: the mechanism.
-        coordinates: known ones of joints by name, radians or length from the stated configuration.
-        position: (3,) origin of the platform's frame in the world, length.
-        rotation: (3, 3) of the platform's frame in the world.
+        coordinates: known joint coordinates by name, radians or length from the stated configuration.
+        position: (3,) origin of the platform frame in the world frame, length.
+        rotation: (3, 3) rotation of the platform frame in the world frame.
     """
     motions = Motions(mechanism)
     values = np.zeros(motions.count)
@@ -129,19 +131,19 @@ def closed_near(
 
 
 def closed_nearby(motions: Motions, near: Coordinates) -> ClosedMechanism | None:
-    """Return a mechanism with its loops closed near coordinates that open them; None where they do not close."""
+    """Return a mechanism with loops closed near coordinates that leave them open; None if they do not close."""
     path = _Path(motions, {}, None)
     at, _ = path.closed(near, 1.0)
     return None if at is None else _closed(path, at, 1.0, 1)
 
 
 class _Path:
-    """The equations along a path: loops, couplings, and the platform's pose.
+    """Equations along a path: loops, couplings, and the platform's pose.
 
     Args:
-        motions: of the mechanism.
-        held: values of coordinates at the end of the path, of order 1, by column.
-        pose: of the platform as a function of the part of the path; None where it is open.
+        motions: kinematics of the mechanism.
+        held: prescribed coordinates at the end of the path, of order 1, by column.
+        pose: platform pose as a function of the fraction of the path; None for a free pose.
     """
 
     def __init__(self, motions: Motions, held: Mapping[int, float], pose: _Pose | None) -> None:
@@ -156,7 +158,7 @@ class _Path:
             self._couplings[row] /= np.abs(self._couplings[row]).max()
 
     def equations(self, at: Coordinates, placed: Placed, part: float) -> Equations:
-        """Return the equations at a part of the path."""
+        """Return the equations at a fraction of the path."""
         residual, slopes = self.motions.loops(placed)
         rows, derivatives = [residual, self._couplings @ at.values], [slopes, self._couplings]
         if self._pose is not None:
@@ -166,17 +168,18 @@ class _Path:
         return Equations(np.concatenate(rows), np.vstack(derivatives))
 
     def closed(self, at: Coordinates, part: float) -> tuple[Coordinates | None, FloatArray]:
-        """Return the coordinates at which the loops are closed, near others.
+        """Return the coordinates of closed loops near given ones.
 
         Returns:
-            The coordinates, or None; then the singular values of the derivatives, or the residual that is left.
+            Coordinates, with the singular values of the derivatives; or None, with the remaining residual.
         """
         values = at.values.copy()
         for column, value in self._held.items():
             values[column] = part * value
         found, residual, slopes = self.reduced(Coordinates(values, at.balls), part)
         if part < 1.0 and self._pose is not None and not _is_closed(residual):
-            # A robot with fewer than six freedoms leaves the straight path: the loops alone close near it.
+            # A robot with fewer than six degrees of freedom leaves the straight path: then only the loops are closed
+            # near it.
             found, residual, slopes = _Path(self.motions, self._held, None).reduced(found, part)
         if not _is_closed(residual):
             return None, np.array([float(np.abs(residual).max())])
@@ -185,7 +188,7 @@ class _Path:
         return found, np.asarray(singular, dtype=np.float64)
 
     def reduced(self, at: Coordinates, part: float) -> tuple[Coordinates, FloatArray, FloatArray]:
-        """Return the coordinates of least residual near others, with the residual and its derivatives."""
+        """Return the coordinates of least residual near given ones, with the residual and its derivatives."""
         descent = Descent(
             self.motions, lambda there, placed: self.equations(there, placed, part), self._free, _EXACT, stuck=_STUCK
         )
@@ -194,13 +197,13 @@ class _Path:
 
 
 def _is_closed(residual: FloatArray) -> bool:
-    """Return whether equations hold."""
+    """Return True if equations are satisfied."""
     return float(np.abs(residual).max(initial=0.0)) <= CLOSED
 
 
 @dataclass(frozen=True, eq=False)
 class _Pose:
-    """A straight path of the platform: displacement (4, 4) from the stated configuration, at a part of the way."""
+    """Straight path of the platform: displacement (4, 4) from the stated configuration, by the fraction of the path."""
 
     start: FloatArray
     shift: FloatArray
@@ -214,7 +217,7 @@ class _Pose:
 
 
 def _pose_path(mechanism: Mechanism, position: FloatArray | None, rotation: FloatArray | None) -> _Pose:
-    """Return the path of the platform from the stated pose to another one."""
+    """Return the platform path from the stated pose to a requested one."""
     link = mechanism.link(mechanism.platform)
     shift = np.zeros(3) if position is None else np.asarray(position, dtype=np.float64) - link.position
     turn = np.eye(3) if rotation is None else np.asarray(rotation, dtype=np.float64) @ link.rotation.T
@@ -222,16 +225,16 @@ def _pose_path(mechanism: Mechanism, position: FloatArray | None, rotation: Floa
 
 
 def _check_wanted(mechanism: Mechanism, wanted: Mapping[str, float]) -> None:
-    """Refuse coordinates of joints that are unknown or have none."""
+    """Refuse coordinates of unknown joints, and of joints without a coordinate."""
     kinds = {joint.name: joint.kind for joint in mechanism.joints}
     for name in wanted:
         if kinds.get(name) not in ("R", "P", "H"):
             known = ", ".join(joint.name for joint in mechanism.joints if joint.actuated)
-            raise MechanismError(f"joint {name}", f"has no coordinate that can be given; actuated joints are {known}")
+            raise MechanismError(f"joint {name}", f"is unknown or has no coordinate; actuated joints are {known}")
 
 
 def _closed(path: _Path, at: Coordinates, nearness: float, points: int) -> ClosedMechanism:
-    """Return a mechanism whose loops are closed at the end of a path."""
+    """Return a mechanism with closed loops at the end of a path."""
     motions = path.motions
     placed, values = motions.placed(at), at.values * motions.units
     coordinates = {
@@ -245,14 +248,14 @@ def _closed(path: _Path, at: Coordinates, nearness: float, points: int) -> Close
 
 
 def _placed(mechanism: Mechanism, placed: Placed, coordinates: Mapping[str, float]) -> Mechanism:
-    """Return a mechanism that is stated at another configuration of it."""
+    """Return a mechanism stated at another of its configurations."""
 
     def link(each: MechanismLink) -> MechanismLink:
         there = placed.displacements[each.name]
         return replace(each, position=moved(there, each.position), rotation=there[:3, :3] @ each.rotation)
 
     def joint(each: MechanismJoint) -> MechanismJoint:
-        # A slide or screw carries its point on the outer link, which is the platform's side of limbs.
+        # The point of a slide or screw moves with the outer link, on the platform side of limbs.
         there = placed.displacements[each.outer]
         limits = each.range
         if limits is not None:
@@ -269,7 +272,7 @@ def _placed(mechanism: Mechanism, placed: Placed, coordinates: Mapping[str, floa
 
 
 def _nearness(spectra: list[FloatArray]) -> float:
-    """Return the smallest singular value on a path, as a part of that at its start; values that stay zero left out."""
+    """Return the smallest nonzero singular value along a path, relative to its start."""
     if not spectra[0].size:
         return 1.0
     rank = max(int(np.count_nonzero(each > _ZERO * each[0])) for each in spectra)

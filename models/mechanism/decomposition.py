@@ -1,12 +1,12 @@
-"""A mechanism's graph taken apart: into limbs, and into the members that resist the platform with locked actuators.
+"""Decomposition of a mechanism's graph: limbs, and members that resist the platform with locked actuators.
 
-The limbs of robots given joint by joint are serial chains from base to platform, and branches behind a driven stem.
-Parts of another shape are left over, each with the reason.
+Limbs of robots given joint by joint are serial chains from base to platform, or branches after an actuated stem. Parts
+of another shape become networks, each with the reason.
 
-For members, links that a locked joint, a weld, or a joint that couplings hold still joins become one. Without base and
-platform, each connected part of the rest is a member; so is a joint directly between base and platform. Joints that a
-coupling relates belong to one member. The same with free actuators is a *limb* here, of any shape. Links that hang on
-one joint are left out.
+For members, links are merged if a locked joint, a weld, or a joint fixed by couplings connects them. Without base and
+platform, each connected part of the rest is a member; so is a joint directly between base and platform. Coupled joints
+belong to one member. The same with free actuators is a *limb* here, of any shape. Links with a single joint are left
+out.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from .topology import Classes, parts
 
 
 class GraphJoint(NamedTuple):
-    """A joint in the graph.
+    """Joint in the graph.
 
     Attributes:
-        one, other: names of its links.
-        is_actuated: whether an actuator drives it.
-        is_weld: whether it makes one body of its links.
+        one, other: names of the links of the joint.
+        is_actuated: True if an actuator drives the joint.
+        is_weld: True if the joint is rigid.
     """
 
     one: str
@@ -35,7 +35,7 @@ class GraphJoint(NamedTuple):
 
 
 class Step(NamedTuple):
-    """A joint of a chain: its index, and whether its first link is on the base's side."""
+    """Joint of a chain: index, and True if its first link is on the base side."""
 
     joint: int
     is_outward: bool
@@ -43,7 +43,7 @@ class Step(NamedTuple):
 
 @dataclass(frozen=True)
 class LimbPaths:
-    """A limb: joints of the stem from the base on, and of each branch; one branch where the limb is serial."""
+    """Limb: joints of the stem from the base on, and of each branch; one branch for a serial limb."""
 
     stem: tuple[Step, ...]
     branches: tuple[tuple[Step, ...], ...]
@@ -51,7 +51,7 @@ class LimbPaths:
 
 @dataclass(frozen=True)
 class Network:
-    """Joints between base and platform that are no limb with branches, and the reason, as a clause."""
+    """Joints between base and platform that do not form a limb with branches, with the reason as a clause."""
 
     joints: tuple[int, ...]
     reason: str
@@ -59,11 +59,11 @@ class Network:
 
 @dataclass(frozen=True)
 class Decomposition:
-    """A graph as limbs.
+    """Decomposition of a graph into limbs and networks.
 
     Attributes:
-        limbs: in the order of their first joints.
-        networks: other parts that join base and platform.
+        limbs: limbs in the order of their first joints.
+        networks: other parts between base and platform.
     """
 
     limbs: tuple[LimbPaths, ...]
@@ -73,12 +73,12 @@ class Decomposition:
 def decompose(
     base: str, platform: str, joints: Sequence[GraphJoint], couplings: Sequence[Collection[int]] = ()
 ) -> Decomposition:
-    """Return a graph as limbs, and as networks where it is none.
+    """Return the limbs of a graph, and its other parts as networks.
 
     Args:
         base: name of the base.
         platform: name of the platform.
-        joints: between links.
+        joints: joints between links.
         couplings: indices of the joints of each coupling, which belong together.
     """
     names = [name for joint in joints for name in (joint.one, joint.other)] + [base, platform]
@@ -108,8 +108,8 @@ def decompose(
 def _joined(
     ends: Sequence[tuple[str, str]], joints: Sequence[int], roots: tuple[str, str], couplings: Sequence[Collection[int]]
 ) -> list[list[int]]:
-    """Return joints in groups that share links other than base and platform, or a coupling."""
-    # A joint is a node here; joints that share a link, or a coupling, have an edge.
+    """Return groups of joints with common links other than base and platform, or with a coupling."""
+    # Nodes are joints here; edges connect joints that share a link or a coupling.
     edges: list[tuple[int, int]] = []
     first: dict[str, int] = {}
     for k in joints:
@@ -121,10 +121,10 @@ def _joined(
 
 
 def without_dangling(
-    ends: Sequence[tuple[str, str]], own: Sequence[int], roots: tuple[str, str], coupled: Collection[int]
+    ends: Sequence[tuple[str, str]], joints: Sequence[int], roots: tuple[str, str], coupled: Collection[int]
 ) -> list[int]:
-    """Return joints without those of links that hang on one joint alone, again and again."""
-    kept = list(own)
+    """Return joints without those of dangling links, which have a single joint, removed repeatedly."""
+    kept = list(joints)
     while True:
         count: dict[str, int] = {}
         for k in kept:
@@ -139,17 +139,17 @@ def without_dangling(
 
 
 def _limb(
-    ends: Sequence[tuple[str, str]], own: Sequence[int], joints: Sequence[GraphJoint], roots: tuple[str, str]
+    ends: Sequence[tuple[str, str]], part: Sequence[int], joints: Sequence[GraphJoint], roots: tuple[str, str]
 ) -> LimbPaths | str:
-    """Return the joints of a part as a limb, or the reason why they are none."""
+    """Return the limb of a connected part, or the reason why it is not a limb."""
     root, top = roots
-    first = [k for k in own if root in ends[k]]
+    first = [k for k in part if root in ends[k]]
     if len(first) > 1:
-        return f"{len(first)} of its joints are on the base, and share links before the platform"
-    left = list(own)
+        return f"{len(first)} of its joints are on the base and share links before the platform"
+    left = list(part)
 
     def walk(node: str, steps: list[Step]) -> tuple[str, list[int]]:
-        """Follow a chain from a node; return the node where it ends or splits, and the joints that go on from it."""
+        """Follow a chain from a node; return its last node, where it ends or splits, and the next joints."""
         while node != top:
             following = [k for k in left if node in ends[k]]
             if len(following) != 1:
@@ -166,7 +166,7 @@ def _limb(
         return LimbPaths((), (tuple(stem),))
     branches = []
     for k in following:
-        if k not in left:  # the branch before has come back to the node by it
+        if k not in left:  # the branch before returned to the node by this joint
             return "its links form a loop of their own"
         left.remove(k)
         branch = [Step(k, ends[k][0] == node)]
@@ -181,14 +181,14 @@ def _limb(
 
 @dataclass(frozen=True)
 class MemberGraph:
-    """A member in the graph.
+    """Member in the graph.
 
     Attributes:
-        limb: number of the limb that it is part of, from 0.
-        passive: indices of the joints that move while actuators are locked.
-        joints: indices of these joints and of all others between base and platform that the member's freedoms with free
-            actuators depend on: those of the limb but for the passive ones of other members.
-        on_platform: indices of the passive joints on the platform, or on a link that is locked to it.
+        limb: number of the member's limb, from 0.
+        passive: indices of the joints that move with locked actuators.
+        joints: indices of these joints and of all others on which the member's motions with free actuators depend:
+            those of the limb without the passive joints of other members.
+        on_platform: indices of the passive joints on the platform, or on a link locked to it.
     """
 
     limb: int
@@ -199,12 +199,12 @@ class MemberGraph:
 
 @dataclass(frozen=True)
 class RobotGraph:
-    """The graph of a mechanism taken apart.
+    """Members and limbs of a mechanism.
 
     Attributes:
-        members: members, which join its base and its platform with locked actuators.
-        limbs: indices of the joints of each limb, which join them with free ones.
-        still: indices of the joints that locked actuators and couplings hold.
+        members: members between base and platform with locked actuators.
+        limbs: joint indices of each limb between base and platform with free actuators.
+        still: indices of the joints that locked actuators and couplings fix.
     """
 
     members: tuple[MemberGraph, ...]
@@ -215,7 +215,7 @@ class RobotGraph:
 def robot_graph(mechanism: Mechanism) -> RobotGraph:
     """Return the members and limbs of a mechanism.
 
-    Where locked actuators alone join base and platform, each limb is one member.
+    If only locked actuators connect base and platform, each limb is one member.
     """
     joints = mechanism.joints
     names = [link.name for link in mechanism.links]
@@ -250,7 +250,7 @@ def robot_graph(mechanism: Mechanism) -> RobotGraph:
 
 
 def _still(mechanism: Mechanism, couplings: Sequence[Collection[int]]) -> set[int]:
-    """Return the joints that stand still with locked actuators: these, and those that couplings then hold."""
+    """Return the joints that are fixed with locked actuators, including those that couplings fix."""
     found = {k for k, joint in enumerate(mechanism.joints) if joint.actuated}
     while True:
         held = {next(k for k in each if k not in found) for each in couplings if sum(k not in found for k in each) == 1}
@@ -262,7 +262,7 @@ def _still(mechanism: Mechanism, couplings: Sequence[Collection[int]]) -> set[in
 def _members(
     mechanism: Mechanism, classes: Classes[str], joints: Sequence[int], couplings: Sequence[Collection[int]]
 ) -> list[list[int]]:
-    """Return the groups of joints between classes of links that join base and platform."""
+    """Return groups of joints between classes of links that connect base and platform."""
     roots = classes.find(mechanism.base), classes.find(mechanism.platform)
     ends = [(classes.find(joint.inner), classes.find(joint.outer)) for joint in mechanism.joints]
     groups = _joined(ends, [k for k in joints if ends[k][0] != ends[k][1]], roots, couplings)

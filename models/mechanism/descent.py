@@ -1,6 +1,6 @@
-"""Joints moved until equations hold, or as near to that as they come: each step makes the residual smaller.
+"""Levenberg-Marquardt iteration on joint coordinates until equations are satisfied or the residual stops falling.
 
-Damped by the squared residual, the steps are those of Levenberg and Marquardt, and converge quadratically [1].
+The damping is the squared residual, with quadratic convergence [1].
 
 Source: 1. N. Yamashita, M. Fukushima, *On the rate of convergence of the Levenberg-Marquardt method*, Computing
 Supplementa 15 (2001).
@@ -17,19 +17,19 @@ from ..arrays import FloatArray
 from ..newton import Linear
 from .motions import Coordinates, Equations, Motions, Placed
 
-#: Loops are closed where no residual, of order 1, is above this: rounding of 60 joints in a row leaves 1e-14.
+#: Largest residual, of order 1, of closed loops: rounding of 60 joints in a row leaves 1e-14.
 CLOSED = 1e-11
 
 
 class Reached(NamedTuple):
-    """Coordinates of a mechanism, with equations there.
+    """Coordinates of a mechanism with the values of equations.
 
     Attributes:
-        at: the coordinates.
-        placed: the mechanism at these.
+        at: joint coordinates.
+        placed: mechanism at these coordinates.
         residual: (m,) left sides of the equations.
-        slopes: (m, n) their derivatives.
-        is_stuck: whether the step to this point hardly made the residual smaller.
+        slopes: (m, n) derivatives of the left sides.
+        is_stuck: True if the step to this point hardly reduced the residual.
     """
 
     at: Coordinates
@@ -40,7 +40,7 @@ class Reached(NamedTuple):
 
     @property
     def error(self) -> float:
-        """Size of the largest left side."""
+        """Largest absolute left side."""
         return float(np.abs(self.residual).max(initial=0.0))
 
     @property
@@ -50,17 +50,17 @@ class Reached(NamedTuple):
 
 
 class Descent:
-    """Equations of a mechanism for Newton's method, which accepts only steps that make the residual smaller.
+    """Equations of a mechanism for Newton's method, with steps accepted only if they reduce the residual.
 
     Args:
         motions: kinematics of the mechanism.
-        equations: functions of coordinates, and of the mechanism at these.
-        free: indices of the coordinates that move.
-        closed: largest left side where the equations hold.
-        size: (f,) of each of these: least-norm steps are shortest in parts of it.
-        stuck: part of the residual above which a step leads nowhere, where loops are open; 1 for none.
-        is_damped: whether steps are damped. Equations that depend on each other have singular values of the order of
-            the residual: damped, they ask for no large steps.
+        equations: function of coordinates and of the mechanism at these.
+        free: indices of the variable coordinates.
+        closed: largest left side at a solution.
+        size: (f,) scale of each variable coordinate, for least-norm steps.
+        stuck: ratio of residuals above which a step is stuck; 1 to disable the test.
+        is_damped: If true, steps are damped. Dependent equations have singular values of the order of the residual,
+            which would cause large undamped steps.
     """
 
     def __init__(
@@ -78,18 +78,18 @@ class Descent:
         self._size, self._stuck, self._is_damped = size, stuck, is_damped
 
     def at(self, at: Coordinates) -> Reached:
-        """Return coordinates with the equations there."""
+        """Return coordinates with the values of the equations."""
         placed = self._motions.placed(at)
         return Reached(at, placed, *self._equations(at, placed), is_stuck=False)
 
     def linear(self, at: Reached) -> Linear | None:
-        """Return the equations to first order; None where they hold, and where steps lead nowhere."""
+        """Return the linearised equations; None at a solution, or if the iteration is stuck."""
         if at.is_stuck or at.error <= self._closed:
             return None
         return Linear(at.residual, at.slopes[:, self._free] * self._size, at.length**2 if self._is_damped else 0.0)
 
     def moved(self, at: Reached, step: FloatArray) -> Reached | None:
-        """Return the coordinates after a step; None where the residual is no smaller there."""
+        """Return the coordinates after a step; None if the residual does not fall."""
         every = np.zeros(self._motions.count)
         every[self._free] = self._size * step
         found = self.at(self._motions.stepped(at.at, every, at.placed))

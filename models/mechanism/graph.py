@@ -1,8 +1,8 @@
-"""A mechanism as a graph: links, and elementary joints between two of them, at one configuration in the world frame.
+"""Mechanism as a graph: links, and elementary joints between two of them, at one configuration in the world frame.
 
-Every description of a robot passes through this form when it is read or written: universal, cylindrical and
-parallelogram joints are made of the elementary ones, with links between them. The premises of the other modules are
-checked here; each fault is refused with one sentence.
+All robot formats are read and written through this form: universal, cylindrical and parallelogram joints consist of
+elementary joints with links between them. The assumptions of the other modules are checked here; each fault is one
+sentence.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ import numpy as np
 from ..arrays import FloatArray
 from .topology import bridges_between, reached
 
-#: Largest difference of the length of a unit axis from 1: an axis that is typed with six decimals is one.
+#: Largest deviation of the length of a unit axis from 1, for axes typed with six decimals.
 _UNIT = 1e-6
 
-#: Hinge, slide, screw, ball, and a rigid connection.
+#: Kinds of joints: hinge, slide, screw, ball, and rigid connection.
 ElementaryKind = Literal["R", "P", "H", "S", "weld"]
 
 
 class MechanismError(ValueError):
-    """A mechanism that contradicts itself.
+    """Error of an inconsistent mechanism.
 
     Attributes:
         place: link or joint in words; empty for the whole mechanism.
-        fault: clause that says what is wrong.
+        fault: description of the fault, as a clause.
     """
 
     def __init__(self, place: str, fault: str) -> None:
@@ -41,12 +41,12 @@ class MechanismError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class MechanismLink:
-    """A rigid body.
+    """Rigid body of a mechanism.
 
     Attributes:
-        name: unique among the links.
-        position: (3,) origin of its frame in the world.
-        rotation: (3, 3) its frame's axes as columns, in the world.
+        name: unique name among the links.
+        position: (3,) origin of the link frame in the world frame, length.
+        rotation: (3, 3) axes of the link frame as columns, in the world frame.
     """
 
     name: str
@@ -54,27 +54,26 @@ class MechanismLink:
     rotation: FloatArray = field(default_factory=lambda: np.eye(3))
 
     def local(self, point: FloatArray) -> FloatArray:
-        """Return a point (3,) of the world in the link's frame."""
+        """Return a world point (3,) in the link frame."""
         return np.asarray(self.rotation.T @ (point - self.position))
 
 
 @dataclass(frozen=True, eq=False)
 class MechanismJoint:
-    """A joint of one of the elementary kinds between two links.
+    """Elementary joint between two links.
 
     Attributes:
-        name: unique among the joints.
-        kind: ``R``, ``P``, ``H``, ``S`` or ``weld``.
-        inner: name of the link on the base's side.
-        outer: name of the other link, whose motion relative to ``inner`` the coordinate counts.
-        point: (3,) its centre, or a point of its axis, in the world.
-        axis: (3,) unit direction of its axis in the world; zero for ``S`` and ``weld``.
-        pitch: way per radian of an ``H``.
-        actuated: whether an actuator drives it.
-        range: smallest and largest coordinate, counted from the stated configuration, radians or length; None for no
-            limit.
-        outer_point: (3,) the joint's point as the outer link has it, where the description leaves the loop open; the
-            same as ``point`` in a closed one.
+        name: unique name among the joints.
+        kind: kind of the joint: ``R``, ``P``, ``H``, ``S`` or ``weld``.
+        inner: name of the link on the base side.
+        outer: name of the other link; the coordinate is its motion relative to ``inner``.
+        point: (3,) centre of the joint, or point of its axis, in the world frame, length.
+        axis: (3,) unit vector along the axis in the world frame; zero for ``S`` and ``weld``.
+        pitch: translation per radian of an ``H`` joint, length.
+        actuated: True if an actuator drives the joint.
+        range: smallest and largest coordinate from the stated configuration, radians or length; None for no limit.
+        outer_point: (3,) point of the joint on the outer link, if the description leaves the loop open, length; None
+            for ``point``.
     """
 
     name: str
@@ -91,10 +90,10 @@ class MechanismJoint:
 
 @dataclass(frozen=True)
 class Coupling:
-    """A linear relation of joint coordinates: the sum of factors times coordinates stays as it is.
+    """Linear relation of joint coordinates: the sum of factors times coordinates is constant.
 
     Attributes:
-        name: unique among the couplings.
+        name: unique name among the couplings.
         factors: pairs of a joint's name and its factor; radians and lengths.
     """
 
@@ -104,12 +103,12 @@ class Coupling:
 
 @dataclass(frozen=True, eq=False)
 class Mechanism:
-    """A robot of any topology at one configuration.
+    """Robot of any topology at one configuration.
 
     Attributes:
-        name: of the robot.
-        links: with the base and the platform among them.
-        joints: between them.
+        name: name of the robot.
+        links: links, including base and platform.
+        joints: joints between the links.
         base: name of the base.
         platform: name of the platform.
         couplings: relations of joint coordinates.
@@ -128,11 +127,11 @@ class Mechanism:
 
 
 def check_mechanism(mechanism: Mechanism) -> None:
-    """Refuse a mechanism that contradicts itself, or that is no robot.
+    """Refuse an inconsistent mechanism, or one that is not a parallel robot.
 
     Raises:
-        MechanismError: the first fault: a name that is given twice or is unknown, a joint without place or axis, a link
-            that nothing joins to the base, a platform on an open chain, or no actuated joint.
+        MechanismError: the first fault: a repeated or unknown name, a joint without position or axis, a link without a
+            connection to the base, a platform on an open chain, or no actuated joint.
     """
     links = [link.name for link in mechanism.links]
     _refuse_twice("link", links)
@@ -140,12 +139,12 @@ def check_mechanism(mechanism: Mechanism) -> None:
     _refuse_twice("coupling", [coupling.name for coupling in mechanism.couplings])
     for role, name in (("base", mechanism.base), ("platform", mechanism.platform)):
         if name not in links:
-            raise MechanismError(role, f"is {name!r}, which is no link; links are {_listing(links)}")
+            raise MechanismError(role, f"is {name!r}, which is not a link; links are {_listing(links)}")
     if mechanism.base == mechanism.platform:
         raise MechanismError("platform", f"is {mechanism.platform!r}, which is the base; two links are needed")
     for link in mechanism.links:
         if not (np.isfinite(link.position).all() and np.isfinite(link.rotation).all()):
-            raise MechanismError(f"link {link.name}", "has a place or rotation that is not finite")
+            raise MechanismError(f"link {link.name}", "has a position or rotation that is not finite")
     for joint in mechanism.joints:
         _check_joint(joint, links)
     _check_couplings(mechanism)
@@ -153,7 +152,9 @@ def check_mechanism(mechanism: Mechanism) -> None:
     joined = reached(mechanism.base, edges)
     loose = [name for name in links if name not in joined]
     if loose:
-        raise MechanismError(f"link {loose[0]}", "is joined to the base by no joint, directly or through other links")
+        raise MechanismError(
+            f"link {loose[0]}", "is not connected to the base, neither directly nor through other links"
+        )
     if not any(joint.actuated for joint in mechanism.joints):
         raise MechanismError("actuated", "is given at no joint; at least one actuator must drive the robot")
     path = bridges_between(mechanism.base, mechanism.platform, edges)
@@ -165,13 +166,13 @@ def check_mechanism(mechanism: Mechanism) -> None:
 
 
 def _check_joint(joint: MechanismJoint, links: Iterable[str]) -> None:
-    """Refuse a joint with unknown links, or without place or axis."""
+    """Refuse a joint with unknown links, or without position or axis."""
     place = f"joint {joint.name}"
     for name in (joint.inner, joint.outer):
         if name not in links:
             raise MechanismError(place, f"has the link {name!r}, which is unknown; links are {_listing(links)}")
     if joint.inner == joint.outer:
-        raise MechanismError(place, f"joins the link {joint.inner!r} to itself; two links are needed")
+        raise MechanismError(place, f"connects the link {joint.inner!r} to itself; two links are needed")
     points = [joint.point] if joint.outer_point is None else [joint.point, joint.outer_point]
     if not all(np.isfinite(point).all() for point in points):
         raise MechanismError(place, "has a point that is not finite")
@@ -183,7 +184,7 @@ def _check_joint(joint: MechanismJoint, links: Iterable[str]) -> None:
             )
             raise MechanismError(f"{place}, axis", fault)
     elif joint.actuated:
-        raise MechanismError(f"{place} ({joint.kind})", "is actuated; only R, P and H can be")
+        raise MechanismError(f"{place} ({joint.kind})", "is actuated; only R, P and H joints can be actuated")
     if not math.isfinite(joint.pitch):
         raise MechanismError(f"{place}, pitch", f"is {joint.pitch}; a finite number is needed")
     if joint.range is not None and not joint.range[0] <= joint.range[1]:
@@ -191,7 +192,7 @@ def _check_joint(joint: MechanismJoint, links: Iterable[str]) -> None:
 
 
 def _check_couplings(mechanism: Mechanism) -> None:
-    """Refuse couplings of joints that are unknown, or that have no coordinate."""
+    """Refuse couplings of unknown joints, and of joints without a coordinate."""
     joints = {joint.name: joint for joint in mechanism.joints}
     for coupling in mechanism.couplings:
         place = f"coupling {coupling.name}"
@@ -201,10 +202,10 @@ def _check_couplings(mechanism: Mechanism) -> None:
             if joints[name].kind not in ("R", "P", "H"):
                 kind = joints[name].kind
                 raise MechanismError(
-                    place, f"has the joint {name!r} ({kind}), which has no coordinate; R, P and H have"
+                    place, f"has the joint {name!r} ({kind}), which has no coordinate; only R, P and H joints have one"
                 )
             if not math.isfinite(factor) or factor == 0:
-                raise MechanismError(place, f"has the factor {factor:g} of {name!r}; a number that is not 0 is needed")
+                raise MechanismError(place, f"has the factor {factor:g} of {name!r}; a nonzero number is needed")
         _refuse_twice(f"{place}: joint", [name for name, _ in coupling.factors])
         if len(coupling.factors) < 2:
             raise MechanismError(place, "couples fewer than two joints; remove it, or weld the joint")
@@ -218,6 +219,6 @@ def _refuse_twice(what: str, names: Iterable[str]) -> None:
 
 
 def _listing(names: Iterable[str], most: int = 8) -> str:
-    """Return names in a row, at most a few of them."""
+    """Return names separated by commas, shortened to a few."""
     found = list(names)
     return ", ".join(found[:most]) + (", ..." if len(found) > most else "")

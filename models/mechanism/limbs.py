@@ -1,6 +1,6 @@
-"""Tables of a robot file from a mechanism: limbs with branches where its graph has them, else links and joints.
+"""Robot-file tables of a mechanism: limbs with branches if its graph has them, else links and joints.
 
-Numbers are written as they are, in the world frame: the configuration of the mechanism is the robot's home.
+Values are written unchanged, in the world frame: the configuration of the mechanism is the robot's home.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from .decomposition import Decomposition, GraphJoint, LimbPaths, Network, Step, 
 from .graph import Mechanism, MechanismError, MechanismJoint, check_mechanism
 from .topology import incident
 
-#: Entries of an axis, and distances and differences of directions that show a parallelogram, in parts of its rods: only
-#: rounding is less, as a robot file states an exact one.
+#: Tolerance for a parallelogram, on axis entries and relative to the rods: only rounding is smaller, as a robot file
+#: states an exact one.
 _SAME = 1e-9
-#: Letters that names of a robot file may not have.
+#: Characters that are not allowed in names of a robot file.
 _NO_NAME = re.compile(r"[^A-Za-z0-9_]")
 
 
 class _FileJoint(NamedTuple):
-    """A joint as a robot file has it: elementary, or a parallelogram in the place of four hinges."""
+    """Joint of a robot file: elementary, or a parallelogram in place of four hinges."""
 
     graph: GraphJoint
     table: dict[str, Any]
@@ -34,13 +34,13 @@ class _FileJoint(NamedTuple):
 def limbs_of(mechanism: Mechanism) -> dict[str, Any]:
     """Return the tables of a robot file with limbs.
 
-    Joints that join nothing to the platform are left out. Four passive hinges that form a parallelogram become one
-    joint ``Pa``. The tables are the arguments of :func:`screwsynth.models.robot`. They have neither ranges of joints,
-    which a case limits, nor a rotation of the platform's frame, whose axes are parallel to the world's at home.
+    Joints without effect on the platform are left out. Four passive hinges that form a parallelogram become one joint
+    ``Pa``. The tables are the arguments of :func:`screwsynth.models.robot`. They contain neither joint ranges, which a
+    case limits, nor a rotation of the platform frame, whose axes are parallel to the world axes at home.
 
     Raises:
-        MechanismError: the mechanism contradicts itself, or a part of it is no limb: nested loops, coupled joints, or a
-            passive joint before branches.
+        MechanismError: the mechanism is inconsistent, or has a part that is not a limb: nested loops, coupled joints,
+            or a passive joint before branches.
     """
     joints, found = _decomposed(mechanism)
     if found.networks:
@@ -50,10 +50,10 @@ def limbs_of(mechanism: Mechanism) -> dict[str, Any]:
 
 
 def links_of(mechanism: Mechanism) -> dict[str, Any]:
-    """Return the tables of a robot file with links and joints, which every mechanism has.
+    """Return the robot-file tables with links and joints, which every mechanism has.
 
     Raises:
-        MechanismError: the mechanism contradicts itself.
+        MechanismError: the mechanism is inconsistent.
     """
     check_mechanism(mechanism)
     names = _names([link.name for link in mechanism.links])
@@ -81,10 +81,10 @@ def links_of(mechanism: Mechanism) -> dict[str, Any]:
 
 
 def robot_tables(mechanism: Mechanism) -> dict[str, Any]:
-    """Return the tables of a robot file: with limbs where the mechanism has them, else with links and joints.
+    """Return the robot-file tables of a mechanism: with limbs if it has them, else with links and joints.
 
     Raises:
-        MechanismError: the mechanism contradicts itself.
+        MechanismError: the mechanism is inconsistent.
     """
     _, found = _decomposed(mechanism)
     return links_of(mechanism) if found.networks else limbs_of(mechanism)
@@ -96,7 +96,7 @@ def _head(mechanism: Mechanism) -> dict[str, Any]:
 
 
 def _decomposed(mechanism: Mechanism) -> tuple[list[_FileJoint], Decomposition]:
-    """Return the joints of a mechanism as a robot file has them, and its limbs by their indices."""
+    """Return the robot-file joints of a mechanism, and its limbs by joint indices."""
     check_mechanism(mechanism)
     joints = _file_joints(mechanism)
     index = {name: k for k, each in enumerate(joints) for name in each.names}
@@ -105,15 +105,13 @@ def _decomposed(mechanism: Mechanism) -> tuple[list[_FileJoint], Decomposition]:
 
 
 def _sentence(network: Network, joints: Sequence[_FileJoint]) -> tuple[str, str]:
-    """Return place and fault of a part that is no limb."""
+    """Return place and fault of a part that is not a limb."""
     names = [name for k in network.joints for name in joints[k].names]
     shown = ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
-    return f"joints {shown}", f"are no limb with branches: {network.reason}"
+    return f"joints {shown}", f"do not form a limb with branches: {network.reason}"
 
 
 def _limb_table(limb: LimbPaths, joints: Sequence[_FileJoint]) -> dict[str, Any]:
-    """Return the table of a limb."""
-
     def tables(steps: Sequence[Step]) -> list[dict[str, Any]]:
         taken: set[str] = set()
         return [_named(_outward(joints[step.joint].table, step.is_outward), taken) for step in steps]
@@ -125,7 +123,7 @@ def _limb_table(limb: LimbPaths, joints: Sequence[_FileJoint]) -> dict[str, Any]
 
 
 def _named(table: dict[str, Any], taken: set[str]) -> dict[str, Any]:
-    """Return a joint's table without its name where another joint of the path has it."""
+    """Return a joint's table without its name if another joint of the path has the same name."""
     if table["name"] in taken:
         return {key: value for key, value in table.items() if key != "name"}
     taken.add(table["name"])
@@ -133,7 +131,7 @@ def _named(table: dict[str, Any], taken: set[str]) -> dict[str, Any]:
 
 
 def _outward(table: dict[str, Any], is_outward: bool) -> dict[str, Any]:
-    """Return a joint's table from the base's side on: the coordinate keeps its sign where the axis turns over."""
+    """Return a joint's table from the base side on; a reversed axis keeps the sign of the coordinate."""
     if is_outward:
         return table
     turned = dict(table)
@@ -146,7 +144,7 @@ def _outward(table: dict[str, Any], is_outward: bool) -> dict[str, Any]:
 
 
 def _file_joints(mechanism: Mechanism) -> list[_FileJoint]:
-    """Return the joints of a mechanism, with parallelograms in the place of four hinges."""
+    """Return the joints of a mechanism, with parallelograms in place of four hinges."""
     left = list(mechanism.joints)
     coupled = {name for coupling in mechanism.couplings for name, _ in coupling.factors}
     names = _names([joint.name for joint in mechanism.joints])
@@ -179,7 +177,7 @@ def _file_joints(mechanism: Mechanism) -> list[_FileJoint]:
 
 
 class _Rod(NamedTuple):
-    """A link between two passive hinges: the links that it joins, its hinges, a place and the way to the other."""
+    """Link between two passive hinges: adjacent links, hinges, start point and span."""
 
     ends: tuple[str, str]
     joints: tuple[MechanismJoint, MechanismJoint]
@@ -187,7 +185,7 @@ class _Rod(NamedTuple):
     span: FloatArray
 
     def is_parallel_to(self, other: _Rod) -> bool:
-        """Return whether this rod and another one are the long sides of a parallelogram."""
+        """Return True if this rod and another one are the long sides of a parallelogram."""
         if self.ends != other.ends or self.joints[0].name == other.joints[0].name:
             return False
         length = float(np.linalg.norm(self.span))
@@ -204,7 +202,7 @@ class _Rod(NamedTuple):
 
 
 def _rods(mechanism: Mechanism) -> list[_Rod]:
-    """Return the links that have two passive hinges and no other joint, with their ends in alphabetical order."""
+    """Return the links with two passive hinges and no other joint, ends in alphabetical order."""
     found = []
     of_link = incident((joint.inner, joint.outer) for joint in mechanism.joints)
     for link in mechanism.links:
@@ -223,7 +221,7 @@ def _rods(mechanism: Mechanism) -> list[_Rod]:
 
 
 def _joint_values(joint: MechanismJoint) -> dict[str, Any]:
-    """Return place, axis, pitch and actuation of a joint as a robot file has them."""
+    """Return position, axis, pitch and actuation of a joint for a robot file."""
     found: dict[str, Any] = {"at": _numbers(joint.point)}
     if joint.kind in ("R", "P", "H"):
         found["axis"] = _numbers(joint.axis)
@@ -240,7 +238,7 @@ def _numbers(vector: FloatArray) -> list[float]:
 
 
 def _names(names: Sequence[str]) -> dict[str, str]:
-    """Return names that a robot file may have, each once."""
+    """Return valid and unique robot-file names."""
     found: dict[str, str] = {}
     taken: set[str] = set()
     for name in names:

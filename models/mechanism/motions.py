@@ -1,8 +1,8 @@
-"""Places and screws of all links and joints of a mechanism at any values of its joints' coordinates.
+"""Displacements and screws of all links and joints of a mechanism at any joint coordinates.
 
-Links are placed along a spanning tree from the base. A joint that is not in the tree closes a loop: its residual is the
-displacement that is missing between its two links. Angles are in radians and lengths in parts of the mechanism's size,
-so that residuals and coordinates are of order 1.
+Links are placed along a spanning tree from the base. A joint outside the tree closes a loop: its residual is the
+displacement between its two sides. Angles are in radians and lengths relative to the mechanism's size, so that
+residuals and coordinates are of order 1.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from ..rotation import axis_angle_from_matrix
 from .graph import ElementaryKind, Mechanism, MechanismJoint
 from .topology import spanning_tree
 
-#: Number of coordinates of a joint of each kind. Those of a spherical joint are steps of a rotation, which is kept as a
-#: matrix: three angles would have singular values.
+#: Number of coordinates of each kind of joint. Those of a spherical joint are steps of a rotation, which is stored as a
+#: matrix: three angles would be singular somewhere.
 WIDTHS: dict[ElementaryKind, int] = {"R": 1, "P": 1, "H": 1, "S": 3, "weld": 0}
 
 
@@ -38,25 +38,25 @@ def rotation_vector(matrix: FloatArray) -> FloatArray:
 
 
 def size_of(mechanism: Mechanism) -> float:
-    """Return a length of the order of a mechanism's: the largest extent of its joints; 1 where all are at one point."""
+    """Return the size of a mechanism, length: the largest extent of its joints; 1 if all are at one point."""
     points = np.array([joint.point for joint in mechanism.joints if joint.kind != "weld"]).reshape(-1, 3)
     return float(np.max(np.ptp(points, axis=0), initial=0.0)) or 1.0 if len(points) else 1.0
 
 
 def about(rotation: FloatArray, point: FloatArray, shift: FloatArray) -> FloatArray:
-    """Return the displacement (4, 4) that turns about a point (3,) and then shifts."""
+    """Return the displacement (4, 4) that rotates about a point (3,) and then translates."""
     found = np.eye(4)
     found[:3, :3], found[:3, 3] = rotation, point - rotation @ point + shift
     return found
 
 
 def moved(displacement: FloatArray, point: FloatArray) -> FloatArray:
-    """Return where a displacement (4, 4) takes a point (3,)."""
+    """Return the point (3,) after a displacement (4, 4)."""
     return np.asarray(displacement[:3, :3] @ point + displacement[:3, 3])
 
 
 def inverse(displacement: FloatArray) -> FloatArray:
-    """Return the displacement (4, 4) back."""
+    """Return the inverse displacement (4, 4)."""
     found = np.eye(4)
     found[:3, :3] = displacement[:3, :3].T
     found[:3, 3] = -displacement[:3, :3].T @ displacement[:3, 3]
@@ -64,10 +64,11 @@ def inverse(displacement: FloatArray) -> FloatArray:
 
 
 class Coordinates(NamedTuple):
-    """Values of all joints' coordinates.
+    """Values of all joint coordinates.
 
     Attributes:
-        values: (n,) by column; radians and lengths in parts of the mechanism's size; 0 for those of spherical joints.
+        values: (n,) coordinates by column, radians and lengths relative to the mechanism's size; 0 for those of
+            spherical joints.
         balls: (3, 3) rotation of each spherical joint, by the joint's index.
     """
 
@@ -76,11 +77,11 @@ class Coordinates(NamedTuple):
 
 
 class Equations(NamedTuple):
-    """Equations of a mechanism at some coordinates.
+    """Equations of a mechanism at given coordinates.
 
     Attributes:
-        residual: (m,) left sides, which are zero where they hold, of order 1.
-        slopes: (m, n) their derivatives by coordinates of order 1, exact where they hold.
+        residual: (m,) left sides of order 1, zero at a solution.
+        slopes: (m, n) derivatives with respect to coordinates of order 1, exact at a solution.
     """
 
     residual: FloatArray
@@ -88,13 +89,13 @@ class Equations(NamedTuple):
 
 
 class Placed(NamedTuple):
-    """A mechanism at some coordinates.
+    """Mechanism at given coordinates.
 
     Attributes:
-        displacements: (4, 4) of each link from the stated configuration, by name.
-        joints: (4, 4) of each joint's own displacement at its coordinates.
-        screws: (6, k) current unit screws of each joint's axes as twists, the world's origin as reference.
-        twists: (6, n) twist of each link for unit rates of the coordinates of the tree, by name.
+        displacements: (4, 4) displacement of each link from the stated configuration, by name.
+        joints: (4, 4) relative displacement of each joint at its coordinates.
+        screws: (6, k) current unit screws of each joint's axes, as twists about the world origin.
+        twists: (6, n) twists of each link for unit rates of the tree's coordinates, by name.
     """
 
     displacements: dict[str, FloatArray]
@@ -108,8 +109,8 @@ def joint_screws(joint: MechanismJoint, rotation: FloatArray, point: FloatArray)
 
     Args:
         joint: the joint.
-        rotation: (3, 3) of the inner link from the configuration in which the joint states its axis.
-        point: (3,) current place of the joint, length.
+        rotation: (3, 3) rotation of the inner link from the stated configuration of the joint.
+        point: (3,) current position of the joint, length.
     """
     if joint.kind == "weld":
         return np.zeros((6, 0))
@@ -131,7 +132,7 @@ class Motions:
     Attributes:
         columns: slice of the coordinates of each joint.
         count: number of coordinates.
-        size: length that coordinates and residuals are parts of.
+        size: reference length of coordinates and residuals.
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
@@ -146,23 +147,23 @@ class Motions:
         unit = [
             self.size if joint.kind == "P" else 1.0 for joint in mechanism.joints for _ in range(WIDTHS[joint.kind])
         ]
-        #: (n,) coordinates of order 1 times this are radians and lengths.
+        #: (n,) factors from coordinates of order 1 to radians and lengths.
         self.units = np.array(unit)
 
     @property
     def stated(self) -> Coordinates:
-        """The coordinates at the stated configuration."""
+        """Coordinates of the stated configuration."""
         balls = {k: np.eye(3) for k, joint in enumerate(self.mechanism.joints) if joint.kind == "S"}
         return Coordinates(np.zeros(self.count), balls)
 
     def column(self, joint: str) -> int:
-        """Return the column of the coordinate of a joint R, P or H."""
+        """Return the column of the coordinate of an R, P or H joint."""
         return self.columns[self._index[joint]].start
 
     def placed(self, at: Coordinates) -> Placed:
-        """Return all links and joints at some coordinates."""
+        """Return the mechanism at given coordinates."""
         joints = self.mechanism.joints
-        own = [self._own_motion(k, at) for k in range(len(joints))]
+        own = [self._relative_displacement(k, at) for k in range(len(joints))]
         displacements = {self.mechanism.base: np.eye(4)}
         twists = {self.mechanism.base: np.zeros((6, self.count))}
         screws: list[FloatArray] = [np.zeros((6, 0))] * len(joints)
@@ -178,7 +179,7 @@ class Motions:
         return Placed(displacements, own, screws, twists)
 
     def loops(self, placed: Placed) -> Equations:
-        """Return the missing rotation vector and displacement of each of the c joints that close a loop."""
+        """Return the closure errors, rotation vector and displacement, of each of the c joints that close a loop."""
         residuals, slopes = [np.zeros(0)], [np.zeros((0, self.count))]
         for k in self.tree.chords:
             joint = self.mechanism.joints[k]
@@ -191,7 +192,7 @@ class Motions:
         return Equations(np.concatenate(residuals), np.vstack(slopes))
 
     def towards(self, placed: Placed, link: str, target: FloatArray) -> Equations:
-        """Return how far a link is from a displacement (4, 4), as :meth:`loops` does."""
+        """Return the error of a link relative to a displacement (4, 4), in the form of :meth:`loops`."""
         origin = next(each.position for each in self.mechanism.links if each.name == link)
         residual = self._mismatch(placed.displacements[link] @ inverse(target), moved(target, origin))
         return Equations(residual, self.at_point(placed.twists[link], moved(target, origin)))
@@ -208,16 +209,16 @@ class Motions:
         return Coordinates(values, balls)
 
     def at_point(self, twists: FloatArray, point: FloatArray) -> FloatArray:
-        """Return twists (6, n) with the velocities of a point in parts of the size, for coordinates of order 1."""
+        """Return twists (6, n) with the velocities of a point relative to the size, for coordinates of order 1."""
         velocities = twists[3:] + np.cross(twists[:3].T, point).T
         return np.asarray(np.vstack([twists[:3], velocities / self.size]) * self.units)
 
     def _mismatch(self, displacement: FloatArray, point: FloatArray) -> FloatArray:
-        """Return a displacement (4, 4) as rotation vector and shift of a point in parts of the size, (6,)."""
+        """Return a displacement (4, 4) as rotation vector and relative translation of a point, (6,)."""
         turn = rotation_vector(displacement[:3, :3])
         return np.concatenate([turn, (moved(displacement, point) - point) / self.size])
 
-    def _own_motion(self, k: int, at: Coordinates) -> FloatArray:
+    def _relative_displacement(self, k: int, at: Coordinates) -> FloatArray:
         """Return the displacement (4, 4) of a joint's outer link at the stated configuration of its inner one."""
         joint, value = self.mechanism.joints[k], at.values[self.columns[k]]
         outer = joint.point if joint.outer_point is None else joint.outer_point

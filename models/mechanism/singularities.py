@@ -1,4 +1,4 @@
-"""Generic ranks of a mechanism, and the singularities that show where its ranks at a configuration differ from them."""
+"""Generic ranks of a mechanism, and singularities by comparison of its ranks with them."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from .wrenches import RobotRanks, wrenches_of
 
 #: Number of random closed configurations; the largest ranks among them are generic.
 _POINTS = 4
-#: Largest random change of each coordinate, radians and parts of the size, and number of trials with each. A large one
-#: leaves the neighbourhood of a singular configuration; a small one finds closed loops where large ones do not close.
+#: Largest random change of each coordinate (radians, and relative to the size), and number of trials with each. A large
+#: change leaves the neighbourhood of a singular configuration; a small one closes loops that a large one cannot.
 _CHANGES = (0.4, 0.15, 0.05)
 _TRIALS = 4
 
@@ -25,26 +25,26 @@ class SingularityType(enum.Enum):
     """Type of a singularity; each value is a clause for people."""
 
     PASSIVE = "its passive joints allow other motions than elsewhere: F jumps here"
-    SERIAL = "its joints are dependent: an actuator cannot drive the platform, which loses a freedom"
-    CONSTRAINT = "the constraints are dependent: the platform gains a freedom even with free actuators"
+    SERIAL = "its joints are dependent: an actuator cannot drive the platform, which loses a degree of freedom"
+    CONSTRAINT = "the constraints are dependent: the platform gains a degree of freedom even with free actuators"
     ACTUATION = "the platform can move with every actuator locked"
     ARCHITECTURE = "the rank is below six at all configurations: the platform can always move"
 
 
 class MechanismSingularity(NamedTuple):
-    """A singularity: its type, and the number of the member that it belongs to, from 0; None for the whole robot."""
+    """Singularity: type, and number of the member from 0; None for the whole robot."""
 
     type: SingularityType
     member: int | None = None
 
 
 def closed_configurations(mechanism: Mechanism, count: int = _POINTS, seed: int = 0) -> Iterator[Mechanism]:
-    """Yield random closed configurations of a mechanism, at most so many.
+    """Yield random closed configurations of a mechanism, at most ``count``.
 
     Args:
-        mechanism: at any configuration.
-        count: of configurations.
-        seed: of the random numbers.
+        mechanism: mechanism at any configuration.
+        count: largest number of configurations.
+        seed: seed of the random numbers.
     """
     motions = Motions(mechanism)
     stated = motions.stated
@@ -64,24 +64,23 @@ def closed_configurations(mechanism: Mechanism, count: int = _POINTS, seed: int 
 def generic_ranks(mechanism: Mechanism, seed: int = 0) -> RobotRanks:
     """Return the ranks of a mechanism at almost all closed configurations.
 
-    The rank of a member is the most frequent one at random configurations: nested loops may allow more motions at a
-    special one, and limbs fewer. The ranks of the robot are the largest where members have theirs.
+    The rank of a member is the most frequent one at random configurations, because special configurations may allow
+    more motions of nested loops, or fewer of limbs. The ranks of the robot are the largest where members have their
+    generic ranks.
 
     Args:
-        mechanism: at any configuration, which counts as well.
-        seed: of the random configurations.
+        mechanism: mechanism at any configuration, which is included.
+        seed: seed of the random configurations.
 
     Raises:
-        MechanismError: the mechanism contradicts itself, or its loops close nowhere.
+        MechanismError: the mechanism is inconsistent, or its loops close nowhere.
     """
     ranks = [wrenches_of(each).ranks for each in closed_configurations(mechanism, seed=seed)]
     if not ranks:
-        raise MechanismError(
-            "", "has loops that could not be closed at any configuration near this one: is it movable?"
-        )
+        raise MechanismError("", "no closed configuration near this one: check that the mechanism is mobile")
     passive = _most_frequent([each.passive for each in ranks])
     every = _most_frequent([each.all for each in ranks])
-    # A limb with dependent joints has more wrenches than elsewhere, and would raise the ranks.
+    # A limb with dependent joints has more wrenches than generic, and would raise the ranks.
     regular = [each for each in ranks if each.passive == passive and each.all == every] or ranks
     jacobian, constraints = (
         max(number) for number in zip(*((r.jacobian, r.constraints) for r in regular), strict=True)
@@ -90,7 +89,7 @@ def generic_ranks(mechanism: Mechanism, seed: int = 0) -> RobotRanks:
 
 
 def _most_frequent(ranks: list[tuple[int, ...]]) -> tuple[int, ...]:
-    """Return the most frequent rank of each member, the larger one of two that are equally so."""
+    """Return the most frequent rank of each member; ties take the larger one."""
     return tuple(max(set(own), key=lambda rank: (own.count(rank), rank)) for own in zip(*ranks, strict=True))
 
 
@@ -98,8 +97,8 @@ def singularities_of(ranks: RobotRanks, generic: RobotRanks) -> tuple[MechanismS
     """Return the singularities at a configuration.
 
     Args:
-        ranks: there.
-        generic: at almost all configurations.
+        ranks: ranks at the configuration.
+        generic: ranks at almost all configurations.
     """
     found: list[MechanismSingularity] = []
     for k, passive in enumerate(ranks.passive):

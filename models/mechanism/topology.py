@@ -1,4 +1,4 @@
-"""The graph of a mechanism as names and pairs of names: connected parts, bridges, and a spanning tree."""
+"""Graph algorithms on names and pairs of names: connected parts, bridges, and spanning trees."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ Edge = tuple[Node, Node]
 
 
 class Classes(Generic[Node]):
-    """Links that move as one: the sets of a partition, by a name that stands for each (union and find).
+    """Partition of links into rigid bodies, each with a representative name (union-find).
 
     Args:
-        names: of all links.
-        pairs: of those that move as one.
+        names: names of all links.
+        pairs: pairs of rigidly connected links.
     """
 
     def __init__(self, names: Iterable[Node], pairs: Iterable[Edge[Node]] = ()) -> None:
@@ -24,19 +24,19 @@ class Classes(Generic[Node]):
             self.merge(*pair)
 
     def find(self, name: Node) -> Node:
-        """Return the name that stands for the set of a name."""
+        """Return the representative of the set with a name."""
         while self._parents[name] != name:
             self._parents[name] = self._parents[self._parents[name]]
             name = self._parents[name]
         return name
 
     def merge(self, one: Node, other: Node) -> None:
-        """Make one set of the sets of two names."""
+        """Merge the sets of two names."""
         self._parents[self.find(one)] = self.find(other)
 
 
 def incident(edges: Iterable[Edge[Node]]) -> dict[Node, list[tuple[int, Node]]]:
-    """Return for each node its edges in their order: the index, and the other end."""
+    """Return the edges of each node in order: index and other end."""
     found: dict[Node, list[tuple[int, Node]]] = {}
     for k, (one, other) in enumerate(edges):
         found.setdefault(one, []).append((k, other))
@@ -46,7 +46,7 @@ def incident(edges: Iterable[Edge[Node]]) -> dict[Node, list[tuple[int, Node]]]:
 
 
 def reached(start: Node, edges: Iterable[Edge[Node]]) -> set[Node]:
-    """Return the nodes that edges join to a start, with the start itself."""
+    """Return the nodes connected to a start node, including it."""
     neighbours = incident(edges)
     found, waiting = {start}, [start]
     while waiting:
@@ -58,7 +58,7 @@ def reached(start: Node, edges: Iterable[Edge[Node]]) -> set[Node]:
 
 
 def parts(nodes: Iterable[Node], edges: Sequence[Edge[Node]]) -> list[list[Node]]:
-    """Return the connected parts of some nodes, by edges with both ends among them, in the nodes' order."""
+    """Return the connected parts of a set of nodes, in the nodes' order, by edges with both ends in the set."""
     allowed = list(nodes)
     own = set(allowed)
     inner = [edge for edge in edges if edge[0] in own and edge[1] in own]
@@ -73,11 +73,11 @@ def parts(nodes: Iterable[Node], edges: Sequence[Edge[Node]]) -> list[list[Node]
 
 
 class Bridges(NamedTuple):
-    """Edges that every path between two nodes uses.
+    """Edges common to all paths between two nodes.
 
     Attributes:
-        bridges: their indices, in the order of the paths.
-        is_open: whether the bridges alone are a path: no loop is between the nodes.
+        bridges: indices of these edges, in the order of the paths.
+        is_open: True if the bridges form a path, without a loop between the nodes.
     """
 
     bridges: list[int]
@@ -85,7 +85,7 @@ class Bridges(NamedTuple):
 
 
 def bridges_between(start: Node, end: Node, edges: Sequence[Edge[Node]]) -> Bridges:
-    """Return the edges that every path from one node to another uses."""
+    """Return the edges common to all paths from one node to another."""
     path = path_between(start, end, edges)
     if path is None:
         return Bridges([], is_open=False)
@@ -95,7 +95,7 @@ def bridges_between(start: Node, end: Node, edges: Sequence[Edge[Node]]) -> Brid
     for k in path:
         node = edges[k][1] if edges[k][0] == node else edges[k][0]
         places[node] = len(places)
-    # Without the path's edges, what still joins two of its nodes is a way around all edges between them.
+    # A connection of two path nodes by other edges bypasses all path edges between them.
     classes = Classes([start, *(node for edge in edges for node in edge)])
     for k, edge in enumerate(edges):
         if k not in on_path:
@@ -113,7 +113,7 @@ def bridges_between(start: Node, end: Node, edges: Sequence[Edge[Node]]) -> Brid
 
 
 def path_between(start: Node, end: Node, edges: Sequence[Edge[Node]]) -> list[int] | None:
-    """Return the indices of the edges of a shortest path, in order; None where there is no path."""
+    """Return the indices of the edges of a shortest path, in order; None if there is no path."""
     neighbours = incident(edges)
     came: dict[Node, tuple[Node, int] | None] = {start: None}
     layer = [start]
@@ -136,12 +136,12 @@ def path_between(start: Node, end: Node, edges: Sequence[Edge[Node]]) -> list[in
 
 
 def between(edges: Sequence[Edge[Node]], first: Node, last: Node) -> list[int]:
-    """Return the indices of the edges that lie on paths from one node to another that pass each node once.
+    """Return the indices of the edges on simple paths from one node to another.
 
-    No single node separates such an edge from one that joins the two nodes: they are in one biconnected component,
-    which a search in depth finds (R. Tarjan, *Depth-first search and linear graph algorithms*, 1972).
+    Such an edge is in the same biconnected component as an edge between the two nodes, which a depth-first search finds
+    (R. Tarjan, *Depth-first search and linear graph algorithms*, 1972).
     """
-    # Edge 0 joins the two nodes.
+    # Edge 0 connects the two nodes.
     neighbours = incident([(first, last), *edges])
     order = {first: 0}
     lowest = {first: 0}
@@ -176,7 +176,7 @@ def between(edges: Sequence[Edge[Node]], first: Node, last: Node) -> list[int]:
 
 
 class Branch(NamedTuple):
-    """An edge of a spanning tree: its index, and its ends from the root on."""
+    """Edge of a spanning tree: index, and ends from the root on."""
 
     edge: int
     parent: str
@@ -184,7 +184,7 @@ class Branch(NamedTuple):
 
 
 class SpanningTree(NamedTuple):
-    """A spanning tree: its edges from the roots on, and the indices of the other edges, each of which closes a loop."""
+    """Spanning tree: edges from the roots on, and indices of the chords, each of which closes a loop."""
 
     branches: list[Branch]
     chords: list[int]
@@ -193,12 +193,12 @@ class SpanningTree(NamedTuple):
 def spanning_tree(
     roots: Sequence[str], edges: Sequence[Edge[str]], reluctance: Callable[[int], float] | None = None
 ) -> SpanningTree:
-    """Return a spanning tree of the nodes that edges join to the roots; the roots count as one node.
+    """Return a spanning tree of the nodes connected to the roots; the roots count as one node.
 
     Args:
-        roots: nodes whose motion is known.
+        roots: nodes with known motion.
         edges: pairs of nodes.
-        reluctance: of an edge's index: edges with a small number are put into the tree first.
+        reluctance: function of an edge's index; edges with small values enter the tree first.
     """
     order = sorted(range(len(edges)), key=lambda k: 0.0 if reluctance is None else reluctance(k))
     classes = Classes({node for edge in edges for node in edge} | set(roots))
@@ -213,7 +213,7 @@ def spanning_tree(
     branches: list[Branch] = []
     known = set(roots)
     waiting, neighbours = list(roots), incident(edges)
-    for node in waiting:  # which grows
+    for node in waiting:  # grows in the loop
         for k, other in neighbours.get(node, ()):
             if k in chosen and other not in known:
                 known.add(other)
@@ -225,15 +225,15 @@ def spanning_tree(
 
 
 def nearest_tree(root: str, edges: Sequence[Edge[str]], lengths: Sequence[int]) -> SpanningTree:
-    """Return a spanning tree with the shortest path from the root to each node, as E. W. Dijkstra's algorithm finds it.
+    """Return a spanning tree of shortest paths from the root, by Dijkstra's algorithm.
 
-    Nodes that edges of length 0 join count as one: such edges are in the tree before all others. So a loop that begins
-    and ends at such a node has no edge on the path to another node.
+    Nodes connected by edges of length 0 count as one: such edges enter the tree before all others. A loop that begins
+    and ends at such a node then has no edge on the path to another node.
 
     Args:
-        root: node where all paths begin.
+        root: start node of all paths.
         edges: pairs of nodes.
-        lengths: lengths of the edges, 0 or more.
+        lengths: lengths of the edges, at least 0.
     """
     classes = Classes({root, *(node for edge in edges for node in edge)})
     for edge, length in zip(edges, lengths, strict=True):

@@ -1,9 +1,9 @@
-"""The wrenches with which a mechanism of any topology resists its platform: members, rows of J, F, rates and ranks.
+"""Wrenches of a mechanism of any topology on its platform: members, rows of J, F, rates and ranks.
 
 A member resists a twist with ``r_k = P_k x``, where ``x = (v + w x c, l w)`` is the twist in scaled coordinates about
 the member's centre, and ``P_k`` projects orthogonally on the complement of the twists ``T_k`` that its passive joints
-allow. ``F = sum |r_k|^2``, as for robots given limb by limb (:mod:`screwsynth.models.member`); here ``T_k`` is the
-platform's part of the null space of the member's loop equations, so that loops may be nested and joints coupled.
+allow. ``F = sum |r_k|^2``, as for robots given limb by limb (:mod:`screwsynth.models.member`). Here ``T_k`` is the
+platform part of the null space of the member's loop equations, so that loops may be nested and joints coupled.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from ..rows import RANK_TOLERANCE, rank_of
 from ..wrench import WrenchKind
 from .centre import centre_of, centre_rule
 from .decomposition import MemberGraph, robot_graph
-from .freedoms import Freedoms
 from .graph import Mechanism, check_mechanism
+from .mobility import Mobility
 
 
 def scaled_twists(twists: FloatArray, centre: FloatArray, length: float) -> FloatArray:
@@ -31,21 +31,21 @@ def scaled_twists(twists: FloatArray, centre: FloatArray, length: float) -> Floa
 
 @dataclass(frozen=True, eq=False)
 class MemberWrenches:
-    """A member with its actuators locked.
+    """Member with locked actuators.
 
     Attributes:
-        limb: number of its limb, from 1.
-        joints: names of its passive joints.
-        actuators: names of the actuated joints of its limb that it depends on.
-        centre: (3,) in the world frame, length.
-        projector: (6, 6) ``P_k`` in scaled coordinates about the centre.
-        actuation: (6, a) ``rho``: resisted part of the screw of each actuator, in the same coordinates.
-        relations: (r, a) equations that its loops demand of the rates of these actuators alone.
-        rows: (d, 6) orthonormal basis of its wrenches as rows of ``J``: a twist's work rate is ``row . (v, w)``. Those
-            that do no work in its actuators are first.
+        limb: number of the member's limb, from 1.
+        joints: names of the passive joints.
+        actuators: names of the actuated joints of the limb on which the member depends.
+        centre: (3,) centre of the member in the world frame, length.
+        projector: (6, 6) projector ``P_k`` in scaled coordinates about the centre.
+        actuation: (6, a) ``rho``: resisted component of each actuator's screw, in scaled coordinates.
+        relations: (r, a) equations of the actuator rates only, which the member's loops impose.
+        rows: (d, 6) orthonormal basis of the member's wrenches as rows of ``J``, with work rate ``row . (v, w)``;
+            constraint wrenches first.
         kinds: kind of each row.
-        twists: (6, t) basis of ``T_k``, the platform's twists that it allows with locked actuators.
-        all_rank: number of independent twists that it allows with free actuators.
+        twists: (6, t) basis of ``T_k``, the platform twists that the member allows with locked actuators.
+        all_rank: number of independent platform twists that the member allows with free actuators.
         length: characteristic length of scaled coordinates.
     """
 
@@ -64,16 +64,16 @@ class MemberWrenches:
 
     @property
     def wrenches(self) -> int:
-        """Dimension of ``W_k``."""
+        """Dimension of the space ``W_k`` of the member's wrenches."""
         return len(self.rows)
 
     @property
     def constraints(self) -> int:
-        """Dimension of ``C_k``: of the wrenches that do no work in its actuated joints."""
+        """Dimension of the space ``C_k`` of constraint wrenches, which do no work in actuated joints."""
         return 6 - self.all_rank
 
     def resisted(self, twist: FloatArray) -> FloatArray:
-        """Return ``r_k`` (6,) of a twist (6,): angular velocity, then velocity at the world origin."""
+        """Return the resisted part ``r_k`` (6,) of a twist (6,), angular velocity, then velocity at world origin."""
         return np.asarray(self.projector @ scaled_twists(twist[:, None], self.centre, self.length)[:, 0])
 
 
@@ -83,9 +83,9 @@ class RobotRanks:
 
     Attributes:
         passive: dimension of ``T_k`` of each member.
-        all: the same with free actuators.
+        all: dimension of the twists of each member with free actuators.
         jacobian: rank of all rows.
-        constraints: rank of the constraints of all limbs.
+        constraints: rank of the constraint wrenches of all limbs.
     """
 
     passive: tuple[int, ...]
@@ -95,24 +95,24 @@ class RobotRanks:
 
     @property
     def freedoms(self) -> int:
-        """Freedoms of the platform with free actuators."""
+        """Degrees of freedom of the platform with free actuators."""
         return 6 - self.constraints
 
     @property
     def locked(self) -> int:
-        """Freedoms of the platform with locked actuators."""
+        """Degrees of freedom of the platform with locked actuators."""
         return 6 - self.jacobian
 
 
 @dataclass(frozen=True, eq=False)
 class RobotWrenches:
-    """A mechanism's resistance at its configuration.
+    """Wrenches of a mechanism on its platform at its configuration.
 
     Attributes:
-        members: its members.
-        ranks: its ranks.
-        units: rates of all actuated joints by name that move the platform with velocities of order 1.
-        feasible: (6, f) basis of the platform's twists with free actuators.
+        members: members of the mechanism.
+        ranks: ranks at the configuration.
+        units: rate of each actuated joint, by name, that moves the platform with a velocity of order 1.
+        feasible: (6, f) basis of the platform twists with free actuators.
     """
 
     members: tuple[MemberWrenches, ...]
@@ -131,15 +131,15 @@ class RobotWrenches:
         return np.vstack([np.zeros((0, 6)), *[member.rows for member in self.members]])
 
     def objective(self, twist: Sequence[float] | FloatArray) -> float:
-        """Return F in a twist (6,): angular velocity, then velocity of the platform's point at the world origin."""
+        """Return F in a twist (6,): angular velocity, then velocity of the platform point at the world origin."""
         chi = np.asarray(twist, dtype=np.float64)
         return float(sum(float(np.sum(member.resisted(chi) ** 2)) for member in self.members))
 
     def rates(self, twist: Sequence[float] | FloatArray) -> Mapping[str, float]:
-        """Return the rates of the actuators that leave least of what each limb resists in a twist (6,).
+        """Return the actuator rates for a twist (6,), by least squares over what each limb resists.
 
-        They are infinite where an actuator cannot drive the platform, and not a number where the twist does not
-        determine them. For a twist that the platform can make with free actuators nothing is left.
+        A rate is infinite for an actuator that cannot drive the platform, and NaN if the twist does not determine it.
+        The fit is exact for a possible platform twist.
         """
         chi = np.asarray(twist, dtype=np.float64)
         found = dict.fromkeys(self.units, float("inf"))
@@ -161,24 +161,24 @@ class RobotWrenches:
 
 
 def wrenches_of(mechanism: Mechanism, length: float = 1.0) -> RobotWrenches:
-    """Return the resistance of a mechanism with closed loops.
+    """Return the wrenches of a mechanism with closed loops.
 
     Args:
-        mechanism: the mechanism at its configuration; see :func:`.closing.close`.
-        length: characteristic length, by which couples are measured.
+        mechanism: mechanism at its configuration; see :func:`.closing.close`.
+        length: characteristic length, unit of couples per force.
 
     Raises:
-        MechanismError: the mechanism contradicts itself.
+        MechanismError: the mechanism is inconsistent.
     """
     check_mechanism(mechanism)
-    graph, freedoms = robot_graph(mechanism), Freedoms(mechanism)
-    members = tuple(_member(mechanism, freedoms, each, length) for each in graph.members)
+    graph, mobility = robot_graph(mechanism), Mobility(mechanism)
+    members = tuple(_member(mechanism, mobility, each, length) for each in graph.members)
     constraints = [np.zeros((0, 6))]
     for limb in graph.limbs:
-        allowed = freedoms.allowed(limb, limb)
-        constraints.append(_reciprocal(freedoms, allowed.twists))
+        allowed = mobility.allowed(limb, limb)
+        constraints.append(_reciprocal(mobility, allowed.twists))
     stacked = np.vstack(constraints)
-    rows = [np.zeros((0, 6)), *[_reciprocal(freedoms, member.twists) for member in members]]
+    rows = [np.zeros((0, 6)), *[_reciprocal(mobility, member.twists) for member in members]]
     _, values, right = np.linalg.svd(stacked, full_matrices=True)
     rank = rank_of(values, 1.0)
     ranks = RobotRanks(
@@ -187,37 +187,36 @@ def wrenches_of(mechanism: Mechanism, length: float = 1.0) -> RobotWrenches:
         jacobian=rank_of(np.linalg.svd(np.vstack(rows), compute_uv=False), 1.0),
         constraints=rank,
     )
-    units = {each.name: 1 / freedoms.angle(each) for each in mechanism.joints if each.actuated}
-    return RobotWrenches(members, ranks, units, freedoms.unscaled(right[rank:].T))
+    units = {each.name: 1 / mobility.angle(each) for each in mechanism.joints if each.actuated}
+    return RobotWrenches(members, ranks, units, mobility.unscaled(right[rank:].T))
 
 
-def _reciprocal(freedoms: Freedoms, twists: FloatArray) -> FloatArray:
-    """Return an orthonormal basis (d, 6) of what is orthogonal to twists in the mechanism's own scale."""
-    left, _, _ = np.linalg.svd(freedoms.scaled(twists), full_matrices=True)
+def _reciprocal(mobility: Mobility, twists: FloatArray) -> FloatArray:
+    """Return an orthonormal basis (d, 6) of the complement of twists, in the mechanism's scale."""
+    left, _, _ = np.linalg.svd(mobility.scaled(twists), full_matrices=True)
     return np.asarray(left[:, twists.shape[1] :].T)
 
 
-def _member(mechanism: Mechanism, freedoms: Freedoms, graph: MemberGraph, length: float) -> MemberWrenches:
-    """Return the wrenches of a member."""
+def _member(mechanism: Mechanism, mobility: Mobility, graph: MemberGraph, length: float) -> MemberWrenches:
     centre = centre_of(mechanism, centre_rule(mechanism, graph))
-    locked = freedoms.allowed(graph.joints, graph.passive)
-    free = freedoms.allowed(graph.joints, graph.joints)
+    locked = mobility.allowed(graph.joints, graph.passive)
+    free = mobility.allowed(graph.joints, graph.joints)
     scaled = scaled_twists(locked.twists, centre, length)
     left, _, _ = np.linalg.svd(scaled, full_matrices=True)
     basis = left[:, locked.twists.shape[1] :]
     projector = basis @ basis.T
     driven = [k for k in graph.joints if mechanism.joints[k].actuated]
     own = np.array([free.columns.index(k) for k in driven], dtype=np.intp)
-    weights = np.array([freedoms.angle(mechanism.joints[k]) / freedoms.size for k in driven])
-    # In every motion with free actuators the resisted part is rho times the rates of the actuators, since a motion
-    # without such rates is not resisted. Rates that no motion has are those in which the relations do work.
+    weights = np.array([mobility.angle(mechanism.joints[k]) / mobility.size for k in driven])
+    # In each motion with free actuators the resisted component is rho times the actuator rates, because a motion
+    # without such rates is not resisted. The relations exclude actuator rates that occur in no motion.
     rates = free.rates[own] * weights[:, None]
     actuation = projector @ scaled_twists(free.platform, centre, length) @ np.linalg.pinv(rates, rcond=RANK_TOLERANCE)
     left, values, _ = np.linalg.svd(rates)
     relations = left[:, rank_of(values, 1.0) :].T * weights
     actuation = actuation * weights
-    # Rows of actuation that are rounding errors of a serial singularity must not count as directions.
-    kept = np.linalg.norm(actuation, axis=0) > RANK_TOLERANCE * max(length, freedoms.size)
+    # Rounding errors of actuation at a serial singularity must not count as directions.
+    kept = np.linalg.norm(actuation, axis=0) > RANK_TOLERANCE * max(length, mobility.size)
     found = basis_of_member(projector, actuation[:, kept], basis.shape[1])
     forces = found.rows[:, :3]
     rows = np.hstack([forces, np.cross(centre, forces) + length * found.rows[:, 3:]])

@@ -1,1 +1,1 @@
-"""A case: a synthesis problem as values, and from a file."""
+"""Cases: synthesis problems as Python objects, and the reader and writer of their files."""

@@ -1,7 +1,7 @@
-"""A case: a robot, fixed and free numbers, and the motions that the platform must make.
+"""Case: a robot with fixed and free dimensions, the tasks of its platform, limits and settings.
 
-A case file becomes a :class:`Case`, and a program can build one directly. Angles are radians here. A case checks itself
-once, in the words of a case file, so that every other module can rely on it.
+A :class:`Case` is read from a case file or made in Python. Angles are radians. Its constructor checks every value, with
+messages in the words of case files, so that all other modules can rely on valid cases.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from .checks import (
     check_value,
     check_vector,
 )
-from .excursions import NotHeld, check_excursions, in_world, not_held, refuse_free
-from .existence import fault_of_dimensions
+from .excursions import OutsideWorkspace, check_excursions, in_world, outside_workspace, refuse_free
+from .existence import assembly_fault
 from .limits.limit import Limit, LimitedCase
 from .limits.limits import Limits
 from .loads import NO_LOADING, Loading
 from .names import parameter_name, pose_prefixes
 from .pathfile import PathFile
-from .pose import HERE, LARGEST, MAX_FREE_ROTATION, Free, OverPoses, Pose, Rotation, Value
+from .pose import LARGEST, MAX_FREE_ROTATION, NO_DISPLACEMENT, Free, OverPoses, Pose, Rotation, Value
 from .radians import angles_of, check_radians, with_radians
 from .settings import Expectation, Published, Search
 from .task import MEASURES, Method, Sense, Task
@@ -49,37 +49,37 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Case(Whole, Shown):
-    """A synthesis problem.
+    """Synthesis problem: a robot, its dimensions and pose, tasks, limits, and settings of the search.
 
     Attributes:
-        model: the robot.
-        parameters: a value for each of the model's parameters: a number or :class:`Free`, or a sequence of three for a
-            point or direction. Stored as tuples of components.
-        position: origin of the platform frame in the world frame, length.
+        model: robot of the case.
+        parameters: value of each parameter of the robot by name: a number or :class:`Free`, or a sequence of three for
+            a point or direction; stored as tuples of components.
+        position: (3,) origin of the platform frame in the world frame, length; each coordinate fixed or free.
         rotation: orientation of the platform.
-        tasks: the motions.
-        units: units for people.
-        characteristic_length: length by which unit couples are multiplied to count beside unit forces; it has an effect
-            only on robots with constraint couples.
-        limits: limits that a design must keep to be built.
-        displacements: displacements of the pose above, one for each pose that the robot takes.
-        further: other stated poses, with their displacements. The robot's dimensions are the same at all poses.
+        tasks: tasks of the platform, one or more.
+        units: units of files, messages and results.
+        characteristic_length: length by which unit couples are multiplied to make them comparable with unit forces; no
+            effect on robots without constraint couples.
+        limits: limits that a design must satisfy to be buildable.
+        displacements: displacements of the first stated pose; each gives one pose of the robot.
+        further: stated poses after the first one, with their displacements; the dimensions are the same at all poses.
         over_poses: combination of F over several poses.
-        worst_everywhere: whether F is its worst over all poses at which limits hold, beside the stated ones.
-        joint_centre_tolerance: largest error of a joint centre in the machine as it is built, length; None for none.
-        workspace: poses for which a machine with these dimensions is judged; None for none.
-        path: programmed path along which a machine with these dimensions is judged; None for none.
-        loading: loads on the platform, and its fastest motions.
+        worst_everywhere: If true, the worst F over the workspace or path is optimised, not F at the stated poses only.
+        joint_centre_tolerance: largest manufacturing error of each joint centre, length; None for no tolerance.
+        workspace: box of poses over which the robot is verified; None for no workspace.
+        path: tool path along which the robot is verified; None for no path.
+        loading: loads on the platform, and its largest speeds.
         search: settings of the search.
         method: method that combines several tasks; the average is equation 15.
-        title: one line for people.
-        name: the file's name.
-        expect: expected values, for regressions.
-        published: numbers that the literature prints.
-        source: name of the case's file, for messages.
+        title: title of the case, one line.
+        name: name of the case, that of its file without suffix.
+        expect: expected results, for regression tests.
+        published: values printed in the literature.
+        source: name of the case file, for messages; None for a case made in Python.
 
     Raises:
-        CaseError: a value is missing, unknown, not finite, out of its range, or crossed; the key is in the words of a
+        CaseError: a value is missing, unknown, not finite, out of its range, or crossed; the message names its key in a
             case file.
     """
 
@@ -91,7 +91,7 @@ class Case(Whole, Shown):
     units: Units = field(default_factory=Units)
     characteristic_length: float = 1.0
     limits: Limits = field(default_factory=Limits)
-    displacements: tuple[Displacement, ...] = (HERE,)
+    displacements: tuple[Displacement, ...] = (NO_DISPLACEMENT,)
     further: Sequence[Pose] = ()
     over_poses: OverPoses = OverPoses.SUM
     worst_everywhere: bool = False
@@ -113,23 +113,23 @@ class Case(Whole, Shown):
             if self.source is None:
                 check_radians(self._angles(), self.units)
         except CaseError as error:
-            # The numbers of a file are in its own unit.
+            # Files state their unit of angles, so a slip between degrees and radians is likely in Python only.
             raise (error if self.source is not None else with_radians(error, self._angles())) from None
 
     def _angles(self) -> Iterator[tuple[str, float]]:
-        """Yield the angles of a case, whose numbers may not be checked yet, with their dotted keys."""
+        """Yield the dotted key and the value of each angle, also before the case is checked."""
         rotations = [self.rotation, *(pose.rotation for pose in self.further)]
         return angles_of(self.model, self.parameters, rotations, self.limits, self.workspace)
 
     def _check(self) -> None:
-        """Check every number, and keep values in one form.
+        """Check every value, and store each in its canonical form.
 
         Raises:
-            CaseError: as for the case.
+            CaseError: a value is not allowed.
         """
         store = object.__setattr__
         store(self, "parameters", MappingProxyType(_check_parameters(self)))
-        if fault := fault_of_dimensions(self.model, self.parameters, self.units):
+        if fault := assembly_fault(self.model, self.parameters, self.units):
             raise NoRobotError("robot.parameters", fault, source=self.source)
         store(self, "position", _check_position(self, self.position, "pose"))
         store(self, "rotation", _check_rotation(self, self.rotation, "pose"))
@@ -154,33 +154,33 @@ class Case(Whole, Shown):
         values = [value for name in self.parameters for value in self.components(name)]
         values += [value for pose in self.poses for value in (*pose.position, pose.rotation.angle)]
         free = sum(isinstance(value, Free) for value in values)
-        parts = [_counted(free, "free number"), _counted(len(self.tasks), "task"), _counted(self.pose_count, "pose")]
+        parts = [_counted(free, "variable"), _counted(len(self.tasks), "task"), _counted(self.pose_count, "pose")]
         parts += [_counted(len(self.limits), "limit")] if self.limits else []
         return f"<Case {self.name!r}: robot {self.model.name!r}, {', '.join(parts)}>"
 
     def to_toml(self) -> str:
-        """Return the case as the text of a case file, from which the same case is read again.
+        """Return the text of a case file from which an equal case is read.
 
         Raises:
-            CaseError: no case file can state the case, such as one of a robot that is not found by its name.
+            CaseError: no case file can state the case, for example because its robot has no name.
         """
         from .. import case_text  # noqa: PLC0415 - files come after cases
 
         return case_text(self)
 
     def replace(self, settings: Mapping[str, float | ArrayLike] | None = None, /, **numbers: float | ArrayLike) -> Case:
-        """Return the case with some of its numbers replaced by name, as ``--set`` does.
+        """Return the case with some values replaced by name, as the option ``--set`` does.
 
-        Numbers are in the units of the case: ``case.replace(x2=7, x3=20)`` has an angle of 20 degrees where the case is
-        in degrees. A free number becomes fixed.
+        Values are in the units of the case: ``case.replace(x2=7, x3=20)`` sets an angle to 20 degrees in a case with
+        degrees. A free variable becomes fixed.
 
         Args:
-            settings: numbers by names with dots, such as ``{"limits.leg_length.max": 40, "p_z.min": 15}``; three for an
-                axis, point or direction.
-            numbers: the same by names without dots.
+            settings: new values by names with dots, such as ``{"limits.leg_length.max": 40, "p_z.min": 15}``; three
+                numbers for an axis, point or direction.
+            numbers: new values by names without dots.
 
         Raises:
-            CaseError: the case has no number of a name, or does not allow a value.
+            CaseError: the case has no value with a name, or a value is not allowed.
         """
         from .. import with_settings  # noqa: PLC0415 - files come after cases
 
@@ -190,19 +190,19 @@ class Case(Whole, Shown):
         """Return the values of a parameter's components.
 
         Args:
-            name: the name that the robot gives the parameter.
+            name: name of the parameter in the robot.
         """
         values = self.parameters[name]
         return tuple(values) if isinstance(values, Sequence) else (values,)
 
     def fixed_parameters(self, reason: str) -> FloatArray:
-        """Return the values (d,) of all components of the robot's parameters, in its order.
+        """Return the values (d,) of all components of the robot's parameters, in the robot's order.
 
         Args:
-            reason: why they must be fixed, as a clause.
+            reason: reason why the parameters must be fixed, as a clause for messages.
 
         Raises:
-            CaseError: one is free.
+            CaseError: a parameter is free.
         """
         found: list[float] = []
         for item in self.model.parameters:
@@ -215,26 +215,30 @@ class Case(Whole, Shown):
 
     @property
     def without_motion(self) -> tuple[Limit[Any], ...]:
-        """The limits on speeds and powers for which the case states no motion: they are those of a path alone."""
+        """Limits on speed and power without a motion in the case; only a path with times gives them a value."""
         return tuple(each for each in self.limits if each.needs_motion and self.loading.motion is None)
 
     def require_motion(self, without: str = "") -> None:
-        """Refuse limits on speeds and powers where no motion is stated.
+        """Refuse limits on speed and power in a case without a motion.
 
         Args:
-            without: what else could state one, as the end of a sentence.
+            without: alternative source of the motion, as the end of the message.
 
         Raises:
-            CaseError: there is one.
+            CaseError: there is such a limit.
         """
         for limit in self.without_motion:
-            raise CaseError(f"limits.{limit.name}", f"means nothing without [motion]{without}", source=self.source)
+            raise CaseError(
+                f"limits.{limit.name}",
+                f"needs [motion], the largest speeds of the platform{without}",
+                source=self.source,
+            )
 
     def parameter_name(self, name: str) -> str:
-        """Return the name of a parameter, or of one of its components, in this case; see :mod:`.names`.
+        """Return the name of a parameter or component in this case; see :mod:`.names`.
 
         Args:
-            name: the name that the robot gives it.
+            name: name of the parameter or component in the robot.
         """
         return parameter_name(name, len(self.poses))
 
@@ -244,29 +248,29 @@ class Case(Whole, Shown):
 
     @property
     def axis(self) -> FloatArray | None:
-        """Axis of rotation that is held fixed, (3,) unit; None where the axis is free."""
+        """Fixed unit axis (3,) of the rotation; None for a free axis."""
         return None if self.rotation.axis is None else frozen_array(self.rotation.axis, (3,))
 
     @property
     def poses(self) -> tuple[Pose, ...]:
-        """The stated poses, each with its displacements."""
+        """Stated poses, each with its displacements."""
         return (Pose(self.position, self.rotation, self.displacements), *self.further)
 
     @property
     def pose_count(self) -> int:
-        """Number of poses that the robot takes."""
+        """Number of poses of the robot: one for each displacement of each stated pose."""
         return sum(len(pose.displacements) for pose in self.poses)
 
     @property
     def pose_prefixes(self) -> tuple[str, ...]:
-        """Prefix of the names of each stated pose's numbers; an empty one for a single pose."""
+        """Prefix of the coordinate names of each stated pose; empty for a single pose."""
         return pose_prefixes(len(self.poses))
 
     @property
     def scalars(self) -> Mapping[str, Dimension]:
-        """Names of the case's own numbers, which ``limits.custom`` may relate, with the dimension of each.
+        """Quantities of the case that ``limits.custom`` may use, by name, with the dimension of each.
 
-        Their order: components of the parameters; then position and, where its axis is held fixed, angle of each pose.
+        The order is: components of the parameters; then, for each pose, position and, if its axis is fixed, angle.
         """
         names = {part: item.dimension for item in self.model.parameters for part in self.component_names(item)}
         for prefix, pose in zip(self.pose_prefixes, self.poses, strict=True):
@@ -277,27 +281,27 @@ class Case(Whole, Shown):
 
     @property
     def limits_over(self) -> Literal["", "workspace", "path"]:
-        """Where limits hold beside the stated poses: over the workspace, or along the path; empty for nowhere."""
+        """Domain of the limits besides the stated poses: ``workspace`` or ``path``; empty for the stated poses only."""
         if self.workspace is not None and self.workspace.has_limits:
             return "workspace"
         return "path" if self.path is not None and self.path.has_limits else ""
 
     @property
     def limits_where(self) -> str:
-        """The same in words; empty for nowhere."""
+        """Domain of the limits besides the stated poses, in words; empty for the stated poses only."""
         return {"": "", "workspace": "over the workspace", "path": "along the path"}[self.limits_over]
 
     @property
     def is_optimised_everywhere(self) -> bool:
-        """Whether what is optimised is the worst of all poses at which limits hold, beside the stated ones."""
+        """True if the worst value over the workspace or path is optimised, not that at the stated poses only."""
         return bool(self.limits_over) and (bool(self.tasks[0].measure) or self.worst_everywhere)
 
     @property
     def world_workspace(self) -> Workspace | None:
-        """The workspace in world coordinates; None without one.
+        """Workspace in world coordinates; None for a case without a workspace.
 
         Raises:
-            CaseError: the workspace is about the pose of the case, which has a free number.
+            CaseError: the workspace is stated about the pose, and the pose has a free coordinate.
         """
         if self.workspace is None:
             return None
@@ -305,21 +309,21 @@ class Case(Whole, Shown):
         return in_world(self.workspace, self.poses[0])
 
     @property
-    def not_held(self) -> NotHeld | None:
-        """How a workspace holds no pose of the case; None where it holds one, or there is none."""
+    def outside_workspace(self) -> OutsideWorkspace | None:
+        """Reason why the workspace contains no stated pose; None if it contains one, or without a workspace."""
         if self.workspace is None:
             return None
         follows = self.model.generic is not None and self.model.generic.constraints > 0
-        return not_held(self.workspace, self.poses, self.units, by_ranges=follows)
+        return outside_workspace(self.workspace, self.poses, self.units, by_ranges=follows)
 
     @property
     def stated_pose_notice(self) -> str:
-        """Sentence about what takes the limits at the stated pose although they hold elsewhere too; else empty."""
+        """Notice for commands that evaluate only the stated pose of a case with limits over a workspace or path."""
         taken = "the limits and F" if self.worst_everywhere else "the limits"
-        return self.limits_where and f"{taken} are taken at the stated pose alone, not {self.limits_where}"
+        return self.limits_where and f"{taken} are evaluated only at the stated pose, not {self.limits_where}"
 
     def at_stated_poses(self) -> Case:
-        """Return the case with F and limits at the stated poses alone."""
+        """Return the case with F and limits at the stated poses only."""
         workspace, path = self.workspace, self.path
         return replace(
             self,
@@ -330,32 +334,32 @@ class Case(Whole, Shown):
 
     @property
     def as_limited(self) -> LimitedCase:
-        """The part of the case that its limits read."""
+        """Part of the case on which its limits depend."""
         return LimitedCase(self.model, self.units, self.scalars, self.loading)
 
 
 def _check_worst_everywhere(case: Case) -> None:
-    """Refuse an F that is its worst over all poses, where it means nothing.
+    """Refuse the worst F over a domain if the limits do not cover the domain, or with several tasks.
 
     Raises:
-        CaseError: in the words of a case file.
+        CaseError: the objective is not allowed.
     """
     if not case.worst_everywhere:
         return
     key = "objective.over"
     if not case.limits_over:
-        raise CaseError(key, "needs limits that hold there too: [limits] over")
+        raise CaseError(key, "needs limits over the same poses: set over in [limits] to 'workspace' or 'path'")
     if len(case.tasks) > 1:
-        raise CaseError(key, "is for a case with one [[task]]", case.limits_over)
+        raise CaseError(key, f"needs exactly one [[task]], got {len(case.tasks)}", case.limits_over)
     if case.pose_count > 1 and case.over_poses is not OverPoses.WORST:
-        raise CaseError("combine.over_poses", "must be 'worst' beside objective.over", case.over_poses.value)
+        raise CaseError("combine.over_poses", "must be 'worst' together with objective.over", case.over_poses.value)
 
 
 def _check_loading(case: Case) -> None:
-    """Refuse loads and motions that mean nothing, and those of a robot whose forces they do not determine.
+    """Refuse invalid loads and motions, and robots whose actuator forces do not follow from the loads.
 
     Raises:
-        CaseError: in the words of a case file.
+        CaseError: loads, motion, gravity or stiffness are not allowed.
     """
     case.loading.check(case.units)
     loading = case.loading
@@ -369,10 +373,10 @@ def _check_loading(case: Case) -> None:
 
 
 def _check_choices(case: Case) -> None:
-    """Refuse listed values of a direction's components, and a combination that cannot tell the best of them.
+    """Refuse catalogue values of directions, and combinations of tasks that do not allow catalogue values.
 
     Raises:
-        CaseError: in the words of a case file.
+        CaseError: a parameter or the combination is not allowed.
     """
     listed = [
         item
@@ -382,20 +386,22 @@ def _check_choices(case: Case) -> None:
     for item in listed:
         key = f"robot.parameters.{item.name}"
         if item.is_direction:
-            raise CaseError(key, "must be numbers or { min, max }: components of a direction have no values to choose")
+            raise CaseError(key, "must be numbers or { min, max }: a direction cannot have { values }")
         if len(case.tasks) > 1 and case.method is Method.AVERAGE:
-            fault = f"must be 'weighted-sum' or 'worst-case' where {key} has values: their average is none of them"
+            fault = (
+                f"must be 'weighted-sum' or 'worst-case': {key} has catalogue values, and an average is not one of them"
+            )
             raise CaseError("combine.method", fault, case.method.value)
         if case.method is Method.WORST_CASE and len({task.sense for task in case.tasks}) > 1:
-            fault = f"must be 'weighted-sum' where {key} has values and tasks have both senses"
+            fault = f"must be 'weighted-sum': {key} has catalogue values, and tasks have both senses"
             raise CaseError("combine.method", fault, case.method.value)
 
 
 def _check_measure(case: Case, task: Task) -> None:
-    """Refuse a number of the actuators that is minimised, where it means nothing.
+    """Refuse an objective of the actuators for which loads, motion or a suitable robot is missing.
 
     Raises:
-        CaseError: in the words of a case file.
+        CaseError: the objective is not allowed.
     """
     if not task.measure:
         return
@@ -403,22 +409,23 @@ def _check_measure(case: Case, task: Task) -> None:
     if task.measure not in MEASURES:
         raise CaseError(key, f"must be one of {listing(MEASURES)}", task.measure)
     if len(case.tasks) > 1:
-        raise CaseError("task", "must be one at most beside [objective], as its F is not optimised")
+        fault = "must be one at most with objective.minimise, which does not optimise the F of tasks"
+        raise CaseError("task", f"{fault}, got {len(case.tasks)}")
     if task.sense is not Sense.MIN:
-        raise CaseError("task[0].sense", "contradicts [objective], which minimises; write min, or leave the task out")
+        raise CaseError("task[0].sense", "must be 'min' with objective.minimise; or remove the task", "max")
     needs_loads, needs_motion = MEASURES[task.measure]
     if needs_loads and not case.loading.loads:
-        raise CaseError(key, "needs a [[load]]", task.measure)
+        raise CaseError(key, "needs a table [[load]] with a load on the platform", task.measure)
     if needs_motion and case.loading.motion is None:
-        raise CaseError(key, "needs [motion]", task.measure)
+        raise CaseError(key, "needs the table [motion] with the largest speeds of the platform", task.measure)
     check_statics(case.model, key, task.measure)
     joints = driven_joints(case.model)
     if task.measure != "actuator_power" and len({joint.dimension for joint in joints}) > 1:
-        raise CaseError(key, "means nothing where some actuators turn and others slide", task.measure)
+        fault = "compares all actuators, but the robot has revolute and prismatic ones; minimise actuator_power"
+        raise CaseError(key, fault, task.measure)
 
 
 def _counted(count: int, word: str) -> str:
-    """Return a number of things in words."""
     return f"{count} {word}{'' if count == 1 else 's'}"
 
 
@@ -436,7 +443,7 @@ def _check_parameters(case: Case) -> dict[str, tuple[Value, ...]]:
     for name, parameter in known.items():
         key = f"robot.parameters.{name}"
         if name not in case.parameters:
-            raise CaseError(key, f"is missing: {parameter.description}, {_allowed_form(parameter)}")
+            raise CaseError(key, f"is missing: {parameter.description}; give {_allowed_form(parameter)}")
         given = case.parameters[name]
         if isinstance(given, str | bytes):  # a sequence too, but of no numbers
             check_real(given, key)
@@ -462,18 +469,19 @@ def _allowed_form(parameter: Parameter) -> str:
 
 
 def _check_position(case: Case, position: Sequence[Value], pose: str) -> tuple[Value, ...]:
-    """Return the position of a stated pose.
+    """Return the checked position of a stated pose.
 
     Args:
         case: the case, for its units.
-        position: the position.
+        position: position of the pose.
         pose: dotted key of the pose, for messages.
 
     Raises:
-        CaseError: there are not three numbers, or one is not allowed.
+        CaseError: there are not three coordinates, or a coordinate is not allowed.
     """
     if len(position) != 3:
-        raise CaseError(f"{pose}.position", "must be a list of 3, each a number or { min, max }")
+        fault = f"must be a list of 3, each a number or {{ min, max }}, got {len(position)}"
+        raise CaseError(f"{pose}.position", fault)
     return tuple(
         check_value(value, f"{pose}.position[{index}]", Dimension.LENGTH, case.units)
         for index, value in enumerate(position)
@@ -481,41 +489,43 @@ def _check_position(case: Case, position: Sequence[Value], pose: str) -> tuple[V
 
 
 def _check_rotation(case: Case, given: Rotation, pose: str) -> Rotation:
-    """Return the rotation of a stated pose, an axis that is held fixed as a unit vector.
+    """Return the checked rotation of a stated pose; a fixed axis becomes a unit vector.
 
     Args:
         case: the case, for its units.
-        given: the rotation.
+        given: rotation of the pose.
         pose: dotted key of the pose, for messages.
 
     Raises:
-        CaseError: the angle is too large, its bounds have no meaning about a free axis, or the axis is zero.
+        CaseError: the angle is too large, its bounds are not symmetric about a free axis, or the axis is zero.
     """
     key = f"{pose}.rotation.angle"
     if given.axis is None:
-        largest, why = MAX_FREE_ROTATION, "with the axis free"
+        largest, why = MAX_FREE_ROTATION, "with a free axis"
     else:
-        largest, why = 2 * math.pi, "with the axis held"
+        largest, why = 2 * math.pi, "with a fixed axis"
     angle = check_value(given.angle, key, Dimension.ANGLE, case.units)
     ends = {f"{key}.min": angle.lower, f"{key}.max": angle.upper} if isinstance(angle, Free) else {key: angle}
     for place, end in ends.items():
         if abs(end) > largest:
             allowed = case.units.text(largest, Dimension.ANGLE)
-            raise CaseError(place, f"must be at most {allowed} in size {why}", case.units.shown(end, Dimension.ANGLE))
+            raise CaseError(
+                place, f"must be at most {allowed} in magnitude {why}", case.units.shown(end, Dimension.ANGLE)
+            )
     lopsided = isinstance(angle, Free) and angle.lower < 0 < angle.upper and not math.isclose(-angle.lower, angle.upper)
     if given.axis is None and isinstance(angle, Free) and lopsided:
-        fault = "must be minus max, or both of one sign: with the axis free the sign of an angle means nothing"
+        fault = "must be -max, or have the sign of max: about a free axis the sign of an angle has no meaning"
         raise CaseError(f"{key}.min", fault, case.units.shown(angle.lower, Dimension.ANGLE))
     axis = None if given.axis is None else unit_vector(check_direction(given.axis, f"{pose}.rotation.axis"))
     return Rotation(axis, angle, given.form)
 
 
 def _check_further_poses(case: Case) -> tuple[Pose, ...]:
-    """Return the stated poses behind the first.
+    """Return the checked stated poses after the first.
 
     Raises:
-        CaseError: a number of them is not allowed, a pose has no displacement, or F is to be the worst over poses in a
-            case with several tasks.
+        CaseError: a coordinate is not allowed, a pose has no displacement, or the worst F over poses is requested for
+            several tasks.
     """
     keys = [f"pose[{k + 1}]" for k in range(len(case.further))]
     poses = tuple(
@@ -527,19 +537,19 @@ def _check_further_poses(case: Case) -> tuple[Pose, ...]:
         for pose, key in zip(case.further, keys, strict=True)
     )
     displacements = [case.displacements, *(pose.displacements for pose in poses)]
-    for key, own in zip(["pose", *keys], displacements, strict=True):
-        if not own:
-            raise CaseError(key, "must have at least one pose")
+    for key, moves in zip(["pose", *keys], displacements, strict=True):
+        if not moves:
+            raise CaseError(key, "must have at least one displacement, got none")
     if sum(map(len, displacements)) > 1 and case.over_poses is OverPoses.WORST and len(case.tasks) > 1:
         raise CaseError("combine.over_poses", "must be 'sum' or 'mean' with several tasks", case.over_poses.value)
     return poses
 
 
 def _check_tasks(case: Case) -> tuple[Task, ...]:
-    """Return the tasks, their twists as arrays (6,).
+    """Return the checked tasks, with twists as arrays (6,).
 
     Raises:
-        CaseError: there is no task, a twist or weight is not allowed, or two tasks have one name.
+        CaseError: there is no task, a twist or weight is not allowed, or two tasks have the same name.
     """
     if not case.tasks:
         raise CaseError("task", "is missing: a case needs at least one [[task]]")
@@ -548,16 +558,16 @@ def _check_tasks(case: Case) -> tuple[Task, ...]:
         key = f"task[{index}]"
         twist = check_reals(task.twist, f"{key}.twist")
         if twist.shape != (6,) or not np.isfinite(twist).all():
-            raise CaseError(f"{key}.twist", "must be six finite numbers")
+            raise CaseError(f"{key}.twist", "must be six finite numbers", twist.tolist())
         size = float(np.abs(twist).max())
         if size == 0:
             raise CaseError(f"{key}.twist", "must not be zero: the platform would not move", twist.tolist())
         if not 1 / LARGEST <= size <= LARGEST:
-            fault = f"has a largest component of {size:g}, which must be between {1 / LARGEST:g} and {LARGEST:g}"
+            fault = f"must have a largest component between {1 / LARGEST:g} and {LARGEST:g}, got {size:g}"
             raise CaseError(f"{key}.twist", fault)
         weight = check_real(task.weight, f"{key}.weight")
         if not (math.isfinite(weight) and weight > 0):
-            raise CaseError(f"{key}.weight", "must be positive", task.weight)
+            raise CaseError(f"{key}.weight", "must be positive and finite", task.weight)
         point = None if task.point is None else frozen_array(check_vector(task.point, f"{key}.point"), (3,))
         _check_measure(case, task)
         stated = replace(task, twist=frozen_array(twist, (6,)), sense=Sense(task.sense), weight=weight, point=point)
@@ -565,15 +575,15 @@ def _check_tasks(case: Case) -> tuple[Task, ...]:
     names = [task.name for task in tasks]
     for index, name in enumerate(names):
         if name in names[:index]:
-            raise CaseError(f"task[{index}].name", "is used by an earlier task", name)
+            raise CaseError(f"task[{index}].name", "is used by an earlier task; give each task its own name", name)
     return tuple(tasks)
 
 
 def _check_tolerance(case: Case) -> None:
-    """Refuse a tolerance that is not positive, or that has no meaning for the robot.
+    """Refuse a tolerance that is not positive, or that is not supported for the robot.
 
     Raises:
-        CaseError: it is refused.
+        CaseError: the tolerance is not allowed.
     """
     tolerance = case.joint_centre_tolerance
     if tolerance is None:
@@ -581,8 +591,8 @@ def _check_tolerance(case: Case) -> None:
     if not 0 < check_real(tolerance, "tolerance.joint_centre") <= LARGEST:
         raise CaseError("tolerance.joint_centre", "must be positive and finite", tolerance)
     if case.model.structure and case.workspace is not None:
-        # The workspace is judged for every machine within it.
+        # The workspace is verified for all robots within the tolerance.
         return
     if not case.model.built or case.model.unknowns:
-        reason = "which is given joint by joint" if case.model.structure else "whose joints are not known"
-        raise CaseError("tolerance.joint_centre", f"is not computed for {case.model.name!r}, {reason}")
+        reason = "add a [workspace] to verify it there" if case.model.structure else "its joint centres are not known"
+        raise CaseError("tolerance.joint_centre", f"is not supported for the robot {case.model.name!r}: {reason}")

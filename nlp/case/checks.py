@@ -1,4 +1,7 @@
-"""Checks of a case's numbers: finite, not too large, inside their range. Faults are in the words of a case file."""
+"""Checks of values in a case: numbers, finite, not too large, within their range.
+
+Messages name the key of the value in a case file.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,7 @@ from .pose import LARGEST, Free, Value
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-#: A bound written in degrees may differ from the same bound in radians by rounding: by this part of the number.
+#: Relative rounding error between a bound in degrees and the same bound in radians.
 _ROUNDING = 1e-12
 
 
@@ -28,14 +31,14 @@ def check_value(
     units: Units,
     domain: tuple[float, float] = (-math.inf, math.inf),
 ) -> Value:
-    """Return a fixed or free number; one that leaves its domain by rounding only is moved back into it.
+    """Return a checked fixed or free value; a value outside its domain by a rounding error is moved onto the bound.
 
     Args:
-        value: the number, radians for an angle.
-        key: its dotted key, for messages.
+        value: fixed or free value, radians for an angle.
+        key: dotted key of the value, for messages.
         dimension: length, angle or plain number.
-        units: units for people.
-        domain: smallest and largest value.
+        units: units of messages.
+        domain: smallest and largest allowed value.
 
     Raises:
         CaseError: a number is not finite, too large or outside the domain, or two bounds are crossed.
@@ -47,7 +50,7 @@ def check_value(
     lower = _check_number(value.lower, f"{key}.min", dimension, units, domain)
     upper = _check_number(value.upper, f"{key}.max", dimension, units, domain)
     if not lower < upper:
-        fault = f"must be below max = {units.text(upper, dimension)}; a fixed value is a number alone"
+        fault = f"must be below max = {units.text(upper, dimension)}; write a fixed value as a plain number"
         raise CaseError(f"{key}.min", fault, units.shown(lower, dimension))
     start = value.start
     if start is not None:
@@ -56,21 +59,23 @@ def check_value(
 
 
 def _check_values(value: Free, key: str, dimension: Dimension, units: Units, domain: tuple[float, float]) -> Free:
-    """Return a number that has one of a few values; the arguments and errors are those of :func:`check_value`."""
+    """Return checked catalogue values; the arguments and errors are those of :func:`check_value`."""
     listed = [
         _check_number(each, f"{key}.values[{k}]", dimension, units, domain) for k, each in enumerate(value.values)
     ]
     found = Free.among(listed)
     for one, other in pairwise(found.values):
         if one == other:
-            raise CaseError(f"{key}.values", "must not have a value twice", units.shown(one, dimension))
+            fault = f"must not have a value twice, got {units.text(one, dimension)} twice"
+            raise CaseError(f"{key}.values", fault)
     if len(listed) < 2:
-        raise CaseError(f"{key}.values", "must have at least 2 entries; a fixed value is a number alone")
+        fault = f"must have at least 2 entries, got {len(listed)}; write a fixed value as a plain number"
+        raise CaseError(f"{key}.values", fault)
     return found
 
 
 def _check_number(value: float, key: str, dimension: Dimension, units: Units, domain: tuple[float, float]) -> float:
-    """Return a number; the arguments and errors are those of :func:`check_value`."""
+    """Return a checked number; the arguments and errors are those of :func:`check_value`."""
     number = check_real(value, key)
     if not math.isfinite(number):
         raise CaseError(key, "must be finite", number)
@@ -89,14 +94,14 @@ def _check_number(value: float, key: str, dimension: Dimension, units: Units, do
 
 
 def check_real(value: object, key: str) -> float:
-    """Return a number as a float; text, truth values and what is no number are refused.
+    """Return a number as a float; texts and truth values are refused.
 
     Args:
-        value: the number.
-        key: its dotted key, for messages.
+        value: value to check.
+        key: dotted key of the value, for messages.
 
     Raises:
-        CaseError: it is no number.
+        CaseError: the value is not a real number.
     """
     is_number = hasattr(value, "__float__") and not isinstance(value, bool | np.bool_ | str | bytes)
     try:
@@ -110,49 +115,49 @@ def _refuse_number(value: object, key: str) -> NoReturn:
 
 
 def check_size(number: float, key: str) -> None:
-    """Refuse a number larger than any number of a case may be.
+    """Refuse a number of too large magnitude.
 
     Args:
-        number: the number.
-        key: its dotted key, for messages.
+        number: number to check.
+        key: dotted key of the number, for messages.
 
     Raises:
-        CaseError: it is larger.
+        CaseError: the magnitude exceeds the largest one of any number in a case.
     """
     if abs(number) > LARGEST:
-        raise CaseError(key, f"must be at most {LARGEST:g} in size", number)
+        raise CaseError(key, f"must be at most {LARGEST:g} in magnitude", number)
 
 
 def check_vector(values: ArrayLike | Sequence[Value], key: str) -> FloatArray:
     """Return three finite numbers as an array (3,).
 
     Args:
-        values: the numbers.
-        key: their dotted key, for messages.
+        values: numbers to check.
+        key: dotted key of the numbers, for messages.
 
     Raises:
-        CaseError: they are not three finite numbers.
+        CaseError: the values are not three finite numbers.
     """
     vector = check_reals(values, key)
     if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise CaseError(key, "must be three finite numbers")
+        raise CaseError(key, "must be three finite numbers", vector.tolist())
     return vector
 
 
 def check_reals(values: ArrayLike | Sequence[Value], key: str) -> FloatArray:
-    """Return numbers as an array; text, truth values and what is no number are refused.
+    """Return numbers as an array; texts and truth values are refused.
 
     Args:
-        values: the numbers, in any shape.
-        key: their dotted key, for messages.
+        values: numbers, in an array of any shape.
+        key: dotted key of the numbers, for messages.
 
     Raises:
-        CaseError: one is no number, or they have no common shape.
+        CaseError: a value is not a real number, or rows have different lengths.
     """
     try:
         given = np.asarray(values)
     except ValueError:  # rows of different lengths
-        raise CaseError(key, "must be numbers in rows of one length") from None
+        raise CaseError(key, "must be numbers in rows of equal length") from None
     parts = values if isinstance(values, list | tuple) and given.ndim == 1 else given.ravel().tolist()
     numbers = [check_real(part, f"{key}[{index}]" if given.ndim == 1 else key) for index, part in enumerate(parts)]
     return np.array(numbers, dtype=np.float64).reshape(given.shape)
@@ -162,49 +167,49 @@ def check_direction(values: ArrayLike | Sequence[Value], key: str) -> FloatArray
     """Return a direction of any length but zero as an array (3,).
 
     Args:
-        values: its components.
-        key: its dotted key, for messages.
+        values: components of the direction.
+        key: dotted key of the direction, for messages.
 
     Raises:
         CaseError: the components are not three finite numbers, or all zero.
     """
     vector = check_vector(values, key)
     if not vector.any():
-        raise CaseError(key, "must not be zero: it gives no direction", vector.tolist())
+        raise CaseError(key, "must not be zero: a zero vector has no direction", vector.tolist())
     return vector
 
 
 def check_statics(model: Model, key: str, value: str | None = None) -> None:
-    """Refuse a robot whose actuators' forces no load determines.
+    """Refuse a robot whose actuator forces do not follow from the loads.
 
     Args:
         model: the robot.
-        key: dotted key of what needs them, for the message.
-        value: its value there; None where the message does not show it.
+        key: dotted key of the load, limit or objective that needs actuator forces, for messages.
+        value: value of this key for messages; None to leave it out.
 
     Raises:
-        CaseError: in the words of a case file.
+        CaseError: the loads do not determine the actuator forces of this robot.
     """
     from ...models.statics import statics_hindrance  # noqa: PLC0415 - a case without loads starts without it
 
     hindrance = statics_hindrance(model)
     if hindrance:
-        raise CaseError(key, f"is not for {model.name!r}: {hindrance}", value)
+        raise CaseError(key, f"is not supported for the robot {model.name!r}: {hindrance}", value)
 
 
 def check_determined_joints(model: Model, key: str, source: str | None = None) -> None:
-    """Refuse a robot with driven joints that the pose does not determine, where poses are judged.
+    """Refuse a robot with free actuator coordinates, for a verification over poses.
 
     Args:
         model: the robot.
-        key: dotted key of what is judged, for the message.
-        source: name of the case's file.
+        key: dotted key of the workspace or path, for messages.
+        source: name of the case file.
 
     Raises:
-        CaseError: the robot has such joints.
+        CaseError: the pose does not determine all actuator coordinates.
     """
     if joints := model.free_joints:
         several = len(joints) > 1
-        who = f"driven joint{'s' * several} {', '.join(joints)} of {model.name!r}"
-        fault = f"is not possible: the pose does not determine the position{'s' * several} of {who}"
+        names = f"actuated joint{'s' * several} {', '.join(joints)} of {model.name!r}"
+        fault = f"is not possible: the pose does not determine the coordinate{'s' * several} of {names}"
         raise CaseError(key, f"{fault}; use a robot file without {'them' if several else 'it'}", source=source)

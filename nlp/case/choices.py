@@ -1,4 +1,4 @@
-"""Dimensions of a case that have one of a few values, as parts from a catalogue have, and cases with some of them."""
+"""Dimensions with catalogue values: a list of discrete values of which a solve chooses one."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -10,19 +10,19 @@ from ..system.jsonvalues import Absent, Hidden, JsonObject, Known, Measure, Vect
 from .case import Case
 from .pose import Free, Value
 
-#: For each such dimension, a range of its values: the place of the first one, and the place behind the last one.
+#: For each such dimension, a slice of its values: index of the first value, and index behind the last value.
 Ranges: TypeAlias = tuple[tuple[int, int], ...]
 
 
-class ListedNumber(NamedTuple):
-    """A dimension that has one of a few values.
+class CatalogueDimension(NamedTuple):
+    """Dimension with catalogue values.
 
     Attributes:
-        parameter: name that the robot gives the parameter.
-        component: index within the parameter.
-        name: of the number in the case.
+        parameter: name of the parameter in the robot.
+        component: index of the component within the parameter.
+        name: name of the component in the case.
         dimension: length, angle or plain number.
-        values: ascending, radians for angles.
+        values: allowed values, ascending, radians for angles.
     """
 
     parameter: str
@@ -32,16 +32,16 @@ class ListedNumber(NamedTuple):
     values: tuple[float, ...]
 
 
-class ChosenNumber(JsonObject):
-    """A number whose value was chosen.
+class ChosenDimension(JsonObject):
+    """Dimension with a chosen catalogue value, or with a rounded value.
 
     Attributes:
-        name: of the number.
-        value: that was chosen.
-        unit: of its numbers.
-        values: of which one was chosen; absent for a rounded number.
-        before: value before it was rounded; else absent.
-        dimension: of its numbers, in radians for angles.
+        name: name of the dimension.
+        value: chosen or rounded value.
+        unit: unit of the values.
+        values: catalogue values; absent for a rounded dimension.
+        before: value before rounding; absent for catalogue values.
+        dimension: physical dimension of the values, in radians for angles.
     """
 
     name: str
@@ -52,23 +52,29 @@ class ChosenNumber(JsonObject):
     dimension: Hidden[Dimension] = Dimension.NUMBER
 
 
-def listed_numbers(case: Case) -> tuple[ListedNumber, ...]:
-    """Return the dimensions of a case that have one of a few values, in the robot's order."""
+def catalogue_dimensions(case: Case) -> tuple[CatalogueDimension, ...]:
+    """Return the dimensions of a case with catalogue values, in the robot's order."""
     return tuple(
-        ListedNumber(item.name, k, name, item.dimension, value.values)
+        CatalogueDimension(item.name, k, name, item.dimension, value.values)
         for item in case.model.parameters
         for k, (name, value) in enumerate(zip(case.component_names(item), case.components(item.name), strict=True))
         if isinstance(value, Free) and value.values
     )
 
 
-def all_values(numbers: Sequence[ListedNumber]) -> Ranges:
-    """Return the ranges of all values."""
+def all_values(numbers: Sequence[CatalogueDimension]) -> Ranges:
+    """Return the slices of all values."""
     return tuple((0, len(each.values)) for each in numbers)
 
 
-def within_ranges(case: Case, numbers: Sequence[ListedNumber], ranges: Ranges) -> Case:
-    """Return a case whose listed numbers are between the ends of ranges of their values; fixed where there is one."""
+def within_ranges(case: Case, numbers: Sequence[CatalogueDimension], ranges: Ranges) -> Case:
+    """Return a case in which each catalogue dimension is free between two of its values, or fixed at a single value.
+
+    Args:
+        case: the case with catalogue values.
+        numbers: its dimensions with catalogue values.
+        ranges: slice of the values of each dimension.
+    """
     given: dict[tuple[str, int], Value] = {}
     for number, (first, behind) in zip(numbers, ranges, strict=True):
         low, high = number.values[first], number.values[behind - 1]
@@ -81,20 +87,25 @@ def within_ranges(case: Case, numbers: Sequence[ListedNumber], ranges: Ranges) -
 
 
 def chosen_settings(case: Case, fixed: Case) -> Mapping[str, float]:
-    """Return the listed numbers of a case as another one fixes them, by name and in the case's units."""
+    """Return the chosen value of each catalogue dimension by name, in the case's units.
+
+    Args:
+        case: the case with catalogue values.
+        fixed: the same case with values chosen.
+    """
     return {
         each.name: case.units.shown(value, each.dimension)
-        for each in listed_numbers(case)
+        for each in catalogue_dimensions(case)
         if not isinstance(value := fixed.components(each.parameter)[each.component], Free)
     }
 
 
-def check_no_choice(case: Case) -> None:
-    """Refuse a case with listed numbers, where one robot with continuous numbers is needed.
+def check_no_catalogue(case: Case) -> None:
+    """Refuse a case with catalogue values, for commands that need continuous dimensions.
 
     Raises:
-        CaseError: there is one.
+        CaseError: a dimension has catalogue values.
     """
-    for each in listed_numbers(case):
-        fault = "has values, of which solve, report, export and certify choose one: give one with --set"
+    for each in catalogue_dimensions(case):
+        fault = "has catalogue values, and only solve, report, export and certify choose one: fix it with --set"
         raise CaseError(f"robot.parameters.{each.name}", fault, source=case.source)

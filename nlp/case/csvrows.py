@@ -1,8 +1,7 @@
-"""Poses and tasks from CSV files: each row becomes the table that a case file would have.
+"""CSV files of poses, tasks, paths and sweep points: rows become tables of a case file, or arrays.
 
-The first row names the columns. Numbers are fixed, and in the units of the case. A fault is told with the file, the row
-as a spreadsheet counts it, and the column. Files of paths have the columns of poses too, and are read by the same
-functions, and so are the points of a sweep.
+The first row has the names of the columns. Values are fixed, and in the units of the case. Messages name the file, the
+row number as in a spreadsheet, and the column.
 """
 
 from __future__ import annotations
@@ -24,25 +23,25 @@ from ..errors import CaseError, InputError, listing, nearest
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Largest size of a file, bytes, and the largest number of its rows: what is larger is no trajectory of a case.
+#: Largest size, bytes, and largest number of rows of a file with poses or tasks of a case.
 _MOST_BYTES, _MOST_ROWS = 4_000_000, 1_000
-#: The same where poses are no part of a case, and nothing is optimised.
+#: Both for poses outside of a case, for which nothing is optimised.
 _MOST_BYTES_APART, _MOST_ROWS_APART = 64_000_000, 200_000
 
-#: Columns of one number of a table, or of several that stand or lack together, by key within the table.
+#: Columns of each key of a table; the columns of a key are all present or all absent.
 _Columns = Mapping[str, tuple[str, ...]]
 
 
 class RowKind(NamedTuple):
-    """What rows of a file become.
+    """Columns of a CSV file, and the tables that its rows become.
 
     Attributes:
-        key: of the tables in a case file.
-        needed: columns that every file has.
-        others: columns that a file may have.
-        words: columns of text.
-        alternatives: keys of which a file has the columns of one only.
-        nested: key within a table, below which all but the needed columns stand; empty for none.
+        key: key of the tables in a case file, ``pose`` or ``task``.
+        needed: required columns, by key within the table.
+        others: optional columns, by key within the table.
+        words: names of the columns with text; all others have numbers.
+        alternatives: groups of keys; a file may have the columns of only one group.
+        nested: key of a table within the table, for the optional columns; empty to put them into the table itself.
     """
 
     key: str
@@ -54,11 +53,11 @@ class RowKind(NamedTuple):
 
     @property
     def columns(self) -> list[str]:
-        """Every column."""
+        """Names of all columns."""
         return [column for part in (self.needed, self.others) for names in part.values() for column in names]
 
 
-#: Rows that are poses.
+#: Rows with poses.
 POSE_ROWS = RowKind(
     "pose",
     needed={"position": ("x", "y", "z")},
@@ -71,7 +70,7 @@ POSE_ROWS = RowKind(
     alternatives=(("rpy",), ("quaternion",), ("axis", "angle")),
     nested="rotation",
 )
-#: By the key that names the file.
+#: Kinds of rows by the key with the name of the file.
 _KINDS: Mapping[str, RowKind] = {
     "poses": POSE_ROWS,
     "tasks": RowKind(
@@ -93,13 +92,13 @@ _KINDS: Mapping[str, RowKind] = {
 
 @dataclass(frozen=True)
 class _Source:
-    """Where the tables of a key come from.
+    """CSV file from which the tables of a key were read.
 
     Attributes:
         file: name of the file.
-        rows: number of each row in the file, as a spreadsheet counts.
+        rows: row number of each table in the file, from 1.
         columns: columns of each key within a table.
-        nested: key within a table, below which some keys stand.
+        nested: key of a table within the table, for the optional columns.
     """
 
     file: str
@@ -110,19 +109,19 @@ class _Source:
 
 @dataclass(frozen=True)
 class TableOrigins:
-    """Where the poses and tasks of a document come from, for messages.
+    """CSV files from which poses and tasks of a document were read, for messages.
 
     Attributes:
-        sources: by key of the tables, ``pose`` or ``task``; none for those of the case file itself.
+        sources: file of each key, ``pose`` or ``task``; without an entry for tables of the case file itself.
     """
 
     sources: Mapping[str, _Source] = field(default_factory=dict)
 
     def error_in(self, error: CaseError, document: str) -> CaseError:
-        """Return an error with the name of its file: a CSV file, with row and column, or the document.
+        """Return an error with the name of its file: the CSV file with row and column, or the case file.
 
         Args:
-            error: the error.
+            error: error without the name of a file.
             document: name of the case file.
         """
         found = re.fullmatch(r"(\w+)(?:\[(\d+)\])?(?:\.(.+))?", error.key)
@@ -141,36 +140,37 @@ class TableOrigins:
 
 
 def named_csv_files(tables: Mapping[str, Any], folder: Path) -> tuple[Path, ...]:
-    """Return the CSV files that a document names.
+    """Return the CSV files to which a document refers.
 
     Args:
         tables: the document, as ``tomllib`` returns it.
-        folder: folder of the document, beside which the files are.
+        folder: folder of the document, from which the file names begin.
     """
     files = (tables.get(name) for name in _KINDS)
     return tuple(folder / file for file in files if isinstance(file, str))
 
 
 def insert_rows(tables: dict[str, Any], folder: Path) -> TableOrigins:
-    """Put the rows of the CSV files that a document names in the places of their names.
+    """Replace the names of CSV files in a document by their rows.
 
     Args:
         tables: the document, as ``tomllib`` returns it; ``poses`` and ``tasks`` become ``pose`` and ``task``.
-        folder: folder of the document, beside which the files are.
+        folder: folder of the document, from which the file names begin.
 
     Raises:
-        CaseError: a document has poses or tasks in two ways, or a file cannot be read or has a fault.
-        InputError: a file is no table at all.
+        CaseError: the document has poses or tasks both as tables and as a file, or a file cannot be read or has an
+            error.
+        InputError: a file is not a table.
     """
     sources = {}
     for name, kind in _KINDS.items():
         file = tables.get(name)
         if name not in tables or not isinstance(file, str):
-            continue  # the schema refuses what is no name
+            continue  # the schema refuses values other than text
         if kind.key in tables:
-            raise CaseError(name, f"cannot stand beside [[{kind.key}]]; state the {name} in one way", file)
+            raise CaseError(name, f"conflicts with [[{kind.key}]]; state the {name} in one way", file)
         found, sources[kind.key] = _read_rows(file, folder, kind, name)
-        # In the place of the name, so that tables keep their order.
+        # The order of the keys is kept.
         items = [(kind.key, found) if key == name else (key, value) for key, value in tables.items()]
         tables.clear()
         tables.update(items)
@@ -178,15 +178,15 @@ def insert_rows(tables: dict[str, Any], folder: Path) -> TableOrigins:
 
 
 def pose_tables(file: str, option: str) -> tuple[list[dict[str, Any]], TableOrigins, tuple[int, ...]]:
-    """Return the tables of the poses of a file that no case names, where they come from, and the number of each row.
+    """Return the poses of a file given by an option, as tables, with their origin and their row numbers.
 
     Args:
-        file: its name.
-        option: that names it, for messages.
+        file: name of the file.
+        option: option with the name of the file, for messages.
 
     Raises:
-        CaseError: the file cannot be read, or has a fault.
-        InputError: the file is no table at all.
+        CaseError: the file cannot be read, or has an error.
+        InputError: the file is not a table.
     """
     most = _MOST_BYTES_APART, _MOST_ROWS_APART
     tables, source = _read_rows(file, Path(), POSE_ROWS, option, *most)
@@ -196,17 +196,19 @@ def pose_tables(file: str, option: str) -> tuple[list[dict[str, Any]], TableOrig
 def _read_rows(
     file: str, folder: Path, kind: RowKind, name: str, most_bytes: int = _MOST_BYTES, most_rows: int = _MOST_ROWS
 ) -> tuple[list[dict[str, Any]], _Source]:
-    """Return the tables of a file's rows, and where they come from.
+    """Return the tables of a file's rows, and their origin.
 
     Raises:
-        CaseError: the file cannot be read, or has a fault.
-        InputError: the file is no table at all.
+        CaseError: the file cannot be read, or has an error.
+        InputError: the file is not a table.
     """
     records = list(csv_rows(_text_of(folder / file, file, name, most_bytes), file))
     if len(records) < 2:
-        raise InputError(f"{file}: has no rows below a row that names the columns")
+        raise InputError(
+            f"{file}: has no rows: expected a first row with the names of the columns, then rows of values"
+        )
     if len(records) - 1 > most_rows:
-        raise InputError(f"{file}: has {len(records) - 1} rows, of which at most {most_rows} are allowed")
+        raise InputError(f"{file}: must have at most {most_rows} rows, got {len(records) - 1}")
     (top, header), *body = records
     columns = check_header(header, kind, lambda fault: CaseError(f"row {top}", fault, source=file))
     tables = [_table_of(number, record, header, columns, kind, file) for number, record in body]
@@ -214,14 +216,14 @@ def _read_rows(
 
 
 def csv_rows(text: str, file: str) -> Iterator[tuple[int, list[str]]]:
-    """Yield the cells of every row that is not empty, without the spaces around them, and its number.
+    """Yield the row number and the stripped cells of every row that is not empty.
 
     Args:
-        text: of the file; commas or semicolons separate its cells.
-        file: its name, for messages.
+        text: text of the file, with commas or semicolons between the cells.
+        file: name of the file, for messages.
 
     Raises:
-        InputError: the text is no table at all.
+        InputError: the text is not CSV.
     """
     import csv  # noqa: PLC0415 - most cases name no files
 
@@ -242,24 +244,24 @@ def _number_in(text: str, row: int, column: str, file: str) -> float:
     """Return the number of a cell.
 
     Raises:
-        CaseError: the cell holds none.
+        CaseError: the cell is empty, or not a number.
     """
     try:
         return float(text)
     except ValueError:
         from ..system.slips import hint_of  # noqa: PLC0415 - only messages need it
 
-        fault = f"must be a number{hint_of(text)}" if text else "is empty; it must be a number"
+        fault = f"must be a number{hint_of(text)}" if text else "must be a number, got an empty cell"
         raise CaseError(f"row {row}, column {column}", fault, text or None, file) from None
 
 
 class NumberTable(NamedTuple):
-    """Numbers of a file.
+    """Numeric columns of a file.
 
     Attributes:
         source: name of the file.
-        rows: (n,) numbers of the rows, as a spreadsheet counts.
-        columns: (n,) numbers of each column, by its name.
+        rows: (n,) row numbers in the file, from 1.
+        columns: (n,) values of each column by name.
     """
 
     source: str
@@ -267,19 +269,23 @@ class NumberTable(NamedTuple):
     columns: Mapping[str, FloatArray]
 
     def block(self, names: str) -> FloatArray:
-        """Return columns (n, k) by their names, which spaces separate."""
+        """Return several columns as an array (n, k).
+
+        Args:
+            names: names of the columns, separated by spaces.
+        """
         return np.stack([self.columns[name] for name in names.split()], axis=1)
 
     def refuse(self, is_wrong: NDArray[np.bool_], name: str, fault: str) -> None:
-        """Refuse the first row at which something is wrong.
+        """Refuse the first row with an error.
 
         Args:
-            is_wrong: (n,) whether it is, at each row.
-            name: of the columns, for messages.
-            fault: the fault, in words.
+            is_wrong: (n,) True for each row with the error.
+            name: name of the column or columns, for messages.
+            fault: description of the error and of the allowed values.
 
         Raises:
-            CaseError: there is such a row.
+            CaseError: a row has the error.
         """
         if is_wrong.any():
             at = int(np.argmax(is_wrong))
@@ -290,17 +296,17 @@ class NumberTable(NamedTuple):
 def number_table(
     records: Iterable[tuple[int, list[str]]], header: list[str], file: str, left_out: Sequence[Mapping[int, str]] = ()
 ) -> NumberTable:
-    """Return the numbers of a file.
+    """Return the numeric columns of a file.
 
     Args:
-        records: rows below the one that names the columns, with their numbers.
+        records: row number and cells of each row below the header.
         header: names of the columns.
         file: name of the file, for messages.
-        left_out: cells in the place of those of columns that a row may leave empty together, by place.
+        left_out: groups of columns that a row may leave empty together: default cell of each column, by column index.
 
     Raises:
-        CaseError: a row has not a cell for each column, or a cell is no number.
-        InputError: the file is no table at all.
+        CaseError: a row does not have one cell per column, or a cell is not a number.
+        InputError: the file is not CSV.
     """
     rows, numbers = array("i"), array("d")
     for row, cells in records:
@@ -313,14 +319,14 @@ def number_table(
             numbers.extend([float(cell) for cell in cells])
         except ValueError:
             for cell, name in zip(cells, header, strict=True):
-                _number_in(cell, row, name, file)  # of which one raises
+                _number_in(cell, row, name, file)  # raises for the first cell that is not a number
         rows.append(row)
     columns = np.array(numbers).reshape(-1, len(header)).T
     return NumberTable(file, np.array(rows, dtype=np.int32), dict(zip(header, columns, strict=True)))
 
 
 def _check_count(cells: Sequence[str], header: Sequence[str], row: int, file: str) -> None:
-    """Refuse a row that has not a cell for each column, by a CaseError."""
+    """Raise a CaseError for a row without exactly one cell per column."""
     if len(cells) != len(header):
         raise CaseError(f"row {row}", f"must have {len(header)} cells, got {len(cells)}", source=file)
 
@@ -329,13 +335,13 @@ def _text_of(path: Path, file: str, name: str, most: int) -> str:
     """Return the text of a file.
 
     Raises:
-        CaseError: it cannot be read, is too large, or no text.
+        CaseError: the file cannot be read, is too large, or is not UTF-8 text.
     """
     try:
         with path.open("rb") as stream:
             content = stream.read(most + 1)
         if len(content) > most:
-            raise CaseError(name, f"is larger than {most // 1_000_000} MB", file)
+            raise CaseError(name, f"cannot be read: it is larger than {most // 1_000_000} MB", file)
         return content.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise CaseError(name, "cannot be read: it is not UTF-8 text", file) from None
@@ -345,28 +351,34 @@ def _text_of(path: Path, file: str, name: str, most: int) -> str:
 
 
 def check_header(header: Sequence[str], kind: RowKind, error: Callable[[str], CaseError]) -> _Columns:
-    """Return the columns that a file has, by key within a table.
+    """Return the columns of a file by key within a table.
+
+    Args:
+        header: names of the columns in the file.
+        kind: allowed columns.
+        error: function that makes an error from a message.
 
     Raises:
-        CaseError: a column is unknown, missing or there twice, or two forms of one thing stand beside each other.
+        CaseError: a column is unknown, missing or duplicate, or columns of two alternatives are present.
     """
     for name in header:
         if name not in kind.columns:
             raise error(f"no such column, {name!r}; {nearest(name, kind.columns)}")
         if list(header).count(name) > 1:
-            raise error(f"column {name!r} is there twice")
+            raise error(f"column {name!r} appears twice; remove one")
     found = {}
     for key, names in {**kind.needed, **kind.others}.items():
         missing = [name for name in names if name not in header]
         if len(missing) < len(names) or key in kind.needed:
             if missing:
-                raise error(f"column{'s' if len(missing) > 1 else ''} {listing(missing)} missing")
+                is_one = len(missing) == 1
+                raise error(f"column{'' if is_one else 's'} {listing(missing)} {'is' if is_one else 'are'} missing")
             found[key] = names
     forms = [[key for key in form if key in found] for form in kind.alternatives]
     given = [form[0] for form in forms if form]
     if len(given) > 1:
         one, other = (found[key][0] for key in given[:2])
-        raise error(f"column {other!r} cannot stand beside {one!r}; state it in one way")
+        raise error(f"column {other!r} conflicts with {one!r}; give only one of the two forms")
     return found
 
 
@@ -376,7 +388,7 @@ def _table_of(
     """Return the table of a row.
 
     Raises:
-        CaseError: a cell is no number, or missing.
+        CaseError: a cell is missing, or not a number.
     """
     _check_count(record, header, number, file)
     cells = dict(zip(header, record, strict=True))
@@ -387,7 +399,7 @@ def _table_of(
     table: dict[str, Any] = {}
     for key, names in columns.items():
         if key not in kind.needed and not any(cells[name] for name in names):
-            continue  # empty cells state nothing
+            continue  # empty cells: the key is left out
         values = [value(name) for name in names]
         place = table.setdefault(kind.nested, {}) if kind.nested and key not in kind.needed else table
         place[key] = values[0] if len(names) == 1 else values

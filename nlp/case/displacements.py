@@ -1,4 +1,4 @@
-"""The displacements that a case file states for a pose: along a task's screw motion, over a grid, or one by one."""
+"""Displacements of a stated pose in a case file: along a task's screw motion, over a grid, or as a list."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from pydantic import ValidationError
 from ...models import Dimension, Displacement, axis_from_screw
 from ..errors import CaseError, listing
 from ..units import Units
-from .pose import HERE, along_screw, over_grid
+from .pose import NO_DISPLACEMENT, along_screw, over_grid
 from .schema import AlongTable, DisplacementTable, GridTable, OffsetsTable, PoseTable
 from .task import Task
 from .toml import TomlValue
 
-#: Largest number of poses from one stated pose: a larger program takes too long to solve.
+#: Largest number of poses from one stated pose: more make a nonlinear program that takes too long to solve.
 _MOST = 200
-#: Largest error of a rotation matrix: files give its entries with a dozen digits.
+#: Largest error of ``R R'`` of a rotation matrix: files give its entries with a dozen digits.
 _ROTATION = 1e-9
-#: Digits of the ends of a trajectory in the search of one that gives the same displacements.
+#: Digits to which first and last of a trajectory are rounded when displacements are written as a trajectory.
 _DIGITS = 12
 
 
@@ -28,37 +28,37 @@ def read_displacements(written: PoseTable, tasks: Sequence[Task], units: Units, 
     """Return the displacements of a stated pose, one for each pose that the robot takes.
 
     Args:
-        written: the table of the pose.
-        tasks: the case's tasks.
-        units: the file's units.
+        written: table of the pose.
+        tasks: tasks of the case.
+        units: units of the file.
         key: dotted key of the table, for messages.
 
     Raises:
-        CaseError: two of a trajectory, a grid and a list, a matrix that is no rotation, a task that does not exist,
-            crossed offsets, or too many poses.
+        CaseError: the table has two of a trajectory, a grid and a list; a matrix is not a rotation; the task does not
+            exist; offsets are crossed; or there are too many poses.
     """
     ways = [way for way in ("along_task", "grid", "displacements") if getattr(written, way) is not None]
     if len(ways) > 1:
-        raise CaseError(f"{key}.{ways[1]}", f"cannot stand beside {ways[0]}; write two poses")
+        raise CaseError(f"{key}.{ways[1]}", f"conflicts with {ways[0]}; write two [[pose]] tables")
     if written.displacements is not None:
         return _read_list(written.displacements, f"{key}.displacements")
     if written.along_task is not None:
         return _read_trajectory(written.along_task, tasks, units, f"{key}.along_task")
-    return (HERE,) if written.grid is None else _read_grid(written.grid, f"{key}.grid")
+    return (NO_DISPLACEMENT,) if written.grid is None else _read_grid(written.grid, f"{key}.grid")
 
 
 def _read_trajectory(written: AlongTable, tasks: Sequence[Task], units: Units, key: str) -> tuple[Displacement, ...]:
     """Return the displacements along a task's screw motion; the errors are those of :func:`read_displacements`."""
     names = [task.name for task in tasks]
     if written.task is None and len(tasks) > 1:
-        raise CaseError(f"{key}.task", f"is missing: there are several tasks, {listing(names)}")
+        raise CaseError(f"{key}.task", f"is missing: give the name of one of the tasks {listing(names)}")
     if written.task is not None and written.task not in names:
-        raise CaseError(f"{key}.task", f"is no task of this case; allowed: {listing(names)}", written.task)
+        raise CaseError(f"{key}.task", f"no such task; allowed: {listing(names)}", written.task)
     if written.first == written.last:
-        raise CaseError(f"{key}.last", "must differ from where the poses begin", written.last)
+        raise CaseError(f"{key}.last", f"must differ from first = {written.first:g}", written.last)
     twist = tasks[0 if written.task is None else names.index(written.task)].twist
     if not np.any(np.asarray(twist, dtype=np.float64)):
-        raise CaseError(f"{key}.task", "has a twist of zero: it leads nowhere")
+        raise CaseError(f"{key}.task", "must have a motion: its twist is zero")
     dimension = Dimension.LENGTH if math.isinf(axis_from_screw(twist).pitch) else Dimension.ANGLE
     first, last = (units.to_internal(end, dimension) for end in (written.first, written.last))
     return along_screw(twist, [float(each) for each in np.linspace(first, last, written.count)])
@@ -72,9 +72,9 @@ def _read_grid(written: GridTable, key: str) -> tuple[Displacement, ...]:
     ]
     count = math.prod(map(len, offsets))
     if count == 1:
-        raise CaseError(key, "must have offsets along x, y or z")
+        raise CaseError(key, "is empty: give offsets along x, y or z, such as x = { min = -5, max = 5, count = 3 }")
     if count > _MOST:
-        raise CaseError(key, f"has {count} poses, of which at most {_MOST} are allowed")
+        raise CaseError(key, f"must have at most {_MOST} poses, got {count}")
     return over_grid(offsets)
 
 
@@ -82,10 +82,10 @@ def _read_list(written: Sequence[DisplacementTable], key: str) -> tuple[Displace
     """Return the displacements of a list.
 
     Raises:
-        CaseError: a matrix is no rotation, or there are too many displacements.
+        CaseError: a matrix is not a rotation, or there are too many displacements.
     """
     if len(written) > _MOST:
-        raise CaseError(key, f"has {len(written)} poses, of which at most {_MOST} are allowed")
+        raise CaseError(key, f"must have at most {_MOST} poses, got {len(written)}")
     found = tuple(Displacement.by(each.rotation, each.translation) for each in written)
     for index, each in enumerate(found):
         error = np.abs(each.rotation @ each.rotation.T - np.eye(3)).max()
@@ -97,16 +97,16 @@ def _read_list(written: Sequence[DisplacementTable], key: str) -> tuple[Displace
 def written_displacements(
     displacements: Sequence[Displacement], tasks: Sequence[Task], units: Units
 ) -> dict[str, TomlValue]:
-    """Return the keys of a pose's table that state its displacements, the inverse of :func:`read_displacements`.
+    """Return the keys of a pose's table for its displacements, the inverse of :func:`read_displacements`.
 
     Args:
-        displacements: of a stated pose.
-        tasks: the case's tasks.
-        units: the file's units.
+        displacements: displacements of a stated pose.
+        tasks: tasks of the case.
+        units: units of the file.
 
     Returns:
-        No key for the stated pose alone; a trajectory or a grid where that gives the same displacements to the last
-        bit, and else a list of all of them.
+        No key for the stated pose only; a trajectory or a grid if it gives the same displacements to the last bit;
+        otherwise a list of all displacements.
     """
     if len(displacements) == 1 and displacements[0].is_identity:
         return {}
@@ -125,7 +125,7 @@ def written_displacements(
 
 
 def _written_grid(displacements: Sequence[Displacement]) -> dict[str, TomlValue] | None:
-    """Return the grid whose corners the first and the last displacement are; None where there is none."""
+    """Return a grid with the first and the last displacement as opposite corners; None if there is no such grid."""
     translations = np.array([each.translation for each in displacements])
     axes: dict[str, TomlValue] = {}
     for name, values in zip("xyz", translations.T, strict=True):
@@ -138,7 +138,7 @@ def _written_grid(displacements: Sequence[Displacement]) -> dict[str, TomlValue]
 
 
 def _written_trajectory(displacements: Sequence[Displacement], task: Task, units: Units) -> dict[str, TomlValue] | None:
-    """Return a trajectory along a task's screw from the first to the last displacement, or None."""
+    """Return a trajectory along a task's screw from the first to the last displacement; None if both are equal."""
     screw = axis_from_screw(task.twist)
     ends = []
     for each in (displacements[0], displacements[-1]):
@@ -148,7 +148,7 @@ def _written_trajectory(displacements: Sequence[Displacement], task: Task, units
             R = each.rotation
             turned = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
             amount, dimension = math.atan2(float(screw.axis @ turned), float(np.trace(R)) - 1), Dimension.ANGLE
-        # The ends are numbers of a few digits where a file stated them.
+        # Files give the ends with few digits.
         ends.append(float(f"{units.shown(amount, dimension):.{_DIGITS}g}"))
     if ends[0] == ends[1]:
         return None
@@ -156,7 +156,7 @@ def _written_trajectory(displacements: Sequence[Displacement], task: Task, units
 
 
 def _read_again(way: dict[str, TomlValue], tasks: Sequence[Task], units: Units) -> tuple[Displacement, ...]:
-    """Return the displacements that the keys of a pose's table state; none where they are refused."""
+    """Return the displacements of the keys of a pose's table; empty if the keys are refused."""
     try:
         table = PoseTable.model_validate({"position": [0, 0, 0], **way})
         return read_displacements(table, tasks, units, "pose")
@@ -165,7 +165,7 @@ def _read_again(way: dict[str, TomlValue], tasks: Sequence[Task], units: Units) 
 
 
 def _are_equal(some: Sequence[Displacement], others: Sequence[Displacement]) -> bool:
-    """Return whether displacements are the same, to the last bit."""
+    """Return whether two lists of displacements are equal to the last bit."""
     return len(some) == len(others) and all(
         np.array_equal(part, other)
         for one, two in zip(some, others, strict=True)
@@ -174,7 +174,7 @@ def _are_equal(some: Sequence[Displacement], others: Sequence[Displacement]) -> 
 
 
 def _read_offsets(written: OffsetsTable | None, key: str) -> list[float]:
-    """Return the offsets along one axis, a single 0 where none are stated.
+    """Return the offsets along one axis; a single 0 without a table.
 
     Raises:
         CaseError: the first is not below the last.

@@ -1,11 +1,8 @@
-"""Workspaces about the pose of a case: excursions in the axes of the world, and the same poses in world coordinates.
+"""Workspaces stated as excursions from the pose of a case, and their conversion to world coordinates.
 
-An excursion moves the platform's origin by its position, and turns the platform of the stated pose by its rotation:
-``p = p0 + e``, ``R = E R0``. In world coordinates these are a box of the same kind where the pose is not turned, where
-nothing turns in the excursions, and where both turn about one axis.
-
-Source of ``E R0`` for roll, pitch and yaw: ``Rz(yaw) Ry(pitch) Rx(roll) R0``, in which a turn R0 about x adds to roll,
-about y to pitch where roll is 0, and about z to yaw where both are 0.
+An excursion displaces the platform along and about the world axes: ``p = p0 + e``, ``R = E R0``. The result is a box in
+world coordinates if the pose has no rotation, the excursions have none, or both rotate about one axis. In ``Rz(yaw)
+Ry(pitch) Rx(roll) R0``, a rotation R0 about x adds to roll; about y to pitch if roll is 0; about z to yaw if both are.
 """
 
 from __future__ import annotations
@@ -26,25 +23,25 @@ from .workspace import LARGEST_TURN, TURNS, TurnKind, Turns, Workspace
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-#: Cosine of the angle between two axes that count as one.
+#: Smallest cosine of the angle between two axes that are considered equal.
 _SAME_AXIS = 1 - 1e-12
-#: Part of the largest number of a comparison by which a pose may be outside of a workspace: rounding.
+#: Relative rounding error by which a pose may be outside of a workspace.
 _ROUNDING = 1e-9
 
 
 class _Along(NamedTuple):
-    """The angle of a workspace to which the angle of a pose adds, by its place, and with which sign."""
+    """Angle of a workspace to which the angle of a pose is added: its index, and the sign of the sum."""
 
     place: int
     sign: float
 
 
 def in_world(workspace: Workspace, pose: Pose) -> Workspace:
-    """Return the poses of a workspace in world coordinates; ranges are rounded outwards.
+    """Return a workspace in world coordinates; ranges are rounded outwards.
 
     Args:
-        workspace: checked by :func:`check_excursions` where it is about the pose.
-        pose: the stated pose of its case, with fixed numbers where the workspace is about it.
+        workspace: the workspace; if stated as excursions, already checked by :func:`check_excursions`.
+        pose: stated pose of the case; fixed if the workspace is stated as excursions.
     """
     if not workspace.about_pose:
         return workspace
@@ -62,26 +59,27 @@ def in_world(workspace: Workspace, pose: Pose) -> Workspace:
 
 
 def check_excursions(workspace: Workspace, pose: Pose, count: int, units: Units) -> None:
-    """Refuse a workspace about a pose that is no box of poses in world coordinates.
+    """Refuse excursions that are not a box in world coordinates.
 
     Args:
         workspace: the workspace.
-        pose: the stated pose.
-        count: number of poses that the robot takes.
-        units: units for people.
+        pose: stated pose of the case.
+        count: number of poses of the robot.
+        units: units of messages.
 
     Raises:
-        CaseError: the case has several poses, both turn about different axes, or the angles are too large together.
+        CaseError: the case has several poses, pose and excursions rotate about different axes, or their angles are too
+            large together.
     """
     if not workspace.about_pose:
         return
     if count > 1 or not pose.displacements[0].is_identity:
-        raise CaseError("workspace.about", "must be 'world' where a case has several poses, or displaced ones", "pose")
+        raise CaseError("workspace.about", "must be 'world' for a case with several or displaced poses", "pose")
     turns, rotation = workspace.turns, pose.rotation
     along = _along(turns, rotation)
     if along is None:
         if any(each != 0.0 for each in turns.angles) and rotation.angle != 0.0:
-            fault = "must be about the pose's axis, or left out, where the pose is turned and about = 'pose'"
+            fault = "must be left out, or about the axis of the pose: with about = 'pose', two axes are not supported"
             raise CaseError("workspace.rotation", fault)
         return
     name = TURNS[along.place] if turns.kind is TurnKind.ROLL_PITCH_YAW else "angle"
@@ -89,15 +87,15 @@ def check_excursions(workspace: Workspace, pose: Pose, count: int, units: Units)
     far = max(abs(one + other) for one in ends_of(turns.angles[along.place]) for other in ends)
     if far > LARGEST_TURN:
         most = units.text(LARGEST_TURN, Dimension.ANGLE)
-        fault = f"reaches {units.text(far, Dimension.ANGLE)} with the angle of the pose, and at most {most} are allowed"
+        fault = f"must be at most {most} together with the angle of the pose, got {units.text(far, Dimension.ANGLE)}"
         raise CaseError(f"workspace.rotation.{name}", fault)
 
 
 def refuse_free(workspace: Workspace, pose: Pose, source: str | None) -> None:
-    """Refuse a pose with a free number where a workspace is about it.
+    """Refuse a pose with a free coordinate for a workspace stated as excursions.
 
     Raises:
-        CaseError: a number is free.
+        CaseError: a coordinate of the pose is free.
     """
     if not workspace.about_pose:
         return
@@ -106,38 +104,38 @@ def refuse_free(workspace: Workspace, pose: Pose, source: str | None) -> None:
     numbers["rotation.angle"] = "angle", rotation.angle
     for key, (name, value) in numbers.items():
         if isinstance(value, Free):
-            fault = "is free, and the workspace is about the pose"
-            raise CaseError(
-                f"pose.{key}", f"{fault}: give it with --set {name}=..., or a result with --of", source=source
-            )
+            fault = f"is free, but the workspace is about the pose: fix it with --set {name}=..., or use --of RESULT"
+            raise CaseError(f"pose.{key}", fault, source=source)
     if rotation.axis is None and rotation.angle != 0.0:
-        fault = "is free, and the workspace is about the pose: give it with --set axis=..., or a result with --of"
+        fault = "is free, but the workspace is about the pose: fix it with --set axis=..., or use --of RESULT"
         raise CaseError("pose.rotation.axis", fault, source=source)
 
 
-class NotHeld(NamedTuple):
-    """A workspace in world coordinates that holds none of a case's poses.
+class OutsideWorkspace(NamedTuple):
+    """Report that a workspace in world coordinates contains no stated pose of the case.
 
     Attributes:
-        sentence: what is outside, with the offer where the numbers may be excursions.
-        may_be_excursions: whether the workspace holds 0 where the pose is outside of it, as excursions do.
+        sentence: message with the coordinate outside of its range, and a hint if excursions were probably intended.
+        may_be_excursions: True if the range of this coordinate contains 0, as ranges of excursions do.
     """
 
     sentence: str
     may_be_excursions: bool
 
 
-def not_held(workspace: Workspace, poses: Sequence[Pose], units: Units, *, by_ranges: bool = False) -> NotHeld | None:
-    """Return how a workspace in world coordinates holds none of a case's poses; None where it holds one.
+def outside_workspace(
+    workspace: Workspace, poses: Sequence[Pose], units: Units, *, by_ranges: bool = False
+) -> OutsideWorkspace | None:
+    """Return the reason why a workspace in world coordinates contains no stated pose; None if it contains one.
 
-    Of a pose with free numbers, any value counts. Rotations are compared where both are fixed or about one axis.
+    A free coordinate of a pose may have any value in its range. Rotations are compared if both are fixed, or about the
+    same axis.
 
     Args:
         workspace: the workspace.
-        poses: the stated poses.
-        units: units for people.
-        by_ranges: whether ranges of the workspace alone count: those of its fixed numbers that the robot cannot choose
-            follow from others.
+        poses: stated poses of the case.
+        units: units of messages.
+        by_ranges: If true, only coordinates with a range are compared, because fixed ones may be dependent.
     """
     if workspace.about_pose:
         return None
@@ -145,30 +143,30 @@ def not_held(workspace: Workspace, poses: Sequence[Pose], units: Units, *, by_ra
     if not all(every):
         return None
     is_one, (fault, holds_zero) = len(poses) == 1, max(every[0], key=lambda each: each.may_be_excursions)
-    sentence = f"the workspace does not hold the pose{'' if is_one else 's'}: {fault}"
+    sentence = f"the workspace does not contain the pose{'' if is_one else 's'}: {fault}"
     if is_one and holds_zero:
-        sentence += '; write about = "pose" in [workspace] if its numbers are excursions about the pose'
-    return NotHeld(sentence, is_one and holds_zero)
+        sentence += '; write about = "pose" in [workspace] if its values are excursions from the pose'
+    return OutsideWorkspace(sentence, is_one and holds_zero)
 
 
-def _faults(workspace: Workspace, pose: Pose, units: Units, *, by_ranges: bool) -> Iterator[NotHeld]:
-    """Yield each coordinate in which a pose is outside of a workspace, as far as that is known."""
+def _faults(workspace: Workspace, pose: Pose, units: Units, *, by_ranges: bool) -> Iterator[OutsideWorkspace]:
+    """Yield a report for each coordinate in which a pose is outside of a workspace, if it can be compared."""
     pairs = [
-        (name, stated, own, Dimension.LENGTH)
-        for name, stated, own in zip("xyz", workspace.position, pose.position, strict=True)
+        (name, stated, at, Dimension.LENGTH)
+        for name, stated, at in zip("xyz", workspace.position, pose.position, strict=True)
     ]
-    pairs += [(name, stated, own, Dimension.ANGLE) for name, stated, own in _angles(workspace.turns, pose.rotation)]
-    for name, stated, own, dimension in pairs:
-        (low, high), (least, most) = ends_of(stated), ends_of(own)
+    pairs += [(name, stated, at, Dimension.ANGLE) for name, stated, at in _angles(workspace.turns, pose.rotation)]
+    for name, stated, at, dimension in pairs:
+        (low, high), (least, most) = ends_of(stated), ends_of(at)
         slack = _ROUNDING * max(map(abs, (low, high, least, most)))
-        is_meant = isinstance(stated, Free) or not by_ranges
-        if is_meant and (least > high + slack or most < low - slack):
-            ranges = [_span(each, units, dimension) for each in (stated, own)]
-            yield NotHeld(f"{name} is {ranges[0]}, and the pose has {ranges[1]}", low <= 0 <= high)
+        is_compared = isinstance(stated, Free) or not by_ranges
+        if is_compared and (least > high + slack or most < low - slack):
+            ranges = [_span(each, units, dimension) for each in (stated, at)]
+            yield OutsideWorkspace(f"{name} is {ranges[0]} there and {ranges[1]} at the pose", low <= 0 <= high)
 
 
 def _angles(turns: Turns, rotation: Rotation) -> list[tuple[str, Value, Value]]:
-    """Return the angles of a workspace beside those of a pose, by name, where they can be compared."""
+    """Return name, value in the workspace and value at the pose of each angle that can be compared."""
     if turns.kind is TurnKind.ANY_AXIS:
         least, most = ends_of(rotation.angle)
         size = min(abs(least), abs(most)) if least * most > 0 else 0.0
@@ -176,9 +174,9 @@ def _angles(turns: Turns, rotation: Rotation) -> list[tuple[str, Value, Value]]:
     along = _along(turns, rotation)
     if along is not None:
         name = TURNS[along.place] if turns.kind is TurnKind.ROLL_PITCH_YAW else "angle"
-        own = rotation.angle
-        low, high = sorted(along.sign * each for each in ends_of(own))
-        return [(name, turns.angles[along.place], Free(low, high) if isinstance(own, Free) else low)]
+        angle = rotation.angle
+        low, high = sorted(along.sign * each for each in ends_of(angle))
+        return [(name, turns.angles[along.place], Free(low, high) if isinstance(angle, Free) else low)]
     if turns.kind is TurnKind.ROLL_PITCH_YAW and rotation.axis is not None and not isinstance(rotation.angle, Free):
         return list(zip(TURNS, turns.angles, _roll_pitch_yaw(rotation.axis, rotation.angle), strict=True))
     if turns == Turns() and rotation.axis is not None:
@@ -187,7 +185,7 @@ def _angles(turns: Turns, rotation: Rotation) -> list[tuple[str, Value, Value]]:
 
 
 def _roll_pitch_yaw(axis: ArrayLike, angle: float) -> tuple[float, float, float]:
-    """Return roll, pitch and yaw of a rotation."""
+    """Return roll, pitch and yaw, radians, of a rotation about an axis (3,)."""
     w, (x, y, z) = math.cos(angle / 2), (math.sin(angle / 2) * frozen_array(axis, (3,))).tolist()
     pitch = math.asin(min(max(2 * (w * y - x * z), -1.0), 1.0))
     return (
@@ -198,14 +196,14 @@ def _roll_pitch_yaw(axis: ArrayLike, angle: float) -> tuple[float, float, float]
 
 
 def _span(value: Value, units: Units, dimension: Dimension) -> str:
-    """Return a number or a range with its unit."""
+    """Return a value or a range as text with its unit."""
     if not isinstance(value, Free):
         return units.text(value, dimension)
     return f"{units.shown(value.lower, dimension):.6g} to {units.text(value.upper, dimension)}"
 
 
 def _along(turns: Turns, rotation: Rotation) -> _Along | None:
-    """Return the angle of a workspace to which that of a pose adds; None for none."""
+    """Return the angle of a workspace to which the angle of a pose is added; None for different axes."""
     if rotation.axis is None or turns.kind is TurnKind.ANY_AXIS:
         return None
     axis: FloatArray = frozen_array(rotation.axis, (3,))
@@ -219,7 +217,7 @@ def _along(turns: Turns, rotation: Rotation) -> _Along | None:
 
 
 def _moved(value: Value, by: float) -> Value:
-    """Return a number moved by another one; a range holds every sum."""
+    """Return a fixed or free value shifted by an offset; a range is rounded outwards."""
     if not by:
         return value
     if not isinstance(value, Free):
@@ -228,7 +226,7 @@ def _moved(value: Value, by: float) -> Value:
 
 
 def _sum(one: float, other: float, outwards: float) -> float:
-    """Return a sum, rounded to one side where it is rounded at all."""
+    """Return a sum; a rounded one is moved towards ``outwards``, an infinity."""
     total = one + other
     # The error of a sum of two doubles is a double (Knuth).
     part = total - one

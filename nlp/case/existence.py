@@ -1,7 +1,7 @@
-"""Dimensions of a case with which its robot does not exist, as a sentence that names the place in the robot's file.
+"""Explanation of dimensions with which a robot cannot be assembled, with the place in the robot file.
 
-The equations of a robot are expressions of its dimensions. At dimensions such as a rod that is too short for the
-distance that it spans, they give no number, and nothing that follows says why. The file of the robot does.
+The equations of a robot are expressions of its dimensions. A rod that is too short for the distance between its joints
+gives an undefined value, such as the root of a negative number. Only the robot file shows which joint or point this is.
 """
 
 from __future__ import annotations
@@ -19,19 +19,17 @@ from .pose import Free, Value
 if TYPE_CHECKING:
     from ...models.joints.written.forms import UndefinedError
 
-#: Robots and dimensions that are remembered: as many as the cases that one program has at a time.
+#: Number of cached results: as many as the cases that one program has at a time.
 _REMEMBERED = 64
 
 
-def fault_of_dimensions(
-    model: Model, parameters: Mapping[str, Value | Sequence[Value] | FloatArray], units: Units
-) -> str:
-    """Return why a robot does not exist with some dimensions, as a clause; empty where no reason is known.
+def assembly_fault(model: Model, parameters: Mapping[str, Value | Sequence[Value] | FloatArray], units: Units) -> str:
+    """Return the reason why a robot cannot be assembled with some dimensions, as a clause; empty for no known reason.
 
     Args:
-        model: the robot; one that is given by its rows has no place without a value.
-        parameters: values of the components of each parameter; what depends on free ones is not examined.
-        units: for the message.
+        model: the robot; robots given by the rows of their Jacobian are not examined.
+        parameters: values of the components of each parameter; expressions of free parameters are not examined.
+        units: units of the message.
     """
     if not model.structure:
         return ""
@@ -43,7 +41,7 @@ def fault_of_dimensions(
 
 @lru_cache(maxsize=_REMEMBERED)
 def _undefined_place(model: Model, values: tuple[tuple[str, float], ...]) -> UndefinedError | None:
-    """Return the first place of a robot's file that has no finite value; None where there is none."""
+    """Return the first expression of a robot file without a finite value, as an error; None if all are finite."""
     from ...models.catalog import definition_of  # noqa: PLC0415 - most robots need no reading of their file
     from ...models.joints.home.chain import home_of  # noqa: PLC0415
     from ...models.joints.written.forms import UndefinedError  # noqa: PLC0415
@@ -60,7 +58,7 @@ def _undefined_place(model: Model, values: tuple[tuple[str, float], ...]) -> Und
 
 
 def _sentence(error: UndefinedError, model: Model, units: Units) -> str:
-    """Return the fault of a place, with the values of the names in it."""
+    """Return the message of an undefined expression, with the values of its names."""
     dimensions = {each.name: each.dimension for each in model.parameters}
     values = []
     for name, numbers in error.values.items():
@@ -70,4 +68,4 @@ def _sentence(error: UndefinedError, model: Model, units: Units) -> str:
             text = ", ".join(f"{number:.7g}" for number in numbers)
             values.append(f"{name} = {text if len(numbers) == 1 else f'({text})'}")
     here = f"; here {', '.join(values)}" if values else ""
-    return f"the robot {model.name!r} does not exist with these dimensions: {error.place} {error.fault}{here}"
+    return f"the robot {model.name!r} cannot be assembled with these dimensions: {error.place} {error.fault}{here}"

@@ -1,10 +1,9 @@
-"""Forces and speeds of actuators at a pose, as expressions: for every load case, and for the fastest motions.
+"""Forces and speeds of actuators at a pose, as expressions, for every load case and for the largest platform speeds.
 
-A load case has one force of an actuator, and a largest change of it by loads of any direction: ``a |v| + b |omega|``
-for a force of size a at a point, whose velocity is v in the platform's motion by a unit rate of this actuator alone,
-and a moment of size b. The largest rate of an actuator is ``linear |g_v| + angular |g_omega|`` for the two parts of its
-row of rates. It is exact where the platform has its rotations and translations independently, as with six freedoms or
-with translations alone; else a motion with both at their largest may be none that it can make.
+Loads of unknown direction change an actuator force by at most ``a |v| + b |omega|``: a and b are the magnitudes of
+force and moment, v and omega the velocities of the loaded point and of the platform at a unit rate of this actuator.
+The largest actuator speed is ``linear |g_v| + angular |g_omega|``, from the two parts of the actuator's row of rates.
+It is exact for six degrees of freedom and for pure translations; otherwise it is an upper bound.
 """
 
 from __future__ import annotations
@@ -17,23 +16,25 @@ from casadi import SX
 
 from ...models import Model
 from ...models.parts import Dimension
-from ...models.statics import DrivenJoint, Statics, driven_joints, freedoms_of
+from ...models.statics import DrivenJoint, Statics, degrees_of_freedom, driven_joints
 from .loads import LoadCase, Loading, Motion
 
-#: Keeps the norm of a vector smooth where it is 0: the norm is too large by at most this part of a typical norm.
+#: Smoothing of the norm of a vector at 0: the norm is too large by at most this part of a typical norm.
 _SMOOTH = 1e-12
 
 
 class CaseForces(NamedTuple):
-    """Forces of the actuators under one load case, as quotients.
+    """Forces of the actuators under one load case, as numerators and a common divisor.
 
     Attributes:
-        case: the loads.
-        wrench: (6, 1) their fixed part: force, then moment about the platform's origin, in the world frame.
-        centre: (a, 1) forces that hold it, times the divisor: positive in the sense of the actuator's rate, torques of
-            turning actuators.
-        spread: (a, 1) largest change of each by loads of any direction, times the size of the divisor.
-        divisor: (1, 1) that of the motions.
+        case: loads that act together.
+        wrench: (6, 1) wrench of the loads of fixed direction: force, then moment about the platform origin, in the
+            world frame.
+        centre: (a, 1) actuator forces that balance this wrench, times the divisor; torques for revolute actuators;
+            positive in the sense of the actuator's rate.
+        spread: (a, 1) largest change of each actuator force by loads of unknown direction, times the magnitude of the
+            divisor.
+        divisor: (1, 1) common divisor of the platform's motions by the actuators.
     """
 
     case: LoadCase
@@ -44,17 +45,17 @@ class CaseForces(NamedTuple):
 
     @property
     def largest(self) -> SX:
-        """Largest force (a, 1) of each actuator."""
+        """Largest signed force (a, 1) of each actuator."""
         return self.centre / self.divisor + self.spread / ca.fabs(self.divisor)
 
     @property
     def smallest(self) -> SX:
-        """Smallest force (a, 1) of each actuator, negative where it pulls."""
+        """Smallest signed force (a, 1) of each actuator; negative for a pulling force."""
         return self.centre / self.divisor - self.spread / ca.fabs(self.divisor)
 
     @property
     def squares(self) -> tuple[SX, ...]:
-        """Squares (a, 1) of the largest and of the smallest force of each actuator, in any order; one if equal."""
+        """Squares (a, 1) of largest and smallest force of each actuator, in any order; one if both are equal."""
         if self.spread.is_zero():
             return (self.centre**2 / self.divisor**2,)
         return tuple((self.centre + sign * self.spread) ** 2 / self.divisor**2 for sign in (1, -1))
@@ -64,11 +65,11 @@ class PosedForces(NamedTuple):
     """Forces and speeds of the actuators at a pose.
 
     Attributes:
-        joints: the actuators.
-        statics: motions of the platform by each of them.
-        cases: their forces under each load case.
-        speeds: (a, 1) their largest speeds; empty without a motion.
-        stiffness: (a, 1) force of each by its displacement; empty where it is not known.
+        joints: actuated joints.
+        statics: motions of the platform by each actuator.
+        cases: forces of the actuators under each load case.
+        speeds: (a, 1) largest speeds of the actuators; empty without a motion.
+        stiffness: (a, 1) stiffness of each actuator, force per displacement; empty if not known.
         size: (1, 1) characteristic size of the robot, length.
     """
 
@@ -81,18 +82,25 @@ class PosedForces(NamedTuple):
 
     @property
     def compliance(self) -> SX:
-        """Displacement (6, 6) of the platform, turn and translation of its origin, by moment and force of a load."""
+        """Compliance (6, 6): rotation and translation of the platform origin per moment and force of a load."""
         return self.statics.compliance(self.stiffness)
 
     def displacement(self, case: CaseForces) -> SX:
-        """Return the platform's displacement (6, 1), turn and translation of its origin, by the fixed part of loads."""
+        """Return the displacement (6, 1) by loads of fixed direction: rotation and translation of the platform origin.
+
+        Args:
+            case: forces of the actuators under a load case.
+        """
         return -self.statics.motions @ (case.centre / case.divisor / self.stiffness)
 
     def deflection(self, case: CaseForces) -> SX:
-        """Return an upper bound of the translation (1, 1) of the platform's origin; exact for loads without any part.
+        """Return an upper bound of the translation (1, 1) of the platform origin; exact for loads of fixed direction.
 
-        Changes of the actuators' forces by loads of any direction add up in it, although no one direction may be the
-        worst for all.
+        The bound adds up the largest force changes of all actuators, although a single load direction may not cause
+        them at the same time.
+
+        Args:
+            case: forces of the actuators under a load case.
         """
         found = _size(self.displacement(case)[3:], self.size)
         if not case.spread.is_zero():
@@ -107,9 +115,9 @@ def forces_at(model: Model, statics: Statics, rotation: SX, loading: Loading, si
 
     Args:
         model: the robot.
-        statics: motions of its platform at the pose.
-        rotation: (3, 3) platform to world coordinates.
-        loading: loads on its platform, and its motions.
+        statics: motions of the platform at the pose.
+        rotation: (3, 3) rotation from platform to world coordinates.
+        loading: loads on the platform, and its largest speeds.
         size: (1, 1) characteristic size of the robot, length.
     """
     joints = driven_joints(model)
@@ -139,13 +147,13 @@ def _case_forces(case: LoadCase, statics: Statics, rotation: SX, joints: Sequenc
 
 
 def _reaches(joints: Sequence[DrivenJoint], size: SX) -> list[SX]:
-    """Return the typical displacement of the platform by a unit of each actuator: 1 for slides, else the size."""
+    """Return the typical platform displacement per unit of each actuator: 1 if prismatic, robot size if revolute."""
     return [size if joint.dimension is Dimension.ANGLE else SX(1) for joint in joints]
 
 
 def _speeds(model: Model, statics: Statics, motion: Motion, joints: Sequence[DrivenJoint], size: SX) -> SX:
     """Return the largest speeds (a, 1) of the actuators."""
-    is_legs = freedoms_of(model) == 6 and not model.actuators
+    is_legs = degrees_of_freedom(model) == 6 and not model.actuators
     rates = statics.rows if is_legs else statics.rates(SX(motion.length(size)))
     return ca.vertcat(
         *[
@@ -161,17 +169,17 @@ def _size(vector: SX, typical: SX) -> SX:
 
 
 def dimension_of_measure(measure: str, joint: DrivenJoint) -> Dimension:
-    """Return the dimension of a number of an actuator: ``actuator_force``, ``actuator_speed`` or ``actuator_power``."""
+    """Return the dimension of an actuator's ``actuator_force``, ``actuator_speed`` or ``actuator_power``."""
     if measure == "actuator_power":
         return Dimension.POWER
     return dimension_of_force(joint) if measure == "actuator_force" else dimension_of_speed(joint)
 
 
 def dimension_of_force(joint: DrivenJoint) -> Dimension:
-    """Return the dimension of an actuator's force: a torque where it turns."""
+    """Return the dimension of an actuator's force: torque if revolute, force if prismatic."""
     return Dimension.TORQUE if joint.dimension is Dimension.ANGLE else Dimension.FORCE
 
 
 def dimension_of_speed(joint: DrivenJoint) -> Dimension:
-    """Return the dimension of an actuator's speed."""
+    """Return the dimension of an actuator's speed: angular if revolute, linear if prismatic."""
     return Dimension.TURN_SPEED if joint.dimension is Dimension.ANGLE else Dimension.SPEED

@@ -1,4 +1,4 @@
-"""Tables of loads, of the platform's motions and of gravity in a case file, and what they state."""
+"""Tables of loads, platform motions, gravity and the objective in a case file, and their conversion."""
 
 from __future__ import annotations
 
@@ -16,65 +16,86 @@ _NOT_OF_MASS = ("force", "moment", "point", "frame", "sign", "any")
 
 
 class AnyTable(Table):
-    """A load of any direction."""
+    """Force and moment of unknown direction, by their largest magnitudes."""
 
-    force: FiniteFloat = Field(default=Load.any_force, ge=0, description="size of a force in any direction")
-    moment: FiniteFloat = Field(default=Load.any_moment, ge=0, description="size of a moment about any axis")
+    force: FiniteFloat = Field(
+        default=Load.any_force, ge=0, description="magnitude of a force that may act in any direction"
+    )
+    moment: FiniteFloat = Field(
+        default=Load.any_moment, ge=0, description="magnitude of a moment that may act about any axis"
+    )
 
 
 class LoadTable(Table):
-    """A load: what the world does to the platform."""
+    """External load on the platform: force and moment at a point, or the weight of a mass."""
 
-    name: str | None = Field(default=None, min_length=1, description="a few words")
-    force: Vector = Field(default=[0.0, 0.0, 0.0], description="force on the platform")
-    moment: Vector = Field(default=[0.0, 0.0, 0.0], description="moment on it, about the point")
-    point: Vector = Field(default=[0.0, 0.0, 0.0], description="where it acts, in the platform's frame")
-    frame: Literal["world", "platform"] = Field(default="world", description="directions of force and moment")
-    sign: Literal["given", "both"] = Field(default="given", description="this load alone, or its opposite too")
-    any: AnyTable | None = Field(default=None, description="force and moment of any direction, on top")
-    mass: FiniteFloat | None = Field(default=None, gt=0, description="a mass whose weight acts, instead of a force")
-    centre: Vector = Field(default=[0.0, 0.0, 0.0], description="centre of the mass, in the platform's frame")
-    always: bool = Field(default=Load.always, description="whether it is added to each of the other loads")
+    name: str | None = Field(default=None, min_length=1, description="name of the load, such as cutting force")
+    force: Vector = Field(default=[0.0, 0.0, 0.0], description="external force on the platform")
+    moment: Vector = Field(default=[0.0, 0.0, 0.0], description="external moment on the platform, about the point")
+    point: Vector = Field(default=[0.0, 0.0, 0.0], description="point at which the force acts, in the platform frame")
+    frame: Literal["world", "platform"] = Field(
+        default="world", description="frame in which force and moment are given"
+    )
+    sign: Literal["given", "both"] = Field(
+        default="given", description="given: the load acts in the given sense only; both: the opposite load counts too"
+    )
+    any: AnyTable | None = Field(
+        default=None, description="additional force and moment of unknown direction, by their magnitudes"
+    )
+    mass: FiniteFloat | None = Field(
+        default=None, gt=0, description="mass whose weight is the load, instead of a force and a moment"
+    )
+    centre: Vector = Field(default=[0.0, 0.0, 0.0], description="centre of the mass, in the platform frame")
+    always: bool = Field(
+        default=Load.always, description="If true, the load acts together with each of the other loads"
+    )
 
     @model_validator(mode="after")
     def _refuse_two_forms(self) -> LoadTable:
-        """Return the table, or refuse a mass beside a force, and a centre without a mass."""
+        """Refuse a mass together with a force, and a centre without a mass."""
         given = [key for key in _NOT_OF_MASS if key in self.model_fields_set]
         if self.mass is not None and given:
-            raise fault_of(given[0], "cannot stand beside mass; write another [[load]]")
+            raise fault_of(given[0], "conflicts with mass; write another [[load]]")
         if self.mass is None and "centre" in self.model_fields_set:
-            raise fault_of("centre", "means nothing without mass; a force acts at point")
+            raise fault_of("centre", "has no effect without mass; for a force, use point")
         return self
 
 
 class MotionTable(Table):
-    """The platform's fastest motions, in any direction and about any axis."""
+    """Largest speeds of the platform, in any direction and about any axis."""
 
-    linear: FiniteFloat = Field(default=Motion.linear, ge=0, description="speed of its origin, length per second")
-    angular: FiniteFloat = Field(default=Motion.angular, ge=0, description="angular speed, angle per second")
+    linear: FiniteFloat = Field(
+        default=Motion.linear, ge=0, description="largest speed of the platform origin, length per second"
+    )
+    angular: FiniteFloat = Field(
+        default=Motion.angular, ge=0, description="largest angular speed of the platform, angle per second"
+    )
 
 
 class GravityTable(Table):
-    """Gravity, for loads that are masses."""
+    """Gravity, for loads given as masses."""
 
     acceleration: Vector = Field(
-        description=f"weight of a unit of mass; without this table {[*GRAVITY]}, in m, N and kg"
+        description=f"acceleration of gravity in the world frame, force per mass; "
+        f"without this table {[*GRAVITY]} in units of m, N and kg"
     )
 
 
 class ObjectiveTable(Table):
-    """What is optimised: a number of the actuators instead of F, or the worst F of all poses."""
+    """Objective: a quantity of the actuators instead of F, or the worst F over a workspace or path."""
 
     minimise: Literal["actuator_force", "actuator_speed", "actuator_power"] | None = Field(
-        default=None, description="its largest size over loads, actuators and poses is made as small as possible"
+        default=None,
+        description="quantity of the actuators whose largest magnitude over loads, actuators and poses is minimised",
     )
     over: Literal["workspace", "path"] | None = Field(
-        default=None, description="F is its worst over all poses there, where the limits must hold too"
+        default=None,
+        description="poses over which the worst F is optimised; limits.over must name the same ones",
     )
 
     @model_validator(mode="after")
     def _refuse_nothing(self) -> ObjectiveTable:
-        """Return the table, or refuse one that says nothing."""
+        """Refuse a table without minimise and over."""
         if self.minimise is None and self.over is None:
             raise fault_of("minimise", "is missing: give minimise, over, or both")
         return self
@@ -83,7 +104,7 @@ class ObjectiveTable(Table):
 def loading_of(
     loads: list[LoadTable], motion: MotionTable | None, gravity: GravityTable | None, units: Units
 ) -> Loading:
-    """Return the loads, the motions and the gravity that a case file states."""
+    """Return loads, motion and gravity of a case file."""
     return Loading(
         tuple(_load(table, f"load {index + 1}") for index, table in enumerate(loads)),
         None if motion is None else Motion(motion.linear, units.to_internal(motion.angular, Dimension.TURN_SPEED)),
@@ -92,7 +113,12 @@ def loading_of(
 
 
 def _load(table: LoadTable, name: str) -> Load:
-    """Return the load of a table, with a name for one that has none."""
+    """Return the load of a table.
+
+    Args:
+        table: the table.
+        name: name of the load if the table has none.
+    """
     further = table.any or AnyTable()
     return Load(
         name=table.name or name,

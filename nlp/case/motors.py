@@ -1,4 +1,4 @@
-"""Names of the numbers of actuators that loads and motions demand."""
+"""Quantities of actuators that loads and motions demand: coordinate, force, speed and power."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import enum
 from typing import NamedTuple
 
 
-class MotorNumber(enum.Enum):
-    """A number of an actuator; each value is the word in results."""
+class ActuatorQuantity(enum.Enum):
+    """Kinds of quantities of an actuator; each value is the word in results."""
 
     COORDINATE = "coordinate"
     FORCE = "force"
@@ -16,17 +16,17 @@ class MotorNumber(enum.Enum):
 
 
 class Motor(NamedTuple):
-    """A number of an actuator.
+    """Quantity of one actuator under one load case.
 
     Attributes:
-        number: the number.
+        number: kind of the quantity.
         place: index of the actuator.
-        actuator: its name.
-        load: name of the load case; empty for a number that depends on none.
-        is_backwards: whether a power is that of forces below 0.
+        actuator: name of the actuator.
+        load: name of the load case; empty for a quantity that does not depend on loads.
+        is_backwards: If true, a power is that of negative forces.
     """
 
-    number: MotorNumber = MotorNumber.FORCE
+    number: ActuatorQuantity = ActuatorQuantity.FORCE
     place: int = 0
     actuator: str = ""
     load: str = ""
@@ -34,5 +34,5 @@ class Motor(NamedTuple):
 
     @property
     def whose(self) -> tuple[int, str]:
-        """The actuator and the load, whose numbers are searched together."""
+        """Actuator and load case; quantities with the same pair are searched together."""
         return self.place, self.load

@@ -1,7 +1,7 @@
-"""Names of a case's own numbers: of the robot's parameters, and of position and rotation of each stated pose.
+"""Names of a case's quantities: parameters of the robot, and position and rotation of each stated pose.
 
-A robot may give its parameters any names. A parameter, or a component of one, that has the name of a number of a
-pose, such as ``p_x``, is written ``robot.p_x``.
+A robot may give its parameters any names. A parameter or component with the name of a pose coordinate, such as
+``p_x``, is written ``robot.p_x``.
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ from functools import lru_cache
 
 from ...models import component_names
 
-#: Stands before the name of a parameter that a pose uses too.
+#: Prefix of a parameter whose name is also that of a pose coordinate.
 _ROBOT = "robot."
 
 
 def pose_prefixes(count: int) -> tuple[str, ...]:
-    """Return the prefix of the names of each stated pose's numbers; an empty one for a single pose.
+    """Return the prefix of the coordinate names of each stated pose; empty for a single pose.
 
     Args:
         count: number of stated poses.
@@ -24,7 +24,7 @@ def pose_prefixes(count: int) -> tuple[str, ...]:
 
 
 @lru_cache
-def pose_numbers(count: int) -> frozenset[str]:
+def pose_names(count: int) -> frozenset[str]:
     """Return the names of position, axis and angle of every stated pose.
 
     Args:
@@ -35,10 +35,10 @@ def pose_numbers(count: int) -> frozenset[str]:
 
 
 def parameter_name(name: str, count: int) -> str:
-    """Return the name of a parameter, or of one of its components, in a case; different names stay different.
+    """Return the name of a parameter or component in a case; it differs from all coordinate names of poses.
 
     Args:
-        name: the name that the robot gives it.
+        name: name of the parameter or component in the robot.
         count: number of stated poses of the case.
     """
-    return f"{_ROBOT}{name}" if name in pose_numbers(count) or name.startswith(_ROBOT) else name
+    return f"{_ROBOT}{name}" if name in pose_names(count) or name.startswith(_ROBOT) else name

@@ -1,4 +1,4 @@
-"""Numbers of a case file replaced by name, as ``--set`` does."""
+"""Replacement of values in a case file by name, as the option ``--set`` does."""
 
 from __future__ import annotations
 
@@ -10,40 +10,40 @@ from ...models import component_names
 from ..errors import CaseError, nearest
 from .names import parameter_name, pose_prefixes
 
-#: Numbers of a case by name, in its file's units: three numbers for a point, axis or direction.
+#: New values by name, in the units of the case file: a number, or three for a point, axis or direction.
 Settings: TypeAlias = Mapping[str, float | list[float]]
-#: Table or list of a number, and the key or index within it.
+#: Table or list that contains a value, and the key or index of the value.
 _Place: TypeAlias = tuple[Any, int | str]
 
-#: Stands before the dotted key of a limit.
+#: Prefix of the dotted keys of limits.
 _LIMITS = "limits."
-#: Stands before the name of a number of a path's place.
+#: Prefix of the names of coordinates of the path's frame.
 _PLACE = "path.place."
-#: What a free number has.
+#: Keys of the table of a free variable.
 ENDS = ("min", "max", "start")
-#: Beginning of the name of a number of a task, such as ``task.pitch`` or ``task[1].point_x``.
+#: Names of values of a task, such as ``task.pitch`` or ``task[1].point_x``.
 _TASK = re.compile(r"task(\[\d+\])?\..+")
-#: Names of the six numbers of a task's twist.
+#: Names of the six components of a task's twist.
 _TWIST = tuple(f"twist_{k}" for k in range(6))
-#: Forms of a rotation that are one list of numbers.
+#: Forms of a rotation that are a single list of numbers.
 _FORMS = ("rpy", "quaternion")
-#: Tables within that of a joint in ``limits.joint``.
+#: Tables within the table of a joint in ``limits.joint``.
 _PARTS_OF_JOINTS = ("first", "second", "angle", "stroke")
 
 
 def override_number(tables: dict[str, Any], name: str, value: float | list[float]) -> None:
-    """Replace a number, or the three numbers of a point, axis or direction, in a document's tables.
+    """Replace a number, or the three numbers of a point, axis or direction, in a document.
 
     Args:
         tables: the document, as ``tomllib`` returns it; changed in place.
-        name: the name in the case; behind the name of a free number ``.min``, ``.max`` or ``.start`` may stand; or
-            the dotted key of a limit, such as ``limits.leg_length.max``, or of a number of a task, such as
-            ``task.pitch`` and ``task.point_x``, with its place among several as in ``task[1].pitch``; or of the place
-            of a path, such as ``path.place.x``.
-        value: a number, or three, in the file's units.
+        name: name of a quantity of the case; ``.min``, ``.max`` or ``.start`` may follow the name of a free variable.
+            Or the dotted key of a limit, such as ``limits.leg_length.max``; of a task, such as ``task.pitch`` or
+            ``task.point_x``, with an index for several tasks, as in ``task[1].pitch``; or of the path's frame, such as
+            ``path.place.x``.
+        value: new value, in the units of the file: a number, or three.
 
     Raises:
-        CaseError: the case has no number of this name.
+        CaseError: the case has no value with this name.
     """
     if name.startswith(_LIMITS):
         _override_limit(tables, name, value)
@@ -59,9 +59,9 @@ def override_number(tables: dict[str, Any], name: str, value: float | list[float
     if end in ENDS and whole in places:
         table, place = places[whole]
         if not isinstance(table[place], dict):
-            raise CaseError(name, f"cannot be set: {whole} is not free")
+            raise CaseError(name, f"cannot be set: {whole} is fixed; set {whole} itself")
         if "values" in table[place]:
-            raise CaseError(name, f"cannot be set: {whole} has one of a few values, and no ends")
+            raise CaseError(name, f"cannot be set: {whole} has catalogue values and no bounds; set {whole} itself")
         table[place][end] = value
         return
     if name not in places:
@@ -71,7 +71,7 @@ def override_number(tables: dict[str, Any], name: str, value: float | list[float
 
 
 def fields_of(name: str) -> tuple[str, ...]:
-    """Return the fields of a case in which a number is that has a name as for :func:`override_number`."""
+    """Return the fields of a case that change with a value, by its name as for :func:`override_number`."""
     if name.startswith(_LIMITS):
         return ("limits",)
     if name.startswith(_PLACE):
@@ -82,25 +82,25 @@ def fields_of(name: str) -> tuple[str, ...]:
 
 
 def _allowed(name: str, tables: Mapping[str, Any], places: Mapping[str, _Place], rotations: list[str]) -> str:
-    """Return the names that can be set, those of ends, limits and tasks by an example each, as a hint."""
+    """Return a hint with the names that can be set; bounds, limits and tasks are shown by one example each."""
     written = {each: table[place] for each, (table, place) in places.items()}
     free = [each for each, value in written.items() if isinstance(value, dict) and "values" not in value]
     ends = [f"{each}.{end}" for each in free for end in ENDS]
     tasks = sorted(task_numbers(tables), key=len)
     others = [
-        *(f"ends of free numbers such as {each}" for each in ends[1:2]),
+        *(f"bounds of variables such as {each}" for each in ends[1:2]),
         "limits such as limits.leg_length.max",
-        *(f"numbers of tasks such as {each}" for each in [name for name in tasks if name.endswith("pitch")][:1]),
+        *(f"values of tasks such as {each}" for each in [name for name in tasks if name.endswith("pitch")][:1]),
     ]
     hint = nearest(name, [*places, *rotations], [*ends, *tasks])
     return f"{hint}; also {', '.join(others)}"
 
 
 def task_numbers(tables: Mapping[str, Any]) -> dict[str, _Place]:
-    """Return the numbers of a document's tasks that can be set: table or list, and key or index within it, by name.
+    """Return the place of each value of a document's tasks that can be set, by name.
 
-    A vector has its own name and one for each component, such as ``task.point`` and ``task.point_x``. With several
-    tasks, those of the first one are called ``task[0].point``.
+    A vector has a name, and a name for each component: ``task.point`` and ``task.point_x``. With several tasks, names
+    have an index: ``task[0].point``.
     """
     tasks = tables.get("task", [])
     found: dict[str, _Place] = {}
@@ -117,7 +117,7 @@ def task_numbers(tables: Mapping[str, Any]) -> dict[str, _Place]:
 
 
 def _override_task(tables: dict[str, Any], name: str, value: float | list[float]) -> None:
-    """Replace a number of a task; arguments and errors are those of :func:`override_number`."""
+    """Replace a value of a task; arguments and errors are those of :func:`override_number`."""
     places = task_numbers(tables)
     if name not in places:
         raise CaseError(name, f"cannot be set; {nearest(name, places)}")
@@ -126,28 +126,28 @@ def _override_task(tables: dict[str, Any], name: str, value: float | list[float]
 
 
 def _override_place(tables: dict[str, Any], name: str, value: float | list[float]) -> None:
-    """Replace or add a number of a path's place; arguments and errors are those of :func:`override_number`."""
+    """Replace or add a coordinate of the path's frame; arguments and errors are those of :func:`override_number`."""
     key, _, end = name.removeprefix(_PLACE).partition(".")
     path = tables.get("path")
     if not isinstance(path, dict):
-        raise CaseError(name, "cannot be set: the case has no path")
+        raise CaseError(name, "cannot be set: the case has no table [path]")
     table = path.setdefault("place", {})
     if end:
         if not isinstance(table.get(key), dict):
-            raise CaseError(name, f"cannot be set: {_PLACE}{key} is not free")
+            raise CaseError(name, f"cannot be set: {_PLACE}{key} is fixed; set {_PLACE}{key} itself")
         table, key = table[key], end
     table[key] = value
 
 
 def _places(tables: dict[str, Any], name: str) -> tuple[dict[str, _Place], list[str]]:
-    """Return where the numbers of a document are; a rotation that is to be set, and lacks, is made first.
+    """Return the places of the values of a document; a missing rotation that is to be set is added first.
 
     Args:
         tables: the document.
-        name: name of the number to be set.
+        name: name of the value to be set.
 
     Returns:
-        The place of each number by its name, and the names of the rotation of each pose, which it may lack.
+        Place of each value by name, and names for the rotation of each pose, also where the rotation is missing.
     """
     parameters = tables.get("robot", {}).get("parameters", {})
     given = tables.setdefault("pose", {})
@@ -169,17 +169,17 @@ def _places(tables: dict[str, Any], name: str) -> tuple[dict[str, _Place], list[
 
 
 def _rotation_places(pose: dict[str, Any], prefix: str, name: str) -> dict[str, _Place]:
-    """Return the place of the number of a pose's rotation that is to be set, which is made where it lacks."""
+    """Return the place of the value of a pose's rotation that is to be set; a missing rotation is added."""
     for part in _FORMS:
         if name == f"{prefix}{part}":
-            # It takes the place of a rotation in any form.
+            # It replaces a rotation in any form.
             pose["rotation"] = {part: None}
             return {name: (pose["rotation"], part)}
     for part in ("angle", "axis"):
         if name in (f"{prefix}{part}", *(f"{prefix}{part}.{end}" for end in ENDS)):
             rotation = pose.setdefault("rotation", {"axis": [0, 0, 1], "angle": 0})
             if part == "axis":
-                # An axis takes the place of a rotation in another form; it then needs an angle of its own.
+                # An axis replaces a rotation in another form.
                 for other in rotation.keys() - {"axis", "angle"}:
                     del rotation[other]
             return {f"{prefix}{part}": (rotation, part)}
@@ -187,17 +187,17 @@ def _rotation_places(pose: dict[str, Any], prefix: str, name: str) -> dict[str, 
 
 
 def _override_limit(tables: dict[str, Any], name: str, value: float | list[float]) -> None:
-    """Replace or add a number of the limits; arguments and errors are those of :func:`override_number`."""
+    """Replace or add a value of a limit; arguments and errors are those of :func:`override_number`."""
     first, *others = name.removeprefix(_LIMITS).split(".")
     limits = tables.setdefault("limits", {})
     if first == "joint" and len(others) > 1 and all(others) and isinstance(limits, dict):
         _override_joint(limits, others, value)
         return
     if not first or len(others) > 1 or not all(others) or not isinstance(limits, dict):
-        raise CaseError(name, "cannot be set; write a limit and its number, such as limits.leg_length.max")
+        raise CaseError(name, "cannot be set; write a limit and its key, such as limits.leg_length.max")
     written = limits.get(first)
     if isinstance(written, dict):
-        # An angle's limit alone is its largest value: { max = 45, about = "home" } and 45 have one key in results.
+        # A joint angle may be a plain number or a table: 45 means the same as { max = 45 }.
         written[others[0] if others else "max"] = value
     elif others and not (others == ["max"] and written is not None):
         limits[first] = {others[0]: value}
@@ -206,12 +206,12 @@ def _override_limit(tables: dict[str, Any], name: str, value: float | list[float
 
 
 def _override_joint(limits: dict[str, Any], parts: list[str], value: float | list[float]) -> None:
-    """Replace or add a number of the limits on a joint, whose name may hold dots.
+    """Replace or add a value of the limits on a joint; the name of the joint may contain dots.
 
     Args:
-        limits: the table of the limits; changed in place.
-        parts: of the dotted key behind ``limits.joint``.
-        value: the number, or the axis of a cone.
+        limits: table of the limits; changed in place.
+        parts: parts of the dotted key after ``limits.joint``.
+        value: new value: a number, or the axis of a cone.
     """
     *joint, end = parts
     part = joint.pop() if len(joint) > 1 and joint[-1] in _PARTS_OF_JOINTS else None

@@ -1,4 +1,4 @@
-"""The programmed path of a case: the name of its file, and choices that the file leaves open."""
+"""Tool path of a case: name of its file, and conventions that the file does not state."""
 
 from __future__ import annotations
 
@@ -19,27 +19,28 @@ from .workspace import LARGEST_TURN, TURNS
 if TYPE_CHECKING:
     from .toml import TomlValue
 
-#: Conventions of three angles: the factors of a rotation from left to right, and ``rpy`` for ``zyx``.
+#: Conventions of three angles: axes of the rotation matrices from left to right, and ``rpy`` for ``zyx``.
 Convention: TypeAlias = Literal["rpy", "xyz", "xzy", "yxz", "yzx", "zxy", "zyx"]
-#: Names of the numbers of a place, with their dimensions: position, then rotation ``Rz(yaw) Ry(pitch) Rx(roll)``.
+#: Coordinates of the path's frame, with their dimensions: position, then rotation ``Rz(yaw) Ry(pitch) Rx(roll)``.
 PLACE = {**dict.fromkeys("xyz", Dimension.LENGTH), **dict.fromkeys(TURNS, Dimension.ANGLE)}
 
 
 @dataclass(frozen=True)
 class PathFile:
-    """The file of a programmed path, which is read where the path is asked for.
+    """Tool path of a case, as the name of its file; the file is read when a command needs the path.
 
     Attributes:
         file: name of the file: G-code, or a table of poses whose name ends in ``.csv``.
-        folder: folder beside which the file is: that of the case file; the current one if left out.
-        unit: ``"mm"`` or ``"in"``, of a program before G20 or G21; None for that of the case.
-        start: (6,) X, Y, Z, A, B, C at which the machine stands before a program, angles in degrees; None where this is
-            not known.
-        offsets: (6,) origins of a program's coordinate systems by their names, such as ``"G54"``.
-        angles: convention of a program's A, B and C.
-        between: ``"angles"`` or ``"slerp"``, the motion between two points; None for that of the file.
-        place: (6,) of the path's frame in the world, its position and then roll, pitch and yaw, radians; fixed or free.
-        has_limits: whether a solve must find a design that is regular and keeps the case's limits along the path.
+        folder: folder from which the name begins: that of the case file; empty for the current folder.
+        unit: ``"mm"`` or ``"in"``, unit of the G-code before G20 or G21; None for the case's length unit.
+        start: (6,) X, Y, Z, A, B, C before the first line of the G-code, angles in degrees; None if not known.
+        offsets: (6,) origin of each coordinate system of the G-code by its name, such as ``"G54"``.
+        angles: convention of the angles A, B and C in the G-code.
+        between: interpolation of rotations between two points, ``"angles"`` or ``"slerp"``; None for the file's
+            default.
+        place: (6,) pose of the path's frame in the world frame: position, then roll, pitch and yaw, radians; each fixed
+            or free.
+        has_limits: If true, a solve finds a design without singularities and violated limits along the whole path.
     """
 
     file: str
@@ -53,13 +54,13 @@ class PathFile:
     has_limits: bool = False
 
     def check(self, units: Units) -> None:
-        """Refuse a number of the place that is out of its range.
+        """Check the pose of the path's frame.
 
         Args:
-            units: units for people.
+            units: units of messages.
 
         Raises:
-            CaseError: it is refused.
+            CaseError: a coordinate is out of its range, or there are not six.
         """
         if len(self.place) != len(PLACE):
             raise CaseError("path.place", f"must have {len(PLACE)} numbers, got {len(self.place)}")
@@ -69,7 +70,7 @@ class PathFile:
 
     @property
     def free(self) -> tuple[str, ...]:
-        """Names of the free numbers of the place."""
+        """Names of the free coordinates of the path's frame."""
         return tuple(name for name, value in zip(PLACE, self.place, strict=True) if isinstance(value, Free))
 
     @property
@@ -78,7 +79,7 @@ class PathFile:
         return Path(self.folder) / self.file
 
     def to_keys(self, units: Units) -> dict[str, TomlValue | None]:
-        """Return the table of a case file that states this path; the file's name is as it was stated."""
+        """Return the keys of the table ``[path]`` that state this path, with the file name unchanged."""
         place = {
             name: None if value == 0 else written_value(value, units, dimension)
             for (name, dimension), value in zip(PLACE.items(), self.place, strict=True)

@@ -1,8 +1,8 @@
-"""Poses of a case: fixed and free numbers, rotations, displacements. Angles are radians.
+"""Poses of a case: fixed and free values, rotations, displacements. Angles are radians.
 
-Conventions: a rotation matrix turns platform coordinates into world coordinates; its columns are the platform's axes. A
-quaternion is ``(w, x, y, z)``, the scalar part first. Roll, pitch and yaw turn about the world's fixed axes x, then y,
-then z: ``R = Rz(yaw) Ry(pitch) Rx(roll)``.
+Conventions: a rotation matrix transforms platform coordinates into world coordinates; its columns are the platform
+axes. A quaternion is ``(w, x, y, z)``, the scalar part first. Roll, pitch and yaw rotate about the fixed world axes x,
+then y, then z: ``R = Rz(yaw) Ry(pitch) Rx(roll)``.
 """
 
 from __future__ import annotations
@@ -27,26 +27,26 @@ if TYPE_CHECKING:
 
     from .toml import TomlValue
 
-#: Largest distance of a matrix from an orthogonal one, in a component of ``R' R``, and of a quaternion's size from 1:
-#: more than numbers with seven decimals leave, and far less than a slip of the pen.
+#: Largest error of a component of ``R' R``, and of the norm of a quaternion: above the rounding of values with seven
+#: decimals, and far below a typing error.
 ROUNDING = 1e-6
-#: Largest angle of a rotation about a free axis. Its variables are a quaternion's vector part, which is a smooth
-#: function of the rotation below half a turn only.
+#: Largest angle of a rotation about a free axis. Its variables are the vector part of a quaternion, which is a smooth
+#: function of the rotation only below half a turn.
 MAX_FREE_ROTATION = math.radians(179)
-#: Largest number of a case, and the inverse of the smallest twist: squares and fourth powers stay finite.
+#: Largest magnitude of a number in a case, and inverse of the smallest twist: squares and fourth powers stay finite.
 LARGEST = 1e30
 
 
 @dataclass(frozen=True)
 class Free:
-    """A number that the solver chooses between two bounds.
+    """Free variable: the solver chooses its value between two bounds.
 
     Attributes:
-        lower: smallest value, finite.
-        upper: largest value, finite and above ``lower``.
+        lower: lower bound, finite.
+        upper: upper bound, finite and above ``lower``.
         start: value at the first starting point; None for the middle.
-        values: the only values that the number may have, ascending from ``lower`` to ``upper``, such as those of a
-            catalogue; none for every value between the bounds. For dimensions of a robot.
+        values: catalogue values, ascending from ``lower`` to ``upper``, of which the solver chooses one; empty for a
+            continuous variable. Only dimensions of a robot can have them.
     """
 
     lower: float
@@ -56,7 +56,10 @@ class Free:
 
     @classmethod
     def among(cls, values: Iterable[float]) -> Free:
-        """Return a number that has one of a few values, such as those of a catalogue; at least two.
+        """Return a variable with catalogue values.
+
+        Args:
+            values: allowed values, at least two.
 
         Raises:
             ValueError: there is no value.
@@ -74,7 +77,7 @@ Value: TypeAlias = float | Free
 
 
 class StatedRange(Protocol):
-    """A range of a number as a table of a case file states it, in the file's units; it may have a ``start``."""
+    """Table of a range in a case file, in the file's units; it may have a ``start``."""
 
     min: float
     max: float
@@ -82,18 +85,18 @@ class StatedRange(Protocol):
 
 @runtime_checkable
 class StatedValues(Protocol):
-    """The values of a number as a table of a case file states them, in the file's units."""
+    """Table of catalogue values in a case file, in the file's units."""
 
     values: list[float]
 
 
 def internal_value(written: float | StatedRange | StatedValues, units: Units, dimension: Dimension) -> Value:
-    """Return a fixed or free number of a case file, radians for an angle."""
+    """Return a fixed or free value of a case file in internal units: radians for an angle."""
     if isinstance(written, float | int):
         return units.to_internal(written, dimension)
     if isinstance(written, StatedValues):
         return Free.among(units.to_internal(value, dimension) for value in written.values)
-    start = getattr(written, "start", None)  # which a range of poses does not have
+    start = getattr(written, "start", None)  # a range of a workspace has no start
     return Free(
         units.to_internal(written.min, dimension),
         units.to_internal(written.max, dimension),
@@ -102,7 +105,7 @@ def internal_value(written: float | StatedRange | StatedValues, units: Units, di
 
 
 def written_value(value: Value, units: Units, dimension: Dimension) -> TomlValue:
-    """Return a fixed or free number in the case's unit, the inverse of :func:`internal_value`."""
+    """Return a fixed or free value as TOML in the case's unit, the inverse of :func:`internal_value`."""
     if not isinstance(value, Free):
         return units.written(value, dimension)
     if value.values:
@@ -112,17 +115,17 @@ def written_value(value: Value, units: Units, dimension: Dimension) -> TomlValue
 
 
 def ends_of(value: Value) -> tuple[float, float]:
-    """Return the bounds of a number: the same twice for a fixed one."""
+    """Return the bounds of a value; both are equal for a fixed value."""
     return (value.lower, value.upper) if isinstance(value, Free) else (float(value), float(value))
 
 
 def sizes_of_turn(angle: Value) -> tuple[float, float]:
-    """Return the smallest and the largest size, radians, of a rotation about a free axis.
+    """Return the smallest and the largest magnitude, radians, of a rotation about a free axis.
 
-    The sign of the angle has no meaning about a free axis.
+    The sign of an angle about a free axis has no meaning.
 
     Args:
-        angle: the angle, radians.
+        angle: fixed or free angle, radians.
     """
     lower, upper = ends_of(angle)
     sizes = sorted((abs(lower), abs(upper)))
@@ -130,7 +133,7 @@ def sizes_of_turn(angle: Value) -> tuple[float, float]:
 
 
 class RotationForm(enum.Enum):
-    """Form in which a case states a rotation, and in which its poses are shown; a matrix counts as axis and angle."""
+    """Forms of a rotation in a case and in the output; a matrix is shown as axis and angle."""
 
     AXIS_ANGLE = "axis and angle"
     RPY = "rpy"
@@ -142,10 +145,10 @@ class Rotation:
     """Orientation of the platform, ``exp(angle [axis]x)`` in the world frame (equation 9).
 
     Attributes:
-        axis: (3,) axis that is held fixed, any length but zero; None leaves the axis free.
-        angle: radians. About a free axis the sign of an angle has no meaning: ``Free(-0.5, 0.5)`` allows every rotation
-            by at most 0.5 about any axis. The start of such an angle is about z.
-        form: in which the rotation was stated, and is shown.
+        axis: (3,) fixed axis of rotation, of any length but zero; None for a free axis.
+        angle: angle of rotation, radians, fixed or free. About a free axis its sign has no meaning: ``Free(-0.5, 0.5)``
+            allows every rotation by at most 0.5 about any axis. Its start is a rotation about z.
+        form: form in which the rotation was stated, and in which it is shown.
     """
 
     axis: ArrayLike | None = (0.0, 0.0, 1.0)
@@ -154,16 +157,21 @@ class Rotation:
 
     @classmethod
     def from_rpy(cls, roll: float, pitch: float, yaw: float) -> Rotation:
-        """Return the fixed rotation ``Rz(yaw) Ry(pitch) Rx(roll)``, radians.
+        """Return the fixed rotation ``Rz(yaw) Ry(pitch) Rx(roll)``.
+
+        Args:
+            roll: angle about the world x axis, radians.
+            pitch: angle about the world y axis, radians.
+            yaw: angle about the world z axis, radians.
 
         Raises:
-            CaseError: a number is not finite.
+            CaseError: an angle is not finite.
         """
         return cls(*rotation_from_rpy((roll, pitch, yaw), "rotation.rpy"), RotationForm.RPY)
 
     @classmethod
     def from_matrix(cls, matrix: ArrayLike) -> Rotation:
-        """Return the fixed rotation of a matrix (3, 3) that turns platform coordinates into world coordinates.
+        """Return the fixed rotation of a matrix (3, 3) from platform to world coordinates.
 
         Raises:
             CaseError: the matrix is not orthogonal, or a reflection.
@@ -175,28 +183,28 @@ class Rotation:
         """Return the fixed rotation of a unit quaternion (4,) ``(w, x, y, z)``.
 
         Raises:
-            CaseError: the quaternion is not unit.
+            CaseError: the quaternion is not of unit length.
         """
         return cls(*rotation_from_quaternion(quaternion, "rotation.quaternion"), RotationForm.QUATERNION)
 
 
 #: No displacement.
-HERE = Displacement.by(np.eye(3), np.zeros(3))
+NO_DISPLACEMENT = Displacement.by(np.eye(3), np.zeros(3))
 
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """A stated pose of the platform, and the displacements that make poses of the robot from it.
+    """Stated pose of the platform, with its displacements.
 
     Attributes:
-        position: origin of the platform frame in the world frame, length.
+        position: (3,) origin of the platform frame in the world frame, length; each coordinate fixed or free.
         rotation: orientation of the platform.
-        displacements: displacements of this pose, one for each pose that the robot takes.
+        displacements: displacements of this pose; each gives one pose of the robot.
     """
 
     position: Sequence[Value]
     rotation: Rotation = field(default_factory=Rotation)
-    displacements: tuple[Displacement, ...] = (HERE,)
+    displacements: tuple[Displacement, ...] = (NO_DISPLACEMENT,)
 
 
 class OverPoses(enum.Enum):
@@ -211,37 +219,41 @@ def along_screw(twist: ArrayLike, amounts: Sequence[float]) -> tuple[Displacemen
     """Return displacements along the finite screw motion ``exp(t [chi])`` of a twist.
 
     Args:
-        twist: (6,) ``chi``, of any size but zero: only its axis and pitch count.
-        amounts: radians about the axis, or a length for a pure translation, for each displacement.
+        twist: (6,) twist ``chi`` of any magnitude but zero; only its axis and pitch matter.
+        amounts: amount of each displacement: radians about the axis, or a length for a pure translation.
     """
     screw = axis_from_screw(twist)
     return tuple(screw_displacement(screw, amount) for amount in amounts)
 
 
 def over_grid(offsets: Sequence[Sequence[float]]) -> tuple[Displacement, ...]:
-    """Return displacements without rotation to every combination of offsets along x, y and z."""
+    """Return the translations by all combinations of offsets along x, y and z.
+
+    Args:
+        offsets: offsets along each of the three axes, length.
+    """
     return tuple(Displacement.by(np.eye(3), offset) for offset in itertools.product(*offsets))
 
 
 def rotation_from_matrix(matrix: ArrayLike, key: str) -> AxisAngle:
-    """Return axis and angle of a rotation matrix; what rounding left is removed.
+    """Return axis and angle of the rotation that is nearest to a matrix with rounding errors.
 
     Args:
-        matrix: (3, 3).
-        key: its dotted key, for messages.
+        matrix: (3, 3) matrix, orthogonal up to rounding.
+        key: dotted key of the matrix, for messages.
 
     Raises:
-        CaseError: it is not three rows of three finite numbers, not orthogonal, or a reflection.
+        CaseError: the matrix is not three rows of three finite numbers, not orthogonal, or a reflection.
     """
     rows = _numbers(matrix, (3, 3), key, "three rows of three finite numbers")
     with np.errstate(over="ignore", invalid="ignore"):
         error = float(np.max(np.abs(rows.T @ rows - np.eye(3))))
     if not error <= ROUNDING:
-        fault = "must be orthogonal: its columns must be unit vectors at right angles"
-        raise CaseError(key, f"{fault}, and R' R differs from the unit matrix by {error:.3g}")
+        fault = "must be orthogonal, with perpendicular unit vectors as columns"
+        raise CaseError(key, f"{fault}; R' R differs from the identity by {error:.3g}")
     if np.linalg.det(rows) < 0:
-        raise CaseError(key, "must be a rotation: its determinant is -1, as of a reflection")
-    # The nearest orthogonal matrix.
+        raise CaseError(key, "must be a rotation with determinant 1, got a reflection with determinant -1")
+    # Nearest orthogonal matrix.
     left, _, right = np.linalg.svd(rows)
     return axis_angle_from_matrix(left @ right)
 
@@ -250,16 +262,16 @@ def rotation_from_quaternion(quaternion: ArrayLike, key: str) -> AxisAngle:
     """Return axis and angle, in [0, pi], of a unit quaternion.
 
     Args:
-        quaternion: (4,) ``(w, x, y, z)``; its negative is the same rotation.
-        key: its dotted key, for messages.
+        quaternion: (4,) quaternion ``(w, x, y, z)``; its negative is the same rotation.
+        key: dotted key of the quaternion, for messages.
 
     Raises:
-        CaseError: it is not four finite numbers, or not unit.
+        CaseError: the quaternion is not four finite numbers, or not of unit length.
     """
     parts = _numbers(quaternion, (4,), key, "four finite numbers: w, x, y, z")
     size = math.hypot(*parts.tolist())
     if not abs(size - 1) <= ROUNDING:
-        raise CaseError(key, f"must be a unit quaternion (w, x, y, z): its size is {size:.7g}", parts.tolist())
+        raise CaseError(key, f"must be a unit quaternion (w, x, y, z), got one of norm {size:.7g}", parts.tolist())
     sign = -1.0 if parts[0] < 0 else 1.0
     sine = math.hypot(*parts[1:].tolist())
     if sine == 0:
@@ -268,18 +280,18 @@ def rotation_from_quaternion(quaternion: ArrayLike, key: str) -> AxisAngle:
 
 
 def rotation_from_rpy(rpy: ArrayLike, key: str) -> AxisAngle:
-    """Return axis and angle of roll, pitch and yaw: about the world's x, then y, then z.
+    """Return axis and angle of the rotation by roll, pitch and yaw, about the world x, then y, then z axis.
 
     Args:
-        rpy: (3,) radians.
-        key: its dotted key, for messages.
+        rpy: (3,) angles, radians.
+        key: dotted key of the angles, for messages.
 
     Raises:
-        CaseError: it is not three finite numbers.
+        CaseError: the angles are not three finite numbers.
     """
     half = _numbers(rpy, (3,), key, "three finite numbers: roll, pitch, yaw") / 2
     (sr, sp, sy), (cr, cp, cy) = np.sin(half).tolist(), np.cos(half).tolist()
-    # The product of three quaternions.
+    # Product of three quaternions.
     return rotation_from_quaternion(
         (
             cr * cp * cy + sr * sp * sy,
@@ -292,7 +304,7 @@ def rotation_from_rpy(rpy: ArrayLike, key: str) -> AxisAngle:
 
 
 def rotations_from_rpy(rpy: FloatArray) -> FloatArray:
-    """Return the rotations (N, 3, 3) ``Rz(yaw) Ry(pitch) Rx(roll)`` of rows (N, 3) of roll, pitch and yaw, radians."""
+    """Return the rotations (N, 3, 3) ``Rz(yaw) Ry(pitch) Rx(roll)`` of N rows of roll, pitch and yaw, radians."""
     (sr, sp, sy), (cr, cp, cy) = np.sin(rpy).T, np.cos(rpy).T
     rows = [
         [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
@@ -303,10 +315,10 @@ def rotations_from_rpy(rpy: FloatArray) -> FloatArray:
 
 
 def _numbers(values: ArrayLike, shape: tuple[int, ...], key: str, words: str) -> FloatArray:
-    """Return finite numbers as an array.
+    """Return finite numbers as an array of a given shape.
 
     Raises:
-        CaseError: they are not finite, or of another shape.
+        CaseError: a number is not finite, or the shape is another one.
     """
     try:
         numbers: FloatArray = np.array(values, dtype=np.float64)

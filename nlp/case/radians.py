@@ -1,4 +1,4 @@
-"""Angles of a case that is made in Python: degrees in the place of radians, which their size tells."""
+"""Check for angles in degrees where a case made in Python expects radians: an angle of more than a whole turn."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from .limits.limits import Limits
 from .pose import Free, Rotation
 from .workspace import TURNS, Workspace
 
-#: Size from which on an angle is one in degrees: every angle of a case has a smaller one of the same direction.
+#: Largest angle, radians. A larger value was given in degrees: no rotation needs more than a whole turn.
 _TURN = 2 * math.pi
-#: Rounding of a whole turn.
+#: Relative rounding error of a whole turn.
 _ROUNDING = 1e-9
-#: Largest size of an angle of a case: a whole turn, with the rounding of one.
+#: Largest magnitude of an angle in a case: a whole turn, with its rounding error.
 WHOLE_TURN = _TURN * (1 + _ROUNDING)
 
 
@@ -27,7 +27,7 @@ def angles_of(
     limits: Limits,
     workspace: Workspace | None,
 ) -> Iterator[tuple[str, float]]:
-    """Yield the angles of a case with their dotted keys, radians; values that are no numbers are left out."""
+    """Yield the dotted key and the value, radians, of each angle of a case; values that are not numbers are skipped."""
     for item in model.parameters:
         if item.dimension is Dimension.ANGLE and item.name in parameters:
             yield from _ends(f"robot.parameters.{item.name}", parameters[item.name])
@@ -36,7 +36,7 @@ def angles_of(
     for limit in limits:
         try:
             angles = limit.angles(model) if limit.exists_for(model) else {}
-        except CaseError:  # a limit that contradicts itself has a fault of its own
+        except CaseError:  # the check of limits reports a contradiction
             continue
         for key, angle in angles.items():
             yield from _ends(f"limits.{key}", angle)
@@ -50,16 +50,16 @@ def check_radians(angles: Iterable[tuple[str, float]], units: Units) -> None:
     """Refuse an angle of more than a whole turn.
 
     Raises:
-        CaseError: there is one.
+        CaseError: an angle is too large.
     """
     for key, angle in angles:
         if abs(angle) > WHOLE_TURN:
-            fault = f"must be at most {units.text(_TURN, Dimension.ANGLE)} in size"
+            fault = f"must be at most {units.text(_TURN, Dimension.ANGLE)} in magnitude"
             raise CaseError(key, fault, units.shown(angle, Dimension.ANGLE))
 
 
 def with_radians(error: CaseError, angles: Iterable[tuple[str, float]]) -> CaseError:
-    """Return an error about one of some angles with it in radians and degrees; another error unchanged."""
+    """Return an error about an angle with its value in radians and degrees added; any other error unchanged."""
     angle = next((angle for key, angle in angles if key == error.key), None)
     if angle is None or error.value is None:
         return error
@@ -68,7 +68,7 @@ def with_radians(error: CaseError, angles: Iterable[tuple[str, float]]) -> CaseE
 
 
 def _ends(key: str, value: object) -> Iterator[tuple[str, float]]:
-    """Yield the numbers of a value, which may be free or a sequence, with their dotted keys."""
+    """Yield the dotted key and the value of each number of a fixed value, a free value or a sequence."""
     if isinstance(value, Free):
         for name, end in (("min", value.lower), ("max", value.upper), ("start", value.start)):
             yield from _ends(f"{key}.{name}", end)

@@ -1,4 +1,4 @@
-"""Reader of case files: TOML becomes a :class:`~screwsynth.nlp.case.case.Case`, and degrees become radians."""
+"""Reader of case files: from TOML to a :class:`~screwsynth.nlp.case.case.Case`, with angles in radians."""
 
 from __future__ import annotations
 
@@ -41,18 +41,18 @@ from .table import Range, case_error
 from .task import Method, Sense, Task, unit_twist
 from .toml import toml_document
 
-#: Tables of robot files, one of which each has.
+#: Tables of robot files; each robot file has at least one of these.
 _OF_ROBOT_FILES = frozenset(("limb", "links", "joint"))
 
 
 class CaseFile(NamedTuple):
-    """A case as it was read from a file.
+    """Case with its text and its input files.
 
     Attributes:
         case: the case.
-        text: TOML that states this case by itself: the text of the file, unless settings change it or other files
-            belong to it.
-        inputs: the files that it is read from, and the words for each in messages: its own, and those that it names.
+        text: TOML that states this case without other files: the text of the case file, unless settings change it or
+            it refers to other files.
+        inputs: input files, each with its description for messages: the case file, and the files to which it refers.
     """
 
     case: Case
@@ -65,23 +65,23 @@ def load_case(name: str, settings: Settings | None = None) -> Case:
 
     Args:
         name: path of a TOML file, the bare name of a shipped case, or ``-`` for standard input.
-        settings: numbers by name that replace those of the file, in the file's units: a parameter or one of its
-            components (``base_1_x``), ``p_x``, ``p_y``, ``p_z``, ``angle``, or ``axis`` with three numbers. A
-            parameter with the name of a number of the pose is called ``robot.p_x`` and the like. ``p_z.max`` is an end
-            of a free number, ``limits.leg_length.max`` a number of a limit, which may be a new one.
+        settings: new values by name, in the units of the file: a parameter or component (``base_1_x``), ``p_x``,
+            ``p_y``, ``p_z``, ``angle``, or ``axis`` with three numbers; a bound of a variable (``p_z.max``); a value of
+            a limit, which may be new (``limits.leg_length.max``). A parameter with the name of a pose coordinate is
+            called ``robot.p_x``.
 
     Raises:
-        InputError: the file cannot be read, or holds a fault.
+        InputError: the file cannot be read, or has an error.
     """
     return read_case(name, settings).case
 
 
 def read_case(name: str, settings: Settings | None = None) -> CaseFile:
-    """Read a case from its file, with a text that states it; arguments and errors are those of :func:`load_case`."""
+    """Read a case with its text and its input files; arguments and errors are those of :func:`load_case`."""
     path = find_case(name)
     text = read_text(path)
     tables = tables_of(path, text)
-    # The names of files leave the tables when a case is made of these.
+    # The reader replaces file names in the tables by the content of the files.
     inputs, named = inputs_of(path, tables), named_files(tables, path.parent)
     source = Path(source_name(path))
     case = case_from_tables(tables, name=source.stem, source=source.name, settings=settings or {}, folder=path.parent)
@@ -93,8 +93,8 @@ class PoseRows(NamedTuple):
 
     Attributes:
         positions: (N, 3) origins of the platform frame in the world frame, length.
-        rotations: (N, 3, 3) platform to world coordinates.
-        rows: (N,) number of each row in the file, as a spreadsheet counts.
+        rotations: (N, 3, 3) rotation matrices from platform to world coordinates.
+        rows: (N,) row number of each pose in the file, from 1.
     """
 
     positions: FloatArray
@@ -103,15 +103,15 @@ class PoseRows(NamedTuple):
 
 
 def read_poses(file: str, units: Units, option: str = "poses") -> PoseRows:
-    """Return the poses of a CSV file that stands apart from a case; its columns are those of a case's ``poses``.
+    """Return the poses of a CSV file given by an option; the columns are those of the key ``poses`` of a case.
 
     Args:
         file: name of the file.
-        units: of its numbers.
-        option: that names it, for messages.
+        units: units of the values in the file.
+        option: option with the name of the file, for messages.
 
     Raises:
-        InputError: the file cannot be read, or holds a fault.
+        InputError: the file cannot be read, or has an error.
     """
     tables, origins, rows = pose_tables(file, option)
     positions, rotations = np.zeros((len(tables), 3)), np.zeros((len(tables), 3, 3))
@@ -122,7 +122,7 @@ def read_poses(file: str, units: Units, option: str = "poses") -> PoseRows:
             rotation = _rotation(written.rotation, units, f"pose[{k}]")
             axis, angle = rotation.axis, rotation.angle
             if axis is None:
-                raise CaseError(f"pose[{k}].rotation.axis", "is missing: the axis of a given pose is fixed")
+                raise CaseError(f"pose[{k}].rotation.axis", "is missing: give the axis of rotation with its angle")
             rotations[k] = _matrix(unit_vector(check_direction(axis, f"pose[{k}].rotation.axis")), ends_of(angle)[0])
     except CaseError as error:
         raise (error if error.source else origins.error_in(error, file)) from None
@@ -130,7 +130,7 @@ def read_poses(file: str, units: Units, option: str = "poses") -> PoseRows:
 
 
 def _pose_table(table: dict[str, Any], index: int) -> PoseTable:
-    """Return a pose as a table of the schema; errors are those of :func:`_parse`."""
+    """Return a checked table of a pose; errors are those of :func:`_parse`."""
     try:
         return PoseTable.model_validate(table)
     except ValidationError as error:
@@ -139,7 +139,7 @@ def _pose_table(table: dict[str, Any], index: int) -> PoseTable:
 
 
 def _matrix(axis: FloatArray, angle: float) -> FloatArray:
-    """Return the rotation (3, 3) about a unit axis (3,), radians."""
+    """Return the rotation matrix (3, 3) of an angle, radians, about a unit axis (3,)."""
     x, y, z = axis.tolist()
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.asarray(np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross)
@@ -154,18 +154,18 @@ def case_from_tables(
         tables: the document, as ``tomllib`` returns it; settings and CSV files change it in place.
         name: name of the case in results.
         source: name of the document in messages.
-        settings: as for :func:`load_case`.
-        folder: folder beside which the files are that the document names; the current one if left out.
+        settings: new values by name, see :func:`load_case`.
+        folder: folder from which file names in the document begin; the current folder if left out.
 
     Raises:
-        CaseError: the document, or a CSV file that it names, holds a fault.
-        InputError: a CSV file is no table at all.
+        CaseError: the document, or a CSV file to which it refers, has an error.
+        InputError: a CSV file is not a table.
     """
     origins = TableOrigins()
     try:
         if "robot" not in tables and not _OF_ROBOT_FILES.isdisjoint(tables):
-            fault = f'is a robot file, and not a case; [robot] file = "{source}" in a case reads it, and screwsynth new'
-            raise CaseError("the file", f"{fault} writes such a case")
+            fault = f'is a robot file, not a case; write [robot] file = "{source}" in a case'
+            raise CaseError("the file", f"{fault}, or let screwsynth new {source} write one")
         check_version(CASE_FILES, tables)
         origins = insert_rows(tables, folder or Path())
         robot_file = insert_robot_file(tables, folder or Path())
@@ -180,15 +180,15 @@ def case_from_tables(
 
 
 def case_with_settings(tables: dict[str, Any], settings: Settings, like: Case) -> Case:
-    """Return the case of a document with numbers replaced, and with the robot of the case that the document states.
+    """Return the case of a document with values replaced, and with the robot of a case already read from the document.
 
     Args:
         tables: the document, as ``tomllib`` returns it; changed in place.
-        settings: as for :func:`load_case`.
-        like: the case that the document states.
+        settings: new values by name, see :func:`load_case`.
+        like: case read from the document without settings.
 
     Raises:
-        CaseError: the case has no number of a name, or does not allow a value.
+        CaseError: the case has no value with a name, or a value is not allowed.
     """
     for key, value in settings.items():
         override_number(tables, key, value)
@@ -196,13 +196,13 @@ def case_with_settings(tables: dict[str, Any], settings: Settings, like: Case) -
 
 
 def _parse(tables: dict[str, Any]) -> Document:
-    """Return a document as tables of the schema.
+    """Return the checked tables of a document.
 
     Args:
         tables: the document, as ``tomllib`` returns it.
 
     Raises:
-        CaseError: the first fault, with its dotted key.
+        CaseError: the document has an error; the first one is reported, with its dotted key.
     """
     try:
         return Document.model_validate(tables)
@@ -219,17 +219,18 @@ def _case_of(
         written: the document.
         name: name of the case in results.
         source: name of the document in messages.
-        folder: of the document; an empty name for the current one.
-        robot_file: name of the file from which the robot's definition is; None where the document has it.
-        model: the robot; None for that of the document.
+        folder: folder of the document; empty for the current folder.
+        robot_file: name of the file with the robot's definition; None if the document contains the definition.
+        model: the robot; None for the robot of the document.
 
     Raises:
-        CaseError: the document holds a fault.
+        CaseError: the document has an error.
     """
     units = Units(written.units.length, written.units.angle, written.units.force)
     model = model_of_table(written.robot, robot_file) if model is None else model
     if not model.has_couples and "characteristic_length" in written.robot.model_fields_set:
-        raise CaseError("robot.characteristic_length", f"means nothing for {model.name!r}, which has no couple rows")
+        fault = f"has no effect on {model.name!r}, which has no constraint couples; remove the key"
+        raise CaseError("robot.characteristic_length", fault)
     dimensions = {parameter.name: parameter.dimension for parameter in model.parameters}
     poses = written.pose if isinstance(written.pose, list) else [written.pose]
     tasks = [_task(task, index) for index, task in enumerate(written.task)]
@@ -281,29 +282,29 @@ def _pose_keys(written: Document) -> list[str]:
 
 
 def _combination(written: Document, poses: int) -> tuple[Method, OverPoses]:
-    """Return how a case combines its tasks, and F over its poses.
+    """Return the combination of tasks, and the combination of F over poses.
 
     Args:
         written: the document.
-        poses: number of poses that the robot takes.
+        poses: number of poses of the robot.
 
     Raises:
-        CaseError: a key has no meaning for a case with one task, or with one pose.
+        CaseError: a key has no effect on a case with one task, or with one pose.
     """
     combine = written.combine
     if combine is None:
         return Case.method, Case.over_poses
     if len(written.task) == 1 and (combine.method is not None or combine.over_poses is None):
         key = "combine" if combine.over_poses is None else "combine.method"
-        raise CaseError(key, "means nothing for one task; take it out, or give another [[task]]")
+        raise CaseError(key, "has no effect with one task; remove it, or add another [[task]]")
     if poses == 1 and combine.over_poses is not None:
-        raise CaseError("combine.over_poses", "means nothing for one pose; take it out, or give another [[pose]]")
+        raise CaseError("combine.over_poses", "has no effect with one pose; remove it, or add another [[pose]]")
     method = Case.method if combine.method is None else Method(combine.method)
     return method, Case.over_poses if combine.over_poses is None else OverPoses(combine.over_poses)
 
 
 def _expectation(written: ExpectTable) -> Expectation:
-    """Return the values that a regression expects."""
+    """Return the expected results of a document."""
     values = tuple(ExpectedValue(row.quantity, row.value, row.within) for row in written.value)
     return Expectation(written.F, written.tolerance, written.singular, values)
 
@@ -315,12 +316,12 @@ def _parameter_value(
 
     Args:
         key: name of the parameter.
-        given: the value in the file's units.
-        units: the file's units.
-        dimension: dimension of the parameter.
+        given: value in the units of the file.
+        units: units of the file.
+        dimension: physical dimension of the parameter.
 
     Raises:
-        CaseError: a single number stands in brackets.
+        CaseError: the value is a list of a single number.
     """
     if not isinstance(given, list):
         return internal_value(given, units, dimension)
@@ -330,15 +331,15 @@ def _parameter_value(
 
 
 def _rotation(written: RotationTable | None, units: Units, pose: str) -> Rotation:
-    """Return the rotation of a stated pose: none where the file states none.
+    """Return the rotation of a stated pose; the identity without a table.
 
     Args:
-        written: its table.
-        units: the file's units.
+        written: table of the rotation; None if the file has none.
+        units: units of the file.
         pose: dotted key of the pose, for messages.
 
     Raises:
-        CaseError: a matrix is not orthogonal, or a quaternion not unit.
+        CaseError: the matrix is not orthogonal, or the quaternion is not of unit length.
     """
     if written is None:
         return Rotation()
@@ -351,19 +352,19 @@ def _rotation(written: RotationTable | None, units: Units, pose: str) -> Rotatio
     if written.quaternion is not None:
         return Rotation(*rotation_from_quaternion(written.quaternion, f"{key}.quaternion"), RotationForm.QUATERNION)
     if written.angle is None:
-        raise CaseError(f"{key}.angle", "is missing")
+        raise CaseError(f"{key}.angle", "is missing: give a number or { min, max }")
     return Rotation(written.axis, internal_value(written.angle, units, Dimension.ANGLE))
 
 
 def _task(written: TaskTable, index: int) -> Task:
-    """Return a task.
+    """Return a task of a document.
 
     Args:
-        written: its table.
-        index: its place among the tasks.
+        written: table of the task.
+        index: index of the task.
 
     Raises:
-        CaseError: the motion is stated in two ways, or a part of its screw is missing or not allowed.
+        CaseError: the motion is stated both by a screw and by a twist, or axis, point or pitch is missing or invalid.
     """
     key, name = f"task[{index}]", written.name or f"task {index + 1}"
     if written.twist is None:
@@ -372,11 +373,11 @@ def _task(written: TaskTable, index: int) -> Task:
         return Task(twist, Sense(written.sense), name, written.weight, point)
     for part in ("axis", "point", "pitch"):
         if getattr(written, part) is not None:
-            raise CaseError(f"{key}.{part}", "cannot stand beside twist; say the motion in one way")
+            raise CaseError(f"{key}.{part}", "conflicts with twist; state the motion in one way")
     return Task(written.twist, Sense(written.sense), name, written.weight)
 
 
 def _published(row: PublishedTable) -> Published:
-    """Return a published number."""
+    """Return a published value of a document."""
     value = tuple(row.value) if isinstance(row.value, list) else (row.value,)
     return Published(row.quantity, value, row.source, row.reproduced, row.because, row.decimals, row.over)

@@ -1,7 +1,7 @@
-"""Robot files, which a case names by ``[robot] file = "my-robot.toml"``, beside its own file: their schema and reader.
+"""Robot files: their schema and reader. A case refers to a robot file by ``[robot] file = "my-robot.toml"``.
 
-The classes check keys and types, of tables and keys as :func:`screwsynth.models.robot` takes them. Everything else is
-checked where the robot is built.
+The classes check keys and types; the tables are the arguments of :func:`screwsynth.models.robot`, which checks
+everything else.
 """
 
 from __future__ import annotations
@@ -35,116 +35,142 @@ VectorExpression = Annotated[
 
 
 class DimensionTable(Table):
-    """A dimension that a case fixes or frees."""
+    """Dimension of the robot: a parameter that a case fixes or leaves free."""
 
-    typical: FiniteFloat = Field(description="a sensible value; degrees for an angle")
-    kind: Literal["length", "angle", "number"] = Field(default="length", description="kind of number")
-    description: str = Field(default="", description="a few words")
+    typical: FiniteFloat = Field(description="typical value of the dimension; degrees for an angle")
+    kind: Literal["length", "angle", "number"] = Field(
+        default="length", description="physical dimension: length, angle or plain number"
+    )
+    description: str = Field(default="", description="description of the dimension in a few words")
 
 
 class RepeatTable(Table):
-    """Copies of a limb by rotation about an axis."""
+    """Copies of a limb, rotated about an axis."""
 
     count: Annotated[int, Field(ge=1, le=MOST_LIMBS)] | None = Field(
-        default=None, description="number of copies, evenly spread"
+        default=None, description="number of limbs, evenly spaced around the axis"
     )
     angles: Annotated[list[FiniteFloat], Field(min_length=1, max_length=MOST_LIMBS)] | None = Field(
-        default=None, description="angle of each copy, degrees"
+        default=None, description="angle of rotation of each limb about the axis, degrees, instead of count"
     )
-    axis: Vector = Field(default=[0.0, 0.0, 1.0], description="direction of the axis")
-    through: Vector = Field(default=[0.0, 0.0, 0.0], description="point of the axis")
+    axis: Vector = Field(default=[0.0, 0.0, 1.0], description="direction of the axis of rotation")
+    through: Vector = Field(default=[0.0, 0.0, 0.0], description="point on the axis of rotation")
 
 
 class JointTable(Table):
-    """A joint of a limb, at home."""
+    """Joint of a limb, in the home configuration."""
 
-    type: Literal["R", "P", "H", "C", "U", "S", "Pa"] = Field(description="its kind")
-    name: Name | None = Field(default=None, description="its name, by which limits mean this joint of every limb")
-    at: VectorExpression = Field(description="its centre, or a point of its axis")
-    axis: VectorExpression | None = Field(default=None, description="direction of its axis")
-    axes: Annotated[list[VectorExpression], Field(min_length=2, max_length=2)] | None = Field(
-        default=None, description="axes of a U, the base side first"
+    type: Literal["R", "P", "H", "C", "U", "S", "Pa"] = Field(
+        description="joint type: R revolute, P prismatic, H helical, C cylindrical, U universal, S spherical, "
+        "Pa parallelogram"
     )
-    pitch: Expression | None = Field(default=None, description="way per radian of an H")
-    to: VectorExpression | None = Field(default=None, description="far end of a parallelogram's rod")
-    actuated: bool | None = Field(default=None, description="whether an actuator drives it")
+    name: Name | None = Field(
+        default=None, description="name of the joint; a limit with this name is on this joint of every copy of the limb"
+    )
+    at: VectorExpression = Field(description="centre of the joint, or a point on its axis")
+    axis: VectorExpression | None = Field(default=None, description="direction of the joint axis")
+    axes: Annotated[list[VectorExpression], Field(min_length=2, max_length=2)] | None = Field(
+        default=None, description="two axes of a universal joint, the one on the base side first"
+    )
+    pitch: Expression | None = Field(default=None, description="translation per radian of a helical joint")
+    to: VectorExpression | None = Field(default=None, description="far end of a rod of a parallelogram joint")
+    actuated: bool | None = Field(default=None, description="If true, an actuator drives the joint")
 
 
 class BranchTable(Table):
-    """One of several paths of a limb behind the joints that they share."""
+    """Branch of a limb: one of several parallel chains that follow the common joints."""
 
-    joints: Annotated[list[JointTable], Field(min_length=1)] = Field(description="joints, towards the platform")
+    joints: Annotated[list[JointTable], Field(min_length=1)] = Field(
+        description="joints of the branch, from the common joints to the platform"
+    )
 
 
 class LimbTable(Table):
-    """A limb, with its copies."""
+    """Limb of the robot, with its copies."""
 
-    name: Name | None = Field(default=None, description="its name; copies are numbered")
-    repeat: RepeatTable | None = Field(default=None, description="copies of the limb")
-    points: dict[str, VectorExpression] = Field(default_factory=dict, description="points by name, at home")
+    name: Name | None = Field(default=None, description="name of the limb; its copies are numbered")
+    repeat: RepeatTable | None = Field(default=None, description="copies of the limb, rotated about an axis")
+    points: dict[str, VectorExpression] = Field(
+        default_factory=dict, description="points by name, in the home configuration"
+    )
     joints: list[JointTable] = Field(default_factory=empty_list, description="joints from the base to the platform")
-    branch: list[BranchTable] = Field(default_factory=empty_list, description="paths behind these joints")
-    centre: VectorExpression | None = Field(default=None, description="place where its wrenches are measured")
+    branch: list[BranchTable] = Field(
+        default_factory=empty_list, description="parallel chains that follow these joints and end at the platform"
+    )
+    centre: VectorExpression | None = Field(
+        default=None, description="reference point for the moments of the limb's wrenches"
+    )
 
 
 class LinkJointTable(Table):
-    """A joint between two links, at home."""
+    """Joint between two links, in the home configuration."""
 
-    name: Name = Field(description="its name, unique among the joints")
-    type: Literal["R", "P", "H", "C", "U", "S", "Pa", "weld"] = Field(description="its kind")
+    name: Name = Field(description="name of the joint, unique among all joints")
+    type: Literal["R", "P", "H", "C", "U", "S", "Pa", "weld"] = Field(
+        description="joint type: R revolute, P prismatic, H helical, C cylindrical, U universal, S spherical, "
+        "Pa parallelogram, weld rigid connection"
+    )
     between: Annotated[list[Name], Field(min_length=2, max_length=2)] = Field(
-        description="names of its links, the base's side first"
+        description="names of the two links, the one on the base side first"
     )
-    at: VectorExpression | None = Field(default=None, description="its centre, or a point of its axis")
-    axis: VectorExpression | None = Field(default=None, description="direction of its axis")
+    at: VectorExpression | None = Field(default=None, description="centre of the joint, or a point on its axis")
+    axis: VectorExpression | None = Field(default=None, description="direction of the joint axis")
     axes: Annotated[list[VectorExpression], Field(min_length=2, max_length=2)] | None = Field(
-        default=None, description="axes of a U, the base side first"
+        default=None, description="two axes of a universal joint, the one on the base side first"
     )
-    pitch: Expression | None = Field(default=None, description="way per radian of an H")
-    to: VectorExpression | None = Field(default=None, description="far end of a parallelogram's rod")
-    actuated: bool | None = Field(default=None, description="whether an actuator drives it")
+    pitch: Expression | None = Field(default=None, description="translation per radian of a helical joint")
+    to: VectorExpression | None = Field(default=None, description="far end of a rod of a parallelogram joint")
+    actuated: bool | None = Field(default=None, description="If true, an actuator drives the joint")
 
 
 class CouplingTable(Table):
-    """A linear relation of joints' coordinates."""
+    """Linear relation of joint coordinates, such as that of gears."""
 
     factors: dict[str, Expression] = Field(
-        description="factor of each joint; their sum with coordinates stays as it is"
+        description="factor of each joint coordinate by joint name; the sum of factors times coordinates is constant"
     )
 
 
 class HeadTable(Table):
-    """The part of every robot file: version, name, home and dimensions."""
+    """Common keys of all robot files: version, name, home and dimensions."""
 
-    schema_: Literal[1] = Field(default=1, alias=VERSION_KEY, description="version of the keys of this file")
-    name: Name = Field(description="its name")
-    description: str = Field(default="", description="one sentence")
-    length_unit: str = Field(default="", description="unit of the typical lengths, such as m; empty for proportions")
-    home: VectorExpression = Field(default="0*x", description="origin of the platform at home")
+    schema_: Literal[1] = Field(default=1, alias=VERSION_KEY, description="version of the file format")
+    name: Name = Field(description="name of the robot")
+    description: str = Field(default="", description="description of the robot in one sentence")
+    length_unit: str = Field(
+        default="", description="unit of the typical lengths, such as m; empty if only proportions matter"
+    )
+    home: VectorExpression = Field(default="0*x", description="origin of the platform frame in the home configuration")
     dimensions: dict[str, DimensionTable] = Field(default_factory=dict, description="dimensions by name")
-    derived: dict[str, Expression] = Field(default_factory=dict, description="further numbers by name")
+    derived: dict[str, Expression] = Field(
+        default_factory=dict, description="derived quantities by name, as expressions of the dimensions"
+    )
 
 
 class RobotFile(HeadTable):
-    """A robot given limb by limb, at home."""
+    """Robot given by its limbs, in the home configuration."""
 
-    limb: Annotated[list[LimbTable], Field(min_length=1)] = Field(description="limbs")
+    limb: Annotated[list[LimbTable], Field(min_length=1)] = Field(description="limbs from the base to the platform")
 
 
 class LinkFile(HeadTable):
-    """A robot given by links and joints, at home: for shapes that limbs with branches do not have."""
+    """Robot given by links and joints, in the home configuration: for structures other than limbs with branches."""
 
     links: Annotated[list[Name], Field(min_length=2)] = Field(description="names of all links")
-    base: Name = Field(default="base", description="the link that is the base")
-    platform: Name = Field(default="platform", description="the link that is the platform")
-    points: dict[str, VectorExpression] = Field(default_factory=dict, description="points by name, at home")
-    joint: Annotated[list[LinkJointTable], Field(min_length=1)] = Field(description="joints")
-    coupling: list[CouplingTable] = Field(default_factory=empty_list, description="relations of joints' coordinates")
+    base: Name = Field(default="base", description="name of the base link")
+    platform: Name = Field(default="platform", description="name of the platform link")
+    points: dict[str, VectorExpression] = Field(
+        default_factory=dict, description="points by name, in the home configuration"
+    )
+    joint: Annotated[list[LinkJointTable], Field(min_length=1)] = Field(description="joints between the links")
+    coupling: list[CouplingTable] = Field(
+        default_factory=empty_list, description="linear relations of joint coordinates"
+    )
 
 
 #: Keys longer than this are cut in messages.
 _LONGEST_KEY = 60
-#: Words for one entry of a list.
+#: Singular of the keys of lists, for messages about one entry.
 _ONE = {
     "limb": "limb",
     "joint": "joint",
@@ -155,7 +181,7 @@ _ONE = {
     "angles": "angle",
     "axes": "axis",
 }
-#: Values that a key must have, for messages where it is missing.
+#: Allowed values of keys, for messages about a missing key.
 _NEEDED = {
     "type": "one of R, P, H, C, U, S and Pa",
     "at": "a point, as an expression in quotes or a list of 3",
@@ -171,20 +197,20 @@ _NEEDED = {
 
 
 def check_form(tables: dict[str, Any]) -> None:
-    """Refuse a robot file whose keys or types are not those of the schema.
+    """Check keys and types of a robot file.
 
     Args:
         tables: the document, as ``tomllib`` returns it.
 
     Raises:
-        CaseError: the first fault, with limb and joint in words.
+        CaseError: a key or a type is not allowed; the first one is reported, with limb and joint in words.
     """
     if "robot" in tables and "task" in tables:
-        raise CaseError("the file", "is a case, and not a robot file; screwsynth solve takes it")
+        raise CaseError("the file", "is a case, not a robot file; screwsynth solve takes it")
     check_version(ROBOT_FILES, tables)
     given = [key for key in GRAPH_KEYS if key in tables]
     if given and "limb" in tables:
-        raise CaseError(given[0], "cannot stand beside limb: give the robot by limbs, or by links and joints")
+        raise CaseError(given[0], "conflicts with limb: give the robot by limbs, or by links and joints")
     try:
         (LinkFile if given else RobotFile).model_validate(tables)
     except ValidationError as error:
@@ -192,7 +218,7 @@ def check_form(tables: dict[str, Any]) -> None:
 
 
 def _error(fault: ErrorDetails, tables: dict[str, Any]) -> CaseError:
-    """Return a fault of tables as an error whose key is a place in words, such as ``limb 2, joint 1, axis``."""
+    """Return an error of pydantic as an error with its place in words, such as ``limb 2, joint 1, axis``."""
     written = case_error(fault)
     location = [*fault["loc"], *([fault["ctx"]["key"]] if "key" in fault.get("ctx", {}) else [])]
     if location[0] == "joint" and len(location) > 1 and isinstance(location[1], int):
@@ -209,16 +235,16 @@ def _error(fault: ErrorDetails, tables: dict[str, Any]) -> CaseError:
     if fault["type"] == "unknown_key" and location[-1] == "branch" and "branch" in location[:-1]:
         return CaseError(_place(location), NESTED_BRANCH)
     needed = _NEEDED.get(str(location[-1])) if fault["type"] == "missing" else None
-    # The word "points" is a key of its own, and not a slip for "joint".
+    # "points" is a key too, and not a slip for "joint".
     if needed and (written.fault == "is missing" or location == ["joint"]):
         return CaseError(_place(location), f"is missing; it must be {needed}", written.value)
     return CaseError(_place(location), written.fault, written.value)
 
 
 def _place(location: Sequence[int | str]) -> str:
-    """Return a path into the document in words; parts that stand for branches of a union are left out.
+    """Return a location in the document in words, without branches of unions.
 
-    An entry of a list of tables, or of axes, is counted by the word for one of them; others are entries of a vector.
+    Entries of lists of tables and of axes are numbered by name, as in ``joint 2``; other entries are ``entry 2``.
     """
     parts: list[str] = []
     for part in location:
@@ -231,41 +257,41 @@ def _place(location: Sequence[int | str]) -> str:
     return ", ".join(parts) or "the file"
 
 
-#: Largest robot file, bytes: a hundred times the largest that a person writes.
+#: Largest robot file, bytes: a hundred times the largest one that a person writes.
 _LARGEST_FILE = 2**20
 
 
 def insert_robot(tables: dict[str, Any], folder: Path) -> str:
-    """Put the robot file that a case names in the place of its name, and return this name.
+    """Replace the name of a robot file in a case by the content of the file, and return the name.
 
     Args:
         tables: the case, as ``tomllib`` returns it; ``file`` of its table ``robot`` becomes ``definition``.
-        folder: folder of the case, beside which the file is.
+        folder: folder of the case file, from which the name begins.
 
     Raises:
-        CaseError: the file cannot be read, holds a fault, or stands beside a robot that is given in another way.
+        CaseError: the file cannot be read or has an error, or the case also gives the robot in another way.
     """
     table = tables["robot"]
     name = table["file"]
     if not isinstance(name, str) or not name:
-        raise CaseError("robot.file", "must be the name of a robot file")
+        raise CaseError("robot.file", "must be the name of a robot file in quotes")
     for other in ("model", "definition"):
         if other in table:
-            raise CaseError(f"robot.{other}", "cannot stand beside file: give the robot in one way")
+            raise CaseError(f"robot.{other}", "conflicts with file: give the robot in one way")
     definition = read_definition(name, folder)
     tables["robot"] = {"definition": definition, **{key: value for key, value in table.items() if key != "file"}}
     return name
 
 
 def read_definition(name: str, folder: Path) -> dict[str, Any]:
-    """Return the tables of a robot file, with their form checked.
+    """Return the tables of a robot file, with keys and types checked.
 
     Args:
         name: path of the file.
         folder: folder from which a relative path begins.
 
     Raises:
-        CaseError: the file cannot be read, or holds a fault.
+        CaseError: the file cannot be read, or has an error.
     """
     path = folder / name
     try:
@@ -295,7 +321,7 @@ def model_of_definition(definition: Mapping[str, Any], source: str | None = None
         source: name of the file, for messages; None for a definition within a case.
 
     Raises:
-        CaseError: the definition holds a fault.
+        CaseError: the definition has an error.
     """
     prefix = "" if source else "robot.definition: "
     try:

@@ -1,4 +1,7 @@
-"""Robots by name, with checks of their options. Every fault of another package's robot becomes a sentence."""
+"""Robots by name, with checks of their options.
+
+Any error in a robot of another package becomes a message that names its function.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,7 @@ def build_model(name: str, options: Mapping[str, Any] | None = None) -> Model:
 
     Args:
         name: name of the robot.
-        options: its options by name, as ``tomllib`` returns them; checked against the signature of its function.
+        options: options of the robot by name, as ``tomllib`` returns them; checked against its function's signature.
 
     Raises:
         CaseError: there is no such robot or option, or an option has a value that is not allowed.
@@ -44,27 +47,27 @@ def build_model(name: str, options: Mapping[str, Any] | None = None) -> Model:
             raise CaseError(f"robot.{key}", fault, value) from None
     for key, option in declared.items():
         if option.default is option.empty and key not in options:
-            raise CaseError(f"robot.{key}", f"is missing: {name!r} needs it")
+            raise CaseError(f"robot.{key}", f"is missing: the robot {name!r} needs this option")
     try:
         model = function(**options)
     except (Exception, SystemExit) as error:  # another package's function may raise any exception
         raise _error(name, function, f"{type(error).__name__}: {error}") from error
     if not isinstance(model, Model):
-        raise _error(name, function, f"it returned a {type(model).__name__}, not a Model")
+        raise _error(name, function, f"expected a Model as result, got {type(model).__name__}")
     if model.name != name:
-        raise _error(name, function, f"its model calls itself {model.name!r}")
+        raise _error(name, function, f"expected a model with this name, got {model.name!r}")
     return model
 
 
 def model_of_table(table: RobotTable, robot_file: str | None = None) -> Model:
-    """Return the robot of a case's table ``robot``, by its name or by its definition.
+    """Return the robot of the table ``[robot]``, by its name or by its definition.
 
     Args:
         table: the table.
-        robot_file: name of the file from which the definition is; None where the case has it.
+        robot_file: name of the file of the definition; None if the case file contains the definition.
 
     Raises:
-        CaseError: there is no such robot or option, or the definition holds a fault.
+        CaseError: there is no such robot or option, or the definition has an error.
     """
     if table.definition is None:
         return build_model(table.model or "", table.options)
@@ -76,17 +79,17 @@ def model_of_table(table: RobotTable, robot_file: str | None = None) -> Model:
 
 
 def insert_robot_file(tables: dict[str, Any], folder: Path) -> str | None:
-    """Put the robot file that a case names in the place of its name.
+    """Replace the name of a robot file in a case by the content of the file.
 
     Args:
         tables: the case, as ``tomllib`` returns it; ``file`` of its table ``robot`` becomes ``definition``.
-        folder: folder of the case, beside which the file is.
+        folder: folder of the case file, from which the name begins.
 
     Returns:
-        The file's name; None where the case names none.
+        Name of the robot file; None if the case has none.
 
     Raises:
-        CaseError: the file cannot be read, holds a fault, or stands beside a robot that is given in another way.
+        CaseError: the file cannot be read or has an error, or the case also gives the robot in another way.
     """
     table = tables.get("robot")
     if not isinstance(table, dict) or "file" not in table:
@@ -97,19 +100,19 @@ def insert_robot_file(tables: dict[str, Any], folder: Path) -> str | None:
 
 
 def _error(name: str, function: RobotFunction, fault: str) -> CaseError:
-    """Return the error of a robot function that cannot be used."""
+    """Return the error for a robot function that cannot be used."""
     origin = f"{getattr(function, '__module__', '?')}:{getattr(function, '__qualname__', '?')}"
     return CaseError("robot.model", f"cannot be used: {origin}: {fault}", name)
 
 
 class ModelOption(NamedTuple):
-    """An option of a robot.
+    """Option of a robot.
 
     Attributes:
-        name: the option's name.
-        allowed: allowed values, in words.
-        default: the default as TOML writes it; None where the option must be given.
-        choices: the allowed values where they can be listed.
+        name: name of the option.
+        allowed: description of the allowed values.
+        default: default value as TOML; None if the option must be given.
+        choices: allowed values, if they can be listed; else empty.
     """
 
     name: str
@@ -136,7 +139,7 @@ def model_options(name: str) -> list[ModelOption]:
 
 
 def _signature(name: str, function: RobotFunction) -> tuple[Mapping[str, inspect.Parameter], dict[str, Any]]:
-    """Return the options of a robot function, and their types.
+    """Return the parameters of a robot function, and their types.
 
     Raises:
         CaseError: the function cannot be used.
@@ -148,16 +151,16 @@ def _signature(name: str, function: RobotFunction) -> tuple[Mapping[str, inspect
         raise _error(name, function, f"{type(error).__name__}: {error}") from error
     for key, option in declared.items():
         if option.kind not in (option.KEYWORD_ONLY, option.POSITIONAL_OR_KEYWORD):
-            raise _error(name, function, f"its option {key!r} cannot be given by name")
+            raise _error(name, function, f"its parameter {key!r} must be a keyword parameter")
     return declared, hints
 
 
 def _hint(name: str) -> str:
-    """Return what may be meant by the name of a robot that does not exist."""
+    """Return a hint for the name of a robot that does not exist."""
     if name.endswith(".toml"):
-        return f'a robot file is named by file = "{name}", in the place of model'
+        return f'for a robot file, write file = "{name}" instead of model'
     if name in shipped_cases():
-        return "this is a case"
+        return f"{name!r} is a case; screwsynth solve takes it"
     return nearest(name, model_names())
 
 
@@ -165,7 +168,7 @@ def _find_function(name: str) -> RobotFunction:
     """Return the function of a robot.
 
     Raises:
-        CaseError: there is no such robot, or its entry point is no function.
+        CaseError: there is no such robot, or its entry point is not a function.
     """
     try:
         function = robot_function(name)
@@ -176,5 +179,6 @@ def _find_function(name: str) -> RobotFunction:
     except (Exception, SystemExit) as error:  # importing another package may raise anything
         raise CaseError("robot.model", f"cannot be used: {type(error).__name__}: {error}", name) from error
     if not callable(function) or isinstance(function, Model):
-        raise CaseError("robot.model", f"cannot be used: its entry point is a {type(function).__name__}", name)
+        fault = f"cannot be used: its entry point must be a function, got {type(function).__name__}"
+        raise CaseError("robot.model", fault, name)
     return function

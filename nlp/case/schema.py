@@ -1,11 +1,8 @@
-"""Schema of case files: tables and keys.
+"""Schema of case files: tables, keys and types.
 
-The classes mirror the file, in the user's units and words. They check keys, types and finite numbers, for which no
-robot need be known. Everything else is checked once, by :class:`screwsynth.nlp.case.case.Case`. A key that may be left
-out has the default of the value that it becomes.
-
-The tables of limits, of the workspace and of loads take as long to make as all others together. They are imported when
-a file states them.
+The classes mirror the file, in the user's units and words. They check keys, types and finite numbers, which is possible
+without the robot. :class:`screwsynth.nlp.case.case.Case` checks everything else. The tables of limits, workspace and
+loads are imported only for files that contain them, because pydantic needs as long for them as for all others.
 """
 
 from __future__ import annotations
@@ -40,27 +37,27 @@ else:
     PathTable = Annotated[Any, Later("workspacetables", "PathTable")]
     WorkspaceTable = Annotated[Any, Later("workspacetables", "WorkspaceTable")]
 
-#: Forms of a fixed rotation, each of which stands alone.
+#: Forms of a fixed rotation; each excludes all other keys of the table.
 _FIXED = ("rpy", "matrix", "quaternion")
 
 Label = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=20)]
 
 
 class Listed(Table):
-    """A dimension that has one of a few values, such as those of a catalogue."""
+    """Dimension with catalogue values, of which a solve chooses one."""
 
     values: Annotated[list[FiniteFloat], Field(min_length=1)] = Field(
-        description="the values, two or more, of which one is chosen"
+        description="allowed values of the dimension, two or more"
     )
 
 
 def _tag_of_value(value: object) -> str:
-    """Return the branch of a union for a number, a range, values or a list of them."""
+    """Return the branch of a union for a number, a range, catalogue values, or a list of these."""
     return "<list>" if isinstance(value, list | tuple) else _tag_of_dimension(value)
 
 
 def _tag_of_dimension(value: object) -> str:
-    """Return the branch of a union for a number, a range or values."""
+    """Return the branch of a union for a number, a range or catalogue values."""
     is_listed = isinstance(value, Listed) or (isinstance(value, dict) and "values" in value)
     return "<values>" if is_listed else tag_of_number(value)
 
@@ -89,54 +86,60 @@ NumberOrTable = Annotated[
 
 
 class UnitsTable(Table):
-    """Units of every number in the file."""
+    """Units of all values in the file."""
 
-    length: Label = Field(default=Units.length, description="label of the length unit")
-    angle: Literal["deg", "rad"] = Field(default=Units.angle, description="unit of angles")
-    force: Label = Field(default=Units.force, description="label of the unit of force; a torque is force times length")
+    length: Label = Field(default=Units.length, description="name of the length unit, such as mm")
+    angle: Literal["deg", "rad"] = Field(default=Units.angle, description="unit of angles: degrees or radians")
+    force: Label = Field(
+        default=Units.force, description="name of the force unit, such as N; torques are in force times length"
+    )
 
 
 class RobotTable(Table):
-    """The robot: its model, the model's own options, and its dimensions."""
+    """Robot of the case: its name or file, its options, and its dimensions."""
 
     model_config = ConfigDict(
         extra="allow",
         json_schema_extra={"oneOf": [{"required": [each]} for each in ("model", "file", "definition")]},
     )
 
-    model: str | None = Field(default=None, description="name of the robot; `screwsynth models` lists them")
-    file: FileName | None = Field(default=None, description="robot file beside this one, instead of a name")
-    definition: dict[str, Any] | None = Field(default=None, description="content of a robot file, instead of a name")
+    model: str | None = Field(default=None, description="name of a robot; `screwsynth models` lists all")
+    file: FileName | None = Field(
+        default=None, description="name of a robot file in the folder of the case file, instead of model"
+    )
+    definition: dict[str, Any] | None = Field(default=None, description="content of a robot file, instead of model")
     parameters: dict[str, VectorOrValue] = Field(
         default_factory=dict,
-        description="a number, { min, max } or { values } for each parameter; three for a point",
+        description="value of each parameter by name: a number, a range { min, max } or catalogue values { values }; "
+        "three of these for a point or direction",
     )
     characteristic_length: FiniteFloat = Field(
         default=Case.characteristic_length,
         gt=0,
-        description="length by which unit couples are made comparable with unit forces",
+        description="length by which unit couples are multiplied to make them comparable with unit forces",
     )
     actuator_stiffness: NumberOrTable | None = Field(
-        default=None, description="force of an actuator by its displacement, of all or by name"
+        default=None,
+        description="stiffness of the actuators, force per displacement: one number, or a number for each by name",
     )
 
     @model_validator(mode="after")
     def _refuse_two_robots(self) -> RobotTable:
-        """Return the table, or refuse one that gives no robot, or gives it twice."""
+        """Refuse a table without a robot, or with two forms of it."""
         if self.model is None and self.definition is None:
-            raise fault_of("model", "is missing")
+            raise fault_of("model", "is missing: give model, or the name of a robot file by file")
         if self.model is not None and self.definition is not None:
-            raise fault_of("definition", "cannot stand beside model: give the robot in one way")
+            raise fault_of("definition", "conflicts with model: give the robot in one way")
         return self
 
     @property
     def options(self) -> dict[str, Any]:
-        """The model's own options, as ``tomllib`` returns their values."""
+        """Options of the robot by name, as ``tomllib`` returns them."""
         return dict(self.model_extra or {})
 
 
 class RotationTable(Table):
-    """Rotation of the platform: about an axis of the world frame, or fixed in one of three other forms."""
+    """Rotation of the platform: axis and angle, or a fixed rotation by roll-pitch-yaw, matrix or quaternion."""
 
     model_config = ConfigDict(
         json_schema_extra={
@@ -149,73 +152,85 @@ class RotationTable(Table):
         }
     )
 
-    axis: Vector | None = Field(default=None, description="held axis; left out, the axis is free")
-    angle: Value | None = Field(default=None, description="angle, fixed or free")
-    rpy: Vector | None = Field(default=None, description="roll, pitch, yaw: about the world's x, then y, then z")
+    axis: Vector | None = Field(
+        default=None, description="fixed axis of rotation in the world frame; a free variable if left out"
+    )
+    angle: Value | None = Field(
+        default=None, description="angle of rotation: a number, or a range { min, max } for a free variable"
+    )
+    rpy: Vector | None = Field(
+        default=None, description="roll, pitch, yaw: angles of rotation about the world x, then y, then z axis"
+    )
     matrix: Annotated[list[Vector], Field(min_length=3, max_length=3)] | None = Field(
-        default=None, description="rows of the matrix from platform to world coordinates"
+        default=None, description="rotation matrix from platform to world coordinates, by rows"
     )
     quaternion: Annotated[list[FiniteFloat], Field(min_length=4, max_length=4)] | None = Field(
-        default=None, description="unit quaternion w, x, y, z"
+        default=None, description="unit quaternion [w, x, y, z], scalar part first"
     )
 
     @model_validator(mode="after")
     def _refuse_two_forms(self) -> RotationTable:
-        """Return the table, or refuse two forms of a rotation beside each other, and none."""
+        """Refuse a table with two forms of the rotation, and a table without a rotation."""
         given = [form for form in (*_FIXED, "angle", "axis") if getattr(self, form) is not None]
         if given in ([], ["axis"]):
             raise fault_of("angle", f"is missing: give angle, or one of {listing(_FIXED)}")
         if len(given) > 1 and given[0] in _FIXED:
-            raise fault_of(given[1], f"cannot stand beside {given[0]}; state the rotation in one way")
+            raise fault_of(given[1], f"conflicts with {given[0]}; state the rotation in one way")
         return self
 
 
 class AlongTable(Table):
-    """Poses along the finite screw motion of a task, evenly spaced."""
+    """Evenly spaced poses along the finite screw motion of a task."""
 
-    task: str | None = Field(default=None, description="name of the task; needed where there are several")
-    first: FiniteFloat = Field(description="where it begins: an angle, or a length for a translation")
-    last: FiniteFloat = Field(description="where it ends")
+    task: str | None = Field(default=None, description="name of the task; required with several tasks")
+    first: FiniteFloat = Field(
+        description="displacement of the first pose along the screw: an angle, or a length for a translation"
+    )
+    last: FiniteFloat = Field(description="displacement of the last pose along the screw, in the same unit as first")
     count: int = Field(ge=2, le=50, description="number of poses")
 
 
 class OffsetsTable(Table):
-    """Offsets of the platform's position along one axis, evenly spaced."""
+    """Evenly spaced offsets of the platform position along one world axis."""
 
-    min: FiniteFloat = Field(description="first offset")
-    max: FiniteFloat = Field(description="last offset")
+    min: FiniteFloat = Field(description="first offset from the stated pose, length")
+    max: FiniteFloat = Field(description="last offset from the stated pose, length, above min")
     count: int = Field(ge=2, le=20, description="number of offsets")
 
 
 class GridTable(Table):
-    """Poses over a box about the stated one: every combination of offsets along the world's axes."""
+    """Grid of poses around the stated pose: all combinations of offsets along the world axes."""
 
-    x: OffsetsTable | None = Field(default=None, description="offsets along x; none if left out")
-    y: OffsetsTable | None = Field(default=None, description="offsets along y")
-    z: OffsetsTable | None = Field(default=None, description="offsets along z")
+    x: OffsetsTable | None = Field(default=None, description="offsets along the world x axis; no offset if left out")
+    y: OffsetsTable | None = Field(default=None, description="offsets along the world y axis; no offset if left out")
+    z: OffsetsTable | None = Field(default=None, description="offsets along the world z axis; no offset if left out")
 
 
 class DisplacementTable(Table):
-    """A displacement of the stated pose: ``x -> rotation x + translation``, in the world frame."""
+    """Displacement of the stated pose: ``x -> rotation x + translation``, in the world frame."""
 
     rotation: Annotated[list[Vector], Field(min_length=3, max_length=3)] = Field(
         default=[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-        description="rows of the rotation matrix; left out: no rotation",
+        description="rotation matrix, by rows; the identity if left out",
     )
-    translation: Vector = Field(description="where the world's origin goes")
+    translation: Vector = Field(description="translation vector: the displaced position of the world origin")
 
 
 class PoseTable(Table):
     """Pose of the platform in the world frame."""
 
     position: Annotated[list[Value], Field(min_length=3, max_length=3)] = Field(
-        description="origin of the platform frame"
+        description="origin of the platform frame: three coordinates, each a number or { min, max }"
     )
-    rotation: RotationTable | None = Field(default=None, description="left out: no rotation")
-    along_task: AlongTable | None = Field(default=None, description="poses along a task's screw motion from this one")
-    grid: GridTable | None = Field(default=None, description="poses over a box about this one")
+    rotation: RotationTable | None = Field(
+        default=None, description="rotation of the platform; if left out, no rotation"
+    )
+    along_task: AlongTable | None = Field(
+        default=None, description="several poses along a task's screw motion, starting from this pose"
+    )
+    grid: GridTable | None = Field(default=None, description="several poses on a grid around this pose")
     displacements: Annotated[list[DisplacementTable], Field(min_length=1)] | None = Field(
-        default=None, description="poses at these displacements from this one, instead of a trajectory or a grid"
+        default=None, description="several poses by their displacements from this pose, instead of along_task or grid"
     )
 
 
@@ -226,18 +241,24 @@ Poses = Annotated[
 
 
 class TaskTable(Table):
-    """A motion that the platform must make: axis, point and pitch, or the six numbers of a twist."""
+    """Task: instantaneous motion that the platform must make, by axis, point and pitch, or by a twist."""
 
-    name: str | None = Field(default=None, min_length=1, description="a few words")
-    sense: Literal["max", "min"] = Field(description="maximise or minimise F")
-    axis: Vector | None = Field(default=None, description="direction of the screw axis, any length but zero")
-    point: Vector | None = Field(default=None, description="any point on the axis")
-    pitch: float | None = Field(
-        default=None, description="translation per radian; inf is a pure translation along the axis"
+    name: str | None = Field(default=None, min_length=1, description="name of the task, such as drive the screw")
+    sense: Literal["max", "min"] = Field(description="sense of optimisation: maximise or minimise F")
+    axis: Vector | None = Field(
+        default=None, description="direction of the screw axis in the world frame, of any length but zero"
     )
-    weight: FiniteFloat = Field(default=Task.weight, gt=0, description="weight of the task beside others")
+    point: Vector | None = Field(default=None, description="any point on the screw axis, in the world frame")
+    pitch: float | None = Field(
+        default=None, description="translation per radian; 0 for a rotation, inf for a translation along the axis"
+    )
+    weight: FiniteFloat = Field(
+        default=Task.weight, gt=0, description="weight of the task in a combination of several tasks"
+    )
     twist: Annotated[list[FiniteFloat], Field(min_length=6, max_length=6)] | None = Field(
-        default=None, description="angular velocity and velocity at the world origin, instead of axis, point and pitch"
+        default=None,
+        description="twist [omega, v]: angular velocity of the platform and velocity of its point at the world origin, "
+        "instead of axis, point and pitch",
     )
 
 
@@ -246,74 +267,99 @@ class CombineTable(Table):
 
     method: Literal["average", "weighted-sum", "worst-case"] | None = Field(
         default=None,
-        description="average of the tasks' optima (equation 15), best weighted sum, or best worst task",
+        description="average: weighted mean of the separate optima (equation 15); weighted-sum: optimum of the "
+        "weighted sum of F; worst-case: optimum of the worst F",
     )
     over_poses: Literal["sum", "mean", "worst"] | None = Field(
-        default=None, description="combination of F over several poses; the sum if left out"
+        default=None, description="combination of F over several poses: sum, mean or worst; the sum if left out"
     )
 
 
 class ToleranceTable(Table):
     """Manufacturing tolerances."""
 
-    joint_centre: FiniteFloat = Field(description="largest error of each joint centre, in any direction")
+    joint_centre: FiniteFloat = Field(description="largest error of each joint centre in any direction, length")
 
 
 class SolveTable(Table):
-    """Settings of the search."""
+    """Settings of the search for optima."""
 
     starts: int = Field(default=Search.starts, ge=1, le=100_000, description="number of starting points")
-    seed: int = Field(default=Search.seed, ge=0, description="seed of the random ones")
-    max_iterations: int = Field(default=Search.max_iterations, ge=1, le=1_000_000, description="limit for each start")
+    seed: int = Field(default=Search.seed, ge=0, description="seed of the random starting points")
+    max_iterations: int = Field(
+        default=Search.max_iterations,
+        ge=1,
+        le=1_000_000,
+        description="largest number of Ipopt iterations from each starting point",
+    )
     screen: bool = Field(
-        default=Search.screen, description="whether a quick search in C finds the optima that Ipopt confirms"
+        default=Search.screen,
+        description="If true, a fast search in C finds the optima and Ipopt confirms them; if false, Ipopt runs from "
+        "each starting point",
     )
 
 
 class ExpectedValueTable(Table):
-    """A number that a regression expects in the result."""
+    """Expected value of a quantity in the result, for regression tests."""
 
-    quantity: str = Field(min_length=1, description="dotted path in the JSON result, such as pose.angle")
-    value: FiniteFloat = Field(description="expected number, in the case's units")
-    within: FiniteFloat = Field(gt=0, description="largest difference from it")
+    quantity: str = Field(
+        min_length=1, description="dotted path of the quantity in the JSON result, such as pose.angle"
+    )
+    value: FiniteFloat = Field(description="expected value, in the case's units")
+    within: FiniteFloat = Field(gt=0, description="largest allowed difference, in the same unit")
 
 
 class ExpectTable(Table):
-    """Values that a regression expects."""
+    """Expected results, for regression tests."""
 
-    F: FiniteFloat | None = Field(default=Expectation.F, ge=0, description="objective at the optimum")
-    tolerance: FiniteFloat = Field(default=Expectation.tolerance, gt=0, description="relative; absolute where F is 0")
-    singular: bool | None = Field(
-        default=Expectation.singular, description="whether J is rank deficient at the optimum"
+    F: FiniteFloat | None = Field(default=Expectation.F, ge=0, description="expected F at the optimum")
+    tolerance: FiniteFloat = Field(
+        default=Expectation.tolerance,
+        gt=0,
+        description="largest allowed difference of F, relative; absolute if F is 0",
     )
-    value: list[ExpectedValueTable] = Field(default_factory=empty_list, description="other numbers of the result")
+    singular: bool | None = Field(
+        default=Expectation.singular,
+        description="If true, J must be rank deficient at the optimum; if false, it must have full rank",
+    )
+    value: list[ExpectedValueTable] = Field(
+        default_factory=empty_list, description="expected values of other quantities of the result"
+    )
 
 
 class PublishedTable(Table):
-    """A number that the literature prints."""
+    """Value printed in the literature."""
 
-    quantity: str = Field(min_length=1, description="dotted path in the JSON result, or gain (percent, with over)")
-    value: Numbers = Field(description="as printed")
-    source: str = Field(min_length=1, description="where")
-    reproduced: bool = Field(description="whether this program reproduces it")
-    because: str = Field(default=Published.because, description="the reason, where it does not")
-    decimals: int | None = Field(
-        default=Published.decimals, ge=0, le=15, description="printed decimals, if the value hides zeros"
+    quantity: str = Field(
+        min_length=1,
+        description="dotted path of the quantity in the JSON result, or gain: percentage by which F exceeds that of "
+        "the case over",
     )
-    over: str | None = Field(default=Published.over, description="the case that a gain is over")
+    value: Numbers = Field(description="value as printed, one number or several")
+    source: str = Field(min_length=1, description="place in the literature, such as Section 4.1")
+    reproduced: bool = Field(description="If true, this program reproduces the value")
+    because: str = Field(default=Published.because, description="reason why the value is not reproduced")
+    decimals: int | None = Field(
+        default=Published.decimals,
+        ge=0,
+        le=15,
+        description="number of printed decimals, if trailing zeros were printed",
+    )
+    over: str | None = Field(default=Published.over, description="name of the reference case of a gain")
 
     @model_validator(mode="after")
     def _refuse_incomplete(self) -> PublishedTable:
-        """Return the table, or refuse a missing reason, and a gain without its other case."""
+        """Refuse a missing reason, and a gain without its reference case."""
         if not self.reproduced and not self.because:
-            raise fault_of("because", "is missing: say why the number is not reproduced")
+            raise fault_of("because", "is missing: say why the value is not reproduced")
         if (self.quantity == "gain") != (self.over is not None):
-            raise fault_of("over", 'belongs to quantity = "gain", and that to it')
+            fault = 'is missing: quantity = "gain" needs the name of a reference case'
+            raise fault_of("over", fault if self.over is None else 'is allowed only for quantity = "gain"')
         return self
 
 
 class Document(Table):
-    """A whole case file."""
+    """Case file."""
 
     model_config = ConfigDict(
         title="screwsynth case file",
@@ -334,99 +380,105 @@ class Document(Table):
         },
     )
 
-    schema_: Literal[1] = Field(default=1, alias=VERSION_KEY, description="version of the keys of this file")
-    title: str = Field(default=Case.title, description="one line for people")
+    schema_: Literal[1] = Field(default=1, alias=VERSION_KEY, description="version of the file format")
+    title: str = Field(default=Case.title, description="title of the case, one line")
     # Defaults are constructed without validators, which are built when a document is first read.
     units: UnitsTable = UnitsTable.model_construct()
     robot: RobotTable
-    # A document that names CSV files has their rows here by the time that it is checked.
+    # Rows of CSV files are inserted here before the document is checked.
     pose: Poses = Field(default_factory=empty_list)
     task: Annotated[list[TaskTable], Field(min_length=1)] = Field(default_factory=empty_list)
-    poses: FileName | None = Field(default=None, description="CSV file beside this one with a pose in each row")
-    tasks: FileName | None = Field(default=None, description="CSV file beside this one with a task in each row")
-    combine: CombineTable | None = Field(default=None, description="several tasks or poses only")
-    limits: LimitsTable | None = Field(default=None, description="limits that a design must keep to be built")
+    poses: FileName | None = Field(
+        default=None, description="name of a CSV file with one pose in each row, in the folder of the case file"
+    )
+    tasks: FileName | None = Field(
+        default=None, description="name of a CSV file with one task in each row, in the folder of the case file"
+    )
+    combine: CombineTable | None = Field(default=None, description="combination of several tasks, or of several poses")
+    limits: LimitsTable | None = Field(default=None, description="limits that a design must satisfy to be buildable")
     tolerance: ToleranceTable | None = Field(default=None, description="manufacturing tolerances")
-    workspace: WorkspaceTable | None = Field(default=None, description="poses for which a machine is judged")
+    workspace: WorkspaceTable | None = Field(default=None, description="box of poses over which the robot is verified")
     solve: SolveTable = SolveTable.model_construct()
     expect: ExpectTable = ExpectTable.model_construct()
     published: list[PublishedTable] = Field(default_factory=empty_list)
-    path: PathTable | None = Field(default=None, description="programmed path along which a machine is judged")
-    load: list[LoadTable] = Field(default_factory=empty_list, description="loads on the platform")
-    motion: MotionTable | None = Field(default=None, description="the platform's fastest motions")
-    gravity: GravityTable | None = Field(default=None, description="gravity, for loads that are masses")
-    objective: ObjectiveTable | None = Field(default=None, description="what is optimised, and over which poses")
+    path: PathTable | None = Field(default=None, description="tool path along which the robot is verified")
+    load: list[LoadTable] = Field(default_factory=empty_list, description="external loads on the platform")
+    motion: MotionTable | None = Field(default=None, description="largest speeds of the platform")
+    gravity: GravityTable | None = Field(default=None, description="gravity, for loads given as masses")
+    objective: ObjectiveTable | None = Field(default=None, description="objective other than F at the stated poses")
 
     @model_validator(mode="after")
     def _refuse_without_pose_or_task(self) -> Document:
-        """Return the document, or refuse one that states no pose or no task."""
+        """Refuse a document without a pose or a task."""
         for key in ("pose", "task"):
             if key not in self.model_fields_set and not (key == "task" and "objective" in self.model_fields_set):
-                raise fault_of(key, "is missing")
+                raise fault_of(
+                    key, f"is missing: add a table [{key}]" if key == "pose" else "is missing: add a [[task]]"
+                )
         return self
 
     @classmethod
     def file_schema(cls) -> dict[str, Any]:
-        """Return the JSON Schema of case files, for which all tables are imported."""
+        """Return the JSON Schema of case files; this imports all tables."""
         Later.is_over = True
         cls.model_rebuild(force=True)
         return cls.model_json_schema()
 
     def read_worst_everywhere(self) -> bool:
-        """Return whether F is its worst over all poses at which limits hold.
+        """Return True if the worst F over the workspace or path is to be optimised.
 
         Raises:
-            CaseError: the limits do not hold there.
+            CaseError: the limits are not over the same poses.
         """
         if self.objective is None or self.objective.over is None:
             return False
         over = self.objective.over
         if not self._has_limits_over(over):
-            raise CaseError("objective.over", f"needs limits that hold there too: [limits] over = '{over}'", over)
-        return self.objective.minimise is None  # a number of the actuators is that of all these poses by itself
+            raise CaseError("objective.over", f"needs limits over the same poses: [limits] over = '{over}'", over)
+        return self.objective.minimise is None  # a quantity of the actuators covers all these poses anyway
 
     def _has_limits_over(self, poses: str) -> bool:
-        """Return whether limits hold over the workspace, or along the path."""
+        """Return True if the limits are over some poses, ``workspace`` or ``path``."""
         return self.limits is not None and self.limits.over == poses
 
     def read_workspace(self, units: Units) -> Workspace | None:
-        """Return the workspace that the document states, over which its limits may hold; None where it states none.
+        """Return the workspace of the document; None without a table ``[workspace]``.
 
         Args:
-            units: the document's units.
+            units: units of the document.
 
         Raises:
-            CaseError: the axis of its rotations is zero, or limits hold over a workspace that is not stated.
+            CaseError: the axis of its rotations is zero, or the limits are over a workspace that is missing.
         """
         has_limits = self._has_limits_over("workspace")
         if self.workspace is not None:
             return self.workspace.read(units, has_limits=has_limits)
         if has_limits:
-            raise CaseError("limits.over", "needs the table [workspace], which states the poses", "workspace")
+            raise CaseError("limits.over", "needs the table [workspace] with the box of poses", "workspace")
         return None
 
     def read_path(self, folder: str, units: Units) -> PathFile | None:
-        """Return the programmed path that the document states, along which its limits may hold; None without one.
+        """Return the tool path of the document; None without a table ``[path]``.
 
         Args:
-            folder: of the document, beside which the path's file is.
-            units: the document's units.
+            folder: folder of the document, from which the path's file name begins.
+            units: units of the document.
 
         Raises:
-            CaseError: limits hold along a path that is not stated.
+            CaseError: the limits are along a path that is missing.
         """
         has_limits = self._has_limits_over("path")
         if self.path is not None:
             return self.path.read(folder, units, has_limits=has_limits)
         if has_limits:
-            raise CaseError("limits.over", "needs the table [path], which names its file", "path")
+            raise CaseError("limits.over", "needs the table [path] with the name of its file", "path")
         return None
 
     def read_tasks(self, tasks: Sequence[Task]) -> list[Task]:
-        """Return the tasks, that of a number of the actuators in the place of F of a motion.
+        """Return the tasks of the case; with ``objective.minimise``, a quantity of the actuators replaces F.
 
         Args:
-            tasks: those that the document states.
+            tasks: tasks that the document states.
         """
         if self.objective is None or self.objective.minimise is None:
             return list(tasks)
@@ -435,10 +487,10 @@ class Document(Table):
         return [replace(task, measure=self.objective.minimise) for task in tasks]
 
     def read_loading(self, units: Units) -> Loading:
-        """Return the loads, the motions and the gravity that the document states, and the actuators' stiffness.
+        """Return loads, motion, gravity and actuator stiffness of the document.
 
         Args:
-            units: the document's units.
+            units: units of the document.
         """
         found, stiffness = NO_LOADING, self.robot.actuator_stiffness
         if self.load or self.motion is not None or self.gravity is not None:

@@ -1,4 +1,4 @@
-"""Settings of the search of a case, and values that a regression expects of it."""
+"""Settings of a case's search, expected results for regression tests, and published values."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from ..errors import CaseError
 
 @dataclass(frozen=True)
 class Search:
-    """Settings of the search.
+    """Settings of the search for optima.
 
     Attributes:
         starts: number of starting points.
-        seed: seed of the random ones.
-        max_iterations: the solver's limit for each start.
-        compiled: whether Ipopt calls the objective as compiled C instead of through CasADi's interpreter. Compiled C
-            needs a C compiler, and a second or two the first time.
-        screen: whether a quick search in C finds the optima from the starts, which Ipopt then confirms, instead of
-            Ipopt from each start. Where that search does not apply, Ipopt searches from each start.
+        seed: seed of the random starting points.
+        max_iterations: largest number of Ipopt iterations from each starting point.
+        compiled: If true, Ipopt evaluates the objective as compiled C instead of by CasADi's interpreter. This needs a
+            C compiler, and a second or two the first time.
+        screen: If true, a fast search in C runs from all starting points, and Ipopt only confirms its optima. If
+            false, or where the fast search does not apply, Ipopt runs from each starting point.
 
     Raises:
-        CaseError: a number is not whole, or too small.
+        CaseError: a setting is not a whole number, or too small.
     """
 
     starts: int = 32
@@ -41,12 +41,12 @@ class Search:
                 raise CaseError(f"solve.{key}", f"must be at least {least}", value)
 
     def but(self, starts: int | None, seed: int | None, *, compiled: bool = False) -> Search:
-        """Return the same settings but for the ones that are given.
+        """Return a copy with some settings changed.
 
         Args:
-            starts: number of starting points; None for the same.
-            seed: seed; None for the same.
-            compiled: whether the objective is compiled, also where these settings leave it interpreted.
+            starts: number of starting points; None leaves it unchanged.
+            seed: seed of the random starting points; None leaves it unchanged.
+            compiled: If true, the objective is compiled; if false, this setting stays unchanged.
         """
         return Search(
             self.starts if starts is None else starts,
@@ -59,12 +59,12 @@ class Search:
 
 @dataclass(frozen=True)
 class ExpectedValue:
-    """A number that a regression expects in the result.
+    """Expected value of a quantity in the result, for regression tests.
 
     Attributes:
-        quantity: dotted path in the result, such as ``pose.angle``.
-        value: the expected number, in the case's units.
-        within: largest difference from it.
+        quantity: dotted path in the JSON result, such as ``pose.angle``.
+        value: expected value, in the case's units.
+        within: largest allowed difference, in the same unit.
     """
 
     quantity: str
@@ -74,13 +74,13 @@ class ExpectedValue:
 
 @dataclass(frozen=True)
 class Expectation:
-    """Values that a regression expects of a case.
+    """Expected results of a case, for regression tests.
 
     Attributes:
-        F: objective at the optimum; None where nothing is expected of it.
-        tolerance: largest difference of F, relative; absolute where F is 0.
-        singular: whether J is rank deficient at the optimum; None where nothing is expected of it.
-        values: other numbers of the result.
+        F: expected objective at the optimum; None for no expectation.
+        tolerance: largest allowed difference of F, relative; absolute if F is 0.
+        singular: If true, J must be rank deficient at the optimum; if false, regular; None for no expectation.
+        values: expected values of other quantities of the result.
     """
 
     F: float | None = None
@@ -91,17 +91,17 @@ class Expectation:
 
 @dataclass(frozen=True)
 class Published:
-    """A number that the literature prints, and whether this program reproduces it.
+    """Value printed in the literature, and whether this program reproduces it.
 
     Attributes:
-        quantity: dotted path in the result, such as ``pose.angle``, or ``gain``: the percentage by which F exceeds that
-            of the case ``over``.
-        value: the number as printed.
-        source: its place in the literature.
-        reproduced: whether this program reproduces the number.
-        because: the reason, where this program does not.
-        decimals: number of digits printed behind the point, where the value alone does not show it.
-        over: name of the case that a gain is over.
+        quantity: dotted path in the JSON result, such as ``pose.angle``, or ``gain``: percentage by which F exceeds
+            the F of another case.
+        value: value as printed, one number or several.
+        source: place in the literature.
+        reproduced: If true, this program reproduces the value.
+        because: reason why the value is not reproduced; empty if it is.
+        decimals: number of printed decimals, if trailing zeros were printed; None to count those of the value.
+        over: name of the reference case of a gain.
     """
 
     quantity: str

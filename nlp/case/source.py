@@ -1,7 +1,7 @@
-"""Files of cases: found by name, read as text and as tables, with the CSV and robot files that they name.
+"""Case files by name: their paths, their text, their tables, and the files that they refer to.
 
-A case is named by its path; a shipped case also by its bare name; ``-`` is standard input, which is read once for all
-readings of a command.
+The name of a case is its path, or the bare name of a shipped case. ``-`` is standard input, which is read once per
+command and kept.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from ..errors import InputError, nearest
 from ..system.reading import read_limited, text_of_bytes
 from .csvrows import named_csv_files
 
-#: Largest case file, bytes. The largest that a person writes is a thousand times smaller; a device has no end.
+#: Largest case file, bytes: a thousand times the largest that a person writes. A device file may be endless.
 _LARGEST_FILE = 4 * 2**20
 _SHIPPED = Path(cases.__file__).parent
-#: Standard input as a path, and its name in results and messages. A file with this name has a folder before it.
+#: Standard input as a path, and its name in results and messages. A file called "-" is given as "./-".
 _STDIN, _STDIN_NAME = Path("-"), "stdin"
-#: Standard input that was read, and its content.
+#: Stream of the last reading of standard input, and its content.
 _read: list[tuple[object, bytes]] = []
 
 
 def shipped_cases() -> tuple[str, ...]:
-    """Return the names of the cases that come with the package, in order."""
+    """Return the names of the shipped cases, sorted."""
     return tuple(sorted(path.stem for path in _SHIPPED.glob("*.toml")))
 
 
@@ -48,7 +48,7 @@ def find_case(name: str) -> Path:
     except OSError as error:  # such as a name that is too long
         raise InputError(f"{name}: cannot be read: {error.strerror}") from None
     if path is None and name in model_names():
-        raise InputError(f"{name}: is a robot, not a case; screwsynth new {name} > my-{name}.toml writes a case of it")
+        raise InputError(f"{name}: is a robot, not a case; screwsynth new {name} > my-{name}.toml writes a case for it")
     if path is None and name.endswith(".toml"):
         stem = Path(name).stem
         hint = f"; did you mean {stem!r}? this case comes with screwsynth" if stem in shipped_cases() else ""
@@ -63,24 +63,24 @@ def find_case(name: str) -> Path:
 
 
 def _file_of(name: str) -> Path | None:
-    """Return the file with a path or a bare name, or None where there is none.
+    """Return the file of a path or of a shipped case; None if it does not exist.
 
     Raises:
-        InputError: the path is a folder's.
+        InputError: the path is a folder.
     """
     path = Path(name)
     if name and path.is_dir():
-        raise InputError(f"{name}: is a folder, not a case file")
+        raise InputError(f"{name}: is a folder, not a case file; give the path of a .toml file")
     if name and path.exists():
         return path.absolute() if path == _STDIN else path
     return _SHIPPED / f"{name}.toml" if name in shipped_cases() else None
 
 
 def read_text(path: Path) -> str:
-    """Return the text of a case's file; a byte order mark is left out, and line ends are those of Unix.
+    """Return the text of a case file, without a byte order mark and with Unix line ends.
 
     Raises:
-        InputError: the file cannot be read, is too large, or is no UTF-8 text.
+        InputError: the file cannot be read, is too large, or is not UTF-8 text.
     """
     name = source_name(path)
     content = _read_stdin() if path == _STDIN else read_limited(path, _LARGEST_FILE)
@@ -91,23 +91,23 @@ def read_text(path: Path) -> str:
 
 
 def source_name(path: Path) -> str:
-    """Return the name of a case's file for messages."""
+    """Return the name of a case file for messages."""
     return _STDIN_NAME if path == _STDIN else str(path)
 
 
 def _read_stdin() -> bytes:
-    """Return what standard input holds, which can be read once.
+    """Return the content of standard input; later calls return the same content.
 
     Raises:
-        InputError: it cannot be read, or is too large.
+        InputError: standard input cannot be read, or is too large.
     """
     stream = sys.stdin
     if _read and _read[-1][0] is stream:
         return _read[-1][1]
     try:
         content = stream.buffer.read(_LARGEST_FILE + 1)
-    except (AttributeError, OSError, ValueError):  # a closed stream, or none of bytes
-        raise InputError(f"{_STDIN_NAME}: cannot be read") from None
+    except (AttributeError, OSError, ValueError):  # a closed stream, or a stream without bytes
+        raise InputError(f"{_STDIN_NAME}: cannot be read: standard input is closed; give a case file") from None
     if len(content) > _LARGEST_FILE:
         raise InputError(f"{_STDIN_NAME}: cannot be read: it is larger than {_LARGEST_FILE // 2**20} MB")
     _read[:] = [(stream, content)]
@@ -115,7 +115,11 @@ def _read_stdin() -> bytes:
 
 
 def tables_of(path: Path, text: str) -> dict[str, Any]:
-    """Return the tables of a case file's text.
+    """Return the tables of a case file.
+
+    Args:
+        path: path of the file, for messages.
+        text: text of the file.
 
     Raises:
         InputError: the text is not valid TOML.
@@ -129,11 +133,11 @@ def tables_of(path: Path, text: str) -> dict[str, Any]:
 
 
 def named_files(tables: Mapping[str, Any], folder: Path) -> tuple[Path, ...]:
-    """Return the CSV files and the robot file that a document names and whose content it holds; they need not exist.
+    """Return the CSV files and the robot file to which a case file refers; they need not exist.
 
     Args:
-        tables: the document, as ``tomllib`` returns it.
-        folder: folder of the document, beside which the files are.
+        tables: the case file, as ``tomllib`` returns it.
+        folder: folder of the case file, from which the file names begin.
     """
     robot = tables.get("robot")
     file = robot.get("file") if isinstance(robot, dict) else None
@@ -142,25 +146,26 @@ def named_files(tables: Mapping[str, Any], folder: Path) -> tuple[Path, ...]:
 
 
 def _path_files(tables: Mapping[str, Any], folder: Path) -> tuple[Path, ...]:
-    """Return the file of the programmed path that a document names; the arguments are those of :func:`named_files`."""
+    """Return the tool-path file to which a case file refers; the arguments are those of :func:`named_files`."""
     path = tables.get("path")
     file = path.get("file") if isinstance(path, dict) else None
     return (folder / file,) if isinstance(file, str) and file else ()
 
 
 def inputs_of(path: Path, tables: Mapping[str, Any]) -> Mapping[Path, str]:
-    """Return the files that a case is read from, as :func:`case_inputs`, from its file and that file's tables."""
+    """Return the input files of a case as :func:`case_inputs` does, from its path and its tables."""
     names = (*named_files(tables, path.parent), *_path_files(tables, path.parent))
     return {**dict.fromkeys(names, "a file that the case names"), path: "the case file"}
 
 
 def case_inputs(name: str) -> Mapping[Path, str]:
-    """Return the files that a case is read from, and the words for each in messages: its own, and those that it names.
+    """Return the input files of a case, each with its description for messages.
 
-    A pipe or device can be read once only, and is left to who reads the case: the files that it names are not known.
+    These are the case file and the files to which it refers. A pipe or device can be read only once, by the reader of
+    the case; only the pipe itself is then returned.
 
     Args:
-        name: as for :func:`find_case`.
+        name: path of the case file, the bare name of a shipped case, or ``-`` for standard input.
 
     Raises:
         InputError: the file cannot be read, or is not valid TOML.

@@ -1,4 +1,4 @@
-"""Tables of a case file: known keys only, pydantic's strict types, and sentences about values that pydantic refuses."""
+"""Base of all tables in case files: only known keys, strict types, and messages in the words of the file."""
 
 from __future__ import annotations
 
@@ -26,25 +26,25 @@ Vector = Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)]
 
 
 def empty_list() -> list[Any]:
-    """Return an empty list, the default of a key. Its signature is read at once, that of ``list`` in 2 ms."""
+    """Return an empty list, as the default of a key; pydantic inspects ``list`` itself 2 ms slower."""
     return []
 
 
 class Table(BaseModel):
-    """A table of a case file, with its known keys only."""
+    """Table of a case file, with only known keys."""
 
     # Validators are built when a document is first read, once for the whole tree of tables.
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, defer_build=True)
 
     @classmethod
     def allowed_keys(cls) -> tuple[str, ...]:
-        """Return the keys that the table may have."""
+        """Return the allowed keys of the table."""
         return tuple(field.alias or name for name, field in cls.model_fields.items())
 
     @model_validator(mode="before")
     @classmethod
     def _refuse_unknown_keys(cls, table: object) -> object:
-        """Return the table unchanged, or refuse its first unknown key."""
+        """Refuse the first unknown key of a table."""
         if isinstance(table, dict) and cls.model_config.get("extra") == "forbid":
             for key in table:
                 if key not in cls.allowed_keys():
@@ -56,11 +56,13 @@ class Table(BaseModel):
 
 
 class Range(Table):
-    """A number that is free between its bounds."""
+    """Free variable between two bounds."""
 
-    min: FiniteFloat = Field(description="lower bound")
-    max: FiniteFloat = Field(description="upper bound, above min")
-    start: FiniteFloat | None = Field(default=None, description="where the first search begins; the middle if left out")
+    min: FiniteFloat = Field(description="lower bound of the variable")
+    max: FiniteFloat = Field(description="upper bound of the variable, above min")
+    start: FiniteFloat | None = Field(
+        default=None, description="value at the first starting point; the middle of the range if left out"
+    )
 
 
 def tag_of_number(value: object) -> str:
@@ -74,14 +76,14 @@ Value = Annotated[
 
 
 class Later:
-    """The type of a table whose class is imported when a document states the table.
+    """Type of a table with a late import: the class is imported when a document contains the table.
 
     Args:
         module: module of this package.
         name: name of the class.
 
     Attributes:
-        is_over: whether types that are built now have the class at once, as a schema needs it.
+        is_over: If true, types that are built from now on import the class at once, as a JSON Schema needs.
     """
 
     is_over: ClassVar[bool] = False
@@ -99,17 +101,17 @@ class Later:
         return kind
 
 
-#: Parts of a fault's path that stand for branches of a union, or for a key of a table, and are no keys of a file.
+#: Parts of a pydantic location that are branches of a union, or mark a key of a table, and not keys of the file.
 _TAGS = ("<number>", "<range>", "<values>", "<list>", "<pose>", "<poses>", "<word>", "<lists>", "[key]")
 
 
 def fault_of(key: str, fault: str) -> PydanticCustomError:
-    """Return the error of a validator about a key of its table, which may be missing; an empty key for the whole."""
+    """Return the error of a validator about a key of its table; an empty key stands for the whole table."""
     return PydanticCustomError("reason", "{fault}", {"fault": fault, **({"key": key} if key else {})})
 
 
 def case_error(fault: ErrorDetails) -> CaseError:
-    """Return a fault as an error with a dotted key and a sentence."""
+    """Return an error of pydantic as an error with a dotted key and a sentence."""
     context = fault.get("ctx", {})
     location = [*fault["loc"], *([context["key"]] if "key" in context else [])]
     value = fault["input"]
@@ -118,7 +120,7 @@ def case_error(fault: ErrorDetails) -> CaseError:
 
 
 def dotted_key(location: list[int | str]) -> str:
-    """Return a path into the document as a key, such as ``robot.parameters.x4.min`` or ``pose.position[0]``."""
+    """Return a location in the document as a dotted key, such as ``robot.parameters.x4.min``, ``pose.position[0]``."""
 
     def parts() -> Iterator[str]:
         for part in location:
@@ -130,7 +132,7 @@ def dotted_key(location: list[int | str]) -> str:
     return "".join(parts()).lstrip(".") or "the file"
 
 
-#: Sentences for faults of a type, whatever the key.
+#: Sentences by pydantic's kind of error, for any key.
 _KINDS = {
     "model_type": "must be a table",
     "dict_type": "must be a table",
@@ -142,7 +144,7 @@ _KINDS = {
     "finite_number": "must be finite",
     "string_too_short": "must not be empty",
 }
-#: Sentences for keys whose type alone would say too little.
+#: Sentences for keys for which "must be a list" would say too little.
 _FORMS = {
     **dict.fromkeys(("axis", "point", "force", "moment", "centre", "acceleration"), "must be a list of 3 numbers"),
     "rpy": "must be a list of 3 numbers: roll, pitch, yaw",
@@ -150,21 +152,35 @@ _FORMS = {
     "quaternion": "must be a list of 4 numbers: w, x, y, z",
     "twist": "must be a list of 6 numbers",
     "position": "must be a list of 3, each a number or { min, max }",
+    "values": "must be a list of numbers",
     "task": "must be a list of tables: write [[task]], with two brackets",
     "load": "must be a list of tables: write [[load]], with two brackets",
     "limb": "must be a list of tables: write [[limb]], with two brackets",
     "published": "must be a list of tables: write [[published]], with two brackets",
 }
-#: Keys that name a file, and those of the tables that its rows become.
+#: Advice for missing keys of case files.
+_MISSING = {
+    **dict.fromkeys(("min", "max", "first", "last", "value", "joint_centre"), "give a number"),
+    **dict.fromkeys(("quantity", "source"), "give text in quotes"),
+    **dict.fromkeys(("translation", "acceleration"), "give a list of 3 numbers"),
+    "count": "give a whole number",
+    "length": "give a length by which moments are divided",
+    "position": "give a list of 3, each a number or { min, max }",
+    "reproduced": "give true or false",
+    "robot": "add a table [robot]",
+    "sense": "give 'max' or 'min'",
+    "within": "give the largest allowed difference",
+}
+#: Keys with the name of a file, and keys of the tables that its rows become.
 _FILES = {"poses": "pose", "tasks": "task"}
 
 
 def _sentence(fault: ErrorDetails, context: Mapping[str, Any]) -> str:
-    """Return the second half of a sentence about a fault; its first half is the key.
+    """Return the message of an error without its key.
 
     Args:
-        fault: the fault.
-        context: its context, as pydantic returns it.
+        fault: error of pydantic.
+        context: context of the error, as pydantic returns it.
     """
     key = str(fault["loc"][-1]) if fault["loc"] else ""
     match fault["type"]:
@@ -173,7 +189,7 @@ def _sentence(fault: ErrorDetails, context: Mapping[str, Any]) -> str:
         case "literal_error":
             sentence = f"must be one of {context['expected']}"
         case "string_type" if key in _FILES:
-            sentence = f"must be the name of a CSV file; no such key for tables, did you mean {_FILES[key]!r}?"
+            sentence = f"must be the name of a CSV file; for tables, write [[{_FILES[key]}]]"
         case "list_type" if key in _FORMS:
             sentence = _FORMS[key]
         case "float_type":
@@ -190,18 +206,32 @@ def _sentence(fault: ErrorDetails, context: Mapping[str, Any]) -> str:
 
 
 def _sentence_of_missing_key(key: str, table: object) -> str:
-    """Return the sentence for a key that is missing, with the key of the table that may be meant."""
+    """Return the message about a missing key, with an unknown key of the table that is similar."""
     import difflib  # noqa: PLC0415 - only messages need it
 
     close = difflib.get_close_matches(key, table if isinstance(table, dict) else (), n=1)
-    return f"is missing; is it what {close[0]!r} was meant to be?" if close else "is missing"
+    if close:
+        return f"is missing; rename {close[0]!r}?"
+    return f"is missing: {_MISSING[key]}" if key in _MISSING else "is missing"
 
 
 def _sentence_of_number(fault: ErrorDetails) -> str:
-    """Return the sentence for a value that is no number."""
-    location = fault["loc"]
+    """Return the message about a value that is not a number."""
+    location, text = fault["loc"], fault["input"]
     if location[-1] == "pitch":
         return "must be a number, or inf without quotes"
-    if location[-1] != "<number>":
-        return "must be a number"
-    return "must be a number or a list of numbers" if location[0] == "published" else "must be a number or { min, max }"
+    allowed = "must be a number"
+    if location[-1] == "<number>":
+        allowed += " or a list of numbers" if location[0] == "published" else " or { min, max }"
+    return f"{allowed}{_hint_of_number(text)}" if isinstance(text, str) else allowed
+
+
+def _hint_of_number(text: str) -> str:
+    """Return a hint for a text in the place of a number: without quotes, or without a unit; else empty."""
+    from ..system.slips import hint_of  # noqa: PLC0415 - only messages need it
+
+    try:
+        float(text)
+    except ValueError:
+        return hint_of(text)
+    return f"; write {text.strip()} without quotes"

@@ -1,4 +1,4 @@
-"""Tasks of a case, and the methods that combine several."""
+"""Tasks of a case, and methods that combine several tasks."""
 
 from __future__ import annotations
 
@@ -15,34 +15,34 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
-#: Numbers of the actuators that can be minimised, and whether they need loads and motions.
+#: Quantities of the actuators that can be minimised; for each, whether it needs loads, and whether it needs motions.
 MEASURES = {"actuator_force": (True, False), "actuator_speed": (False, True), "actuator_power": (True, True)}
 
 
 class Sense(enum.Enum):
-    """Sense of the optimisation of F."""
+    """Sense of optimisation: maximise or minimise F."""
 
     MAX = "max"
     MIN = "min"
 
     @property
     def sign(self) -> float:
-        """1 of a maximum and -1 of a minimum: this times the number is maximised."""
+        """1 for a maximum, -1 for a minimum: ``sign * F`` is maximised."""
         return 1.0 if self is Sense.MAX else -1.0
 
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """An instantaneous twist deformation (ITD) that the platform must make (equation 12).
+    """Task: instantaneous twist deformation (ITD) that the platform must make (equation 12).
 
     Attributes:
         twist: (6,) ``(omega, v)`` in the world frame; ``v`` is the velocity of the platform point at the world origin.
-        sense: whether F is maximised or minimised.
-        name: a few words.
-        weight: positive weight among several tasks.
-        point: (3,) point of the axis as it was stated, length; None for a translation, and for a task given as a twist.
-        measure: number of the actuators that is minimised instead of F, such as ``actuator_force``; empty for F.
-        is_stated: whether the motion is a case's own; else it stands for none, and says nothing.
+        sense: sense of optimisation of F: maximum or minimum.
+        name: name of the task.
+        weight: positive weight of the task in a combination of several tasks.
+        point: (3,) point of the screw axis as stated, length; None for a translation, or for a task given as a twist.
+        measure: quantity of the actuators that is minimised instead of F, such as ``actuator_force``; empty for F.
+        is_stated: If true, the case states the motion; if false, the twist is a placeholder of an objective without F.
     """
 
     twist: ArrayLike
@@ -55,11 +55,11 @@ class Task:
 
     @classmethod
     def minimise(cls, measure: str) -> Task:
-        """Return the objective that a number of the actuators is as small as possible.
+        """Return an objective that minimises the largest force, speed or power of the actuators.
 
         Args:
-            measure: ``"actuator_force"``, ``"actuator_speed"`` or ``"actuator_power"``: the largest size over loads,
-                actuators and poses.
+            measure: ``"actuator_force"``, ``"actuator_speed"`` or ``"actuator_power"``; its largest magnitude over
+                loads, actuators and poses is minimised.
         """
         return cls((0.0, 0.0, 0.0, 0.0, 0.0, 1.0), Sense.MIN, measure, measure=measure, is_stated=False)
 
@@ -74,15 +74,15 @@ class Task:
         name: str = "task",
         weight: float = 1.0,
     ) -> Task:
-        """Return a unit screw motion about an axis.
+        """Return the task of a unit screw motion.
 
         Args:
-            sense: ``"max"`` or ``"min"``.
-            axis: (3,) direction, any length but zero.
-            pitch: translation per radian, length; ``math.inf`` is the pure translation along the axis.
-            point: (3,) any point of the axis, length; needed unless the pitch is infinite.
-            name: a few words.
-            weight: positive.
+            sense: sense of optimisation of F, ``"max"`` or ``"min"``.
+            axis: (3,) direction of the screw axis, of any length but zero.
+            pitch: translation per radian, length; ``math.inf`` for a pure translation along the axis.
+            point: (3,) any point on the axis, length; not needed for an infinite pitch.
+            name: name of the task.
+            weight: positive weight of the task in a combination of several tasks.
 
         Raises:
             CaseError: the sense is another word, the axis is zero, the point is missing, or a number is not finite.
@@ -96,14 +96,14 @@ class Task:
     def rotation(
         cls, axis: ArrayLike, through: ArrayLike, *, sense: Sense | str = "max", name: str = "task", weight: float = 1.0
     ) -> Task:
-        """Return a pure rotation about an axis.
+        """Return the task of a pure rotation about an axis.
 
         Args:
-            axis: (3,) direction of the axis, any length but zero; the right-hand rule gives the sense of rotation.
-            through: (3,) any point of the axis, length.
-            sense: ``"max"`` or ``"min"``.
-            name: a few words.
-            weight: positive weight among several tasks.
+            axis: (3,) direction of the axis, of any length but zero; the right-hand rule gives the sense of rotation.
+            through: (3,) any point on the axis, length.
+            sense: sense of optimisation of F, ``"max"`` or ``"min"``.
+            name: name of the task.
+            weight: positive weight of the task in a combination of several tasks.
 
         Raises:
             CaseError: the sense is another word, the axis is zero, or a number is not finite.
@@ -115,13 +115,13 @@ class Task:
     def translation(
         cls, direction: ArrayLike, *, sense: Sense | str = "max", name: str = "task", weight: float = 1.0
     ) -> Task:
-        """Return a pure translation along a direction.
+        """Return the task of a pure translation along a direction.
 
         Args:
-            direction: (3,) direction of the velocity, any length but zero.
-            sense: ``"max"`` or ``"min"``.
-            name: a few words.
-            weight: positive weight among several tasks.
+            direction: (3,) direction of the velocity, of any length but zero.
+            sense: sense of optimisation of F, ``"max"`` or ``"min"``.
+            name: name of the task.
+            weight: positive weight of the task in a combination of several tasks.
 
         Raises:
             CaseError: the sense is another word, the direction is zero, or a number is not finite.
@@ -134,26 +134,26 @@ def unit_twist(axis: ArrayLike | None, point: ArrayLike | None, pitch: float | N
     """Return the twist (6,) of a unit screw motion.
 
     Args:
-        axis: (3,) direction, any length but zero.
-        point: (3,) any point of the axis, length; needed unless the pitch is infinite.
-        pitch: translation per radian, length; ``math.inf`` is the pure translation along the axis.
+        axis: (3,) direction of the screw axis, of any length but zero.
+        point: (3,) any point on the axis, length; not needed for an infinite pitch.
+        pitch: translation per radian, length; ``math.inf`` for a pure translation along the axis.
         key: dotted key of the task, for messages.
 
     Raises:
-        CaseError: a part is missing or not allowed.
+        CaseError: axis, point or pitch is missing or not allowed.
     """
     if axis is None:
         raise CaseError(f"{key}.axis", "is missing: give axis, point and pitch, or twist")
     direction = check_direction(axis, f"{key}.axis")
     if pitch is None:
-        raise CaseError(f"{key}.pitch", "is missing: a number, 0 for a rotation, inf for a translation")
+        raise CaseError(f"{key}.pitch", "is missing: give a number, 0 for a rotation, inf for a translation")
     pitch = check_real(pitch, f"{key}.pitch")
     if pitch == math.inf:
         return screw_from_axis(direction, (0.0, 0.0, 0.0), pitch)
     if not math.isfinite(pitch):
-        raise CaseError(f"{key}.pitch", "must be a number or inf", pitch)
+        raise CaseError(f"{key}.pitch", "must be a number, or inf for a translation", pitch)
     if point is None:
-        raise CaseError(f"{key}.point", "is missing: any point on the axis")
+        raise CaseError(f"{key}.point", "is missing: give any point on the axis")
     check_size(pitch, f"{key}.pitch")
     on_axis = check_vector(point, f"{key}.point")
     for index, coordinate in enumerate(on_axis.tolist()):
@@ -162,7 +162,7 @@ def unit_twist(axis: ArrayLike | None, point: ArrayLike | None, pitch: float | N
 
 
 class Method(enum.Enum):
-    """Method that combines several tasks."""
+    """Methods that combine several tasks."""
 
     AVERAGE = "average"
     WEIGHTED_SUM = "weighted-sum"

@@ -1,4 +1,4 @@
-"""TOML of plain values: on a line, as lines of a table, and as a whole document."""
+"""Writer of TOML: values on one line, tables, and whole documents."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from ..errors import CaseError, one_line
 TomlValue: TypeAlias = "bool | int | float | str | Sequence[TomlValue] | Mapping[str, TomlValue | None]"
 
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
-#: Integers up to this size are floats without loss, and are written without a point.
+#: Largest float that is written as an integer: up to here, both are equal without loss.
 _LARGEST_INTEGER = 2**53
 
 
 def plain_value(value: object) -> TomlValue:
-    """Return the value of a robot's option as TOML has it; a tuple is a list.
+    """Return a value of a robot's option as a TOML value; a tuple becomes a list.
 
     Raises:
         CaseError: TOML has no such value.
@@ -29,7 +29,8 @@ def plain_value(value: object) -> TomlValue:
         return {str(key): plain_value(part) for key, part in value.items()}
     if isinstance(value, Sequence):
         return [plain_value(part) for part in value]
-    raise CaseError("robot", f"has an option that cannot be written to a case file: {one_line(repr(value))[:60]}")
+    fault = "has an option that TOML cannot state: use numbers, texts, truth values, lists and tables, got"
+    raise CaseError("robot", f"{fault} {one_line(repr(value))[:60]}")
 
 
 def _short_number(value: float) -> str:
@@ -41,14 +42,14 @@ def _short_number(value: float) -> str:
 
 
 def toml_text(value: TomlValue, number_text: Callable[[float], str] = _short_number) -> str:
-    """Return a value on one line, from which ``tomllib`` reads the same value.
+    """Return a value as TOML on one line, from which ``tomllib`` reads an equal value.
 
     Args:
         value: the value.
-        number_text: text of a number; whole floats lose their point if left out.
+        number_text: formatter of numbers; by default, whole floats are written without a point.
 
     Raises:
-        TypeError: TOML has no form for a value here.
+        TypeError: the value is not a number, text, truth value, list or table.
     """
     if isinstance(value, bool):
         return "true" if value else "false"
@@ -62,7 +63,7 @@ def toml_text(value: TomlValue, number_text: Callable[[float], str] = _short_num
         return f"{{ {inner} }}" if inner else "{}"
     if isinstance(value, Sequence):
         return f"[{', '.join(toml_text(part, number_text) for part in value)}]"
-    raise TypeError(f"TOML has no form for {value!r} here")
+    raise TypeError(f"expected a number, text, truth value, list or table for TOML, got {value!r}")
 
 
 def option_text(value: object) -> str:
@@ -71,35 +72,35 @@ def option_text(value: object) -> str:
 
 
 def toml_key(key: str) -> str:
-    """Return a key, in quotes where it needs them."""
+    """Return a key, in quotes if TOML needs them."""
     return key if _BARE_KEY.fullmatch(key) else toml_text(key)
 
 
 def toml_lines(table: Mapping[str, TomlValue | None], number_text: Callable[[float], str] = _short_number) -> list[str]:
-    """Return a line for each key of a table."""
+    """Return one line for each key of a table; keys with the value None are left out."""
     given = ((key, value) for key, value in table.items() if value is not None)
     return [f"{toml_key(key)} = {toml_text(value, number_text)}" for key, value in given]
 
 
 def toml_table(header: str, table: Mapping[str, TomlValue | None]) -> list[str]:
-    """Return a table behind an empty line and its header, such as ``[limits]``; nothing for an empty table."""
+    """Return the lines of a table: an empty line, the header, such as ``[limits]``, and its keys; none if empty."""
     lines = toml_lines(table)
     return ["", header, *lines] if lines else []
 
 
 def toml_tables(header: str, tables: Iterable[Mapping[str, TomlValue | None]]) -> list[str]:
-    """Return the tables of a list, each behind a header such as ``[[task]]``."""
+    """Return the lines of several tables with the same header, such as ``[[task]]``."""
     return [line for table in tables for line in toml_table(header, table)]
 
 
 def toml_document(tables: Mapping[str, Any]) -> str:
-    """Return a document as TOML, which reads as the same tables; every number keeps its type.
+    """Return a whole document as TOML, from which ``tomllib`` reads equal tables; each number keeps its type.
 
     Args:
         tables: the document, as ``tomllib`` returns it, without dates and times.
 
     Raises:
-        TypeError: TOML has no form for a value here.
+        TypeError: a value is not a number, text, truth value, list or table.
     """
     plain = {key: value for key, value in tables.items() if not _is_table(value)}
     parts = ["\n".join(toml_lines(plain, repr))] if plain else []
@@ -112,7 +113,7 @@ def toml_document(tables: Mapping[str, Any]) -> str:
 
 
 def _is_table(value: object) -> bool:
-    """Return whether a value gets a header of its own: a table, or a list of nothing but tables."""
+    """Return whether a value is written below a header: a table, or a list of tables only."""
     if isinstance(value, list):
         return bool(value) and all(isinstance(each, dict) for each in value)
     return isinstance(value, dict)

@@ -1,4 +1,4 @@
-"""Values of numbers of a case by name: the form in which sweeps and trade-off curves take them in Python."""
+"""Values of quantities of a case by name, as arguments of sweeps and trade-off curves in Python."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ import numpy as np
 from ...models import FloatArray
 from ..errors import InputError
 
-#: Values of each number, in the units of the case, by the name that ``--set`` has for it.
+#: Values of each quantity, in the units of the case, by its name for ``--set``.
 Over: TypeAlias = Mapping[str, Iterable[float]]
 
 
 def axes_of(over: Over, argument: str = "over", *, repeated: bool = False) -> dict[str, FloatArray]:
-    """Return the values (k,) of each number.
+    """Return the values (k,) of each quantity.
 
     Args:
-        over: the values by name.
-        argument: name of this argument in Python, for messages.
-        repeated: whether a value may be there twice.
+        over: values by name.
+        argument: name of the argument in Python, for messages.
+        repeated: If true, a value may appear twice.
 
     Raises:
-        InputError: the argument is no mapping, a number has no values, or a value is not finite or is there twice.
+        InputError: the argument is not a mapping, a quantity has no values, or a value is not finite or appears twice.
     """
     if not isinstance(over, Mapping):
         fault = "must be a mapping from names to values, such as {'x1': [10, 12, 14]}"
@@ -37,7 +37,7 @@ def axes_of(over: Over, argument: str = "over", *, repeated: bool = False) -> di
 
 
 def _values(name: str, values: Iterable[float], argument: str) -> FloatArray:
-    """Return the values (k,) of a number; the errors are those of :func:`axes_of`."""
+    """Return the values (k,) of a quantity; the errors are those of :func:`axes_of`."""
     if isinstance(values, str | bytes) or not isinstance(values, Iterable):
         raise InputError(f"{argument} {name}: must be a list of numbers, got {type(values).__name__} {values!r:.60}")
     found = list(values)

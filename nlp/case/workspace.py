@@ -1,4 +1,4 @@
-"""The workspace of a case: a box of poses for which a machine is judged. Angles are radians."""
+"""Workspace of a case: a box of poses over which a robot is verified. Angles are radians."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from .pose import Free, Value, ends_of, written_value
 if TYPE_CHECKING:
     from .toml import TomlValue
 
-#: Largest size of a rotation's angle: the coordinates in which boxes of rotations are covered, tangents of half the
-#: angle, grow without bound towards half a turn.
+#: Largest magnitude of a rotation angle: searches use the tangent of half the angle as coordinate, which grows without
+#: bound towards half a turn.
 LARGEST_TURN = math.radians(150)
-#: The coordinates of a position, and the three angles of a rotation by roll, pitch and yaw.
+#: Coordinates of a position, and angles of a rotation by roll, pitch and yaw.
 POSITION = ("x", "y", "z")
 TURNS = ("roll", "pitch", "yaw")
 
 
 class TurnKind(enum.Enum):
-    """Coordinates of the rotations of a workspace."""
+    """Kinds of coordinates for the rotations of a workspace."""
 
     ANY_AXIS = "any axis"
     AXIS = "axis"
@@ -36,13 +36,13 @@ class TurnKind(enum.Enum):
 
 @dataclass(frozen=True)
 class Turns:
-    """The rotations of a workspace.
+    """Rotations of a workspace.
 
     Attributes:
-        kind: ``ANY_AXIS``: by at most the larger end of the one angle, about any axis; ``AXIS``: by an angle about the
-            axis; ``ROLL_PITCH_YAW``: ``Rz(yaw) Ry(pitch) Rx(roll)``.
-        angles: one value, or three, radians; fixed or free.
-        axis: (3,) unit axis of ``AXIS``, in the world frame.
+        kind: kind of coordinates. ``ANY_AXIS``: all rotations about any axis by at most the larger end of the angle;
+            ``AXIS``: rotations about one axis; ``ROLL_PITCH_YAW``: ``Rz(yaw) Ry(pitch) Rx(roll)``.
+        angles: angles, radians, each fixed or free: three for ``ROLL_PITCH_YAW``, else one.
+        axis: (3,) unit axis of rotation in the world frame, for ``AXIS``.
     """
 
     kind: TurnKind = TurnKind.AXIS
@@ -52,11 +52,12 @@ class Turns:
 
 @dataclass(frozen=True)
 class DependentCoordinate:
-    """A coordinate of the pose that the robot cannot choose: it follows from the others.
+    """Dependent coordinate of the pose: the independent coordinates determine it by the loop equations.
 
     Attributes:
-        index: among the six of a pose: position, then rotation.
-        lower, upper: working range in which a search begins, length or radians: no limit, and nothing is proved of it.
+        index: index among the six coordinates of a pose: position, then rotation.
+        lower: lower end of the range in which a search looks for the coordinate, length or radians; not a limit.
+        upper: upper end of this range.
     """
 
     index: int
@@ -66,20 +67,20 @@ class DependentCoordinate:
 
 @dataclass(frozen=True)
 class Workspace:
-    """A box of poses.
+    """Box of poses.
 
     Attributes:
-        position: origin of the platform frame in the world frame, length; fixed or free components.
-        turns: rotations.
-        has_limits: whether a solve must find a design that is regular and keeps the case's limits at each of the poses.
-        about_pose: whether the numbers are excursions about the stated pose of the case, see :mod:`.excursions`, and
-            not coordinates of the world.
-        dependent: coordinates that the robot of a case cannot choose, as a judgement of it finds them; empty in a case.
-            A range stated for one is a limit, and a number the place where its value is looked for.
-        held: indices of fixed coordinates that it chooses beside those with ranges; empty without dependent ones.
+        position: (3,) origin of the platform frame in the world frame, length; each coordinate fixed or free.
+        turns: rotations of the platform.
+        has_limits: If true, a solve finds a design without singularities and violated limits at every pose of the box.
+        about_pose: If true, position and rotation are excursions from the stated pose of the case, see
+            :mod:`.excursions`; if false, they are in the world frame.
+        dependent: dependent coordinates of the robot, which a verification adds; empty in a case. A range stated for a
+            dependent coordinate is a limit; a number is the start of the search for its value.
+        held: indices of independent coordinates with a fixed value; empty without dependent coordinates.
 
     Raises:
-        CaseError: a number is not allowed; the key is in the words of a case file.
+        CaseError: a coordinate is not allowed; the message names its key in a case file.
     """
 
     position: Sequence[Value]
@@ -91,17 +92,18 @@ class Workspace:
 
     def __post_init__(self) -> None:
         if len(self.position) != 3:
-            raise CaseError("workspace.position", "must be a list of 3, each a number or { min, max }")
+            fault = f"must be a list of 3, each a number or {{ min, max }}, got {len(self.position)}"
+            raise CaseError("workspace.position", fault)
         object.__setattr__(self, "position", tuple(self.position))
 
     def check(self, units: Units) -> None:
-        """Refuse a number that is out of its range, and a box that is one pose.
+        """Check the ranges of all coordinates.
 
         Args:
-            units: units for people.
+            units: units of messages.
 
         Raises:
-            CaseError: it is refused.
+            CaseError: a coordinate is out of its range, or the box is a single pose.
         """
         for index, value in enumerate(self.position):
             check_value(value, f"workspace.position[{index}]", Dimension.LENGTH, units)
@@ -118,16 +120,14 @@ class Workspace:
                 and (angle.lower == 0 or math.isclose(-angle.lower, angle.upper))
             )
             if not whole:
-                fault = (
-                    "must be { min = -a, max = a } or { min = 0, max = a }: with the axis free its sign means nothing"
-                )
+                fault = "must be { min = -a, max = a } or { min = 0, max = a }: about any axis its sign has no meaning"
                 raise CaseError(f"{key}.angle", fault)
         if not any(isinstance(value, Free) for value in (*self.position, *turns.angles)):
             raise CaseError("workspace", "is one pose: give at least one number as { min, max }")
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the six coordinates of a pose: those of a rotation about any axis are parts of its Cayley vector."""
+        """Names of the six coordinates of a pose; rotations about any axis have the components of the Cayley vector."""
         turns: tuple[str, ...] = TURNS
         if self.turns.kind is TurnKind.ANY_AXIS:
             turns = tuple(f"cayley_{axis}" for axis in POSITION)
@@ -142,16 +142,16 @@ class Workspace:
 
     @property
     def independent(self) -> tuple[str, ...]:
-        """Names of the coordinates with ranges that the robot chooses."""
+        """Names of the independent coordinates with a range."""
         dependent = [each.index for each in self.dependent]
         return tuple(self.names[k] for k, _ in self.ranged if k not in dependent)
 
     def set_words(self, units: Units, digits: Callable[[float], str] = "{:.7g}".format) -> str:
-        """Return the set of poses in words, without dependent coordinates, such as ``roll, pitch in [-5, 5] deg``.
+        """Return a description of the box without dependent coordinates, such as ``roll, pitch in [-5, 5] deg``.
 
         Args:
-            units: units for people.
-            digits: writes a number.
+            units: units of the description.
+            digits: formatter of numbers.
         """
         dependent, groups = [each.index for each in self.dependent], dict[str, list[str]]()
         is_any = self.turns.kind is TurnKind.ANY_AXIS
@@ -170,39 +170,39 @@ class Workspace:
         if is_any:
             most = max(map(abs, ends_of(self.turns.angles[0])))
             angle = f"{digits(units.shown(most, Dimension.ANGLE))} {units.label(Dimension.ANGLE)}"
-            own = [self.names[k] for k in range(3, 6) if k not in dependent]
+            chosen = [self.names[k] for k in range(3, 6) if k not in dependent]
             texts.append(
                 f"rotation by at most {angle} about any axis"
-                if len(own) == 3
-                else f"rotation with ({', '.join(own)}) of at most {angle}"
+                if len(chosen) == 3
+                else f"rotation with ({', '.join(chosen)}) of at most {angle}"
             )
         return ", ".join(texts)
 
     @property
     def ranged(self) -> list[tuple[int, Value]]:
-        """The coordinates that have ranges, with their indices."""
+        """Indices and values of the coordinates with a range."""
         values: list[Value] = [*self.position, *self.turns.angles]
         if self.turns.kind is TurnKind.ANY_AXIS:
             values += self.turns.angles * 2
         return [(k, each) for k, each in enumerate(values) if isinstance(each, Free)]
 
     def by_three_angles(self) -> Workspace:
-        """Return the same box with the rotation about one coordinate axis as roll, pitch and yaw.
+        """Return the same box with roll, pitch and yaw instead of the angle about a coordinate axis.
 
         Raises:
-            CaseError: the rotation is about another axis.
+            CaseError: the axis of rotation is not a coordinate axis.
         """
         axis, (angle,) = self.turns.axis, self.turns.angles
         places = [k for k in range(3) if abs(axis[k]) == 1.0]
         if not places:
-            fault = "the platform turns about other axes too: state the rotation as { roll, pitch, yaw }"
+            fault = "must be { roll, pitch, yaw }: this platform also rotates about axes other than the given one"
             raise CaseError("workspace.rotation", fault)
         angles: list[Value] = [0.0, 0.0, 0.0]
         angles[places[0]] = angle if axis[places[0]] > 0 else _negative(angle)
         return replace(self, turns=Turns(TurnKind.ROLL_PITCH_YAW, tuple(angles)))
 
     def to_keys(self, units: Units) -> dict[str, TomlValue | None]:
-        """Return the table of a case file that states this workspace."""
+        """Return the keys of the table ``[workspace]`` that state this workspace."""
         turns = self.turns
         angles = [_written(value, units, Dimension.ANGLE) for value in turns.angles]
         rotation: dict[str, TomlValue | None] = {"angle": angles[0]}
@@ -218,10 +218,10 @@ class Workspace:
 
 
 def _negative(value: Value) -> Value:
-    """Return the same number of the opposite sense."""
+    """Return a fixed or free value with the opposite sign."""
     return Free(-value.upper, -value.lower) if isinstance(value, Free) else -value
 
 
 def _written(value: Value, units: Units, dimension: Dimension) -> TomlValue:
-    """Return a fixed or free number in the case's unit; a start means nothing in a box."""
+    """Return a fixed or free value as TOML in the case's unit, without a start."""
     return written_value(replace(value, start=None) if isinstance(value, Free) else value, units, dimension)

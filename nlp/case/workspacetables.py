@@ -1,4 +1,4 @@
-"""Tables of the workspace and of the programmed path in a case file, and what they state."""
+"""Tables of the workspace and of the tool path in a case file, and their conversion."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from .workspace import TURNS, TurnKind, Turns, Workspace
 
 
 class SpanTable(Table):
-    """A range of a number of the pose."""
+    """Range of a coordinate of the pose."""
 
-    min: FiniteFloat = Field(description="smallest value")
-    max: FiniteFloat = Field(description="largest value, above min")
+    min: FiniteFloat = Field(description="smallest value of the coordinate")
+    max: FiniteFloat = Field(description="largest value of the coordinate, above min")
 
 
 Span = Annotated[
@@ -29,7 +29,7 @@ Span = Annotated[
 
 
 class WorkspaceRotationTable(Table):
-    """Rotations of a workspace: about any axis, about one axis, or by roll, pitch and yaw."""
+    """Rotations of the workspace: about any axis, about one axis, or by roll, pitch and yaw."""
 
     model_config = ConfigDict(
         json_schema_extra={
@@ -42,41 +42,50 @@ class WorkspaceRotationTable(Table):
         }
     )
 
-    axis: Vector | None = Field(default=None, description="axis of the world frame; left out: any axis")
-    angle: Span | None = Field(default=None, description="angle about the axis")
-    roll: Span | None = Field(default=None, description="first turn, about the world's x; 0 if left out")
-    pitch: Span | None = Field(default=None, description="second turn, about the world's y; 0 if left out")
-    yaw: Span | None = Field(default=None, description="third turn, about the world's z; 0 if left out")
+    axis: Vector | None = Field(
+        default=None, description="axis of rotation in the world frame; if left out, rotations about every axis"
+    )
+    angle: Span | None = Field(default=None, description="angle of rotation about the axis, a number or a range")
+    roll: Span | None = Field(default=None, description="first rotation, about the world x axis; 0 if left out")
+    pitch: Span | None = Field(default=None, description="second rotation, about the world y axis; 0 if left out")
+    yaw: Span | None = Field(default=None, description="third rotation, about the world z axis; 0 if left out")
 
     @model_validator(mode="after")
     def _refuse_two_forms(self) -> WorkspaceRotationTable:
-        """Return the table, or refuse two forms of a rotation beside each other, and none."""
+        """Refuse a table with two forms of the rotation, and a table without a rotation."""
         turns = [name for name in TURNS if getattr(self, name) is not None]
         others = [name for name in ("angle", "axis") if getattr(self, name) is not None]
         if turns and others:
-            raise fault_of(turns[0], f"cannot stand beside {others[0]}; state the rotation in one way")
+            raise fault_of(turns[0], f"conflicts with {others[0]}; state the rotation in one way")
         if not turns and self.angle is None:
             raise fault_of("angle", "is missing: give angle, or one or more of roll, pitch, yaw")
         return self
 
 
 class WorkspaceTable(Table):
-    """The poses that a machine must reach: every pose of a box."""
+    """Workspace: a box of poses, all of which the robot must reach."""
 
     about: Literal["world", "pose"] = Field(
         default="world",
-        description="origin of the numbers: the world, or the case's pose, for excursions along the axes of the world",
+        description="world: position and rotation in the world frame; pose: excursions from the pose of the case, "
+        "along and about the axes of the world frame",
     )
     position: Annotated[list[Span], Field(min_length=3, max_length=3)] = Field(
-        description="origin of the platform frame"
+        description="origin of the platform frame: three coordinates, each a number or { min, max }"
     )
-    rotation: WorkspaceRotationTable | None = Field(default=None, description="left out: no rotation")
+    rotation: WorkspaceRotationTable | None = Field(
+        default=None, description="rotations of the platform; if left out, no rotation"
+    )
 
     def read(self, units: Units, *, has_limits: bool) -> Workspace:
-        """Return the workspace, over which limits may hold.
+        """Return the workspace.
+
+        Args:
+            units: units of the file.
+            has_limits: If true, a solve must satisfy the limits at every pose of the workspace.
 
         Raises:
-            CaseError: the axis of its rotations is zero.
+            CaseError: the axis of rotation is zero.
         """
         position = [internal_value(value, units, Dimension.LENGTH) for value in self.position]
         return Workspace(position, _turns(self.rotation, units), has_limits, about_pose=self.about == "pose")
@@ -86,33 +95,49 @@ Six = Annotated[list[FiniteFloat], Field(min_length=6, max_length=6)]
 
 
 class PlaceTable(Table):
-    """The place of a path's frame in the world; free numbers are chosen by a solve with limits over the path."""
+    """Pose of the path's frame in the world frame; a solve with limits over the path chooses free coordinates."""
 
-    x: Value = Field(default=0.0, description="position")
-    y: Value = Field(default=0.0, description="position")
-    z: Value = Field(default=0.0, description="position")
-    roll: Value = Field(default=0.0, description="first turn, about the world's x")
-    pitch: Value = Field(default=0.0, description="second turn, about the world's y")
-    yaw: Value = Field(default=0.0, description="third turn, about the world's z")
+    x: Value = Field(default=0.0, description="x coordinate of the path's origin in the world frame")
+    y: Value = Field(default=0.0, description="y coordinate of the path's origin in the world frame")
+    z: Value = Field(default=0.0, description="z coordinate of the path's origin in the world frame")
+    roll: Value = Field(default=0.0, description="first rotation of the path's frame, about the world x axis")
+    pitch: Value = Field(default=0.0, description="second rotation of the path's frame, about the world y axis")
+    yaw: Value = Field(default=0.0, description="third rotation of the path's frame, about the world z axis")
 
 
 class PathTable(Table):
-    """The programmed path along which a machine is judged."""
+    """Tool path along which the robot is verified."""
 
-    file: FileName = Field(description="file beside this one: G-code, or a .csv file of poses")
-    unit: Literal["mm", "in"] | None = Field(default=None, description="unit of a program before G20 or G21")
+    file: FileName = Field(
+        description="name of a file in the folder of the case file: G-code, or a table of poses (.csv)"
+    )
+    unit: Literal["mm", "in"] | None = Field(
+        default=None, description="length unit of the G-code before G20 or G21; the unit of the case if left out"
+    )
     start: Six | None = Field(
-        default=None, description="X, Y, Z, A, B, C, angles in degrees, where the machine stands before a program"
+        default=None, description="X, Y, Z, A, B, C before the first line of the G-code, angles in degrees"
     )
     offsets: dict[Literal["G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3"], Six] = Field(
-        default_factory=dict, description="origins of a program's coordinate systems"
+        default_factory=dict, description="origin (X, Y, Z, A, B, C) of each coordinate system of the G-code"
     )
-    angles: Convention = Field(default=PathFile.angles, description="convention of a program's A, B and C")
-    between: Literal["angles", "slerp"] | None = Field(default=None, description="motion between two points")
-    place: PlaceTable | None = Field(default=None, description="of the path's frame; left out: that of the world")
+    angles: Convention = Field(default=PathFile.angles, description="convention of the angles A, B and C in the G-code")
+    between: Literal["angles", "slerp"] | None = Field(
+        default=None,
+        description="interpolation of rotations between two points: linear angles or slerp; the default depends on "
+        "the file type",
+    )
+    place: PlaceTable | None = Field(
+        default=None, description="pose of the path's frame in the world frame; if left out, both frames are equal"
+    )
 
     def read(self, folder: str, units: Units, *, has_limits: bool) -> PathFile:
-        """Return the programmed path, along which limits may hold; its file is beside the document, in the folder."""
+        """Return the tool path.
+
+        Args:
+            folder: folder of the case file, from which the path's file name begins.
+            units: units of the file.
+            has_limits: If true, a solve must satisfy the limits along the whole path.
+        """
         given, stated = dict(self), self.place
         given["place"] = tuple(
             0.0 if stated is None else internal_value(getattr(stated, name), units, dimension)
@@ -122,10 +147,10 @@ class PathTable(Table):
 
 
 def _turns(rotation: WorkspaceRotationTable | None, units: Units) -> Turns:
-    """Return the rotations that a case file states.
+    """Return the rotations of a workspace.
 
     Raises:
-        CaseError: the axis is zero.
+        CaseError: the axis of rotation is zero.
     """
     if rotation is None:
         return Turns()

@@ -1,7 +1,7 @@
-"""Writer of case files: a :class:`~screwsynth.nlp.case.case.Case` becomes TOML, from which the same case is read again.
+"""Writer of case files: TOML from which an equal :class:`~screwsynth.nlp.case.case.Case` is read.
 
-Angles are written in the case's unit. A motion is written as axis, point and pitch where it was stated so and these
-give the same six numbers, and else as a twist.
+Angles are written in the case's unit. A task is written as axis, point and pitch if these give its twist to the last
+bit, and otherwise as a twist.
 """
 
 from __future__ import annotations
@@ -33,25 +33,24 @@ from .toml import TomlValue, plain_value, toml_lines, toml_table, toml_tables
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-#: Digits to which a ratio of two components is rounded in the search of a short direction, such as [2, 2, 1].
+#: Digits to which components are rounded in the search for a short direction, such as [2, 2, 1].
 _DIGITS = 12
-#: Largest whole number that a component of a short direction has.
+#: Largest integer component of a short direction.
 _LARGEST_COMPONENT = 12
 #: Largest rounding error of a component, in units of its last place: of one division and one norm.
 _ROUNDINGS = 4
-#: Two robots whose expressions differ by more than this part of their size at a random point are not the same.
+#: Relative difference of the expressions of two robots at a random point, above which the robots are different.
 _SAME = 1e-9
 
 
 def case_text(case: Case) -> str:
-    """Return a case as the text of a case file; the text is read again before it is returned.
+    """Return the text of a case file for a case; the text is checked by reading it again.
 
-    A characteristic length and a combination that have no effect on the case are left out, as a case file cannot state
-    them.
+    A characteristic length and a combination without effect are left out, because case files do not allow them.
 
     Raises:
-        CaseError: no case file can state the case: its robot is not found by its name and options, or a value is not
-            one that a file may have.
+        CaseError: no case file can state the case: its name and options give another robot, or a value is not allowed
+            in files.
     """
     text = "\n".join(_lines(case)) + "\n"
     try:
@@ -59,20 +58,20 @@ def case_text(case: Case) -> str:
     except CaseError as error:
         raise CaseError(error.key, f"cannot be written to a case file: {error.fault}", error.value) from None
     if not _are_same(case.model, again.model):
-        fault = "cannot be written to a case file: the robot of this name, with these options, is another one"
+        fault = "cannot be written to a case file: this name with these options gives a different robot"
         raise CaseError("robot.model", fault, case.model.name)
     return text
 
 
 def with_settings(case: Case, settings: Mapping[str, float | ArrayLike]) -> Case:
-    """Return a case with some of its numbers replaced by name, as ``--set`` does; the rest is that of the case.
+    """Return a case with some values replaced by name, as the option ``--set`` does.
 
     Args:
         case: the case; its robot need not have a name.
-        settings: numbers in the case's units, by the names that :func:`load_case` takes.
+        settings: new values in the case's units, by the names of :func:`load_case`.
 
     Raises:
-        CaseError: the case has no number of a name, does not allow a value, or has a part that no case file can state.
+        CaseError: the case has no value with a name, a value is not allowed, or no case file can state the case.
     """
     try:
         numbers = {name: _setting(name, value) for name, value in settings.items()}
@@ -90,14 +89,14 @@ def with_settings(case: Case, settings: Mapping[str, float | ArrayLike]) -> Case
 
 
 def _setting(name: str, value: float | ArrayLike) -> float | list[float]:
-    """Return a number, or the numbers of a point, axis or direction; the error is that of a number of a case."""
+    """Return a checked number, or the numbers of a point, axis or direction."""
     if np.ndim(value) == 0:
         return check_real(value, name)
     return [float(part) for part in check_reals(value, name)]
 
 
 def _as_stated(old: Rotation, new: Rotation) -> Rotation:
-    """Return a rotation in the form in which the case states it, where it is the same."""
+    """Return the old rotation, with its form, if both rotations are equal; otherwise the new one."""
     one, other = ((), ()) if old.axis is None or new.axis is None else (old.axis, new.axis)
     is_same = (old.axis is None) == (new.axis is None) and np.array_equal(one, other)
     return old if is_same and old.angle == new.angle else new
@@ -145,13 +144,13 @@ def _lines(case: Case) -> Iterator[str]:
 
 
 def _units(units: Units) -> dict[str, TomlValue | None]:
-    """Return the table of the units; a file without forces has none for them."""
+    """Return the table of the units; the default force unit is left out."""
     force = None if units.force == Units.force else units.force
     return {"length": units.length, "angle": units.angle, "force": force}
 
 
 def _stiffness(loading: Loading) -> dict[str, TomlValue]:
-    """Return the actuators' stiffness, one number or one by actuator."""
+    """Return the key of the actuator stiffness: one number for all actuators, or a table by name."""
     given = loading.stiffness
     return {} if given is None else {"actuator_stiffness": given[""] if given.keys() == {""} else dict(given)}
 
@@ -186,13 +185,13 @@ def _expectation(expect: Expectation) -> Iterator[str]:
 
 
 def _direction(unit: FloatArray) -> list[float]:
-    """Return components (3,) whose unit vector is the given one to the last bit: short ones if there are any."""
+    """Return components (3,) with a given unit vector to the last bit; short integers if there are any."""
     largest = float(np.abs(unit).max())
     for scale in range(1, _LARGEST_COMPONENT + 1):
         short = [round(float(part) / largest * scale, _DIGITS) for part in unit]
         if np.array_equal(unit_vector(short), unit):
             return short
-    # The unit vector was made from components whose largest is 1, which are these but for rounding.
+    # Components with largest magnitude 1 gave this unit vector; search for them among the rounded ones.
     long, steps = unit / largest, range(-_ROUNDINGS, _ROUNDINGS + 1)
     moved = np.abs(long) < 1
     for moves in itertools.product(*(steps if each else (0,) for each in moved)):
@@ -224,10 +223,10 @@ def _task(task: Task) -> dict[str, TomlValue | None]:
     motion: dict[str, TomlValue | None] = {"twist": twist.tolist()}
     screw = axis_from_screw(twist)
     pitch = round(screw.pitch, _DIGITS)
-    # The unit vector in the twist itself, which is not rounded again.
+    # The twist contains the unit vector itself, without another rounding.
     axis = _direction(twist[3:] if math.isinf(pitch) else twist[:3])
     point = None if task.point is None else np.asarray(task.point, dtype=np.float64).tolist()
-    # A motion that was stated by its twist has no point, and stays so.
+    # A task that was stated by its twist has no point, and is written as a twist.
     is_screw = math.isinf(pitch) == (point is None)
     if is_screw and np.array_equal(unit_twist(axis, point, pitch, "task"), twist):
         motion = {"axis": axis, "point": point, "pitch": pitch}
@@ -236,7 +235,7 @@ def _task(task: Task) -> dict[str, TomlValue | None]:
 
 
 def _combination(case: Case) -> dict[str, TomlValue | None]:
-    """Return the table of the combination of tasks and poses: only the keys that a file with them may have."""
+    """Return the table of the combination of tasks and poses, with only the keys that the file may have."""
     method = case.method.value if len(case.tasks) > 1 else None
     return {"method": method, "over_poses": case.over_poses.value if case.pose_count > 1 else None}
 
@@ -256,32 +255,32 @@ def _limits(case: Case) -> dict[str, TomlValue | None]:
 
 
 def _merge(found: dict[str, TomlValue | None], other: Mapping[str, TomlValue | None], place: str) -> None:
-    """Add the keys of a table to another one, those of tables of joints within it too.
+    """Merge a table into another one, including the tables of joints and actuators within it.
 
     Args:
-        found: the table that is added to.
-        other: the keys.
+        found: table that receives the keys.
+        other: table with the new keys.
         place: dotted key of the table, for messages.
 
     Raises:
-        CaseError: both have a key with different values.
+        CaseError: both tables have a key with different values.
     """
     for key, value in other.items():
         have = found.setdefault(key, value)
         if isinstance(have, dict) and isinstance(value, Mapping) and _is_merged(key, place):
             _merge(have, value, f"{place}.{key}")
         elif have != value:
-            fault = "cannot be written to a case file, which has one value of it, while the limits have two"
-            raise CaseError(f"{place}.{key}", fault)
+            fault = "cannot be written to a case file, which allows one value, but the limits have two"
+            raise CaseError(f"{place}.{key}", f"{fault}: {have} and {value}")
 
 
 def _is_merged(key: str, place: str) -> bool:
-    """Return whether several limits may have one key, by joint or by actuator."""
+    """Return whether several limits may share a key, as those of joints and of actuators do."""
     return "joint" in (key, place.rpartition(".")[2]) or key.startswith("actuator_")
 
 
 def _are_same(one: Model, other: Model) -> bool:
-    """Return whether two robots have the same parameters, rows and measures: their values are equal at a point."""
+    """Return whether two robots have equal parameters, rows and measures, by their values at a random point."""
     names = [[item.components for item in model.parameters] for model in (one, other)]
     if names[0] != names[1] or one.limbs != other.limbs or len(one.unknowns) != len(other.unknowns):
         return False

@@ -1,4 +1,4 @@
-"""The commands and their common help."""
+"""Commands of the command line, and the help that lists them."""
 
 from __future__ import annotations
 
@@ -12,77 +12,83 @@ from .usage import with_present_names
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-#: What help says of each command, by what the command is for: the first line of the command's own help, and an example.
-#: Help and every command are read from here without the modules of the others.
+#: Commands by purpose, with the first line of their help and an example. With this list, a command starts without the
+#: modules of the other commands.
 GROUPS = {
     "Solve": {
         "new": ("Print a commented starter case.", "new stewart-gough > my-robot.toml"),
         "models": ("List the robots, or show one in full.", "models 6-ups --plot robot.png"),
-        "solve": ("Maximise or minimise F, and show the evidence.", "solve paper-4.1-helical --json result.json"),
-        "evaluate": ("Show F, J, rank and rates at one point.", "evaluate paper-4.1-helical --set p_z=40"),
+        "solve": ("Optimise F, and show the evidence of the optimum.", "solve paper-4.1-helical --json result.json"),
+        "evaluate": (
+            "Show F, limits, rank and rates at one design and pose.",
+            "evaluate paper-4.1-helical --set p_z=40",
+        ),
         "inverse": (
-            "Compute positions of actuators and joints at many poses.",
+            "Compute actuator and joint coordinates at many poses.",
             "inverse hexapod-linuxcnc --poses poses.csv --csv joints.csv",
         ),
-        "report": ("Solve a case and write a page about it.", "report paper-4.1-helical --out report.html"),
+        "report": ("Solve a case, and write an HTML report.", "report paper-4.1-helical --out report.html"),
     },
     "Prove": {
         "certify": (
-            "Prove a bound of the global optimum over the whole box.",
+            "Prove a bound of the global optimum of a case.",
             "certify paper-4.1-helical --proof proof.json",
         ),
         "workspace": (
-            "Prove regular poses and limits over a whole workspace.",
+            "Prove no singularity and no violated limit over a workspace.",
             "workspace hexapod-linuxcnc --html workspace.html",
         ),
         "path": (
-            "Prove regular poses and limits at every point of a path.",
+            "Prove no singularity and no violated limit along a tool path.",
             "path hexapod-pocket --html path.html",
         ),
-        "verify-proof": ("Check a proof with independent code.", "verify-proof proof.json paper-4.1-helical"),
+        "verify-proof": ("Check a proof file with independent code.", "verify-proof proof.json paper-4.1-helical"),
     },
     "Explore": {
         "tradeoff": (
-            "Solve along one limit or number, and show F against it.",
+            "Re-solve for a range of values of one limit or parameter.",
             "tradeoff hexapod-machining --over limits.leg_length.max=28:40:13",
         ),
         "sweep": (
-            "Solve at thousands of values of fixed numbers.",
+            "Solve for thousands of values of fixed parameters.",
             "sweep paper-4.1-helical --over x1=10:14:41 --out sweep.csv",
         ),
         "pareto": (
-            "Find the front of two or more goals of a case.",
+            "Compute the Pareto front of two or more goals.",
             "pareto hexapod-machining --goal 'max F' --goal 'min limits.leg_length.max'",
         ),
         "compare": (
-            "Compare several robots on the task of a case.",
+            "Compare robots on the task of a case, and rank them.",
             "compare drilling-spindle case 6-ups delta --html robots.html",
         ),
     },
     "Exchange": {
         "import": (
-            "Read a robot with closed loops from MJCF or URDF.",
+            "Convert a closed-loop MJCF or URDF model to a robot file.",
             "import robot.xml --platform head --out robot.toml",
         ),
         "export": (
             "Write the solved robot as MJCF, URDF, CSV or DXF.",
             "export paper-4.1-helical --format mjcf --format csv --out robot",
         ),
-        "codegen": ("Write F and its derivatives as C for embedding.", "codegen paper-4.1-helical --out helical"),
-        "schema": ("Print the JSON Schema of case files.", "schema --result > result.schema.json"),
+        "codegen": (
+            "Write F and its derivatives as C code for controllers.",
+            "codegen paper-4.1-helical --out helical",
+        ),
+        "schema": ("Print the JSON Schema of case files or results.", "schema --result > result.schema.json"),
     },
     "Paper": {
-        "check": ("Compare cases with their expected and published values.", "check paper-4.1-helical --markdown"),
+        "check": ("Compare results with expected and published values.", "check paper-4.1-helical --markdown"),
     },
 }
-#: So many columns of a terminal are left for an example.
+#: Columns of a terminal that an example may take.
 _WIDTH = 76
 SUMMARIES = {name: summary for group in GROUPS.values() for name, (summary, _) in group.items()}
 EXAMPLES = {name: f"screwsynth {example}" for group in GROUPS.values() for name, (_, example) in group.items()}
 
 
 def help_of_commands() -> str:
-    """Return the help of the command line: the commands by what they are for."""
+    """Return the help of the command line: the commands by purpose."""
     from .helptext import paragraphs, table, usage
 
     options = [("--version", "Print the version."), HELP_ROW]
@@ -98,7 +104,7 @@ def help_of_commands() -> str:
 
 
 def run_command(words: list[str]) -> None:
-    """Run the command that a command line names; without a word, help goes to standard error.
+    """Run the command of a command line; without a command, help goes to standard error.
 
     Raises:
         InputError: the command line has a fault.
@@ -121,16 +127,16 @@ def run_command(words: list[str]) -> None:
         print_notice(help_of_commands())
         raise SystemExit(2)
     if rest[0] not in SUMMARIES:
-        raise InputError(f"{rest[0]}: no such command; {_meant(rest)}")
+        raise InputError(f"{rest[0]}: no such command; {_suggestion(rest)}")
     command_of(rest[0]).run(rest[1:])
 
 
 def _program(version: Annotated[bool, Option("--version", "", "Print the version.")] = False) -> None:
-    """Geometry and pose of a parallel robot for a given instantaneous screw motion."""
+    """Synthesis of parallel robots: dimensions and pose for a given instantaneous screw motion."""
 
 
-def _meant(args: list[str]) -> str:
-    """Return what may be meant by arguments whose first one is no command, as a clause."""
+def _suggestion(args: list[str]) -> str:
+    """Return a suggestion, as a clause, for arguments that do not begin with a command."""
     import shlex
     from pathlib import Path
 
@@ -143,15 +149,15 @@ def _meant(args: list[str]) -> str:
     if word == "version":
         return "write screwsynth --version"
     if word in model_names():
-        return f"this is a robot: screwsynth models {word} shows it, screwsynth new {word} writes a case of it"
+        return f"this is a robot: screwsynth models {word} shows it, screwsynth new {word} prints a case for it"
     if word in shipped_cases() or word.endswith(".toml") or Path(word).is_file():
-        return f"a case stands behind a command, as in screwsynth solve {shlex.quote(word)}"
+        return f"this is a case: write it after a command, as in screwsynth solve {shlex.quote(word)}"
     return nearest(word, SUMMARIES)
 
 
 def command_of(name: str) -> Command:
     """Return a command with its options, from its module."""
-    # A command that is too wide for a line goes on in the next one.
+    # A command that is too wide for a line continues on the next one.
     begin, option, end = EXAMPLES[name].rpartition(" --")
     example = f"{begin} \\\n   {option}{end}" if len(EXAMPLES[name]) > _WIDTH else EXAMPLES[name]
     if name == "import":

@@ -1,4 +1,4 @@
-"""The option ``--range`` of the command ``path``: how far each coordinate can move from a pose."""
+"""Option ``--range`` of the command ``path``: free travel from a pose along each coordinate."""
 
 from __future__ import annotations
 
@@ -22,20 +22,19 @@ def show_ranges(
     *,
     whole: bool,
 ) -> NoReturn:
-    """Write how far each coordinate of a pose can move, and exit.
+    """Write the free travel along each coordinate of a pose, and exit.
 
     Args:
-        case: with fixed dimensions.
-        start: the pose: position, and roll, pitch and yaw in degrees; None for the case's.
-        most: length and angle in degrees, with a comma, that coordinates are moved by; None for the size of the robot
-            and a right angle.
-        time: seconds; None for the usual ones.
-        files: that are written.
-        report: called with what is done next.
-        whole: whether everything is printed, and not the answer alone.
+        case: case with fixed dimensions.
+        start: pose: position, and roll, pitch and yaw in degrees; None for the pose of the case.
+        most: largest length and angle in degrees, with a comma; None for the size of the robot and a right angle.
+        time: time limit, seconds; None for the default.
+        files: files to write.
+        report: function that is called with the name of each next step.
+        whole: If true, everything is printed, not only the answer.
 
     Raises:
-        InputError: a number is not allowed.
+        InputError: a value is not allowed.
     """
     from ..proof.workspace.axis_ranges import TIME_LIMIT, axis_ranges
     from ..results.axisranges import axis_ranges_result

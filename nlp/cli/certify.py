@@ -1,4 +1,4 @@
-"""The command ``certify``."""
+"""Command ``certify``."""
 
 from __future__ import annotations
 
@@ -20,17 +20,23 @@ def certify(
     gap: options.OptimumGap = 1e-4,
     time: options.Time = None,
     above: Annotated[
-        float | None, options.number("--above", "F", "Prove that F is above this value on the whole box")
+        float | None,
+        options.number("--above", "F", "Only prove that F is above this value everywhere within the bounds"),
     ] = None,
     proof: options.ProofFile = None,
-    starts: Annotated[int | None, options.starts("Starting points for the incumbent; the case's if left out")] = None,
+    starts: Annotated[
+        int | None, options.starts("Starting points of the solve for the best known point; the case's if left out")
+    ] = None,
     seed: options.Seed = None,
     all_assemblies: options.AllAssemblies = False,
     jobs: options.Jobs = None,
     json_file: options.JsonFile = None,
     whole: options.ShowAll = False,
 ) -> None:
-    """Prove a bound of the global optimum over the whole box."""
+    """Prove a bound of the global optimum of a case.
+
+    The bound holds for every point within the bounds of the variables and the limits of the case.
+    """
     from ..errors import InputError, one_line
     from ..interruption import Milestone, answer_after
     from ..results.evidence import certified_of
@@ -40,9 +46,9 @@ def certify(
     try:
         answer_after(Milestone.START)
         answer_after(Milestone.BOUND)
-        CertifyOptions(gap, above, time, jobs)  # a wrong option is reported before a wrong case
+        CertifyOptions(gap, above, time, jobs)  # a fault of an option is reported before a fault of the case
         files = options.Outputs(json=json_file, proof=proof)
-        loaded, text, inputs = options.read_machine(case, settings, of).file
+        loaded, text, inputs = options.read_changed_case(case, settings, of).file
         files.check(inputs)
         certified = certify_with_progress(
             loaded,
@@ -62,13 +68,13 @@ def certify(
     def proof_text() -> str | None:
         if certified.tree is not None:
             return proof_of(certified, text).as_text()
-        # A file of an earlier run is left as it is: it must not be taken for the proof of this one.
+        # The file of an earlier run stays: an empty file would look like a proof of this run.
         print_notice(f"--proof {one_line(proof or '')}: not written, as there is no complete proof")
         return None
 
     def shown() -> Iterable[Line | TextTable]:
         in_home_mode = all(each.nlp.in_home_mode for each in certified.certificates)
-        options.show(contents.unknown_lines(loaded.model, all_assemblies=not in_home_mode), whole=True)
-        return contents.certified_summary(loaded, result)
+        unknowns = contents.unknown_lines(loaded.model, all_assemblies=not in_home_mode)
+        return [*contents.certified_summary(loaded, result), *unknowns]
 
     files.deliver(shown, whole=whole, done=certified.is_proved, proof=proof_text, json=lambda: result)

@@ -1,4 +1,4 @@
-"""The command ``check``."""
+"""Command ``check``."""
 
 from __future__ import annotations
 
@@ -11,15 +11,20 @@ from .commandline import Argument, print_notice
 def check(
     cases: Annotated[
         list[str] | None,
-        Argument("[CASE]...", "Case files or names of shipped cases, - is stdin; all shipped ones if left out."),
+        Argument("[CASE]...", "Case files or names of shipped cases, - is stdin; all shipped cases if left out."),
     ] = None,
     json_file: options.JsonFile = None,
-    junit: Annotated[str | None, options.file("--junit", "Write JUnit XML for a CI; - is stdout")] = None,
-    markdown: Annotated[bool, options.flag("--markdown", "Print the published numbers as a table")] = False,
+    junit: Annotated[
+        str | None, options.file("--junit", "Write JUnit XML for continuous integration; - is stdout")
+    ] = None,
+    markdown: Annotated[bool, options.flag("--markdown", "Print a table of the published values in Markdown")] = False,
     _time: options.Time = None,
     whole: options.ShowAll = False,
 ) -> None:
-    """Compare cases with their expected and published values."""
+    """Compare results with expected and published values.
+
+    A case states these values under [expect] and [[published]].
+    """
     from ..case.source import case_inputs, shipped_cases
     from ..errors import InputError
     from ..interruption import Milestone, answer_after, is_requested, why_stopped

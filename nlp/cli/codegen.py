@@ -1,4 +1,4 @@
-"""The command ``codegen``."""
+"""Command ``codegen``."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ def codegen(
     settings: options.SettingTexts = None,
     of: options.ResultFile = None,
     no_measure: Annotated[
-        bool, options.flag("--no-measure", "Do not compile the C to write its flash and stack into it")
+        bool, options.flag("--no-measure", "Do not compile the code to measure its flash and stack size")
     ] = False,
     force: options.Force = False,
 ) -> None:
-    """Write F and its derivatives as C for embedding."""
+    """Write F and its derivatives as C code for controllers."""
     from ..embedding.codegen import generate_c, size_words
     from ..embedding.ctext import identifier
     from ..errors import one_line
@@ -29,7 +29,7 @@ def codegen(
 
     if not force:
         check_folder(out)
-    loaded, text, inputs = options.read_machine(case, settings, of).file
+    loaded, text, inputs = options.read_changed_case(case, settings, of).file
     files = generate_c(loaded, text)
     for name in files if Path(out).is_dir() else ():
         check_outputs(inputs, {"--out": str(Path(out) / name)})
@@ -44,13 +44,13 @@ def codegen(
 
 
 def _measured(files: dict[str, str], prefix: str) -> dict[str, str]:
-    """Return the files with figures of flash and stack, which are printed; a terminal shows the progress."""
+    """Return the files with the measured sizes of flash and stack, which are printed; a terminal shows the progress."""
     from ..embedding.measure import figure_words, measure, with_figures
 
     if sys.stderr.isatty():
         from rich.console import Console
 
-        with Console(stderr=True).status("compiling to measure flash and stack; --no-measure leaves this out"):
+        with Console(stderr=True).status("compiling to measure flash and stack; --no-measure skips this"):
             figures = measure(files, prefix)
     else:
         figures = measure(files, prefix)

@@ -1,10 +1,10 @@
-"""Commands that the signatures of functions declare: their arguments and options, how these are read, and their help.
+"""Commands declared by the signatures of functions: arguments, options, reading, and help.
 
-The annotation of a parameter has its option or argument, as in ``Annotated[int, Option("--jobs", "N", "Threads")]``. A
+The annotation of a parameter has the option or argument, as in ``Annotated[int, Option("--jobs", "N", "Threads")]``. A
 parameter without a default is required; one that is a list takes several values.
 
-Libraries for this take longer to load than everything else that help needs, and ``argparse`` reads a value with a minus
-sign, such as the vector -1,0,0, as an option.
+Libraries for this load slower than everything else that help needs, and ``argparse`` takes a value with a minus sign,
+such as the vector -1,0,0, for an option.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
     from contextlib import AbstractContextManager
 
-#: Names of the option that every command has, and its row in help.
+#: Names of the option of every command, and its row in help.
 HELP = ("-h", "--help")
 HELP_ROW = (", ".join(HELP), "Show this message and exit.")
 
@@ -28,8 +28,8 @@ class Argument(NamedTuple):
     """Argument of a command.
 
     Attributes:
-        metavar: the word that stands for it in help.
-        help: one sentence about it.
+        metavar: placeholder in help.
+        help: sentence of help.
     """
 
     metavar: str
@@ -41,10 +41,10 @@ class Option(NamedTuple):
 
     Attributes:
         name: name, with its two dashes.
-        metavar: the word that stands for its value in help; empty for a flag, which has no value.
-        help: one sentence about it.
-        read: reader of its value; it raises InputError.
-        during: function from its value, or its default, to a context in which the command runs.
+        metavar: placeholder for the value in help; empty for a flag, which has no value.
+        help: sentence of help.
+        read: reader of the value; it raises InputError.
+        during: function from the value, or the default, to a context in which the command runs.
     """
 
     name: str
@@ -58,11 +58,11 @@ class Parameter(NamedTuple):
     """Parameter of a command's function.
 
     Attributes:
-        key: its name in the function.
-        declared: its option or argument.
-        is_several: whether it is a list.
-        is_required: whether it has no default.
-        default: its default; None where it is required.
+        key: name in the function.
+        declared: option or argument.
+        is_several: If true, the parameter is a list.
+        is_required: If true, the parameter has no default.
+        default: default; None for a required parameter.
     """
 
     key: str
@@ -73,12 +73,12 @@ class Parameter(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Name of the option, or the word that stands for the argument."""
+        """Name of the option, or placeholder of the argument."""
         return self.declared.name if isinstance(self.declared, Option) else self.declared.metavar
 
     @property
     def row(self) -> tuple[str, str]:
-        """Row of the parameter in help: its form, and words about it."""
+        """Row of the parameter in help: form and sentence."""
         each, words = self.declared, self.declared.help
         if self.is_required:
             words += "  [required]"
@@ -88,7 +88,7 @@ class Parameter(NamedTuple):
 
     @property
     def missing(self) -> str:
-        """Words about the parameter where it is required and not given."""
+        """Words of the message that the required parameter is missing."""
         words = self.declared.help.removesuffix(".")
         # Words such as CSV keep their letters.
         words = words if words[1:2].isupper() else words[:1].lower() + words[1:]
@@ -107,15 +107,15 @@ class Command:
     """A command.
 
     Attributes:
-        name: name.
-        arguments: arguments, of which the last may be a list.
-        options: options by name, without that of help.
+        name: name of the command.
+        arguments: arguments; the last one may be a list.
+        options: options by name, without the help option.
 
     Args:
-        name: name.
-        function: function that the command calls; its docstring is the text of the command's help.
+        name: name of the command.
+        function: function that the command calls; its docstring is the text of the help.
         shown: example for help.
-        rewritten: the words of a command line in the form in which they are read.
+        rewritten: function from the words of a command line to the words that are read.
     """
 
     def __init__(
@@ -140,7 +140,7 @@ class Command:
         return "\n\n".join([*blocks, example(self._example)])
 
     def run(self, words: list[str]) -> None:
-        """Call the function with what a command line gives, or print help where that is requested.
+        """Call the function with the values of a command line, or print help where it is requested.
 
         Raises:
             InputError: the command line has a fault.
@@ -159,7 +159,7 @@ class Command:
         """Return the values of a command line by the names of the function's parameters; None where help is requested.
 
         Raises:
-            InputError: an option or an argument is missing, is not one of the command, or has no such value.
+            InputError: an option or argument is missing, unknown, or has a value that is not allowed.
         """
         texts, places, is_help = self._sorted(self._rewritten(words))
         if is_help:
@@ -174,7 +174,7 @@ class Command:
                 raise InputError(f"{each.name}: is missing: {each.missing}")
             given.setdefault(key, each.default)
         if places:
-            taken = ", ".join(each.name for each in self.arguments) or "options alone"
+            taken = ", ".join(each.name for each in self.arguments) or "only options"
             raise InputError(f"{self.name}: got unexpected extra argument(s) ({' '.join(places)}); it takes {taken}")
         return given
 
@@ -226,6 +226,6 @@ def print_line(text: str) -> None:
 
 
 def print_notice(text: str) -> None:
-    """Write a line to standard error: what a command says beside its result."""
+    """Write a line to standard error: a remark that is no part of the result."""
     sys.stderr.write(f"{text}\n")
     sys.stderr.flush()

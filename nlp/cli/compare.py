@@ -1,4 +1,4 @@
-"""The command ``compare``."""
+"""Command ``compare``."""
 
 from __future__ import annotations
 
@@ -13,13 +13,17 @@ def compare(
     case: options.CaseName,
     robots: Annotated[
         list[str],
-        Argument("ROBOT...", "Names of robots, robot files, or 'case' for the case's own robot."),
+        Argument("ROBOT...", "Names of robots, robot files, or 'case' for the robot of the case."),
     ],
     size: Annotated[
-        float | None, options.number("--size", "LENGTH", "Common size; that of the case's robot if left out")
+        float | None,
+        options.number("--size", "LENGTH", "Common size of the robots; the size of the case's robot if left out"),
     ] = None,
-    no_scale: Annotated[bool, options.flag("--no-scale", "Take typical lengths as they are")] = False,
-    part: Annotated[float, options.number("--part", "PART", "Part by which dimensions are free; 0: fixed")] = 0.25,
+    no_scale: Annotated[bool, options.flag("--no-scale", "Do not scale robots to a common size")] = False,
+    part: Annotated[
+        float,
+        options.number("--part", "FRACTION", "Bounds of dimensions, as a fraction of typical values; 0 fixes them"),
+    ] = 0.25,
     certified: options.Certify = False,
     time: Annotated[float | None, options.time("60 for each proof if left out")] = None,
     settings: options.SettingTexts = None,
@@ -32,10 +36,13 @@ def compare(
     csv_file: Annotated[str | None, options.table("a row for each robot")] = None,
     markdown: options.MarkdownFile = None,
     html: options.PageFile = None,
-    plot: Annotated[str | None, options.plot("Draw the designs in one scale")] = None,
+    plot: Annotated[str | None, options.plot("Draw the designs at the same scale")] = None,
     whole: options.ShowAll = False,
 ) -> None:
-    """Compare several robots on the task of a case."""
+    """Compare robots on the task of a case, and rank them.
+
+    Robots are scaled to a common size, and their dimensions are optimised near typical values.
+    """
     from pathlib import Path
 
     from ..comparison.compare import compare as compare_robots
@@ -44,7 +51,7 @@ def compare(
     from ..interruption import Milestone, answer_after, is_requested, why_stopped
 
     files = options.Outputs(resume=resume, json=json_file, csv=csv_file, markdown=markdown, html=html, plot=plot)
-    read = options.read_machine(case, settings, of).file
+    read = options.read_changed_case(case, settings, of).file
     inputs = dict(read.inputs)
     for each in read_robots(robots, read.case):
         if each.file is not None:
@@ -68,7 +75,7 @@ def compare(
             )
         is_stopped = is_requested()
         if is_stopped:
-            begun = f"{len(found.entries)} of {len(robots)} robots are begun, the last one not to its end"
+            begun = f"{len(found.entries)} of {len(robots)} robots are solved or begun, the last one is incomplete"
             print_notice(f"{why_stopped()}: {begun}")
         is_proved = not certified or all(
             each.certified is not None and each.certified.is_proved for each in found.ranked

@@ -1,4 +1,4 @@
-"""Outputs of the commands that make tables of designs: ``sweep``, ``tradeoff``, ``pareto`` and ``compare``."""
+"""Outputs of the commands with tables of designs: ``sweep``, ``tradeoff``, ``pareto`` and ``compare``."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ def deliver(
     done: bool,
     shown: Callable[[], Iterable[Line | TextTable]] | None = None,
 ) -> NoReturn:
-    """Write a table of designs into the files that are asked for, show it, and exit.
+    """Write a table of designs into the requested files, show it, and exit.
 
     Args:
         files: the files.
         found: the table.
         result: returns the result for JSON.
-        whole: whether everything is shown, and not the answer alone.
-        done: whether the exit status is 0, and not 1.
-        shown: returns the lines for the terminal; the table with the lines around it where it is left out.
+        whole: If true, everything is shown, not only the answer.
+        done: If true, the exit status is 0; else 1.
+        shown: returns the lines for the terminal; None for the table with the lines around it.
 
     Raises:
         InputError: a file cannot be written.
@@ -54,15 +54,15 @@ def deliver(
 
 @contextmanager
 def resumed(journal: str | None) -> Iterator[None]:
-    """Take searches of a block from a journal of an earlier run, and keep those that are new in it.
+    """Take searches of a block from the journal of an earlier run, and add new ones to it.
 
-    The journal is removed where the block delivers a result that no stop has cut short.
+    The journal is removed after a result that no stop has cut short.
 
     Args:
-        journal: its file; None without one.
+        journal: file of the journal; None without a journal.
 
     Raises:
-        InputError: the file cannot be written, is something else, or is held by another process.
+        InputError: the file cannot be written, is no journal, or is used by another process.
     """
     if journal is None:
         yield

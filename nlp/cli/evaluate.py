@@ -1,4 +1,4 @@
-"""The command ``evaluate``."""
+"""Command ``evaluate``."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ def evaluate(
     case: options.CaseName,
     settings: options.SettingTexts = None,
     of: Annotated[
-        str | None, options.text("--of", "RESULT", "Take dimensions and pose from a result that solve --json wrote")
+        str | None, options.text("--of", "RESULT", "Take dimensions and pose from a result of solve --json")
     ] = None,
     claim: Annotated[
         str | None,
         options.text(
-            "--set-from", "RESULT#N", "Take the pose of the N-th refuted claim of workspace --json or path --json"
+            "--set-from", "RESULT#N", "Take the pose of violation N in a result of workspace --json or path --json"
         ),
     ] = None,
     json_file: options.JsonFile = None,
@@ -25,19 +25,19 @@ def evaluate(
     table: options.CsvTable = None,
     whole: options.ShowAll = False,
 ) -> None:
-    """Show F, J, rank and rates at one point.
+    """Show F, limits, rank and rates at one design and pose.
 
-    Nothing is optimised. Free numbers are at their starts, or in the middle of their ranges. Driven joints that the
-    pose does not determine are at home, or where --of has them.
+    Nothing is optimised. A variable has its start value, or else the middle of its bounds. Actuator coordinates that
+    the pose does not determine are 0 (home), or those of the result of --of.
     """
     from ..evidence import state
     from ..evidence.evaluation import starting_point, without_speeds
     from ..program.formulation import formulate_each
     from ..results.evaluation import evaluation_of
 
-    given = options.read_machine(case, settings, of, at_pose=True, claim=claim).file
+    given = options.read_changed_case(case, settings, of, at_pose=True, claim=claim).file
     loaded = given.case
-    if left_out := loaded.without_motion:  # a pose of a path, whose own motion is meant
+    if left_out := loaded.without_motion:  # a pose of a path: its speeds come from the motion of the path
         loaded = without_speeds(loaded)
         names = ", ".join(f"limits.{each.name}" for each in left_out)
         print_notice(f"{names}: left out, as the case has no [motion]")

@@ -1,4 +1,4 @@
-"""The command ``export``."""
+"""Command ``export``."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from .commandline import print_notice
 def export(
     case: options.CaseName,
     out: options.Folder,
-    formats: Annotated[list[str], options.several("--format", "NAME", "mjcf, urdf, csv, dxf or all")],
+    formats: Annotated[list[str], options.several("--format", "NAME", "Format: mjcf, urdf, csv, dxf or all")],
     settings: options.SettingTexts = None,
     of: Annotated[
-        str | None, options.text("--of", "RESULT", "Write the robot of a result of solve --json; nothing is solved")
+        str | None, options.text("--of", "RESULT", "Write the robot of a result of solve --json, without a solve")
     ] = None,
     pose: options.PoseNumber = 1,
     starts: options.Starts = None,
@@ -27,7 +27,7 @@ def export(
 ) -> None:
     """Write the solved robot as MJCF, URDF, CSV or DXF.
 
-    A case with nothing free is taken as it is, and one with a result as the result states it.
+    A case without variables is not solved. With --of, the dimensions and the pose are those of the result.
     """
     from ..case.reader import read_case
     from ..errors import one_line

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-#: Fewest and most columns of help, whatever the terminal has, and columns that stay free at its right edge.
+#: Smallest and largest width of help in columns, and columns that stay free at the right edge of the terminal.
 _NARROWEST, _WIDEST, _EDGE = 50, 98, 2
-#: Widest first column of a table: what is longer has a line of its own.
+#: Largest width of the first column of a table; a longer entry has a line of its own.
 _FIRST = 30
 _INDENT = "  "
 
@@ -22,7 +22,7 @@ def columns() -> int:
 
 
 def usage(command: str, words: Iterable[str]) -> str:
-    """Return the usage line of a command, from the words that stand for its options and arguments."""
+    """Return the usage line of a command with placeholders for its options and arguments."""
     begin = f"Usage: {command} "
     return textwrap.fill(" ".join(words), columns(), initial_indent=begin, subsequent_indent=" " * len(begin))
 
@@ -41,7 +41,7 @@ def example(command: str) -> str:
 
 
 def table(title: str, rows: Sequence[tuple[str, str]]) -> str:
-    """Return a titled table of names and words about them."""
+    """Return a table of names and sentences, with a title."""
     first = min(max(len(name) for name, _ in rows), _FIRST)
     margin = " " * (len(_INDENT) + first + 2)
     lines = [f"{title}:"]

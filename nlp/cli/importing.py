@@ -1,4 +1,4 @@
-"""The command ``import``."""
+"""Command ``import``."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from .commandline import Argument, print_line
 
 
 def with_repeated_options(words: list[str]) -> list[str]:
-    """Return the words of a command line with ``--actuated`` or ``--free`` before each of its values.
+    """Return the words of a command line with ``--actuated`` or ``--free`` before each of their values.
 
-    These options also take every value up to the next option.
+    These options also take all values up to the next option.
     """
     written: list[str] = []
     option, is_first = "", False
@@ -29,35 +29,38 @@ def with_repeated_options(words: list[str]) -> list[str]:
 
 
 def import_(
-    file: Annotated[str, Argument("FILE", "A model in MJCF (.xml) or URDF.")],
-    platform: Annotated[str, options.text("--platform", "BODY", "Body, link or site that is the platform")],
-    base: Annotated[str, options.text("--base", "BODY", "Body that is the base; the fixed root if left out")] = "",
+    file: Annotated[str, Argument("FILE", "Model in MJCF (.xml) or URDF.")],
+    platform: Annotated[str, options.text("--platform", "BODY", "Platform: a body, link or site of the model")],
+    base: Annotated[str, options.text("--base", "BODY", "Base: a body of the model; the fixed root if left out")] = "",
     actuated: Annotated[
-        list[str] | None, options.several("--actuated", "JOINT", "Driven joint, instead of those of the model")
+        list[str] | None,
+        options.several("--actuated", "JOINT", "Actuated joint, instead of the actuators of the model"),
     ] = None,
     out: Annotated[str | None, options.file("--out", "Robot file to write; - is stdout")] = None,
     close: Annotated[
-        bool, options.flag("--close", "Close open loops by Newton's method, if need be from other starts")
+        bool, options.flag("--close", "Close loops that the model leaves open, by Newton's method from several starts")
     ] = False,
     keyframe: Annotated[
-        str, options.text("--keyframe", "NAME", "Configuration of an MJCF file: one of its keyframes")
+        str, options.text("--keyframe", "NAME", "Home configuration: a keyframe of the MJCF file")
     ] = "",
     snap: Annotated[
-        float, options.number("--snap", "LENGTH", "Move axes by up to this, so that they meet or are parallel")
+        float, options.number("--snap", "LENGTH", "Move axes by up to this length, so that they meet or are parallel")
     ] = 0.0,
     loops: Annotated[
-        str | None, options.file("--loops", "Loops of a URDF, instead of the .yaml file beside it")
+        str | None, options.file("--loops", "File of the loops of a URDF model, instead of the .yaml file next to it")
     ] = None,
     free: Annotated[
         list[str] | None,
-        options.several("--free", "NAME", "Make a joint's place, JOINT.axis, or a suggestion a dimension"),
+        options.several("--free", "NAME", "Make a dimension of a joint's position, of JOINT.axis, or of a suggestion"),
     ] = None,
-    suggest: Annotated[bool, options.flag("--suggest", "List circles and symmetries, for --free")] = False,
+    suggest: Annotated[
+        bool, options.flag("--suggest", "List circles and symmetries of the joints as suggestions for --free")
+    ] = False,
     force: options.Force = False,
 ) -> None:
-    """Read a robot with closed loops from MJCF or URDF.
+    """Convert a closed-loop MJCF or URDF model to a robot file.
 
-    The robot file has the model's numbers; its joints have the model's names. FILE stands before --actuated and --free.
+    The joints keep the names of the model. FILE must come before --actuated and --free.
     """
     from ..errors import InputError, one_line
     from ..formats.reading.importing import Request, import_robot
@@ -72,8 +75,8 @@ def import_(
     if not platform:
         raise InputError("--platform: needs a value, BODY")
     if out is None and not suggest:
-        raise InputError("--out: is missing: name the robot file to write, or ask for --suggest")
-    inputs = {Path(file): "the model that is read", **({} if loops is None else {Path(loops): "its file of loops"})}
+        raise InputError("--out: is missing: name the robot file to write, or give --suggest")
+    inputs = {Path(file): "the model that is read", **({} if loops is None else {Path(loops): "the file of its loops"})}
     check_outputs(inputs, {"--out": out})
     if out is not None:
         check_origin(out, BEGINNING, force=force)
@@ -93,4 +96,4 @@ def import_(
         title = Line(found.mechanism.name, tone=Tone.TITLE)
         show(options.console(), [title, *(Line(text, label=label) for label, text in lines)])
         if out is not None:
-            print_line(f'{one_line(out)} has the robot: [robot] file = "{one_line(Path(out).name)}" in a case reads it')
+            print_line(f'{one_line(out)} is written; use it in a case with [robot] file = "{one_line(Path(out).name)}"')

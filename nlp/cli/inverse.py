@@ -1,4 +1,4 @@
-"""The command ``inverse``."""
+"""Command ``inverse``."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from . import contents, options
 
 def inverse(
     case: options.CaseName,
-    poses: Annotated[str, options.file("--poses", "CSV file of poses, as a case names it")],
-    csv_file: Annotated[str | None, options.table("the positions of all joints")] = None,
-    derivatives: Annotated[bool, options.flag("--derivatives", "Write the rates of the actuators and J too")] = False,
+    poses: Annotated[str, options.file("--poses", "CSV file of poses, in the format of a case's file of poses")],
+    csv_file: Annotated[str | None, options.table("the coordinates of all joints")] = None,
+    derivatives: Annotated[bool, options.flag("--derivatives", "Also write actuator rates and J")] = False,
     previous: Annotated[
-        bool, options.flag("--previous", "Follow the joints from pose to pose, not each from home")
+        bool, options.flag("--previous", "Start each pose from the joints of the previous pose, not from home")
     ] = False,
     settings: options.SettingTexts = None,
     of: options.ResultFile = None,
     whole: options.ShowAll = False,
 ) -> None:
-    """Compute positions of actuators and joints at many poses.
+    """Compute actuator and joint coordinates at many poses.
 
-    The exit status is 1 where a pose is not closed: out of reach, or not one that the robot can take.
+    The exit status is 1 if a pose has no solution: it is out of reach, or not a pose of the robot's degrees of freedom.
     """
     from pathlib import Path
 
@@ -32,7 +32,7 @@ def inverse(
     if derivatives and csv_file is None:
         raise InputError("--derivatives: needs --csv FILE")
     files = options.Outputs(csv=csv_file)
-    loaded, _, inputs = options.read_machine(case, settings, of).file
+    loaded, _, inputs = options.read_changed_case(case, settings, of).file
     files.check({**inputs, Path(poses): "the file of the poses"})
     given = read_poses(poses, loaded.units, "--poses")
     found = inverse_at(loaded, given.positions, given.rotations, follow="previous" if previous else "home")

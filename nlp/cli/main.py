@@ -1,6 +1,6 @@
-"""The command ``screwsynth``: from the process's arguments to its exit status.
+"""Command ``screwsynth``: from the arguments of the process to its exit status.
 
-Exit status: 0 done; 1 no answer, no proof, a violated limit, or a failed check; 2 the input is wrong; 130 interrupted.
+Exit status: 0 done; 1 no answer, no proof, a violated limit, or a failed check; 2 wrong input; 130 interrupted.
 """
 
 from __future__ import annotations
@@ -20,18 +20,17 @@ if TYPE_CHECKING:
 #: Objects allocated between two garbage collections. Imports allocate 90,000 objects and leave no garbage: with
 #: Python's own threshold of 700 they cause 120 collections, which take 60 ms of a solve's 700.
 _GARBAGE_AFTER = 200_000
-#: Stack of the thread that works, bytes: that of a main thread, where a system gives other threads less.
+#: Stack of the working thread, bytes: the size of a main thread's stack, as some systems give other threads less.
 _STACK = 16 * 2**20
-#: Seconds between two looks at the working thread, where a signal does not end the wait by itself.
+#: Seconds between two checks of the working thread, on systems where a signal does not end the wait.
 _LOOK = 0.25
 
 
 def main() -> None:
     """Run the command line, and end the process without finalising the interpreter.
 
-    The work runs in a thread of its own, so that this one answers an interrupt at once: a long call into a numerical
-    library would hold it back. Every file is closed by the end. Finalising the numerical libraries takes 110 ms, of a
-    solve's 700.
+    The work runs in a separate thread, so that the main thread answers an interrupt at once, even during a long call of
+    a numerical library. All files are closed by the end. Finalising the libraries takes 110 ms of a solve's 700.
     """
     listen()
     _open_standard_streams()
@@ -42,12 +41,12 @@ def main() -> None:
     stack_size(0)
     while work.is_alive():
         work.join(_LOOK)
-    # Without a status, the thread ended with an error, which is shown already.
+    # Without a status, the thread ended with an error, which Python has shown.
     os._exit(ended[0] if ended else 1)
 
 
 def run() -> int:
-    """Run the command line on ``sys.argv``; errors become one sentence on standard error.
+    """Run the command line on ``sys.argv``; an error becomes one sentence on standard error.
 
     Returns:
         Exit status.
@@ -56,13 +55,12 @@ def run() -> int:
 
     # pydantic would look for plugins in every installed distribution: 6 ms where there are 70.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-    # The matrices here are a dozen wide: BLAS threads would only cost 40 ms or more of processor time beside the
-    # solver's own.
+    # The matrices have about a dozen rows: BLAS threads would only cost 40 ms or more of processor time.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     thresholds = gc.get_threshold()
     gc.set_threshold(_GARBAGE_AFTER, *thresholds[1:])
     for stream in (sys.stdout, sys.stderr):
-        # A terminal that cannot show a letter of a title shows its escape instead.
+        # A terminal shows an escape for a letter that it cannot show.
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     try:
@@ -80,7 +78,11 @@ def run() -> int:
         gc.set_threshold(*thresholds)
     if not is_requested() and status != INTERRUPTED:
         return status
-    _say(f"interrupted: the result is what was known by then; {kept()}" if is_requested() else f"interrupted: {kept()}")
+    _say(
+        f"interrupted: the result shows the state at that time; {kept()}"
+        if is_requested()
+        else f"interrupted: {kept()}"
+    )
     return INTERRUPTED
 
 
@@ -96,7 +98,7 @@ def _status_of(words: list[str]) -> int:
 
 
 def _say(sentence: str) -> None:
-    """Write a sentence to standard error; where that is closed or full, the exit status says enough."""
+    """Write a sentence to standard error; errors of standard error are ignored, as the exit status remains."""
     try:
         sys.stderr.write(f"screwsynth: {sentence}\n")
         sys.stderr.flush()
@@ -105,12 +107,12 @@ def _say(sentence: str) -> None:
 
 
 class _Lenient(io.FileIO):
-    """A file that loses what cannot be written."""
+    """File that drops bytes that cannot be written."""
 
     lost: type[OSError] = OSError
 
     def write(self, content: Buffer) -> int:
-        """Write bytes, or lose them."""
+        """Write bytes, or drop them."""
         try:
             return super().write(content)
         except self.lost:
@@ -118,17 +120,17 @@ class _Lenient(io.FileIO):
 
 
 class _Unread(_Lenient):
-    """A file that loses what nobody reads any more, as behind ``head``."""
+    """File that drops bytes after its reader has ended, as in a pipe to ``head``."""
 
     lost = BrokenPipeError
 
 
 def _open_standard_streams() -> None:
-    """Open closed standard streams, and make standard error one that never fails.
+    """Open closed standard streams, and make standard error a stream that never fails.
 
-    A file that is opened later would otherwise become a standard stream. Writing to a closed standard output is an
-    error, as for a full one; what is written to a closed standard error is lost. A standard output that nobody reads
-    any more is none: the command goes on, writes its files, and ends with its own status.
+    A file that is opened later would otherwise become a standard stream. Writing to a closed or full standard output is
+    an error; text for a closed standard error is lost. A standard output whose reader has ended is no error: the
+    command writes its files, and ends with its own status.
     """
     for descriptor, flags in enumerate((os.O_RDONLY, os.O_RDONLY, os.O_WRONLY)):
         try:

@@ -1,4 +1,4 @@
-"""The command ``models``."""
+"""Command ``models``."""
 
 from __future__ import annotations
 
@@ -15,13 +15,15 @@ if TYPE_CHECKING:
 
 
 def models(
-    name: Annotated[str | None, Argument("[NAME]", "One robot, or a robot file (.toml), in full.")] = None,
+    name: Annotated[
+        str | None, Argument("[NAME]", "Name of a robot, or a robot file (.toml), to show in full.")
+    ] = None,
     plot: options.PlotFile = None,
     whole: options.ShowAll = False,
 ) -> None:
     """List the robots, or show one in full.
 
-    One robot is shown with its parameters, options and wrenches.
+    A robot is shown with its options, parameters, limbs and wrenches.
     """
     from pathlib import Path
 
@@ -40,7 +42,7 @@ def models(
         return
     found = model_options(name) if file is None else ()
     needed = [option.name for option in found if option.default is None]
-    # Without the options that have no default, the robot cannot be built, and has no parameters to show.
+    # A robot whose options have no default cannot be built, and has no parameters to show.
     model = options.read_robot(file) if file is not None else None if needed else build_model(name)
     if plot is not None and model is None:
         raise InputError(f"--plot {plot}: robot {name!r} needs its option {needed[0]!r} first")

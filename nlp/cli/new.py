@@ -1,4 +1,4 @@
-"""The command ``new``."""
+"""Command ``new``."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def new(
 ) -> None:
     """Print a commented starter case.
 
-    A case of a robot file belongs in the same folder.
+    Save a case for a robot file in the folder of that file.
     """
     from pathlib import Path
 

@@ -1,6 +1,6 @@
-"""Arguments and options of the commands, what reads them, and the files that a command writes.
+"""Arguments and options of the commands, their readers, and the files that a command writes.
 
-An option that several commands have is defined here, once.
+Options of several commands are defined here, once.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class WholeNumber:
 
     Attributes:
         option: name of the option.
-        least, most: smallest and largest allowed number; no largest one for None.
+        least, most: smallest and largest allowed number; no largest number for None.
     """
 
     def __init__(self, option: str, least: int, most: int | None = None) -> None:
@@ -57,11 +57,11 @@ class WholeNumber:
 
 
 class Number:
-    """Reader of an option that is a number; without a smallest one, the command checks whether it is allowed.
+    """Reader of an option that is a number.
 
     Attributes:
         option: name of the option.
-        least: smallest allowed number, where all below 1 are allowed.
+        least: smallest allowed number; numbers must then be below 1. None where the command checks the number.
     """
 
     def __init__(self, option: str, least: float | None = None) -> None:
@@ -85,17 +85,17 @@ class Number:
         return number
 
 
-# The words of the command line: what several commands have has one name, one form and one sentence of help, to which a
-# command adds its own words.
+# Words of the command line: an option of several commands has one name, one form and one sentence of help, to which a
+# command adds words of its own.
 
 
 def text(name: str, metavar: str, words: str) -> Option:
-    """Return an option that is a text, with what the help says of it."""
+    """Return an option that is a text, with its sentence of help."""
     return Option(name, metavar, f"{words}.")
 
 
 def several(name: str, metavar: str, words: str) -> Option:
-    """Return an option that is given once for each value: the only form of a list of names."""
+    """Return an option that is given once for each value."""
     return Option(name, metavar, f"{words}; may be repeated.")
 
 
@@ -115,8 +115,8 @@ def plot(words: str, name: str = "--plot") -> Option:
 
 
 def page(words: str) -> Option:
-    """Return the option of a page that a command writes beside its result."""
-    return file("--html", f"Write a page of HTML{words}; - is stdout")
+    """Return the option of a page of HTML."""
+    return file("--html", f"Write an HTML page{words}; - is stdout")
 
 
 def table(words: str) -> Option:
@@ -125,12 +125,12 @@ def table(words: str) -> Option:
 
 
 def number(name: str, metavar: str, words: str, least: float | None = None) -> Option:
-    """Return an option that is a number, of at least one and below 1 where a smallest one is given."""
+    """Return an option that is a number; with a smallest allowed number, it must be below 1 too."""
     return Option(name, metavar, f"{words}.", Number(name, least))
 
 
 def whole(name: str, words: str, least: int, most: int | None = None) -> Option:
-    """Return an option that is a whole number within ends."""
+    """Return an option that is a whole number between two bounds."""
     return Option(name, "N", f"{words}.", WholeNumber(name, least, most))
 
 
@@ -145,7 +145,7 @@ def jobs(words: str) -> Option:
 
 
 def _seconds(text: str) -> float:
-    """Return the time that a text gives.
+    """Return the time of a text, seconds.
 
     Raises:
         InputError: the text is no number, or the number is not positive.
@@ -158,49 +158,54 @@ def _seconds(text: str) -> float:
 
 
 def time(left_out: str, end: str = "shows its results") -> Option:
-    """Return the option ``--time``, with the time of a command without it, and what the command does at its end."""
-    words = f"Seconds for the whole command, which then {end}; {left_out}."
+    """Return the option ``--time``, with the default time, and the command's action at the end of the time."""
+    words = f"Time limit of the command in seconds; it then {end}; {left_out}."
     return Option("--time", "SECONDS", words, _seconds, within)
 
 
-CaseName = Annotated[str, Argument("CASE", "A case file, or the bare name of a shipped case; - is stdin.")]
+CaseName = Annotated[str, Argument("CASE", "Case file, or name of a shipped case; - is stdin.")]
 SettingTexts = Annotated[
-    list[str] | None, several("--set", "NAME=VALUE", "Replace a number of the case: x4=20, p_z=40, axis=0,0,1")
+    list[str] | None, several("--set", "NAME=VALUE", "Replace a value of the case: x4=20, p_z=40, axis=0,0,1")
 ]
-ResultFile = Annotated[str | None, text("--of", "RESULT", "Take the dimensions from a result that solve --json wrote")]
-Starts = Annotated[int | None, starts("Starting points; the case's if left out")]
-Seed = Annotated[int | None, whole("--seed", "Seed; the case's if left out", 0)]
-Jobs = Annotated[int | None, jobs("Threads; results do not depend on them; all cores if left out")]
+ResultFile = Annotated[str | None, text("--of", "RESULT", "Take the dimensions from a result of solve --json")]
+Starts = Annotated[int | None, starts("Number of starting points; the case's if left out")]
+Seed = Annotated[int | None, whole("--seed", "Random seed; the case's if left out", 0)]
+Jobs = Annotated[int | None, jobs("Number of threads, which does not change results; all cores if left out")]
 Time = Annotated[float | None, time("no limit if left out")]
-PoseNumber = Annotated[int, whole("--pose", "Pose that is drawn or written, where the case has several", 1)]
-Certify = Annotated[bool, flag("--certify", "Prove every optimum too, as certify does")]
-# A bound of an optimum is one number, and takes 1e-4; a machine has dozens of ranges of numbers, which take 1e-3.
-OptimumGap = Annotated[float, number("--gap", "PART", "Largest relative gap of a proven optimum", 1e-10)]
-RangeGap = Annotated[float, number("--gap", "PART", "Largest relative gap of a number without a limit", 1e-9)]
-AllAssemblies = Annotated[
-    bool, flag("--all-assemblies", "Cover all working modes of a robot's joints, not home's alone")
+PoseNumber = Annotated[int, whole("--pose", "Number of the pose to draw or write, in a case of several poses", 1)]
+Certify = Annotated[bool, flag("--certify", "Also prove a bound of every optimum, as certify does")]
+# A certificate has one bound, with a gap of 1e-4; a workspace has dozens of ranges, with a gap of 1e-3.
+OptimumGap = Annotated[
+    float, number("--gap", "FRACTION", "Stop when bound and best value differ by less than this fraction", 1e-10)
 ]
+RangeGap = Annotated[
+    float,
+    number("--gap", "FRACTION", "Tighten a range until bound and best value differ by less than this fraction", 1e-9),
+]
+AllAssemblies = Annotated[bool, flag("--all-assemblies", "Cover all working modes of the robot, not only that of home")]
 LegError = Annotated[
-    float, number("--leg-error", "LENGTH", "Largest error of a leg's length: bounds the errors of the pose")
+    float, number("--leg-error", "LENGTH", "Also bound the pose error for leg length errors of up to this")
 ]
-ProofFile = Annotated[str | None, file("--proof", "Write the proof, for verify-proof")]
+ProofFile = Annotated[str | None, file("--proof", "Write the proof file for verify-proof")]
 JsonFile = Annotated[str | None, file("--json", "Write the result as JSON; - is stdout")]
-CsvFile = Annotated[str | None, table("the tables with all digits")]
-CsvTable = Annotated[str | None, text("--table", "NAME", "Write this table only, such as design, limbs or limits")]
+CsvFile = Annotated[str | None, table("all tables, with all digits,")]
+CsvTable = Annotated[
+    str | None, text("--table", "NAME", "Write only this table with --csv, such as design, limbs or limits")
+]
 PlotFile = Annotated[str | None, plot("Draw the robot")]
 CurveFile = Annotated[str | None, plot("Draw the curve")]
 PageFile = Annotated[str | None, page("")]
 MarkdownFile = Annotated[str | None, file("--markdown", "Write the table in Markdown; - is stdout")]
 ResumeFile = Annotated[
-    str | None, file("--resume", "Journal of what is solved: the same command goes on from it after a stop")
+    str | None, file("--resume", "Journal of solved points: after a stop, the same command continues from it")
 ]
-ShowAll = Annotated[bool, flag("--all", "Show every row and every table, not the answer alone")]
+ShowAll = Annotated[bool, flag("--all", "Show all rows and tables, not only the answer")]
 Folder = Annotated[str, text("--out", "DIR", "Folder to write into")]
-Force = Annotated[bool, flag("--force", "Write over files that screwsynth did not write")]
+Force = Annotated[bool, flag("--force", "Overwrite files that screwsynth did not write")]
 
 
 def read_settings(texts: list[str] | None) -> Settings:
-    """Return the numbers that ``--set`` gives, by name; the last counts where one is given twice.
+    """Return the values of ``--set`` by name; of a name that is given twice, the last value.
 
     Raises:
         InputError: a text is neither ``NAME=NUMBER`` nor ``NAME=X,Y,Z``.
@@ -218,34 +223,34 @@ def _read_setting(text: str) -> tuple[str, float | list[float]]:
         numbers = [float(part) for part in value.split(",")]
     except ValueError:
         numbers = []
-    # No number of a case is a pair: two are one with a decimal comma, but for an axis that lacks a part.
+    # No value of a case is a pair: two numbers are one with a decimal comma, or an axis without its third part.
     is_pair = len(numbers) == 2 and not name.endswith("axis")
     if not (name and equals and numbers) or is_pair:
         raise InputError(f"--set {text}: must be NAME=NUMBER, or axis=X,Y,Z{hint_of(value)}")
     return name, numbers[0] if len(numbers) == 1 else numbers
 
 
-class Machine(NamedTuple):
-    """A case as it was read, and the numbers that replace those of its file."""
+class ChangedCase(NamedTuple):
+    """A case, and the values that replace those of its file."""
 
     file: CaseFile
     settings: Settings
 
 
-def read_machine(
+def read_changed_case(
     name: str, texts: list[str] | None, of: str | None, *, at_pose: bool = False, claim: str | None = None
-) -> Machine:
-    """Read a case with the numbers of ``--set``, and with the dimensions of a result of ``--of``.
+) -> ChangedCase:
+    """Read a case with the values of ``--set``, and with the dimensions of the result of ``--of``.
 
     Args:
-        name: of the case.
-        texts: of ``--set``: numbers that replace those of the file, and of the result.
-        of: file of the result; None without one.
-        at_pose: whether a result of this case gives the pose too.
-        claim: result with the number of a refuted claim, of which dimensions and pose are taken; None without one.
+        name: name of the case.
+        texts: texts of ``--set``: values that replace those of the file, and of the result.
+        of: file of the result; None without a result.
+        at_pose: If true, a result of this case gives the pose too.
+        claim: result and number of a violation that gives dimensions and pose; None without a violation.
 
     Raises:
-        InputError: a file cannot be read or holds a fault, or the result is no answer for this robot in these units.
+        InputError: a file cannot be read or has a fault, or the result is no answer for this robot in these units.
     """
     from ..case.reader import read_case
 
@@ -255,7 +260,7 @@ def read_machine(
 
         settings = {**claim_settings(claim, read_case(name, settings).case), **settings}
     if of is None:
-        return Machine(read_case(name, settings), settings)
+        return ChangedCase(read_case(name, settings), settings)
     from ..errors import one_line
     from ..results.settings import dimensions_of, load_answer, place_of, robot_of, settings_of
 
@@ -268,12 +273,12 @@ def read_machine(
     chosen = {**numbers, **place_of(result, case), **settings}
     if not is_same:
         what = "dimensions and the pose" if has_pose else "dimensions"
-        print_notice(f"--of {one_line(of)}: has the {what} of the case {one_line(result.head.case)!r}")
-    return Machine(read_case(name, chosen), chosen)
+        print_notice(f"--of {one_line(of)}: gives the {what} of the case {one_line(result.head.case)!r}")
+    return ChangedCase(read_case(name, chosen), chosen)
 
 
 def read_robot(file: str) -> Model:
-    """Return the robot of a robot file that stands apart from a case.
+    """Return the robot of a robot file, without a case.
 
     Raises:
         InputError: the file cannot be read, or holds a fault.
@@ -286,24 +291,23 @@ def read_robot(file: str) -> Model:
     try:
         return model_of_definition(read_definition(file, Path()), file)
     except CaseError as error:
-        # The key is that of a case that names the file, and there is no case here.
+        # The key belongs to a case that names the file, and there is no case here.
         raise (InputError(f"{file}: {error.fault}") if error.key == "robot.file" else error) from None
 
 
-#: Options of files for which ``-`` is a name: pictures; the table of a sweep, and journals.
+#: Options for which ``-`` is the name of a file: pictures; the table of a sweep, and journals.
 _PICTURES, _NAMED = ("plot", "plot_pose"), ("out", "resume")
 
 
 class Outputs:
-    """The files that a command writes; it refuses those that cannot be made, before the work begins.
+    """Output files of a command; files that cannot be made are refused before the work begins.
 
     Args:
-        targets: file by the option that names it, such as ``json``, or ``plot_pose`` for ``--plot-pose``; None for one
-            that is not asked for. All but pictures, journals and the table of a sweep are standard output for ``-``,
-            one of them at most.
+        targets: files by option, such as ``json``, or ``plot_pose`` for ``--plot-pose``; None for a file that is not
+            requested. ``-`` is standard output, for one file at most; not for pictures, journals and a sweep's table.
 
     Raises:
-        InputError: several are standard output, a picture's ending is none, or Matplotlib is not installed.
+        InputError: several files are standard output, a picture's ending is unknown, or Matplotlib is not installed.
     """
 
     def __init__(self, **targets: str | None) -> None:
@@ -326,14 +330,14 @@ class Outputs:
                 check_library("matplotlib", "pages")
 
     def __getitem__(self, name: str) -> str | None:
-        """Return the file of an option; None where it is not asked for."""
+        """Return the file of an option; None where it is not requested."""
         return self._targets[name]
 
     def check(self, inputs: Mapping[Path, str]) -> None:
-        """Refuse files that cannot be written, that are an input, or that are each other.
+        """Refuse files that cannot be written, that are an input, or that two options name.
 
         Args:
-            inputs: files that are read, and the words for each in messages.
+            inputs: input files, with a word for each in messages.
 
         Raises:
             InputError: a file is refused.
@@ -350,16 +354,16 @@ class Outputs:
         done: bool = True,
         **contents: Callable[[], JsonObject | str | Figure | None],
     ) -> NoReturn:
-        """Write the files that are asked for, show the answer where standard output takes no file, and exit.
+        """Write the requested files, show the answer where standard output takes no file, and exit.
 
-        Nothing is made that is not asked for. Each file is written whole or not at all, in the order of the contents.
+        Only requested contents are made. A file is written completely or not at all, in the order of the contents.
 
         Args:
             shown: returns the lines and tables for the terminal.
-            whole: whether everything is shown, and not the answer alone.
-            done: whether the exit status is 0, and not 1.
-            contents: by option, what returns the content of its file: a result, which is written as JSON, a text, or a
-                picture's figure; None for a file that is not written after all.
+            whole: If true, everything is shown, not only the answer.
+            done: If true, the exit status is 0; else 1.
+            contents: by option, a function that returns the content of its file: a result, which is written as JSON, a
+                text, or a figure; None for a file that is not written after all.
 
         Raises:
             InputError: a file cannot be written.
@@ -396,16 +400,16 @@ def _write(target: str, make: Callable[[], JsonObject | str | Figure | None], *,
 
 
 def check_csv(target: str | None, table: str | None, case: Case, *, at_point: bool) -> None:
-    """Refuse a table that the command has none of, before the work begins.
+    """Refuse the name of a table that the command does not write, before the work begins.
 
     Args:
-        target: of the tables.
+        target: file of the tables.
         table: name of the only table to write.
         case: the case.
-        at_point: whether the case is evaluated at a point, and not solved.
+        at_point: If true, the case is evaluated at a point, not solved.
 
     Raises:
-        InputError: it is refused.
+        InputError: the table is refused.
     """
     from ..errors import InputError, listing
     from ..words.summary import table_names
@@ -418,14 +422,14 @@ def check_csv(target: str | None, table: str | None, case: Case, *, at_point: bo
 
 
 def show(items: Iterable[Line | TextTable], *, whole: bool) -> None:
-    """Print lines and tables: the answer with what fits beside it, or everything."""
+    """Print lines and tables: everything, or the answer and the parts that fit."""
     from ..output.terminal import show as show_on
 
     show_on(console(), items, whole=whole)
 
 
 def console() -> Console | None:
-    """Return a console on standard output for lines and tables; None where that shows no styles."""
+    """Return a console on standard output for lines and tables; None where standard output shows no styles."""
     # With one of these variables, the console itself decides whether it shows styles.
     if not sys.stdout.isatty() and not os.environ.keys() & {"FORCE_COLOR", "TTY_COMPATIBLE"}:
         return None

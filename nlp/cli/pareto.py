@@ -1,4 +1,4 @@
-"""The command ``pareto``."""
+"""Command ``pareto``."""
 
 from __future__ import annotations
 
@@ -13,9 +13,11 @@ def pareto(
     case: options.CaseName,
     goals: Annotated[
         list[str],
-        options.several("--goal", "GOAL", "max or min, then F:TASK or limits.KEY, as in 'max F:drive'; 2 to 6 goals"),
+        options.several(
+            "--goal", "GOAL", "Goal: max or min, then F, F:TASK or limits.KEY, as in 'max F:drive'; 2 to 6 goals"
+        ),
     ],
-    points: Annotated[int, options.whole("--points", "Points of the front", 2, 1000)] = 16,
+    points: Annotated[int, options.whole("--points", "Number of points of the front", 2, 1000)] = 16,
     settings: options.SettingTexts = None,
     of: options.ResultFile = None,
     starts: options.Starts = None,
@@ -31,7 +33,10 @@ def pareto(
     plot: options.CurveFile = None,
     whole: options.ShowAll = False,
 ) -> None:
-    """Find the front of two or more goals of a case."""
+    """Compute the Pareto front of two or more goals.
+
+    One goal is optimised, the others keep bounds.
+    """
     from ..errors import InputError, UncoveredError
     from ..front.data import front_designs, front_result
     from ..front.front import pareto as find_front
@@ -39,7 +44,7 @@ def pareto(
     from ..interruption import Milestone, answer_after, is_requested, why_stopped
 
     files = options.Outputs(resume=resume, json=json_file, csv=csv_file, markdown=markdown, html=html, plot=plot)
-    read = options.read_machine(case, settings, of).file
+    read = options.read_changed_case(case, settings, of).file
     read_goals(goals, read.case)  # before the files are looked at
     files.check(read.inputs)
     answer_after(Milestone.POINT)

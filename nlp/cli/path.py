@@ -1,4 +1,4 @@
-"""The command ``path``."""
+"""Command ``path``."""
 
 from __future__ import annotations
 
@@ -19,38 +19,48 @@ def path(
     case: options.CaseName,
     along: pathoptions.AlongFile = None,
     ranges: Annotated[
-        bool, options.flag("--range", "How far each coordinate can move from a pose, and each two")
+        bool,
+        options.flag(
+            "--range", "Prove the free travel from a pose along each coordinate and each pair, instead of a path"
+        ),
     ] = False,
     most: Annotated[
-        str | None, options.text("--most", "LENGTH,ANGLE", "Largest motion to each side with --range")
+        str | None, options.text("--most", "LENGTH,ANGLE", "Largest travel to each side with --range, angle in degrees")
     ] = None,
     settings: options.SettingTexts = None,
     of: options.ResultFile = None,
     unit: pathoptions.Unit = None,
     start: Annotated[
         str | None,
-        options.text("--start", "X,Y,Z,A,B,C", "Where the machine stands: before a program, or the pose of --range"),
+        options.text("--start", "X,Y,Z,A,B,C", "Pose before the G-code begins, or the pose of --range"),
     ] = None,
     offset: pathoptions.Offsets = None,
     angles: pathoptions.Angles = None,
     between: pathoptions.BetweenPoints = None,
     gap: options.RangeGap = 1e-3,
-    time: Annotated[float | None, options.time("600 if left out, as programs are long; 120 with --range")] = None,
+    time: Annotated[float | None, options.time("600 if left out; 120 with --range")] = None,
     json_file: options.JsonFile = None,
     proof: options.ProofFile = None,
     csv_file: Annotated[str | None, options.table("the actuators along the path")] = None,
     step: Annotated[
-        float | None, options.number("--step", "LENGTH", "Length of the path between rows, at turns by 1 degree")
+        float | None, options.number("--step", "LENGTH", "Distance between rows of --csv; for rotations, 1 degree")
     ] = None,
     within: Annotated[
         float | None,
-        options.number("--within", "LENGTH", "Rows so that actuators linear between them stay this near the path"),
+        options.number(
+            "--within",
+            "LENGTH",
+            "Place rows of --csv so that linear actuator motion between them stays this close to the path",
+        ),
     ] = None,
-    plot: Annotated[str | None, options.plot("Draw numbers along the path")] = None,
+    plot: Annotated[str | None, options.plot("Draw quantities along the path")] = None,
     html: Annotated[str | None, options.page(": verdicts, curves, robot")] = None,
     whole: options.ShowAll = False,
 ) -> None:
-    """Prove regular poses and limits at every point of a path."""
+    """Prove no singularity and no violated limit along a tool path.
+
+    The path is the case's, or that of --along: G-code, or poses in a CSV file.
+    """
     from functools import cache
     from pathlib import Path
 
@@ -72,7 +82,7 @@ def path(
     )
     record = proof_record(proof, json_file)
     answer_after(Milestone.BOUND)
-    (loaded, text, inputs), chosen = options.read_machine(case, settings, of)
+    (loaded, text, inputs), chosen = options.read_changed_case(case, settings, of)
     files = options.Outputs(json=json_file, csv=csv_file, plot=plot, html=html, proof=proof)
     own = PathOptions() if along is not None or ranges or loaded.path is None else options_of(loaded.path)
     choices = pathoptions.PathChoices(unit, start, offset or [], angles, between).over(own)
@@ -102,7 +112,7 @@ def path(
 
     @cache
     def picture() -> contents.PathPicture:
-        """Return what the picture and the page show."""
+        """Return the curves that the picture and the page show."""
         from ..proof.workspace.path_samples import samples_of
 
         return contents.path_picture(judged, samples_of(judged), result)
@@ -120,20 +130,20 @@ def path(
 
 
 def _refuse_elsewhere(along: Mapping[str, object], most: str | None, *, ranges: bool) -> None:
-    """Refuse options of paths beside ``--range``, and its own without it.
+    """Refuse options of paths with ``--range``, and options of ``--range`` without it.
 
     Raises:
-        InputError: one is given.
+        InputError: such an option is given.
     """
     from ..errors import InputError
 
     for name, given in along.items() if ranges else [("--most", most)]:
         if given not in (None, []):
-            raise InputError(f"{name}: is not for --range" if ranges else f"{name}: needs --range")
+            raise InputError(f"{name}: cannot be used with --range" if ranges else f"{name}: needs --range")
 
 
 def _sampling(step: float | None, within: float | None, *, is_written: bool) -> Sampling | None:
-    """Return what the rows of a table are to keep; None for no table.
+    """Return the requirements on the rows of a table; None without a table.
 
     Raises:
         InputError: a length is not positive, or both are given.
@@ -145,5 +155,5 @@ def _sampling(step: float | None, within: float | None, *, is_written: bool) -> 
         if length is not None and not 0 < length < math.inf:
             raise InputError(f"{option} {length:g}: must be a length above 0")
     if step is not None and within is not None:
-        raise InputError("--step and --within: give one; each states how far rows are from each other")
+        raise InputError("--step and --within: give only one; both set the distance between rows")
     return None if step is None and within is None and not is_written else Sampling(step, within)

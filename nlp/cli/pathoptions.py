@@ -1,4 +1,4 @@
-"""Options of the commands ``path`` and ``verify-proof`` that say how a path's file is read."""
+"""Options of the commands ``path`` and ``verify-proof`` for reading a path's file."""
 
 from __future__ import annotations
 
@@ -11,29 +11,29 @@ if TYPE_CHECKING:
 
 AlongFile = Annotated[
     str | None,
-    options.file("--along", "The path, poses in a .csv file or G-code, in place of the case's own"),
+    options.file("--along", "Tool path, G-code or a .csv file of poses, instead of the path of the case"),
 ]
-Unit = Annotated[str | None, options.text("--unit", "mm|in", "Unit of a program before G20 or G21")]
+Unit = Annotated[str | None, options.text("--unit", "mm|in", "Length unit of G-code before G20 or G21")]
 Stands = Annotated[
     str | None,
-    options.text("--start", "X,Y,Z,A,B,C", "Where the machine stands before a program"),
+    options.text("--start", "X,Y,Z,A,B,C", "Pose before the G-code begins"),
 ]
 Offsets = Annotated[
     list[str] | None,
-    options.several("--offset", "G54=X,Y,Z,A,B,C", "Origin of a program's coordinate system"),
+    options.several("--offset", "G54=X,Y,Z,A,B,C", "Origin of a coordinate system of the G-code"),
 ]
 Angles = Annotated[
     str | None,
-    options.text("--angles", "rpy|xyz|...", "Convention of a program's A, B, C; LinuxCNC's rpy if left out"),
+    options.text("--angles", "rpy|xyz|...", "Convention of A, B, C in the G-code; rpy, as in LinuxCNC, if left out"),
 ]
 BetweenPoints = Annotated[
     str | None,
-    options.text("--between", "angles|slerp", "Turns between points: linear angles, or one axis"),
+    options.text("--between", "angles|slerp", "Rotation between points: linear in the angles, or about one axis"),
 ]
 
 
 class PathChoices(NamedTuple):
-    """Choices that a path's file leaves open, as texts of the options; None for those that are not given."""
+    """Texts of the options for reading a path's file; None for an option that is not given."""
 
     unit: str | None
     start: str | None
@@ -43,14 +43,14 @@ class PathChoices(NamedTuple):
 
     @property
     def is_any(self) -> bool:
-        """Whether one is given."""
+        """True if an option is given."""
         return any(each not in (None, []) for each in self)
 
     def over(self, own: PathOptions) -> PathOptions:
-        """Return the choices of a case, but for what is given.
+        """Return the options of a case, replaced where options are given.
 
         Raises:
-            InputError: one is not allowed.
+            InputError: an option is not allowed.
         """
         from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Progress of commands on standard error, where standard error is a terminal; and solves and certificates with it."""
+"""Progress of commands on standard error, where standard error is a terminal; solves and certificates with progress."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _CLEAR_LINE = "\r\033[K"
 
 @contextmanager
 def counting_line() -> Iterator[Callable[[str], None]]:
-    """Give a function that shows a text in the place of the last one; the line is empty at the end."""
+    """Give a function that shows a text in place of the previous text; the line is empty at the end."""
     if not sys.stderr.isatty():
         yield lambda _: None
         return
@@ -39,9 +39,10 @@ def counting_line() -> Iterator[Callable[[str], None]]:
 
 @contextmanager
 def spinner(first: str) -> Iterator[Callable[[str], None]]:
-    """Give a function that shows a text beside a spinner; at the beginning there is a first text.
+    """Give a function that shows a text next to a spinner, with the remaining time of limited work.
 
-    With it the time is shown that the work may still take, where it is limited when the text is given.
+    Args:
+        first: text at the beginning.
     """
     if not sys.stderr.isatty():
         yield lambda _: None
@@ -77,7 +78,7 @@ class SolveOutcome(NamedTuple):
     Attributes:
         solution: the solution.
         found: the solution with its certificates; without certification, the solution.
-        is_proved: whether every certificate is proved; true without certification.
+        is_proved: If true, every certificate is proved, or none is requested.
     """
 
     solution: Solution
@@ -86,13 +87,13 @@ class SolveOutcome(NamedTuple):
 
 
 def tell_workspace(case: Case) -> None:
-    """Say on standard error that the workspace of a case holds no pose of it, where that may be a mistake.
+    """Warn on standard error that the workspace of a case contains no pose of the case, where this may be a mistake.
 
-    Where limits do not hold over the workspace, it may well be elsewhere, but not if it looks like excursions.
+    A workspace without limits may lie elsewhere on purpose, unless its numbers look like excursions from the pose.
     """
     from ..errors import one_line
 
-    found = case.not_held
+    found = case.outside_workspace
     if found is not None and (case.limits_over == "workspace" or found.may_be_excursions):
         sys.stderr.write(f"{one_line(found.sentence)}\n")
 
@@ -100,7 +101,7 @@ def tell_workspace(case: Case) -> None:
 def solve_with_progress(
     case: Case, jobs: int | None, *, certify: bool = False, gap: float = 1e-4, step: float | None = None
 ) -> SolveOutcome:
-    """Solve a case, round its dimensions to multiples of a step, where one is given, and certify it with ``certify``.
+    """Solve a case; round its dimensions to multiples of a given step; with ``certify``, certify the result.
 
     Raises:
         CaseError: the case contradicts itself.
@@ -150,15 +151,15 @@ def certify_with_progress(case: Case | Solution, **options: Any) -> Certified:  
     """Certify a case; the options are those of :func:`screwsynth.nlp.certify`.
 
     Raises:
-        InputError: an option is outside of its range, or has no meaning for the case.
-        UncoveredError: the case's expressions hold an operation without a rule.
+        InputError: an option is out of range, or does not apply to the case.
+        UncoveredError: the case's expressions have an operation without a rule.
     """
     from ..solver.certified import certify
 
-    with spinner("solving for an incumbent") as show:
+    with spinner("solving for the best known point") as show:
 
         def show_search(name: str, seconds: float, bound: float, incumbent: float, boxes: int, left: int) -> None:
-            # The time stands first: narrow terminals cut the end.
+            # The time comes first: narrow terminals cut the end.
             text = f"{name}: {seconds:.0f} s, bound {bound:.7g}, best {incumbent:.7g}, gap {abs(bound - incumbent):.2g}"
             show(f"{text}, {boxes:,} boxes, {left:,} left")
 

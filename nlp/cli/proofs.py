@@ -23,11 +23,11 @@ def proof_record(target: str | None, json_file: str | None) -> ProofRecord | Non
     """Return an empty record of searches; None without a proof.
 
     Args:
-        target: name of the proof's file; ``-`` is standard output; None without a proof.
-        json_file: name of the result's file.
+        target: name of the proof file; ``-`` is standard output; None without a proof.
+        json_file: name of the result file.
 
     Raises:
-        InputError: both are standard output.
+        InputError: both files are standard output.
     """
     from ..errors import InputError
     from ..proof.workspace.proof_record import ProofRecord
@@ -54,10 +54,10 @@ def proof_text(
     Args:
         target: file name; ``-`` is standard output.
         judged: the verdicts.
-        record: record of their searches; there is no proof without one.
-        text: the case file's text.
-        quantities: measures that were asked for.
-        leg_error: largest error of a leg's length.
+        record: record of the searches; None without a proof.
+        text: text of the case file.
+        quantities: requested quantities.
+        leg_error: largest error of a leg length.
     """
     from ..proof.workspace.proof_writer import proof_of
 
@@ -70,13 +70,13 @@ def path_premises(target: str | None, case: Case, along: str | None, choices: Pa
     """Return the premises of a proof about a path; None without a proof.
 
     Args:
-        target: name of the proof's file; None without a proof.
+        target: name of the proof file; None without a proof.
         case: the case.
-        along: the path's file; None for that of the case.
-        choices: options that say how the file is read.
+        along: file of the path; None for the file of the case.
+        choices: options for reading the file.
 
     Raises:
-        InputError: the file cannot be read, or is longer than a proof carries.
+        InputError: the file cannot be read, or is too long for a proof file.
     """
     from ..path.reader import text_of_path
     from ..proof.checker.workspace.path_premises import premises_of
@@ -102,8 +102,8 @@ def path_proof_text(
         target: file name; ``-`` is standard output.
         case: the case.
         judged: the verdicts.
-        record: record of their searches; there is no proof without one.
-        text: the case file's text.
+        record: record of the searches; None without a proof.
+        text: text of the case file.
         premises: premises about the path.
     """
     from ..proof.workspace.path_proof_writer import path_proof_of
@@ -118,7 +118,7 @@ def _proof_file_text(target: str, proof: Proof) -> str | None:
     from ..errors import one_line
 
     if not proof.claims:
-        # A file of an earlier run is left as it is: it must not be taken for the proof of this one.
+        # The file of an earlier run stays: an empty file would look like a proof of this run.
         print_notice(f"--proof {one_line(target)}: not written, as no claim has a proof")
         return None
     for words in _unproved_words(proof.unproved):
@@ -127,7 +127,7 @@ def _proof_file_text(target: str, proof: Proof) -> str | None:
 
 
 def verified_lines(proof: Proof, case: Case, leg_error: float) -> Iterator[Line]:
-    """Check the proof of a workspace, and return the lines that say what it proves.
+    """Check the proof of a workspace, and return lines with the proved claims.
 
     Raises:
         Exit: with status 1 where the proof does not hold.
@@ -145,7 +145,7 @@ def verified_lines(proof: Proof, case: Case, leg_error: float) -> Iterator[Line]
 
 
 def verified_path_lines(proof: Proof, premises: PathPremises, case: Case) -> Iterator[Line]:
-    """Check the proof of a path, and return the lines that say what it proves.
+    """Check the proof of a path, and return lines with the proved claims.
 
     Raises:
         Exit: with status 1 where the proof does not hold.
@@ -174,7 +174,7 @@ def _checked_lines(
     premises: Sequence[str],
     notes: Sequence[str] = (),
 ) -> Iterator[Line]:
-    """Yield what a checked proof proves: the counts, claims that have no proof, notes, then every premise and claim."""
+    """Yield the result of a check: counts, claims without a proof, notes, then every premise and claim."""
     from ..proof.checker.premises import exact
     from ..proof.statement.claims import ERRORS
     from ..words.text import Line
@@ -183,24 +183,24 @@ def _checked_lines(
     count = len(checked.claims) + len(proof.unproved)
     if case.joint_centre_tolerance:
         off = f"{exact(case.joint_centre_tolerance)} {case.units.length}"
-        whose += f", for every machine whose joint centres are off by at most {off}"
-    yield Line(f"holds: {len(checked.claims)} of {count} claims about {whose}")
+        whose += f", for every robot whose joint centres are off by at most {off}"
+    yield Line(f"PROOF VALID: {len(checked.claims)} of {count} claims about {whose}")
     for k, words in enumerate(_unproved_words(proof.unproved)):
-        yield Line(words, part="claims that are not on paper" if k >= SHOWN else "")
+        yield Line(words, part="claims without a proof" if k >= SHOWN else "")
     if proof.unproved:
-        yield Line("the file's reasons for claims that are not on paper are not checked")
+        yield Line("the reasons in the file for claims without a proof are not checked")
     yield from map(Line, notes)
-    yield Line(f"{checked.leaves:,} leaves, shown on {checked.pieces:,} boxes")
+    yield Line(f"{checked.leaves:,} leaves of the proof trees, checked on {checked.pieces:,} boxes")
     for line in premises:
         yield Line(f"  {line}", part="premises")
     legs = f"off by at most {exact(leg_error)} {case.units.length}" if leg_error else "exact"
     for each in checked.claims:
-        of = f", for lengths of legs that are {legs}" if any(each.name == error.name for error in ERRORS) else ""
+        of = f", for leg lengths that are {legs}" if any(each.name == error.name for error in ERRORS) else ""
         yield Line(f"  {each.name}: {_words(each, case)}{of}", part="claims")
 
 
 def _premises(case: Case, checked: VerifiedWorkspace) -> Iterator[str]:
-    """Yield the poses, the tasks and the assemblies that claims are about."""
+    """Yield the poses, the tasks and the assembly modes that the claims cover."""
     from ...models import Dimension
     from ..case.pose import Free
     from ..proof.checker.premises import exact
@@ -217,7 +217,7 @@ def _premises(case: Case, checked: VerifiedWorkspace) -> Iterator[str]:
     if workspace.dependent:
         chosen, names = workspace.set_words(case.units, exact), workspace.names
         following = ", ".join(names[each.index] for each in workspace.dependent)
-        yield f"poses: every {chosen}; {following} follow{'s' * (len(workspace.dependent) == 1)} from these"
+        yield f"poses: every {chosen}; dependent: {following}"
     else:
         yield (
             f"poses: {position} {case.units.label(length)}; rotation by {turns.kind.value}{about}: {rotation} "
@@ -228,18 +228,18 @@ def _premises(case: Case, checked: VerifiedWorkspace) -> Iterator[str]:
     if checked.numbers_at:
         # The boxes of actuators' loads follow the loops from the middle, as those of ranks do.
         followed = "ranks, forces, speeds and powers" if case.loading.cases or case.loading.motion else "ranks"
-        others = "numbers" if followed == "ranks" else "other numbers"
-        middle = "the one of home in the middle of the workspace"
-        yield f"assemblies: {followed} in {middle}, {others} in {checked.numbers_at}"
+        others = "quantities" if followed == "ranks" else "other quantities"
+        middle = "the home assembly mode at the workspace centre"
+        yield f"assembly modes: {followed} in {middle}, {others} in {checked.numbers_at}"
 
 
 def _path_premises(premises: PathPremises, path: ProgrammedPath, case: Case) -> Iterator[str]:
-    """Yield the path, how its file is read, and the assembly that claims are about."""
+    """Yield the path, the options for reading its file, and the assembly mode that the claims cover."""
     from ..proof.checker.premises import exact
 
     arcs = len(path.arc_segments)
     with_arcs = f", {arcs:,} of them arc{'s' * (arcs > 1)}" if arcs else ""
-    placed = ", in its place in the case" if premises.of_case else ""
+    placed = ", placed as in the case" if premises.of_case else ""
     yield f"path: {premises.file}, {len(path):,} segment{'s' * (len(path) > 1)}{with_arcs}{placed}"
     choices = {"angles": premises.angles, "between": path.between.value, "unit before G20 or G21": premises.unit}
     choices |= {name: ", ".join(map(exact, each)) for name, each in premises.offsets.items()}
@@ -247,27 +247,27 @@ def _path_premises(premises: PathPremises, path: ProgrammedPath, case: Case) -> 
         choices["start"] = ", ".join(map(exact, premises.start))
     yield f"read with: {'; '.join(f'{name} {each}' for name, each in choices.items() if each is not None)}"
     if path.is_timed:
-        yield "speeds and powers: in the path's own motion"
+        yield "speeds and powers: in the motion of the path"
     if case.model.unknowns:
-        yield "assembly: that of home at the first point, followed along the path"
+        yield "assembly mode: home at the first point, followed along the path"
 
 
 def _untimed_note(untimed: int, segments: int) -> str:
-    """Return what speeds are along segments without a time."""
+    """Return the note on speeds along segments without a time."""
     verb = "has" if untimed == 1 else "have"
     return f"{untimed:,} of {segments:,} segments {verb} no time: speeds and powers there count as 0"
 
 
 def _words(claim: CheckedClaim, case: Case) -> str:
-    """Return what is shown of a claim."""
+    """Return the proved statement of a claim."""
     from ..proof.checker.premises import outward
     from ..proof.statement.claims import CONSTRAINTS
     from ..results.objective import unit_of_claim
 
-    if claim.by_machine:
-        return "refuted, at the pose given J is singular for a machine within the tolerance"
+    if claim.is_within_tolerance:
+        return "refuted: at the stated pose J is singular for a robot within the tolerance"
     if claim.is_refuted:
-        return "refuted, J is singular at a pose between the two given"
+        return "refuted: J is singular at a pose between the two stated ones"
     if claim.bound is None:
         whose = "the constraint wrenches keep their" if claim.name == CONSTRAINTS else "J has full"
         return f"{whose} rank at every pose"
@@ -280,6 +280,6 @@ def _words(claim: CheckedClaim, case: Case) -> str:
 
 
 def _unproved_words(unproved: Sequence[Unproved]) -> Iterator[str]:
-    """Yield which claims have no proof, and why."""
+    """Yield the claims without a proof, with the reasons."""
     for each in unproved:
-        yield f"not on paper: {f'{each.name} {each.sense}'.strip()}: {each.reason}"
+        yield f"no proof: {f'{each.name} {each.sense}'.strip()}: {each.reason}"

@@ -1,4 +1,4 @@
-"""The command ``report``."""
+"""Command ``report``."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .commandline import print_line
 
 def report(
     case: options.CaseName,
-    out: Annotated[str, options.file("--out", "Page to write, such as report.html; - is stdout")],
+    out: Annotated[str, options.file("--out", "HTML file to write, such as report.html; - is stdout")],
     settings: options.SettingTexts = None,
     of: options.ResultFile = None,
     certify: options.Certify = False,
@@ -21,9 +21,9 @@ def report(
     jobs: options.Jobs = None,
     _time: options.Time = None,
 ) -> None:
-    """Solve a case and write a page about it.
+    """Solve a case, and write an HTML report.
 
-    The page is one file, and opens without a network.
+    The report is one file, and opens without a network.
     """
     from ..case.choices import chosen_settings
     from ..case.reader import load_case
@@ -33,7 +33,7 @@ def report(
     from ..output.pictures.requirements import check_library
     from .progress import solve_with_progress
 
-    (loaded, text, inputs), fixed = options.read_machine(case, settings, of)
+    (loaded, text, inputs), fixed = options.read_changed_case(case, settings, of)
     loaded = replace(loaded, search=loaded.search.but(starts, seed))
     check_outputs(inputs, {"--out": out})
     check_library("plotly", "reports")
@@ -49,12 +49,12 @@ def report(
     try:
         solution, found, is_proved = solve_with_progress(loaded, jobs, certify=certify, gap=gap)
     except UncoveredError as error:
-        # The answer stands without a proof, and the page says why there is none.
+        # The answer is valid without a proof, and the page gives the reason for the missing proof.
         refusal = str(error)
         solution, found, _ = solve_with_progress(loaded, jobs)
         is_proved = False
     result = result_of(found)
-    # The numbers in print are of the case as its file states it.
+    # Published values belong to the case as its file states it.
     is_checked = loaded.published and not fixed and not is_requested()
     check = check_case(case, {case: result}) if is_checked else None
     page = report_of(text, solution, result, check, refusal)

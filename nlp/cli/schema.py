@@ -1,4 +1,4 @@
-"""The command ``schema``."""
+"""Command ``schema``."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from .commandline import print_line
 
 
 def schema(
-    result: Annotated[bool, options.flag("--result", "Print the schema of results, which --json writes")] = False,
+    result: Annotated[
+        bool, options.flag("--result", "Print the schema of results instead, which --json writes")
+    ] = False,
 ) -> None:
-    """Print the JSON Schema of case files.
+    """Print the JSON Schema of case files or results.
 
-    Editors complete and check case files with it.
+    Editors use it to complete and check case files.
     """
     import json
 

@@ -1,4 +1,4 @@
-"""The command ``solve``."""
+"""Command ``solve``."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def solve(
     jobs: options.Jobs = None,
     _time: options.Time = None,
     compiled: Annotated[
-        bool, options.flag("--compiled", "Call the objective as compiled C; needs a C compiler")
+        bool, options.flag("--compiled", "Compile the objective as C for speed; needs a C compiler")
     ] = False,
     json_file: options.JsonFile = None,
     csv_file: options.CsvFile = None,
@@ -26,20 +26,24 @@ def solve(
     pose: options.PoseNumber = 1,
     step: Annotated[
         float | None,
-        options.number("--round", "STEP", "Round the free dimensions to multiples: of the length unit, and degrees"),
+        options.number("--round", "STEP", "Round free dimensions to multiples of this, in the length unit and degrees"),
     ] = None,
     certify: options.Certify = False,
     gap: options.OptimumGap = 1e-4,
     whole: options.ShowAll = False,
 ) -> None:
-    """Maximise or minimise F, and show the evidence."""
+    """Optimise F, and show the evidence of the optimum.
+
+    F is the sum of the squared work rates of legs and constraints in the task: a large F resists the motion of the
+    task, F = 0 leaves it free.
+    """
     from ..errors import InputError
     from ..interruption import Milestone, answer_after
     from ..results.result import result_of
     from .progress import solve_with_progress
 
     answer_after(Milestone.START)
-    given = options.read_machine(case, settings, of).file
+    given = options.read_changed_case(case, settings, of).file
     loaded = replace(given.case, search=given.case.search.but(starts, seed, compiled=compiled))
     files = options.Outputs(json=json_file, plot=plot, csv=csv_file)
     options.check_csv(csv_file, table, loaded, at_point=False)

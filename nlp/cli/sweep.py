@@ -1,4 +1,4 @@
-"""The command ``sweep``."""
+"""Command ``sweep``."""
 
 from __future__ import annotations
 
@@ -27,33 +27,33 @@ def sweep(
         options.several(
             "--over",
             "NAME=FIRST:LAST:COUNT",
-            "A number to vary, or NAME=V1,V2,..., or one CSV file of points, names in its first row",
+            "Parameter to vary, or NAME=V1,V2,..., or one CSV file of points with names in its first row",
         ),
     ],
     out: Annotated[
-        str | None, options.file("--out", "The table: a .parquet or .csv file; a stopped run is resumed")
+        str | None, options.file("--out", "Table to write, a .parquet or .csv file; a stopped run is resumed")
     ] = None,
     settings: options.SettingTexts = None,
     of: options.ResultFile = None,
-    starts: Annotated[int | None, options.starts("Starting points at each point; 8 if left out")] = None,
+    starts: Annotated[int | None, options.starts("Starts of the solve at each point; 8 if left out")] = None,
     seed: options.Seed = None,
-    jobs: Annotated[int | None, options.jobs("Threads, or processes of Ipopt; all cores if left out")] = None,
+    jobs: Annotated[int | None, options.jobs("Threads, or processes with Ipopt; all cores if left out")] = None,
     engine: Annotated[
-        str | None, options.text("--engine", "WORD", "compiled or ipopt; chosen by the case if left out")
+        str | None, options.text("--engine", "WORD", "Solver, compiled or ipopt; chosen for the case if left out")
     ] = None,
     dask: Annotated[
         str | None, options.text("--dask", "ADDRESS", "Run on a Dask cluster, such as tcp://10.0.0.1:8786")
     ] = None,
     certified: options.Certify = False,
-    _time: Annotated[float | None, options.time("no limit if left out", "goes on when it is called again")] = None,
+    _time: Annotated[float | None, options.time("no limit if left out", "continues when it is called again")] = None,
     resume: options.ResumeFile = None,
     json_file: options.JsonFile = None,
     csv_file: Annotated[str | None, options.table("the table")] = None,
     markdown: options.MarkdownFile = None,
     html: options.PageFile = None,
-    plot: Annotated[str | None, options.plot("Draw F over one or two numbers")] = None,
+    plot: Annotated[str | None, options.plot("Draw F over one or two parameters")] = None,
 ) -> None:
-    """Solve at thousands of values of fixed numbers."""
+    """Solve for thousands of values of fixed parameters."""
     from ..output.files import read_text
     from ..output.sweeptable import check_table
     from ..sweeps.columns import check_drawn
@@ -71,7 +71,7 @@ def sweep(
         check_drawn(chosen)
     if out is not None:
         check_table(out)
-    read = options.read_machine(case, settings, of).file
+    read = options.read_changed_case(case, settings, of).file
     inputs = dict(read.inputs)
     if points is not None:
         from pathlib import Path
@@ -87,7 +87,7 @@ def sweep(
 
 @contextmanager
 def _table_file(out: str | None) -> Iterator[Path]:
-    """Give the file of the table, which is removed after the block where no name is given for it."""
+    """Give the file of the table; without a name for it, a temporary file."""
     from pathlib import Path
     from tempfile import TemporaryDirectory
 
@@ -113,11 +113,11 @@ def _run(
     Args:
         found: the sweep.
         table: file of the table.
-        resume: file of the journal; beside the table where it is left out.
-        is_kept: whether the table and the journal beside it stay.
-        engine: as for :func:`.run_sweep`.
-        jobs: likewise.
-        dask: likewise.
+        resume: file of the journal; None for a file next to the table.
+        is_kept: If true, the table and the journal next to it stay.
+        engine: solver, as for :func:`.run_sweep`.
+        jobs: number of threads or processes, as for :func:`.run_sweep`.
+        dask: address of a cluster, as for :func:`.run_sweep`.
 
     Raises:
         InputError: a file belongs to another sweep, or cannot be written.
@@ -128,15 +128,15 @@ def _run(
     from ..sweeps.sweep import run_sweep
 
     if is_written(str(table), found):
-        print_notice(f"{table}: holds all {len(found.points):,} points already")
+        print_notice(f"{table}: already has all {len(found.points):,} points")
         return
     with found.journal_of(str(table), resume) as journal:
         before = len(found.points) - len(journal.missing)
         if before:
-            print_notice(f"{before:,} of {len(found.points):,} points are in {journal.path} already")
+            print_notice(f"{journal.path}: already has {before:,} of {len(found.points):,} points")
 
         def words() -> str:
-            return journal.words if is_kept or resume else "without --out or --resume no point is kept"
+            return journal.words if is_kept or resume else "no point is kept without --out or --resume"
 
         say_on_leaving(words)
         with counting_line() as show:
@@ -158,7 +158,7 @@ def _run(
 
 @contextmanager
 def _named_points(chosen: Points, file: str | None) -> Iterator[None]:
-    """Report a wrong column of the file of the points with the name of this file.
+    """Add the name of the file of points to the message about a wrong column.
 
     Raises:
         InputError: a column is wrong.
@@ -177,7 +177,7 @@ def _points_file(over: list[str]) -> str | None:
     """Return the file of points that ``--over`` names; None where it states a grid.
 
     Raises:
-        InputError: a range, a list or a file stands beside it.
+        InputError: a range, a list or another file is given as well.
     """
     from pathlib import Path
 
@@ -185,7 +185,7 @@ def _points_file(over: list[str]) -> str | None:
 
     file = next((text for text in over if text.endswith(".csv") or Path(text).is_file()), None)
     if file is not None and len(over) > 1:
-        raise InputError(f"--over {file}: a file of points stands alone, without ranges or lists beside it")
+        raise InputError(f"--over {file}: a file of points cannot be combined with ranges or lists")
     return file
 
 
@@ -214,7 +214,7 @@ def _deliver(found: Sweep, table: Path, out: str | None, files: options.Outputs)
 
 
 def _progress_words(before: int, done: int, total: int, seconds: float) -> str:
-    """Return how far the sweep is, and the time left."""
+    """Return the progress of the sweep, and the remaining time."""
     left = seconds * (total - done) / done
     words = f"{left / 3600:.1f} h" if left >= 3600 else f"{left / 60:.0f} min" if left >= 100 else f"{left:.0f} s"
     return f"{before + done:,} of {before + total:,} points, {words} left"

@@ -1,4 +1,4 @@
-"""The command ``tradeoff``."""
+"""Command ``tradeoff``."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def tradeoff(
         options.text(
             "--over",
             "NAME=FIRST:LAST:COUNT",
-            "The number to vary, such as limits.leg_length.max=28:40:13, or NAME=V1,V2,...",
+            "Limit or parameter to vary, such as limits.leg_length.max=28:40:13, or NAME=V1,V2,...",
         ),
     ],
     settings: options.SettingTexts = None,
@@ -37,7 +37,10 @@ def tradeoff(
     html: options.PageFile = None,
     whole: options.ShowAll = False,
 ) -> None:
-    """Solve along one limit or number, and show F against it."""
+    """Re-solve for a range of values of one limit or parameter.
+
+    The table, curve or page shows F against the value, with its slope and the active limits.
+    """
     from ..case.reader import read_case
     from ..errors import InputError, UncoveredError
     from ..interruption import Milestone, answer_after, is_requested, why_stopped
@@ -53,7 +56,7 @@ def tradeoff(
     if not 2 <= len(values) <= _MOST:
         raise InputError(f"--over {over}: must have from 2 to {_MOST} values")
     files = options.Outputs(resume=resume, json=json_file, csv=csv_file, markdown=markdown, html=html, plot=plot)
-    fixed = options.read_machine(case, settings, of).settings
+    fixed = options.read_changed_case(case, settings, of).settings
     read = {value: read_case(case, {**fixed, name: value}) for value in values}
     files.check(read[values[0]].inputs)
     with designs.resumed(resume):
@@ -72,7 +75,9 @@ def tradeoff(
         except UncoveredError as error:
             raise InputError(f"--certify: {error}") from None
         if is_requested() and not found.unsolved:
-            print_notice(f"{why_stopped()}: every value is solved, but not all from the optima beside it")
+            print_notice(
+                f"{why_stopped()}: all values are solved, but not all again from the optima of neighbouring values"
+            )
         result = tradeoff_result(found)
         is_proved = all(point.certified is None or point.certified.is_proved for point in found.points)
         statuses = [point.status for point in result.points]

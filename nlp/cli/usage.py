@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from .commandline import print_notice
 
-#: Earlier names of options by command, which work, are told of, and stand in no help; an empty one has no effect.
+#: Earlier names of options by command: they work with a notice, and no help lists them. An empty name has no effect.
 EARLIER = {
     "report": {"--html": "--out"},
     "tradeoff": {"--page": "--html"},
@@ -19,7 +19,7 @@ _UNTIL = "0.3"
 
 
 def with_present_names(command: str, words: list[str]) -> list[str]:
-    """Return the words of a command line with the present names of options, and print a notice of each earlier one."""
+    """Return the words of a command line with present names of options, and print a notice for each earlier name."""
     names = EARLIER.get(command, {})
     end = words.index("--") if "--" in words else len(words)
     parts = [word.partition("=") for word in words[:end]]

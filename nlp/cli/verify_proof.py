@@ -1,4 +1,4 @@
-"""The command ``verify-proof``."""
+"""Command ``verify-proof``."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ if TYPE_CHECKING:
 
 
 def verify_proof(
-    proof: Annotated[str, Argument("PROOF", "A proof that certify, workspace or path wrote with --proof.")],
+    proof: Annotated[str, Argument("PROOF", "Proof file of certify, workspace or path --proof.")],
     case: Annotated[
         str | None,
-        Argument("[CASE]", "The case to be proved, - is stdin; that in the proof if left out."),
+        Argument("[CASE]", "The case that the proof must be about, - is stdin; the case in the proof if left out."),
     ] = None,
     settings: options.SettingTexts = None,
     of: options.ResultFile = None,
     above: Annotated[
-        float | None, options.number("--above", "F", "The proof must show that F is above this value")
+        float | None, options.number("--above", "F", "Require that the proof shows F above this value")
     ] = None,
     all_assemblies: options.AllAssemblies = False,
     leg_error: options.LegError = 0.0,
@@ -36,9 +36,9 @@ def verify_proof(
     between: pathoptions.BetweenPoints = None,
     whole: options.ShowAll = False,
 ) -> None:
-    """Check a proof with independent code.
+    """Check a proof file with independent code.
 
-    The claims come from the case and from the options, which are those of the command that wrote the proof.
+    The claims are derived again from the case and the options: give the options of the command that wrote the proof.
     """
     from .. import __version__
     from ..errors import InputError
@@ -63,11 +63,11 @@ def verify_proof(
     )
     for name in is_given:
         if is_given[name] and name not in own:
-            raise InputError(f"{name}: means nothing for this proof, which another command wrote")
+            raise InputError(f"{name}: is no option for this kind of proof, which another command wrote")
     if case is not None:
-        loaded = options.read_machine(case, settings, of).file.case
+        loaded = options.read_changed_case(case, settings, of).file.case
     elif settings or of:
-        raise InputError(f"{'--set' if settings else '--of'}: needs the CASE that it changes")
+        raise InputError(f"{'--set' if settings else '--of'}: needs the argument CASE")
     else:
         loaded = _carried_case(given.case, given.name, proof)
     carried = ["case"] if case is None else []
@@ -80,8 +80,7 @@ def verify_proof(
         lines = verified_path_lines(given, given.premises, loaded)
     else:
         lines = verified_lines(given, loaded, leg_error)
-    verb = "is the one" if len(carried) < 2 else "are those"
-    whose = f"the {' and the '.join(carried)} {verb} that the proof carries; " if carried else ""
+    whose = f"{' and '.join(carried)} read from the proof file; " if carried else ""
     first, *others = lines
     options.show([first, Line(f"{whose}checked by screwsynth {__version__}"), *others], whole=whole)
 
@@ -89,35 +88,35 @@ def verify_proof(
 def _hold_path(
     given: PathPremises, case: Case, along: str | None, choices: pathoptions.PathChoices, *, is_own: bool
 ) -> bool:
-    """Hold the path of a proof to the user's files; return whether there are any.
+    """Compare the path of a proof with the user's file; return whether there is such a file.
 
     Args:
         given: premises of the proof.
         case: the case.
-        along: the path's file; None for that of the case, or of the proof.
-        choices: of reading it.
-        is_own: whether the case is the user's.
+        along: file of the path; None for the file of the case, or of the proof.
+        choices: options for reading the file.
+        is_own: If true, the case is the user's, not that of the proof.
 
     Raises:
-        InputError: a file cannot be read, or choices are given without one.
+        InputError: a file cannot be read, or options for reading are given without a file.
         Exit: with status 1 where the proof is for another path.
     """
     from ..errors import InputError
     from ..path.options import PathOptions
     from ..path.reader import options_of, text_of_path
     from ..proof.checker.proof_file import ProofError
-    from ..proof.checker.workspace.path_premises import hold_path, premises_of
+    from ..proof.checker.workspace.path_premises import check_path_premises, premises_of
 
     stated = case.path if is_own and along is None and given.of_case else None
     if along is None and stated is None:
         if choices.is_any:
-            raise InputError("--along: is needed by the options of reading a path")
+            raise InputError("--along: is missing: options for reading a path need it")
         return False
     own = choices.over(PathOptions() if stated is None else options_of(stated))
     file = along if stated is None else str(stated.name)
     try:
         text = text_of_path(file or "")
-        hold_path(given, premises_of(case, file or "", text, own, of_case=stated is not None))
+        check_path_premises(given, premises_of(case, file or "", text, own, of_case=stated is not None))
     except ProofError as error:
         print_notice(f"rejected: {error}")
         raise SystemExit(1) from None
@@ -127,19 +126,19 @@ def _hold_path(
 def _verify(
     statement: Statement, claim: ProofClaim, case: Case, above: float | None, *, all_assemblies: bool
 ) -> Iterable[Line]:
-    """Check the proof of a certificate, and return the lines that say what it proves.
+    """Check the proof of a certificate, and return lines with the proved claim.
 
     Raises:
         Exit: with status 1 where the proof does not hold.
     """
     from ..proof.checker.check import check_proof
-    from ..proof.checker.premises import claim_words, hold_statement, program_of, root_below
+    from ..proof.checker.premises import check_statement, claim_words, program_of, root_below
     from ..proof.checker.proof_file import ProofError
     from ..results.objective import unit_of_objective
     from ..words.text import Line
 
     try:
-        hold_statement(case, statement, above=above, all_assemblies=all_assemblies)
+        check_statement(case, statement, above=above, all_assemblies=all_assemblies)
         checked = check_proof(claim, program_of(case, statement))
         shown = root_below(-checked.bound) if case.tasks[0].measure else -checked.bound
         if above is not None and not shown > above:
@@ -148,12 +147,12 @@ def _verify(
         print_notice(f"rejected: {error}")
         raise SystemExit(1) from None
     bound = None if claim.bound is None else checked.bound
-    holds = Line(f"holds: {claim_words(case, statement, bound, unit_of_objective(case))}")
-    return [holds, Line(f"{checked.leaves:,} leaves, shown on {checked.pieces:,} boxes")]
+    holds = Line(f"PROOF VALID: {claim_words(case, statement, bound, unit_of_objective(case))}")
+    return [holds, Line(f"{checked.leaves:,} leaves of the proof tree, checked on {checked.pieces:,} boxes")]
 
 
 def _carried_case(text: str, name: str, proof: str) -> Case:
-    """Return the case of the text that a proof carries.
+    """Return the case of the text in a proof file.
 
     Raises:
         InputError: the text is no TOML, or no case.

@@ -1,4 +1,4 @@
-"""The command ``workspace``."""
+"""Command ``workspace``."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ def workspace(
     settings: options.SettingTexts = None,
     of: options.ResultFile = None,
     quantities: Annotated[
-        list[str] | None, options.several("--quantity", "NAME", "Bound this measure of the robot too")
+        list[str] | None, options.several("--quantity", "NAME", "Also bound this quantity of the robot")
     ] = None,
     gap: options.RangeGap = 1e-3,
     time: Annotated[float | None, options.time("60 for the proofs if left out")] = None,
     leg_error: options.LegError = 0.0,
-    scale: Annotated[bool, options.flag("--scale", "Find the largest box that is proved, to 1 %")] = False,
+    scale: Annotated[bool, options.flag("--scale", "Find the largest proved box, to 1 %")] = False,
     proof: options.ProofFile = None,
     jobs: options.Jobs = None,
     json_file: options.JsonFile = None,
@@ -38,22 +38,25 @@ def workspace(
     html: Annotated[str | None, options.page(": verdicts, poses, slices")] = None,
     whole: options.ShowAll = False,
 ) -> None:
-    """Prove regular poses and limits over a whole workspace."""
+    """Prove no singularity and no violated limit over a workspace.
+
+    The case states the box of poses under [workspace]. Quantities without a limit are bounded for information.
+    """
     from ..interruption import Milestone, answer_after, seconds_left, within
-    from ..proof.statement.machine import workspace_of_case
+    from ..proof.statement.fixed_robot import workspace_of_case
     from ..results.workspace import scale_data, workspace_of
     from ..words.poses import evaluate_command
     from .proofs import proof_record, proof_text
 
     record = proof_record(proof, json_file)
     answer_after(Milestone.BOUND)
-    (loaded, text, inputs), chosen = options.read_machine(case, settings, of)
+    (loaded, text, inputs), chosen = options.read_changed_case(case, settings, of)
     workspace_of_case(loaded)
     tell_workspace(loaded)
     files = options.Outputs(json=json_file, csv=csv_file, plot=plot, plot_pose=plot_pose, html=html, proof=proof)
     files.check(inputs)
     slices = _slices(loaded, files)
-    # With two searches in one time, the first takes at most half of it.
+    # Two searches share the time: the first one takes at most half of it.
     with within(seconds_left() / 2 if scale else None):
         judged = _judge_with_progress(loaded, quantities or [], gap, time, leg_error, jobs, record)
     largest = None
@@ -89,7 +92,7 @@ def _judge_with_progress(
     jobs: int | None,
     record: ProofRecord | None,
 ) -> Judgement:
-    """Judge a machine with a line of progress on standard error, where standard error is a terminal."""
+    """Judge a robot with a line of progress on standard error, where standard error is a terminal."""
     from ..proof.workspace.judge import TIME_LIMIT, judge_workspace
 
     with spinner("formulating") as show:
@@ -101,18 +104,18 @@ def _judge_with_progress(
             leg_error=leg_error,
             jobs=jobs,
             rank_progress=lambda seconds, boxes, left: show(
-                f"regular poses: {boxes:,} boxes, {left:,} left, {seconds:.0f} s"
+                f"singularities: {boxes:,} boxes, {left:,} left, {seconds:.0f} s"
             ),
-            progress=lambda name, done, total: show(f"{name}: {done} of {total} numbers done"),
+            progress=lambda name, done, total: show(f"{name}: {done} of {total} quantities done"),
             record=record,
         )
 
 
 def _slices(case: Case, files: options.Outputs) -> tuple[Slice, ...]:
-    """Return the slices that the files show; a page has none of a robot without slices.
+    """Return the slices that the files show; empty for a page about a robot without slices.
 
     Raises:
-        CaseError: a picture of slices is asked for, of a robot that has none.
+        CaseError: a picture of slices is requested for a robot without slices.
     """
     from ..errors import CaseError
     from ..proof.workspace.slices.slices import slices_of
@@ -138,5 +141,5 @@ def _worst(case: Case, result: WorkspaceResult, target: str | None) -> Figure:
 
     worst = worst_claim(result, case.tasks[0].sense)
     if worst is None:
-        raise InputError(f"--plot-pose {target}: no pose of the workspace is known at which a number is reached")
+        raise InputError(f"--plot-pose {target}: no violation, and no worst value of a quantity, is known at a pose")
     return contents.figure_of([contents.drawing_at(case, worst)])

@@ -1,6 +1,6 @@
-"""C for embedding: the objective of a case and a whole solver, from the templates in ``c``.
+"""C for embedding: the objective and the solver of a case, from the templates in ``c``.
 
-The modules import each other in this order: ``ctext`` and ``calls`` stand alone; ``subject`` and ``runtimelimits`` use
-``ctext``; ``loops`` and ``stages`` each use those before; ``manifest`` uses ``ctext`` and ``runtimelimits``,
-``measure`` uses ``manifest``, and ``codegen`` uses all of them. ``library`` loads a folder.
+The modules import each other in this order: ``ctext`` and ``calls`` import none; ``subject`` and ``runtimelimits``
+import ``ctext``; ``loops`` and ``stages`` import those before; ``manifest`` imports ``ctext`` and ``runtimelimits``,
+``measure`` imports ``manifest``, and ``codegen`` imports all of them. ``library`` loads a folder.
 """

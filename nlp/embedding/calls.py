@@ -1,7 +1,7 @@
-"""A program as calls of few functions: those that repeat for legs, pairs of legs, joints, tasks and poses.
+"""A program as calls of few functions, repeated for legs, pairs of legs, joints, tasks and poses.
 
 A call of a limit or of the objective is a *final* call. It may take values of *inner* calls: spans of legs, rates of
-rows, their sums, and with several poses the other numbers of the robot at each pose.
+rows, their sums, and for several poses the other values of the robot at each pose.
 """
 
 from __future__ import annotations
@@ -20,28 +20,28 @@ from ...models.wrench import Wrench, force_along
 from ..case.limits.constraint import Call, Form
 from ..program.program import Program
 
-#: Depth to which expressions of joint centres at two poses are compared.
+#: Depth for the comparison of joint-centre expressions at two poses.
 _DEPTH = 1000
-#: Operations of the second derivatives of all calls of one form up to which they stay single operations in C. A loop
-#: saves little then, and single operations are faster.
+#: Number of operations in the second derivatives of all calls of one form up to which they stay single operations in C:
+#: a loop saves little then, and single operations are faster.
 _FEW = 2000
 
 
-#: A row of J from its inputs, as :func:`_inputs_of_row` returns them.
+#: Function that builds a row of J from its inputs, as returned by :func:`_inputs_of_row`.
 RowBuild: TypeAlias = Callable[[SX], Wrench]
 
 
 class InnerCall(NamedTuple):
-    """A call, and its value (r, 1) as the program's own expressions."""
+    """Call, and its value (r, 1) as expressions of the program."""
 
     call: Call
     values: SX
 
     @property
     def computed(self) -> dict[int, int]:
-        """Places of the values by their hash, without constants and without values that are inputs of the call.
+        """Indices of the values by their hash, without constants and without values that are inputs of the call.
 
-        A joint's position may be an unknown of the program itself.
+        A joint coordinate may be an unknown of the program.
         """
         given = {each.element_hash() for each in ca.vertsplit(self.call.inputs)}
         found: dict[int, int] = {}
@@ -52,7 +52,7 @@ class InnerCall(NamedTuple):
 
 
 class FinalCall(NamedTuple):
-    """A call, and the index of the constraint that is its value; the number of constraints for the objective."""
+    """Call, and the index of its constraint; the number of constraints for the objective."""
 
     call: Call
     place: int
@@ -60,13 +60,13 @@ class FinalCall(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Calls:
-    """The calls of a program.
+    """Calls of a program.
 
     Attributes:
-        inner: calls whose values other calls take.
-        final: calls whose values are constraints, or the objective.
-        matrices: J with moments about the platform's origin, (6 m, 1) row after row, at each pose; empty where there is
-            no limit on singular values.
+        inner: calls with values that other calls take.
+        final: calls with values that are constraints, or the objective.
+        matrices: J with moments about the platform's origin, (6 m, 1) row by row, at each pose; empty without a limit
+            on singular values.
     """
 
     inner: tuple[InnerCall, ...]
@@ -76,11 +76,11 @@ class Calls:
 
 @dataclass(frozen=True)
 class RobotValues:
-    """The robot's numbers at a pose as a function of all that they depend on: a ``build`` of a form.
+    """Function that returns the robot's values at a pose from all their inputs: a ``build`` of a form.
 
     Attributes:
         model: the robot.
-        reference: as for :class:`~screwsynth.models.instance.Substitution`.
+        reference: reference of :class:`~screwsynth.models.instance.Substitution`.
     """
 
     model: Model
@@ -103,7 +103,7 @@ class RobotValues:
 
 
 def robot_values(robot: RobotInstance) -> SX:
-    """Return F, rates, F without cancellation, closure, quantities and J row after row, below each other (r, 1).
+    """Return F, rates, bound on F, closure, quantities and J row by row, one below the other (r, 1).
 
     The moments of J are about the platform's origin.
     """
@@ -112,15 +112,15 @@ def robot_values(robot: RobotInstance) -> SX:
 
 
 def span_of_leg(inputs: SX) -> SX:
-    """Return ``p + R a - b``, (3, 1), from p, R column after column, a and b, (18, 1) together."""
+    """Return ``p + R a - b``, (3, 1), from p, R column by column, a and b, (18, 1) together."""
     return inputs[:3] + ca.reshape(inputs[3:12], 3, 3) @ inputs[12:15] - inputs[15:]
 
 
 def find_calls(program: Program) -> Calls:
     """Return the calls of a program.
 
-    At a single pose limits of few operations are no calls. The objective is one where limits take F, or where there
-    are other calls and its second derivatives are many operations.
+    At a single pose, limits of few operations are not calls. The objective is a call if limits take F, or if there are
+    other calls and its second derivatives are many operations.
     """
     several = len(program.robots) > 1
     is_spectral = any(each.spectral is not None for each in program.constraints)
@@ -137,7 +137,7 @@ def find_calls(program: Program) -> Calls:
     chosen = [each for members in by_form(final) if _is_worthwhile(program, members, taken) for each in members]
     of_F = {each.element_hash() for robot in program.robots for each in ca.vertsplit(robot.F)}
     takes_F = several or any(each.element_hash() in of_F for item in chosen for each in ca.vertsplit(item.call.inputs))
-    # Beside other loops the code of those is there already.
+    # With other loops, their code exists already.
     is_large = bool(chosen) and bool(of_F & values) and _second_operations(program, program.objective) > _FEW
     if program.objective_call is not None and (takes_F or is_large):
         chosen.append(FinalCall(program.objective_call, len(program.constraints)))
@@ -149,14 +149,14 @@ def _same(inputs: SX) -> SX:
 
 
 def _central_rows(robot: RobotInstance) -> SX:
-    """Return J (6 m, 1), row after row, with moments about the platform's origin."""
+    """Return J (6 m, 1), row by row, with moments about the platform's origin."""
     return ca.vec(ca.horzcat(*homogenised(robot.jacobian, robot.position, 1.0)).T)
 
 
 def _inner_calls(program: Program, matrices: Sequence[SX]) -> tuple[InnerCall, ...]:
-    """Return the calls that give spans of legs, rates, F, and with several poses the robot's other numbers.
+    """Return the calls for spans of legs, rates, F, and for several poses the robot's other values.
 
-    Of two calls with the same value the first one is used.
+    Of two calls with the same value the first is used.
     """
     calls: list[InnerCall] = []
     first = program.robots[0].legs
@@ -166,7 +166,7 @@ def _inner_calls(program: Program, matrices: Sequence[SX]) -> tuple[InnerCall, .
             inputs = ca.veccat(robot.position, robot.rotation, leg.platform, leg.base)
             calls.append(InnerCall(Call(Form(span_of_leg), inputs), leg.span))
         rows = [_inputs_of_row(row, legs) for row in robot.rows]
-        # The rows of a member are those of one projector: they are no rows that one form gives each by itself.
+        # The rows of a member come from one projector, so no form gives each of them separately.
         is_by_row = len(program.robots) == 1 or all(form == _FORCE_OF_LEG for form, _ in rows)
         if is_by_row and not program.model.members:
             calls += _calls_of_rows(robot, rows)
@@ -179,16 +179,16 @@ def _inner_calls(program: Program, matrices: Sequence[SX]) -> tuple[InnerCall, .
 
 
 def _with_first_joints(leg: LegInstance, first: LegInstance) -> LegInstance:
-    """Return a leg with the expressions of its joint centres at the first pose: no pose changes the centres."""
+    """Return a leg with the joint-centre expressions of the first pose, because no pose changes the centres."""
     pairs = (leg.base, first.base), (leg.platform, first.platform)
     same = all(ca.is_equal(here, there, _DEPTH) for here, there in pairs)
     return replace(leg, base=first.base, platform=first.platform) if same else leg
 
 
 def _inputs_of_row(row: Wrench, legs: Sequence[LegInstance]) -> tuple[Form, SX]:
-    """Return the form of a row's rates, and its inputs: base and span of a leg that it acts along, or the wrench's own.
+    """Return the form of a row's rates, and its inputs: base and span of its leg, or the wrench itself.
 
-    The wrench's own are force, moment and square.
+    The inputs of a wrench are force, moment and square.
     """
     for leg in legs:
         along = force_along(leg.name, leg.base, leg.span)
@@ -201,7 +201,7 @@ def _inputs_of_row(row: Wrench, legs: Sequence[LegInstance]) -> tuple[Form, SX]:
 
 
 def _calls_of_rows(robot: RobotInstance, rows: Sequence[tuple[Form, SX]]) -> list[InnerCall]:
-    """Return the calls that give each row's rates, and those that give F and F without cancellation from them."""
+    """Return the calls for each row's rates, and those for F and its bound from the rates."""
     tasks = robot.F.numel()
     at = robot.inputs.numel() - 6 * tasks
     length, calls = robot.inputs[at - 1], []
@@ -227,13 +227,13 @@ def _wrench(kind: WrenchKind, inputs: SX) -> Wrench:
 
 
 def _rate_of_row(inputs: SX, row: RowBuild) -> SX:
-    """Return a row's rate and its part of F, (2, 1), from characteristic length, twist and the row's inputs."""
+    """Return a row's rate and its term of F, (2, 1), from characteristic length, twist and the row's inputs."""
     length, twist, rows = inputs[0], inputs[1:7], [row(inputs[7:])]
     return ca.vertcat(rates(rows, twist, length), objective(rows, twist, length))
 
 
 def _size_of_row(inputs: SX, row: RowBuild) -> SX:
-    """Return a row's part of F without cancellation, (1, 1), from length, twist, position and the row's inputs."""
+    """Return a row's term of the bound on F, (1, 1), from length, twist, position and the row's inputs."""
     return magnitude([row(inputs[10:])], inputs[1:7], inputs[7:10], inputs[0])
 
 
@@ -242,7 +242,7 @@ _OF_KIND = {kind: Form(_rate_of_row, (partial(_wrench, kind),)) for kind in (Wre
 
 
 def _is_worthwhile(program: Program, members: Sequence[FinalCall], values: set[int]) -> bool:
-    """Return whether calls take values of inner calls, or are many operations."""
+    """Return True if calls take values of inner calls, or have many operations."""
     if any(each.element_hash() in values for item in members for each in ca.vertsplit(item.call.inputs)):
         return True
     multipliers = SX.sym("multipliers", len(members))
@@ -251,13 +251,13 @@ def _is_worthwhile(program: Program, members: Sequence[FinalCall], values: set[i
 
 
 def _second_operations(program: Program, expression: SX, *others: SX) -> int:
-    """Return the number of operations of an expression's second derivatives; it is of x, p and the other symbols."""
+    """Return the number of operations of an expression's second derivatives with respect to x, p and other symbols."""
     inputs = [program.x, program.p, *others]
     return int(ca.Function("hessian", inputs, [ca.hessian(expression, program.x)[0]]).n_instructions())
 
 
 def by_form(final: Iterable[FinalCall]) -> list[list[FinalCall]]:
-    """Return calls of one form and one number of inputs together, in the order of the first of them."""
+    """Return groups of calls with one form and number of inputs, in the order of their first calls."""
     found: dict[tuple[Form, int], list[FinalCall]] = {}
     for item in final:
         found.setdefault((item.call.form, item.call.inputs.numel()), []).append(item)

@@ -1,8 +1,8 @@
-"""C for embedding: the objective and the solver of a case as a folder of C99 that needs no library of Python's.
+"""C for embedding: the objective and the solver of a case as a folder of C99 without Python libraries.
 
-CasADi generates the functions. The templates in ``nlp/embedding/c`` add a header with every number's name, unit, bounds
-and default, readable wrappers, the solver, a test against values from Python, timings, and build files. The same case
-and versions give the same bytes.
+CasADi generates the functions. The templates in ``nlp/embedding/c`` add a header with name, unit, bounds and default of
+all variables and parameters, readable wrappers, the solver, a self-test against values from Python, timings, and build
+files. The same case and versions give the same bytes.
 """
 
 from __future__ import annotations
@@ -42,13 +42,13 @@ from .ctext import (
 from .loops import find_loops
 from .manifest import MANIFEST, NumberColumns, manifest_text, number_columns
 from .measure import NOT_MEASURED
-from .runtimelimits import held_by_fixed_numbers, held_texts, limit_texts, run_time_limits
+from .runtimelimits import fixed_condition_texts, fixed_conditions, limit_texts, run_time_limits
 from .stages import StagedFunctions, loop_texts, stage_functions
 from .subject import Subject, find_subject, magnitude_of, objective_words, turning_joints
 from .worstcase import worst_case_texts
 
 _TEMPLATES = Path(__file__).parent / "c"
-#: Endings of the files whose names begin with the case's prefix, and their templates.
+#: Suffixes of the files whose names begin with the case's prefix, and their templates.
 _PARTS = {
     ".h": "api.h",
     ".c": "api.c",
@@ -60,11 +60,11 @@ _PARTS = {
     "-batch.c": "batch.c",
     ".hpp": "api.hpp",
 }
-#: Endings of the files of the search, which are C as they are: the extension of ``nlp/screening`` is made of them too.
-#: A folder has the case's prefix in the place of their own.
+#: Suffixes of the files of the search, which are complete C: the extension of ``nlp/screening`` is built from them too.
+#: A folder replaces their prefix by that of the case.
 _CORE = ("-sqp.h", "-search.h", "-sqp.c", "-step.c", "-restore.c", "-qp.c")
 _CORE_PREFIX = "screwsynth"
-#: Files of every folder whose names do not begin with the prefix.
+#: Files of every folder without the prefix in their names.
 _OTHERS = (
     *("selftest.c", "stack.c", "bench.c", "example.c", "example.cpp", "realtime.c", "sfunction.c"),
     *("Makefile", "CMakeLists.txt", "README.md"),
@@ -74,7 +74,7 @@ _SEEDS = 16
 #: Number of points of the self-test, and the seed of their random choice.
 _POINTS = 8
 _SEED = 1
-#: Generated C above this size, in bytes, is announced with its reason: compilers take a minute for it.
+#: Size of generated C, bytes, above which it is announced with its reason: compilers take a minute for it.
 _LARGE = 800_000
 _NO_CASE_FILE = "# This case was built in Python: it has no case file.\n"
 
@@ -82,27 +82,27 @@ _NO_CASE_FILE = "# This case was built in Python: it has no case file.\n"
 def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
     """Generate the files of a case's C folder.
 
-    Twists and weights of tasks are run-time arguments, as is everything fixed.
+    Twists and weights of tasks are run-time arguments, as are all fixed parameters.
 
     Args:
         case: the case.
-        source: text of its case file, which goes into the folder as ``case.toml``.
+        source: text of the case file, which is included as ``case.toml``.
 
     Returns:
         Text by file name.
 
     Raises:
-        CaseError: the case contradicts itself, or C cannot be generated for its tasks or its poses.
-        InputError: the case's functions have no finite value at any point that is tried.
+        CaseError: the case is inconsistent, or C cannot be generated for its tasks or its poses.
+        InputError: the functions of the case have no finite value at any trial point.
     """
     subject = find_subject(case)
     nlp, prefix = subject.nlp, identifier(case.name)
-    held = held_by_fixed_numbers(nlp)
+    held = fixed_conditions(nlp)
     staged = stage_functions(nlp.program, magnitude_of(nlp), f"{prefix}_CASADI", held)
     limits = run_time_limits(nlp, f"{prefix}_CASADI")
     columns = number_columns(nlp, limits.limits, prefix)
     names = _substitutions(subject, staged, columns)
-    names |= held_texts(held, limits)
+    names |= fixed_condition_texts(held, limits)
     names |= limit_texts(limits, prefix, columns.limits)
     core = {ending: _core_text(ending, prefix) for ending in _CORE}
     names |= _stated_texts(names, core)
@@ -124,7 +124,7 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
 
 
 def size_words(case: Case, files: Mapping[str, str]) -> str:
-    """Return the size of generated C in words, and the limit that most of it is for where it is large.
+    """Return the size of generated C in words, and for large C the limit that causes most of it.
 
     Args:
         case: the case.
@@ -146,7 +146,7 @@ def size_words(case: Case, files: Mapping[str, str]) -> str:
 
 
 def budget_files(prefix: str) -> dict[str, str]:
-    """Return C by which each of many problems has a budget of its own, for the library that Python loads."""
+    """Return C for separate budgets of many problems, for the library that Python loads."""
     return {f"{prefix}-deadline.c": _fill_template("deadline.c.in", {"id": prefix})}
 
 
@@ -156,13 +156,13 @@ def _fill_template(template: str, names: Mapping[str, str]) -> str:
 
 
 def _core_text(ending: str, prefix: str) -> str:
-    """Return the text of a file of the search, with a case's prefix."""
+    """Return the text of a search file, with the prefix of a case."""
     text = (_TEMPLATES / f"{_CORE_PREFIX}{ending}").read_text(encoding="utf-8")
     return text.replace(_CORE_PREFIX, prefix).replace(_CORE_PREFIX.upper(), prefix.upper())
 
 
 def _stated_texts(names: Mapping[str, str], core: Mapping[str, str]) -> dict[str, str]:
-    """Return the texts for the placeholders about workspaces and the worst case, read from the macros of the C.
+    """Return the texts of the placeholders for workspaces and the worst case, from the macros of the C.
 
     Args:
         names: all other texts.
@@ -185,11 +185,11 @@ def _stated_texts(names: Mapping[str, str], core: Mapping[str, str]) -> dict[str
 
 
 def _casadi_files(functions: Iterable[ca.Function], name: str) -> dict[str, str]:
-    """Generate C and header, by ending; CasADi's own names in them begin with the given one."""
+    """Generate C and header, by suffix; CasADi's names in them begin with the given name."""
     generator = ca.CodeGenerator(f"{name}.c", {"with_header": True, "casadi_int": "int", "indent": 0})
     for function in functions:
         generator.add(function)
-    # CasADi writes files only.
+    # CasADi writes only files.
     with tempfile.TemporaryDirectory() as folder:
         generator.generate(folder + os.sep)
         texts = {end: (Path(folder) / f"{name}{end}").read_text(encoding="utf-8") for end in (".c", ".h")}
@@ -197,7 +197,7 @@ def _casadi_files(functions: Iterable[ca.Function], name: str) -> dict[str, str]
 
 
 def _substitutions(subject: Subject, staged: StagedFunctions, columns: NumberColumns) -> dict[str, str]:
-    """Return the texts for the templates' placeholders."""
+    """Return the texts of the templates' placeholders."""
     nlp, optimum = subject
     case, program = nlp.case, nlp.program
     prefix = identifier(case.name)
@@ -244,12 +244,12 @@ def _substitutions(subject: Subject, staged: StagedFunctions, columns: NumberCol
         "nseeds": str(_SEEDS),
         "measured_macros": f"/* {NOT_MEASURED} */",
         "measured_rows": NOT_MEASURED,
-        "seeds": "/* Where the solver searches from, in half ranges from the middle of the bounds. */\n"
+        "seeds": "/* Starting points of the solver, in half ranges from the middle of the bounds. */\n"
         + matrix_table(f"{prefix}_seeds[{prefix.upper()}_SEEDS][{prefix.upper()}_N + 1]", seeds),
         "tables": _tables(nlp, prefix, columns),
         "count": str(points),
         "has_optimum": str(int(optimum is not None)),
-        # Fewer digits than Ipopt's rounding error has, so that they are the same on every machine.
+        # Fewer digits than Ipopt's rounding error has, so that they are the same on every computer.
         "optimum": "0" if optimum is None else f"{optimum:.9g}",
         "optimum_scale": f"{nlp.objective_size:.9g}",
         "references": references,
@@ -258,14 +258,14 @@ def _substitutions(subject: Subject, staged: StagedFunctions, columns: NumberCol
 
 
 def _kinds_of_joints(nlp: Nlp) -> list[int]:
-    """Return 1 for each variable that is a joint's position from closed loops, 2 for a free position, 0 for others."""
+    """Return 1 for each joint coordinate from closed loops, 2 for a free actuator coordinate, 0 for other variables."""
     places = nlp.program.places
     free = {index for at_pose in places.joints for index in at_pose}
     return [1 if i in places.inner else 2 if i in free else 0 for i in range(nlp.n)]
 
 
 def _tables(nlp: Nlp, prefix: str, columns: NumberColumns) -> str:
-    """Return names, units, bounds and defaults as constant tables; each ends with a zero, so that none is empty."""
+    """Return constant tables of names, units, bounds and defaults, each with a final zero so that none is empty."""
     program, turning = nlp.program, turning_joints(nlp)
     _, variables, parameters, _, constraints, rows, tasks = columns
     kinds = [list(Dimension).index(each.dimension) for each in program.variables]
@@ -273,7 +273,7 @@ def _tables(nlp: Nlp, prefix: str, columns: NumberColumns) -> str:
         kinds[program.places.epigraph.level] = len(Dimension)
     N, P, M, C, T = (f"{prefix.upper()}_{each}" for each in ("N", "P", "M", "C", "TASKS"))
     blocks = [
-        "/* Free variables: names, units, kinds (one scale for each), bounds, and where a search may begin. */",
+        "/* Free variables: names, units, kinds (with one scale each), bounds, and a starting point. */",
         string_table(f"{prefix}_variable_names", N, variables["name"]),
         string_table(f"{prefix}_variable_units", N, variables["unit"]),
         integer_table(f"{prefix}_variable_kinds", N, kinds),
@@ -282,23 +282,23 @@ def _tables(nlp: Nlp, prefix: str, columns: NumberColumns) -> str:
         number_table(f"{prefix}_variable_lower", N, variables["lower"]),
         number_table(f"{prefix}_variable_upper", N, variables["upper"]),
         number_table(f"{prefix}_variable_starts", N, variables["start"]),
-        "/* Fixed numbers: names, units, and the case's values. */",
+        "/* Fixed parameters: names, units, and values of the case. */",
         string_table(f"{prefix}_parameter_names", P, parameters["name"]),
         string_table(f"{prefix}_parameter_units", P, parameters["unit"]),
         number_table(f"{prefix}_parameter_defaults", P, parameters["default"]),
-        "/* Units of F, of each task's rates, and of multipliers of variables' bounds, for the case's twists. */",
+        "/* Units of F, of each task's rates, and of multipliers of variables' bounds, for the twists of the case. */",
         f"static const char *const {prefix}_F_unit = {string_literal(columns.F_unit)};",
         string_table(f"{prefix}_rate_units", T, tasks["rate_unit"]),
         string_table(f"{prefix}_multiplier_units", N, variables["multiplier_unit"]),
-        "/* Rows of the Jacobian: the limb of each, and whether it is a force, a couple or another wrench. */",
+        "/* Rows of the Jacobian: limb and kind of each (force, couple or other wrench). */",
         string_table(f"{prefix}_row_limbs", M, rows["limb"]),
         string_table(f"{prefix}_row_kinds", M, rows["kind"]),
-        "/* Constraints: names, units of their multipliers, and bounds; 1e300 is none. */",
+        "/* Constraints: names, units of their multipliers, and bounds; 1e300 is no bound. */",
         string_table(f"{prefix}_constraint_names", C, constraints["name"]),
         string_table(f"{prefix}_constraint_multiplier_units", C, constraints["multiplier_unit"]),
         number_table(f"{prefix}_constraint_lower", C, constraints["lower"]),
         number_table(f"{prefix}_constraint_upper", C, constraints["upper"]),
-        "/* Tasks: names, and twists of six numbers each. */",
+        "/* Tasks: names and twists, 6 components each. */",
         string_table(f"{prefix}_task_names", T, tasks["name"]),
         number_table(f"{prefix}_task_twists", f"6 * {T}", np.concatenate(tasks["twist"])),
     ]
@@ -309,12 +309,12 @@ def _tables(nlp: Nlp, prefix: str, columns: NumberColumns) -> str:
 
 
 def _references(nlp: Nlp) -> tuple[int, str]:
-    """Return the self-test's points and values.
+    """Return points and values of the self-test.
 
-    The values are those of the program itself, and so independent of the functions from which the C is generated.
+    The values are those of the program, independent of the functions from which the C is generated.
 
     Raises:
-        InputError: no point that is tried has finite values.
+        InputError: no trial point has finite values.
     """
     kernels, p, robot = nlp.program.kernels, nlp.arguments, nlp.program.robot
     centres = ca.horzcat(SX(6, 0), *[ca.vertcat(leg.base, leg.platform) for leg in robot.legs])
@@ -335,7 +335,7 @@ def _references(nlp: Nlp) -> tuple[int, str]:
         if len(rows) == (_POINTS if nlp.n else 1):
             break
     if not rows:
-        raise InputError(f"{nlp.case.source or nlp.case.name}: F has no finite value at any point that was tried")
+        raise InputError(f"{nlp.case.source or nlp.case.name}: F has no finite value at any trial point")
     tables = []
     for name, first in rows[0].items():
         table = name if name == "points" else f"reference_{name}"

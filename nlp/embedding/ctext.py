@@ -1,9 +1,8 @@
-"""C text: tables, string literals, comments, identifiers and macros, valid for any names of a case.
+"""C text: tables, string literals, comments, identifiers and macros, valid for any names in a case.
 
-CasADi's C has more than a controller needs. Beside each function CasADi writes a dozen that return names, sizes and
-sparsities, by which it loads a library. A controller calls none of them, and together they are a fifth of the machine
-code. Each number of an input is read after a test whether the input is given at all. Here every input is given, and the
-tests are a tenth of the machine code.
+CasADi's C has more than a controller needs. For each function CasADi writes a dozen others with names, sizes and
+sparsities for loading a library, together a fifth of the machine code. Tests for missing inputs are another tenth. Both
+are removed here: a controller calls none of these functions, and gives every input.
 """
 
 from __future__ import annotations
@@ -18,14 +17,14 @@ from ...models import FloatArray
 from ..errors import one_line
 from ..program.program import Program
 
-#: Size of a bound that is none, in tables of C.
+#: Value of a missing bound in tables of C.
 NO_BOUND = 1e300
 
 
 def identifier(name: str) -> str:
     """Return the prefix of a case's C names, an identifier of C for any name of a case.
 
-    The generated names continue it by one word, by one with a capital letter, or for files by a hyphen, so that two
+    Generated names continue the prefix by one word, by one with a capital letter, or for files by a hyphen, so that two
     cases with different prefixes have no name in common.
     """
     plain = re.sub(r"[^0-9a-z]+", "_", name.lower(), flags=re.ASCII).strip("_")
@@ -33,12 +32,12 @@ def identifier(name: str) -> str:
 
 
 def c_name(name: str) -> str:
-    """Return the end of a C name for any name of a number: letters, digits and underscores as they are."""
+    """Return the suffix of a C name for any name in a case: letters, digits and underscores stay unchanged."""
     return re.sub(r"[^0-9A-Za-z]+", "_", name).strip("_") or "unnamed"
 
 
 def c_names(names: Iterable[str]) -> list[str]:
-    """Return the ends of C names for names of numbers; equal ones get their index at the end."""
+    """Return the suffixes of C names for names in a case; equal ones get their index at the end."""
     found: list[str] = []
     for index, name in enumerate(names):
         plain = c_name(name)
@@ -54,7 +53,7 @@ def string_table(name: str, size: str, values: Iterable[str]) -> str:
 
 
 def number_table(name: str, size: str, values: Iterable[float]) -> str:
-    """Return a constant table of numbers; infinite ones become bounds that are none."""
+    """Return a constant table of numbers; infinite bounds become :data:`NO_BOUND`."""
     return _table(f"double {name}", size, [repr(max(-NO_BOUND, min(float(each), NO_BOUND))) for each in [*values, 0]])
 
 
@@ -64,30 +63,30 @@ def integer_table(name: str, size: str, values: Iterable[int]) -> str:
 
 
 def _table(name: str, size: str, cells: Iterable[str]) -> str:
-    """Return a constant table, each entry in a line; it has one entry more at the end, so that it is never empty."""
+    """Return a constant table, one entry a line, with an additional last entry so that it is never empty."""
     lines = ",\n    ".join(cells)
     return f"static const {name}[{size} + 1] = {{\n    {lines}}};"
 
 
 def short_table(name: str, values: Iterable[int]) -> str:
-    """Return a constant table of small whole numbers; it ends with a zero, so that it is never empty."""
+    """Return a constant table of small whole numbers, with a final zero so that it is never empty."""
     return f"static const short {name}[] = {{{', '.join(map(str, [*values, 0]))}}};"
 
 
 def matrix_table(declaration: str, rows: Iterable[FloatArray]) -> str:
-    """Return a constant table of rows of numbers; each row ends with a zero."""
+    """Return a constant table of rows of numbers; each row has a final zero."""
     cells = (", ".join(repr(float(value)) for value in [*row, 0.0]) for row in rows)
     body = ",\n    ".join(f"{{{cell}}}" for cell in cells)
     return f"static const double {declaration} = {{\n    {body}}};\n"
 
 
 def comment_text(text: str) -> str:
-    """Return a text that neither ends a C comment nor begins another line; control characters are escaped."""
+    """Return a text for a C comment: without comment marks and line breaks, and with control characters escaped."""
     return one_line(re.sub(r"\s+", " ", text)).replace("*/", "* /").replace("/*", "/ *")
 
 
 def string_literal(text: str) -> str:
-    """Return a C string literal, with octal escapes for UTF-8 bytes outside of ASCII: they end after three digits."""
+    """Return a C string literal, with three-digit octal escapes for UTF-8 bytes outside ASCII."""
     plain = (chr(b) if 32 <= b < 127 and chr(b) not in '"\\?' else f"\\{b:03o}" for b in text.encode())
     return f'"{"".join(plain)}"'
 
@@ -95,7 +94,8 @@ def string_literal(text: str) -> str:
 def index_macros(program: Program, prefix: str) -> str:
     """Return a macro for the index of every entry of x and p, such as ``PREFIX_x_p_z``.
 
-    The macros continue the prefix by a small letter, as no other macro does: so they meet none of another case.
+    These macros continue the prefix by a small letter, unlike all others, so they never collide with those of another
+    case.
     """
     lines = ["/* Indices of the entries of x and of p. */"]
     for vector, scalars in (("x", program.variables), ("p", program.arguments)):
@@ -105,9 +105,9 @@ def index_macros(program: Program, prefix: str) -> str:
 
 
 class Macros:
-    """Macros of C texts whose values are whole numbers: sums, products and comparisons of macros and of parameters.
+    """Macros of C texts with whole-number values: sums, products and comparisons of macros and of parameters.
 
-    Of two macros of one name the one of the later text counts.
+    For two macros of one name, that of the later text counts.
     """
 
     _DEFINITION = re.compile(r"^#define (\w+)(?:\(([\w, ]+)\))?[ \t]+(.+?)[ \t]*$", re.MULTILINE)
@@ -122,12 +122,12 @@ class Macros:
         self._found = {name: (each.split(", "), body) for name, each, body in self._DEFINITION.findall(joined)}
 
     def value(self, name: str, *arguments: int) -> int:
-        """Return the value of a macro for its arguments."""
+        """Return the value of a macro for given arguments."""
         parameters, body = self._found[name]
         return self._evaluated(body, dict(zip(parameters, arguments, strict=False)))
 
     def sum_of_parts(self, name: str) -> int:
-        """Return the sum of the counts in a macro that lists them, such as ``part(values, 3 * N) part(rows, N)``."""
+        """Return the sum of the counts in a macro with a list such as ``part(values, 3 * N) part(rows, N)``."""
         return sum(self._evaluated(count, {}) for count in re.findall(r"\w+\(\w+, ([^()]+)\)", self._found[name][1]))
 
     def _evaluated(self, expression: str, given: Mapping[str, int]) -> int:
@@ -141,38 +141,38 @@ class Macros:
                     return self.value(name, *map(of, arguments))
                 case ast.BinOp(left, operation, right) | ast.Compare(left, [operation], [right]):
                     return int(self._OPERATIONS[type(operation)](of(left), of(right)))
-            raise ValueError(f"{expression!r} is no expression of whole numbers that is read here")
+            raise ValueError(f"{expression!r} is not a supported expression of whole numbers")
 
         return of(ast.parse(expression, mode="eval").body)
 
 
 def version_texts(version: str) -> dict[str, str]:
-    """Return the texts for the placeholders about a version such as ``1.2.3``; a part that is missing is 0."""
+    """Return the texts of the placeholders for a version such as ``1.2.3``; missing parts are 0."""
     parts = [*(match.group() for match in re.finditer(r"\d+", version)), "0", "0", "0"]
     named = dict(zip(("version_major", "version_minor", "version_patch"), parts, strict=False))
-    # Semantic versioning: with the major version 0 a minor one may break what was, with a later one it may not.
+    # Semantic versioning: a minor version may break compatibility only if the major version is 0.
     named["compatibility"] = "SameMinorVersion" if int(parts[0]) == 0 else "SameMajorVersion"
     number = (int(parts[0]) * 1000 + int(parts[1])) * 1000 + int(parts[2])
     return {"version": version, "version_number": str(number)} | named
 
 
-#: Ends of the names of these functions.
+#: Suffixes of the functions that CasADi adds for loading a library.
 _QUERIES = (
     "alloc_mem|init_mem|free_mem|checkout|release|incref|decref|n_in|n_out|default_in|name_in|name_out|"
     "sparsity_in|sparsity_out|work|work_bytes"
 )
-#: One of them: its body has no empty line, and may end on the first line.
+#: Definition of such a function: its body has no empty line, and may end on the first line.
 _DEFINITION = re.compile(
     rf"^CASADI_SYMBOL_EXPORT [^\n]*_(?:{_QUERIES})\([^\n]*\) \{{[^\n]*\n(?:[^\n]+\n)*\n?", re.MULTILINE
 )
 _DECLARATION = re.compile(rf"^CASADI_SYMBOL_EXPORT [^\n]*_(?:{_QUERIES})\([^\n]*\);\n", re.MULTILINE)
 #: Sparsities, which only these functions read.
 _SPARSITY = re.compile(r"^(?:#define casadi_s\d+ |static const casadi_int casadi_s\d+\[)[^\n]*\n", re.MULTILINE)
-#: A number of an input, with its test.
+#: Value of an input, with its test.
 _TESTED = re.compile(r"(arg\[\d+\])\? (\1\[\d+\]) : 0;")
 
 
-#: First line of a function that is left. Not every one uses all of its parameters, and none of them its memory.
+#: First line of a remaining function, which may not use all of its parameters, and none of their memory.
 _BEGIN = re.compile(
     r"^((?:static|CASADI_SYMBOL_EXPORT) int \w+\(const casadi_real\*\* arg, casadi_real\*\* res, casadi_int\* iw, "
     r"casadi_real\* w, int mem\) ?\{)$",
@@ -182,9 +182,9 @@ _USED = "(void)arg, (void)res, (void)iw, (void)w, (void)mem;"
 
 
 def for_controllers(text: str) -> str:
-    """Return the text of a source or of a header without these functions, their tables, and tests of inputs.
+    """Return the text of a source or header without these functions, their tables, and tests of inputs.
 
-    Parameters are used in name, so that no compiler warns of those that are not.
+    Unused parameters are cast to void, so that no compiler warns of them.
     """
     for pattern in (_DEFINITION, _DECLARATION, _SPARSITY):
         text = pattern.sub("", text)

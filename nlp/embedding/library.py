@@ -1,4 +1,4 @@
-"""A folder of C as a Python object: compiled once, and called for many problems at a time."""
+"""Generated C as a Python object, compiled once and called for many problems at a time."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ from .manifest import CompiledLimit, CompiledNumber, Manifest, read_manifest
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-#: Whole numbers among the answers.
+#: Fields of the results that are whole numbers.
 COUNTS = ("status", "runs", "converged", "iterations")
 
 
 class Rows(ctypes.Structure):
-    """Rows of numbers, as the C has them."""
+    """Rows of numbers, as in the C."""
 
     _fields_: ClassVar = [("values", ctypes.c_void_p), ("length", ctypes.c_int), ("is_shared", ctypes.c_int)]
 
 
 class Options(ctypes.Structure):
-    """A budget, as the C has it; zeros are none."""
+    """Budget of a solve, as in the C; 0 for none."""
 
     _fields_: ClassVar = [
         ("max_iterations", ctypes.c_int),
@@ -46,7 +46,7 @@ class Options(ctypes.Structure):
 
 
 class Batch(ctypes.Structure):
-    """Problems and answers, as the C has them."""
+    """Problems and results, as in the C."""
 
     _fields_: ClassVar = [
         *((name, Rows) for name in ("p", "x0", "lower", "upper", "g_lower", "g_upper", "limits")),
@@ -67,27 +67,27 @@ _CHUNK = 32
 
 
 class CompiledSolutions(NamedTuple):
-    """Answers of the solver in C to n problems, one row for each; a row is 0 where the status is ``BAD_INPUT``.
+    """Results of the solver in C for n problems, one row for each; a row is 0 for the status ``BAD_INPUT``.
 
     Attributes:
         F: (n,) objective.
         x: (n, variables) free variables, radians for angles.
-        status: (n,) codes; ``CompiledCase.statuses`` has their names. 0 is an optimum.
+        status: (n,) status codes, named in ``CompiledCase.statuses``; 0 is an optimum.
         R: (n, 3, 3) rotation of the platform.
         axis: (n, 3) unit axis of the rotation.
-        angle: (n,) its angle in ``[0, pi]``.
+        angle: (n,) angle of the rotation in ``[0, pi]``.
         violation: (n,) largest violation of a constraint, in half ranges of the case's variables.
-        residual: (n,) KKT residual; infinite where the point is no end of a search.
+        residual: (n,) KKT residual; infinite if the point is not the end of a search.
         runs: (n,) number of searches.
         converged: (n,) number of searches that ended at an optimum.
         iterations: (n,) number of iterations of all searches.
-        lower_multipliers: (n, variables) by how much F improves per unit by which a variable's lower bound alone is
-            moved outwards; 0 for an inactive one, and all where the point is no optimum.
-        upper_multipliers: (n, variables) likewise.
-        g_lower_multipliers: (n, constraints) likewise for lower bounds of constraints, in the constraint's own unit.
-        g_upper_multipliers: (n, constraints) likewise.
-        limit_multipliers: (n, limits) by how much F improves per unit by which a limit alone is loosened, in the order
-            of ``CompiledCase.limits``.
+        lower_multipliers: (n, variables) improvement of F per unit by which only this variable's lower bound is moved
+            outwards; 0 for an inactive bound, and for all if the point is not an optimum.
+        upper_multipliers: (n, variables) multipliers of the variables' upper bounds, in the same form.
+        g_lower_multipliers: (n, constraints) multipliers of the constraints' lower bounds, per unit of the constraint.
+        g_upper_multipliers: (n, constraints) multipliers of the constraints' upper bounds, per unit of the constraint.
+        limit_multipliers: (n, limits) improvement of F per unit by which only this limit is relaxed, in the order of
+            ``CompiledCase.limits``.
     """
 
     F: FloatArray
@@ -109,14 +109,14 @@ class CompiledSolutions(NamedTuple):
 
     @property
     def ok(self) -> NDArray[np.bool_]:
-        """(n,) whether an optimum was found."""
+        """(n,) True for an optimum."""
         return np.equal(self.status, 0)
 
 
 class CompiledCase:
-    """A case's solver in C, loaded from the folder that ``screwsynth codegen`` wrote.
+    """Solver of a case in C, loaded from the folder written by ``screwsynth codegen``.
 
-    :func:`load_compiled` makes it. Its methods may be called from several threads.
+    Created by :func:`load_compiled`. Methods may be called from several threads.
     """
 
     def __init__(self, manifest: Manifest, library: ctypes.CDLL, folder: Path) -> None:
@@ -126,14 +126,16 @@ class CompiledCase:
         *shape, self._work, self._iwork = list(counts)
         lengths = (manifest.variables, manifest.parameters, manifest.constraints, manifest.limits)
         if shape != [len(each) for each in lengths]:
-            raise InputError(f"{manifest.name}: the manifest and the C of the folder are not of one case")
+            raise InputError(
+                f"{manifest.name}: the manifest and the C files belong to different cases; generate the folder again"
+            )
 
     def __reduce__(self) -> tuple[Callable[[str], CompiledCase], tuple[str]]:
-        """Pickle the folder: it is loaded again where the object is unpickled."""
+        """Pickle only the folder, which is loaded again when the object is unpickled."""
         return load_compiled, (str(self._folder),)
 
     def __repr__(self) -> str:
-        counts = f"{len(self.variables)} variables, {len(self.parameters)} fixed numbers, {len(self.limits)} limits"
+        counts = f"{len(self.variables)} variables, {len(self.parameters)} parameters, {len(self.limits)} limits"
         return f"<CompiledCase {self.name!r}: {counts}>"
 
     @property
@@ -143,17 +145,17 @@ class CompiledCase:
 
     @property
     def variables(self) -> tuple[CompiledNumber, ...]:
-        """The free variables, in the order of ``x``."""
+        """Free variables, in the order of ``x``."""
         return self._manifest.variables
 
     @property
     def parameters(self) -> tuple[CompiledNumber, ...]:
-        """The fixed numbers, in the order of ``p``."""
+        """Fixed parameters, in the order of ``p``."""
         return self._manifest.parameters
 
     @property
     def limits(self) -> tuple[CompiledLimit, ...]:
-        """The limits that can be set."""
+        """Limits that can be set at run time."""
         return self._manifest.limits
 
     @property
@@ -163,7 +165,7 @@ class CompiledCase:
 
     @property
     def status_texts(self) -> tuple[str, ...]:
-        """Sentences of the statuses by code, without a full stop, as the C has them."""
+        """Sentence for each status code, without a full stop, as in the C."""
         text: Any = self._function("status_text")
         text.restype = ctypes.c_char_p
         return tuple(text(code).decode("ascii") for code in range(len(self.statuses)))
@@ -187,24 +189,24 @@ class CompiledCase:
         max_iterations: ArrayLike | None = None,
         deadline_seconds: ArrayLike | None = None,
     ) -> CompiledSolutions:
-        """Return the answers to n problems; n is the number of rows of the arrays that have rows.
+        """Return the results of n problems; n is the number of rows of the two-dimensional arrays.
 
         Args:
-            x0: (variables,) or (n, variables) where the first search of each problem starts; None for none.
-            p: (parameters,) or (n, parameters) fixed numbers; the case's own where None.
-            lower: (variables,) or (n, variables) bounds; the case's own where None. Equal ones fix a variable.
-            upper: likewise.
-            limits: numbers or (n,) numbers by key of ``limits``, lengths in the case's unit and angles in radians.
-            sense: ``"max"`` or ``"min"``; the case's own where None.
-            seeds: number of further searches from the table of starting points; all of them where None.
-            threads: number of threads; that of the processors where None.
-            max_iterations: number or (n,) numbers, largest number of iterations of all searches of a problem.
-            deadline_seconds: number or (n,) numbers, seconds from the begin of a problem's own solve until its end.
-                A problem that a budget ends has the status ``BUDGET`` and the best point so far.
+            x0: (variables,) or (n, variables) start of the first search of each problem; None for no such search.
+            p: (parameters,) or (n, parameters) values of the fixed parameters; None for those of the case.
+            lower: (variables,) or (n, variables) lower bounds; None for those of the case. Equal bounds fix a variable.
+            upper: (variables,) or (n, variables) upper bounds; None for those of the case.
+            limits: one or (n,) values for each key of ``limits``, lengths in the case's unit and angles in radians.
+            sense: ``"max"`` or ``"min"``; None for that of the case.
+            seeds: number of further searches from the table of starting points; None for all.
+            threads: number of threads; None for the number of processors.
+            max_iterations: one or (n,) values: largest number of iterations of all searches of a problem.
+            deadline_seconds: one or (n,) values: seconds from the begin to the end of the solve of a problem. A problem
+                that exceeds a budget has the status ``BUDGET`` and the best point so far.
 
         Raises:
-            InputError: an array has another shape or a number that is not finite, a limit is unknown or not allowed, or
-                there is nowhere to start. Whatever else a problem has against it is its status.
+            InputError: an array has a wrong shape or a number that is not finite, a limit is unknown or not allowed, or
+                there is no starting point. Other faults of a problem are reported by its status.
         """
         manifest = self._manifest
         n, k = len(self.variables), len(self.parameters)
@@ -217,14 +219,14 @@ class CompiledCase:
         counts |= {name: len(each) for name, each in budget.items() if each is not None and each.ndim == 1}
         if len(set(counts.values())) > 1:
             said = ", ".join(f"{name} has {count}" for name, count in counts.items())
-            raise InputError(f"arrays must have one number of rows, and {said}")
+            raise InputError(f"arrays must have the same number of rows, but {said}")
         count = next(iter(counts.values()), 1)
         if sense not in ("max", "min", *Sense, None):
             raise InputError(f"sense = {sense!r}: must be 'max' or 'min'")
         if seeds is not None and not is_between(seeds, 0, manifest.seeds):
             raise InputError(f"seeds = {seeds!r}: must be a whole number from 0 to {manifest.seeds}")
         if seeds == 0 and x0 is None:
-            raise InputError("seeds = 0 without x0: a search needs a point to start from")
+            raise InputError("seeds = 0 without x0: a search needs a starting point")
         if threads is not None and not is_between(threads, 1, None):
             raise InputError(f"threads = {threads!r}: must be a whole number of at least 1")
         batch, answers = self._batch(count, arrays)
@@ -234,7 +236,7 @@ class CompiledCase:
         return answers
 
     def _batch(self, count: int, arrays: Mapping[str, FloatArray | None]) -> tuple[Batch, CompiledSolutions]:
-        """Return problems as the C reads them, and the arrays that it writes."""
+        """Return the problems in the form of the C, and the arrays of its results."""
         batch = Batch()
         for name, given in arrays.items():
             if given is not None:
@@ -249,12 +251,12 @@ class CompiledCase:
         answers = CompiledSolutions(**made)
         for name, values in answers._asdict().items():
             setattr(batch, name, values.ctypes.data)
-        # The C reads and writes memory of these arrays: they must live as long as the batch.
+        # The C uses the memory of these arrays, so they must live as long as the batch.
         batch.kept = (*arrays.values(), answers)
         return batch, answers
 
     def _run(self, batch: Batch, count: int, threads: int, budget: Mapping[str, FloatArray | None]) -> None:
-        """Solve the problems in chunks. ctypes releases the interpreter's lock during a call."""
+        """Solve the problems in chunks; ctypes releases the interpreter's lock during a call."""
         solve_within = self._function("solve_within")
         most, seconds = budget["max_iterations"], budget["deadline_seconds"]
         iterations = None if most is None else np.array(np.broadcast_to(most, count), dtype=np.intc)
@@ -287,7 +289,7 @@ class CompiledCase:
                 is_stopped.set()
 
     def _limit_rows(self, given: Mapping[str, ArrayLike]) -> FloatArray | None:
-        """Return the numbers of all limits, (limits,) or (n, limits); None where none is given.
+        """Return the values of all limits, (limits,) or (n, limits); None if none is given.
 
         Raises:
             InputError: a limit is unknown or not allowed.
@@ -300,7 +302,9 @@ class CompiledCase:
                 raise InputError(f"limits: no limit {key!r} can be set; {nearest(str(key), columns)}")
             columns[key] = checked_numbers(f"limits[{key!r}]", values)
             if columns[key].ndim > 1:
-                raise InputError(f"limits[{key!r}]: must be a number or one for each problem, got {columns[key].shape}")
+                raise InputError(
+                    f"limits[{key!r}]: must be one number, or one for each problem, got shape {columns[key].shape}"
+                )
         for limit in self.limits:
             column = columns[limit.key]
             wrong = column[~((limit.above < column) & (column <= limit.most))]
@@ -316,7 +320,7 @@ class CompiledCase:
         lengths = {key: len(column) for key, column in columns.items() if column.ndim}
         if len(set(lengths.values())) > 1:
             said = listing(f"{key} {length}" for key, length in lengths.items())
-            raise InputError(f"limits: arrays must have one length, got {said}")
+            raise InputError(f"limits: arrays must have the same length, got {said}")
         return np.ascontiguousarray(np.stack(np.broadcast_arrays(*columns.values()), axis=-1))
 
     def _function(self, name: str) -> Callable[..., Any]:
@@ -326,17 +330,17 @@ class CompiledCase:
 
 
 def load_compiled(folder: str | os.PathLike[str]) -> CompiledCase:
-    """Return the solver of a folder of C, compiled when it is loaded first.
+    """Return the solver of a folder of generated C, compiled when it is first loaded.
 
-    The shared library is cached under the user's cache folder, by a hash of the C. It takes a C compiler: ``cc``,
-    ``gcc`` or ``clang``, or the one that the environment variable ``CC`` names.
+    The shared library is cached in the user's cache folder, by a hash of the C. Compilation needs a C compiler: ``cc``,
+    ``gcc`` or ``clang``, or that of the environment variable ``CC``.
 
     Args:
-        folder: the folder that ``screwsynth codegen`` wrote, or :func:`~screwsynth.nlp.generate_c`'s files. A pickle of
-            the result has its absolute path alone.
+        folder: folder with the files of ``screwsynth codegen`` or :func:`~screwsynth.nlp.generate_c`. A pickle of the
+            result contains only its absolute path.
 
     Raises:
-        InputError: the folder is none of generated C or of another version, or there is no working C compiler.
+        InputError: the folder has no generated C or one of another version, or there is no working C compiler.
     """
     manifest = read_manifest(Path(folder))
     path = shared_library({**manifest.files, **budget_files(manifest.prefix)})
@@ -354,7 +358,7 @@ def checked_rows(name: str, given: ArrayLike | None, length: int) -> FloatArray 
     """Return an array (length,) or (n, length) of finite numbers.
 
     Raises:
-        InputError: the shape is another one, or a number is not finite.
+        InputError: the shape is wrong, or a number is not finite.
     """
     if given is None:
         return None
@@ -365,10 +369,10 @@ def checked_rows(name: str, given: ArrayLike | None, length: int) -> FloatArray 
 
 
 def checked_numbers(name: str, given: ArrayLike) -> FloatArray:
-    """Return an array of finite numbers, contiguous. Texts are no numbers, nor are complex ones.
+    """Return a contiguous array of finite numbers; texts and complex numbers are refused.
 
     Raises:
-        InputError: something in it is no number, or not finite.
+        InputError: an entry is not a number, or not finite.
     """
     try:
         found = np.array(given)
@@ -377,7 +381,7 @@ def checked_numbers(name: str, given: ArrayLike) -> FloatArray:
     except (ValueError, TypeError, OverflowError):
         array = None
     if array is None:
-        raise InputError(f"{name}: must be an array of numbers, and no texts or complex ones")
+        raise InputError(f"{name}: must be an array of numbers, without texts or complex numbers")
     wrong = np.argwhere(~np.isfinite(array))
     if len(wrong):
         place = ", ".join(str(index) for index in wrong[0])
@@ -387,16 +391,16 @@ def checked_numbers(name: str, given: ArrayLike) -> FloatArray:
 
 
 def checked_budget(name: str, given: ArrayLike | None, *, is_whole: bool) -> FloatArray | None:
-    """Return a budget, () or (n,) numbers above 0.
+    """Return a budget, () or (n,), of positive numbers.
 
     Raises:
-        InputError: the shape is another one, or a number is not allowed.
+        InputError: the shape is wrong, or a number is not allowed.
     """
     if given is None:
         return None
     array = checked_numbers(name, given)
     if array.ndim > 1:
-        raise InputError(f"{name}: must be a number or one for each problem, got {array.shape}")
+        raise InputError(f"{name}: must be one number, or one for each problem, got shape {array.shape}")
     largest = np.iinfo(np.intc).max if is_whole else np.inf
     is_wrong = ~((array > 0) & (array <= largest)) | (is_whole & (array != np.floor(array)))
     if is_wrong.any():
@@ -406,7 +410,7 @@ def checked_budget(name: str, given: ArrayLike | None, *, is_whole: bool) -> Flo
 
 
 def is_between(value: object, least: int, most: int | None) -> bool:
-    """Return whether a value is a whole number within bounds."""
+    """Return True if a value is a whole number within bounds."""
     if not isinstance(value, int | np.integer) or isinstance(value, bool):
         return False
     return bool(least <= value and (most is None or value <= most))

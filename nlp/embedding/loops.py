@@ -1,8 +1,8 @@
-"""Loops over calls of one function, with tables of the numbers that each call takes.
+"""Loops over calls of one function, with tables of the inputs of each call.
 
-The numbers are *slots*. The first slots are *entries*, expressions of the program's variables: joint centres, spans of
-legs, rotations. The others are values of inner calls. Generated C has the function of a loop once, with its derivatives
-by its inputs; the chain rule gives those by the variables.
+Inputs are *slots*. The first slots are *entries*, expressions of the program's variables: joint centres, spans of legs,
+rotations. The others are values of inner calls. Generated C has the function of a loop once, with derivatives with
+respect to its inputs; the chain rule gives those with respect to the variables.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from .calls import Calls, by_form, find_calls
 
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """Calls of one function.
+    """Loop over calls of one function.
 
     Attributes:
         inputs: (k, 1) symbols of the inputs that depend on variables.
         constants: (q, 1) symbols of the inputs that do not.
-        values: (r, 1) expressions of both.
-        slots: the k slots of each call.
-        constant_places: the q places of each call among the constants.
-        outputs: where the r values of each call go: slots, or for the last loops the index of a constraint; the number
+        values: (r, 1) expressions of inputs and constants.
+        slots: k slots of each call.
+        constant_places: q indices of each call among the constants.
+        outputs: targets of the r values of each call: slots, or for final loops the index of a constraint; the number
             of constraints for the objective.
     """
 
@@ -42,7 +42,7 @@ class Loop:
 
 
 class SpectralCall(NamedTuple):
-    """A constraint on singular values: its index, its estimate, and the slots of J's entries, row after row."""
+    """Constraint on singular values: index, estimate, and slots of J's entries, row by row."""
 
     place: int
     spectral: Spectral
@@ -51,17 +51,17 @@ class SpectralCall(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Loops:
-    """A program's loops.
+    """Loops of a program.
 
     Attributes:
-        entries: (e, 1) the first slots.
-        constants: (q, 1) expressions of the arguments alone that calls take.
+        entries: (e, 1) expressions of the first slots.
+        constants: (q, 1) expressions of arguments only that calls take.
         slot_count: number of all slots.
-        inner: loops whose values are slots, in an order in which they can be computed.
-        final: loops whose values are constraints or the objective.
+        inner: loops with values that are slots, in order of computation.
+        final: loops with values that are constraints or the objective.
         spectra: constraints on singular values.
-        plain: indices of the constraints that no loop has.
-        has_objective: whether a loop has the objective.
+        plain: indices of the constraints outside loops.
+        has_objective: True if a loop computes the objective.
     """
 
     entries: SX
@@ -75,7 +75,7 @@ class Loops:
 
     @property
     def all(self) -> tuple[Loop, ...]:
-        """Every loop, the inner ones first."""
+        """All loops, the inner ones first."""
         return (*self.inner, *self.final)
 
     def __bool__(self) -> bool:
@@ -88,9 +88,9 @@ def find_loops(program: Program) -> Loops:
 
 
 class _Group(NamedTuple):
-    """Calls of one form: the indices of the form's values that are wanted, and where those of each call go.
+    """Calls of one form, with the indices of the used values and their targets.
 
-    For inner calls ``targets`` are their indices among all inner calls; for final ones the places of their values.
+    For inner calls ``targets`` are their indices among all inner calls; for final calls the places of their values.
     """
 
     calls: list[Call]
@@ -99,7 +99,7 @@ class _Group(NamedTuple):
 
 
 class _Value(NamedTuple):
-    """Value of an inner call: index of the call, and place in its values."""
+    """Value of an inner call: index of the call, and index in its values."""
 
     call: int
     place: int
@@ -127,7 +127,6 @@ class _Tables:
         self._slots: dict[_Value, int] = {}
 
     def loops(self) -> Loops:
-        """Return the loops."""
         final = [
             _Group([each.call for each in members], [0], [each.place for each in members])
             for members in by_form(self._calls.final)
@@ -164,7 +163,7 @@ class _Tables:
         )
 
     def _inner_groups(self, final: Sequence[_Group]) -> list[_Group]:
-        """Return the inner calls that are needed, those that other inner calls take first."""
+        """Return the required inner calls, ordered so that inputs come first."""
         wanted: dict[int, set[int]] = {}
         inputs = [call.inputs for group in final for call in group.calls] + [matrix for _, _, matrix in self._spectral]
         while inputs:
@@ -190,7 +189,7 @@ class _Tables:
         return max((1 + self._depth(self._calls.inner[k].call) for k in below), default=0)
 
     def _kinds(self, calls: Sequence[Call]) -> list[float | bool | None]:
-        """Return for each input a number if it is that in all calls or unused, True if none depends on x, else None."""
+        """Return for each input: a number if constant or unused in all calls, True if independent of x, or None."""
         x, form = self._program.x, calls[0].form
         u = SX.sym("u", calls[0].inputs.numel())
         used = ca.which_depends(form(u), u, 1, False)
@@ -221,7 +220,7 @@ class _Tables:
         return list(self._entries).index(self._same.get(element.element_hash(), element).element_hash())
 
     def _constant_place(self, element: SX) -> int:
-        """Return the place of an expression (1, 1) among the constants, which it is added to."""
+        """Return the index of an expression (1, 1) among the constants, added if new."""
         self._constants.setdefault(element.element_hash(), element)
         return list(self._constants).index(element.element_hash())
 
@@ -250,7 +249,7 @@ def _parts(call: Call, indices: Sequence[int]) -> list[SX]:
 
 
 def _canonical(expressions: Sequence[SX]) -> dict[int, SX]:
-    """Return one expression (1, 1) for all equal ones, by the hash of each."""
+    """Return one representative (1, 1) of equal expressions, by the hash of each."""
     joined = ca.vertcat(SX(0, 1), *expressions)
     both = zip(ca.vertsplit(joined), ca.vertsplit(ca.cse(joined)), strict=True)
     return {each.element_hash(): same for each, same in both}

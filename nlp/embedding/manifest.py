@@ -1,6 +1,6 @@
-"""The manifest of a folder of C: names, units, bounds, limits and sizes as JSON, for programs that call the library.
+"""Manifest of a folder of C: names, units, bounds, limits and sizes as JSON, for callers of the library.
 
-It is written with the folder, and read again as a typed value.
+The manifest is written with the folder, and read again as a typed value.
 """
 
 from __future__ import annotations
@@ -25,23 +25,23 @@ from ..units import objective_unit, rate_unit, twist_units
 from .ctext import NO_BOUND
 from .runtimelimits import RunTimeLimit
 
-#: Numbers or names by the key of each column.
+#: Values or names by the key of each column.
 Columns: TypeAlias = Mapping[str, list[Any]]
 
 
 class NumberColumns(NamedTuple):
-    """The numbers of a program in C, column by column: names, units, bounds and values, for the case's own tasks.
+    """Variables and parameters of a program in C as columns: names, units, bounds and values, for the case's tasks.
 
-    Angles are radians. A unit is empty for a plain number, and where the tasks do not agree in that of F.
+    Angles are in radians. A unit is empty for a dimensionless number, and if tasks have different units of F.
 
     Attributes:
         F_unit: unit of F.
-        variables: the free variables; the unit of a level is F's.
-        parameters: the fixed numbers.
-        limits: those that can be set at run time.
-        constraints: with the units of their multipliers.
-        rows: of the Jacobian.
-        tasks: with the units of their rates.
+        variables: free variables; the unit of a level is that of F.
+        parameters: fixed parameters.
+        limits: limits that can be set at run time.
+        constraints: constraints with the units of their multipliers.
+        rows: rows of the Jacobian.
+        tasks: tasks with the units of their rates.
     """
 
     F_unit: str
@@ -54,7 +54,7 @@ class NumberColumns(NamedTuple):
 
 
 def number_columns(nlp: Nlp, limits: Sequence[RunTimeLimit], prefix: str) -> NumberColumns:
-    """Return the numbers of a program in C, with the limits that can be set; C's names begin with the prefix."""
+    """Return the columns of a program in C, with the limits that can be set; C's names begin with the prefix."""
     case, program, epigraph = nlp.case, nlp.program, nlp.program.places.epigraph
     units = replace(case.units, angle="rad")
     twists = [np.asarray(task.twist, dtype=np.float64).tolist() for task in case.tasks]
@@ -70,7 +70,7 @@ def number_columns(nlp: Nlp, limits: Sequence[RunTimeLimit], prefix: str) -> Num
             of_parameters[index] = F
 
     def multipliers(labels: Iterable[str]) -> list[str]:
-        """Return units of F over others; empty where F has none."""
+        """Return units of F per other units; empty if F has none."""
         return ["" if label == F else f"{F}/{label}" if F and label else F for label in labels]
 
     readings = [each.reading for each in program.constraints]
@@ -124,12 +124,12 @@ def number_columns(nlp: Nlp, limits: Sequence[RunTimeLimit], prefix: str) -> Num
 
 #: Name of the manifest in the folder.
 MANIFEST = "manifest.json"
-#: A status in the header: its name, and a comment that says what it means.
+#: Pattern of a status in the header: name, and comment with its meaning.
 _STATUS = re.compile(r"^    SCREWSYNTH_(\w+)(?: = 0)?,? +/\* (.*) \*/$", flags=re.MULTILINE)
 
 
 def manifest_text(nlp: Nlp, columns: NumberColumns, names: Mapping[str, str], files: Mapping[str, str]) -> str:
-    """Return the manifest's text, from the texts of the templates' placeholders and of all other files by name."""
+    """Return the manifest's text, from the texts of the placeholders and of all other files by name."""
     case, prefix = nlp.case, names["id"]
     header = files[f"{prefix}.h"]
     statuses = _STATUS.findall(header[header.index("typedef enum") : header.index("} screwsynth_status;")])
@@ -161,7 +161,7 @@ def json_text(manifest: Mapping[str, object]) -> str:
 
 
 def _objects(columns: Columns) -> list[dict[str, Any]]:
-    """Return objects of JSON from their values by key; None where a number is infinite."""
+    """Return JSON objects from their values by key; None for infinite numbers."""
     rows = zip(*columns.values(), strict=True)
     return [{key: _plain(value) for key, value in zip(columns, row, strict=True)} for row in rows]
 
@@ -172,19 +172,19 @@ def _plain(value: str | float | list[float]) -> str | float | list[float] | None
     return float(value) if math.isfinite(value) else None
 
 
-#: Largest manifest, bytes.
+#: Largest size of a manifest, bytes.
 _LARGEST = 2**26
 
 
 class CompiledNumber(NamedTuple):
-    """A free variable of x or a fixed number of p.
+    """Free variable in x or fixed parameter in p.
 
     Attributes:
-        name: for people.
-        unit: ``rad`` for angles, empty for a plain number.
-        lower: its bound as a variable; -inf for a fixed number.
-        upper: likewise.
-        default: the case's value of a fixed number; for a variable, where the case's first search starts.
+        name: name for people.
+        unit: unit of the value: ``rad`` for angles, empty for a dimensionless number.
+        lower: lower bound of a variable; -inf for a parameter.
+        upper: upper bound of a variable; inf for a parameter.
+        default: value of a parameter in the case, or start of a variable in the first search of the case.
     """
 
     name: str
@@ -195,14 +195,14 @@ class CompiledNumber(NamedTuple):
 
 
 class CompiledLimit(NamedTuple):
-    """A limit that can be set at run time.
+    """Limit that can be set at run time.
 
     Attributes:
         key: dotted key, such as ``leg_length.max``.
-        unit: of its number: ``rad`` for angles, empty for a plain number.
-        default: the case's number.
-        above: the number must be larger than this.
-        most: the number may be at most this.
+        unit: unit of the limit: ``rad`` for angles, empty for a dimensionless number.
+        default: value in the case.
+        above: exclusive lower bound of allowed values.
+        most: largest allowed value.
     """
 
     key: str
@@ -213,14 +213,14 @@ class CompiledLimit(NamedTuple):
 
 
 class Manifest(NamedTuple):
-    """A folder of C: names, units, bounds, limits, statuses and the texts to compile.
+    """Contents of a folder of C: names, units, bounds, limits, statuses and source texts.
 
     Attributes:
-        name: of the case.
-        prefix: of the names in C.
-        variables: the free variables, in the order of x.
-        parameters: the fixed numbers, in the order of p.
-        limits: the limits that can be set.
+        name: name of the case.
+        prefix: prefix of the names in C.
+        variables: free variables, in the order of x.
+        parameters: fixed parameters, in the order of p.
+        limits: limits that can be set at run time.
         constraints: names of the constraints.
         statuses: names of the statuses by code.
         seeds: largest number of searches from the table of starting points.
@@ -239,15 +239,15 @@ class Manifest(NamedTuple):
 
 
 def read_manifest(folder: Path) -> Manifest:
-    """Return a folder's manifest, with the texts of the library.
+    """Return the manifest of a folder, with the texts of the library.
 
     Raises:
-        InputError: the folder is no folder of generated C, is of another version, or lacks a file.
+        InputError: the folder has no generated C, is of another version, or lacks a file.
     """
     try:
         text = read_limited(folder / MANIFEST, _LARGEST)
     except InputError as error:
-        raise InputError(f"{folder}: is no folder that `screwsynth codegen` wrote: {error}") from None
+        raise InputError(f"{folder}: is not a folder written by `screwsynth codegen`: {error}") from None
     try:
         data = value_of(Mapping[str, object], json_tree(text))
         check_version(GENERATED_C, {VERSION_KEY: data[VERSION_KEY]}, f"{folder}: {MANIFEST}")
@@ -256,7 +256,7 @@ def read_manifest(folder: Path) -> Manifest:
         raise InputError(f"{folder}: {error.filename} cannot be read: {error.strerror or error}") from None
     except (ValueError, KeyError) as error:
         why = f"{error} is missing" if isinstance(error, KeyError) else f"{error}"
-        fault = f" is not as `screwsynth codegen` writes it: {why}"
+        fault = f" does not have the form that `screwsynth codegen` writes: {why}"
     raise InputError(f"{folder}: {MANIFEST}{fault}")
 
 
@@ -270,13 +270,13 @@ def _manifest(data: Mapping[str, object], folder: Path) -> Manifest:
     """
     names = [name for key in ("sources", "headers") for name in value_of(tuple[str, ...], data[key], key)]
     if any(Path(name).name != name for name in names):
-        raise ValueError("a name in sources or headers is no name of a file")
+        raise ValueError("a name in sources or headers is not a file name")
     prefix, seeds = value_of(str, data["prefix"], "prefix"), value_of(int, data["seeds"], "seeds")
     if not prefix.isidentifier() or seeds < 0:
-        raise ValueError("prefix must be a name in C, and seeds not negative")
+        raise ValueError("prefix must be a name in C, and seeds at least 0")
 
     def rows(where: str, /, **kinds: object) -> list[list[Any]]:
-        """Return the values of some keys of the objects in a list."""
+        """Return the values of the given keys of the objects in a list."""
         tables = value_of(tuple[Mapping[str, object], ...], data[where], where)
         return [
             [value_of(kind, each[name], f"{where}[{index}].{name}") for name, kind in kinds.items()]

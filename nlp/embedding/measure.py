@@ -1,9 +1,8 @@
-"""Flash and stack of generated C, measured by the compilers of this machine, and written into its files.
+"""Flash and stack of generated C, measured by the installed compilers and written into its files.
 
-Compilers run in a temporary folder and by the names of the files alone, so that the same files and the same compiler
-give the same figures. The bound of a solve's stack follows from the call graphs that gcc writes with
-``-fcallgraph-info=su``. The frames are those of the compiler. Functions of the C library have no frame there: their
-stack is not in the bound.
+Compilers run in a temporary folder with relative file names, so that the same files and compiler give the same figures.
+The stack bound of a solve follows from the call graphs that gcc writes with ``-fcallgraph-info=su``, with the frames of
+this compiler. It excludes functions of the C library, which have no frame there.
 """
 
 from __future__ import annotations
@@ -26,25 +25,25 @@ from .manifest import MANIFEST, json_text
 
 #: Flags of every compiler.
 _FLAGS = ("-std=c99", "-O2")
-#: Writes the call graph with the size of each frame. Only gcc has it.
+#: Flag for the call graph with the size of each frame, which only gcc has.
 _GRAPH = "-fcallgraph-info=su"
-#: The stack that other compilers and flags may take, in parts of the bound of the one measured. clang took 1.36.
+#: Factor on the stack bound for other compilers and flags. clang needed 1.36.
 _ROOM = 1.5
-#: Functions of the mathematics library are found at the start: the linker would need stack in the solve.
+#: Flag to resolve functions of the mathematics library at the start, because the linker would use stack in the solve.
 _LINK = ("-Wl,-z,now", "-lm")
 _PAINTED = re.compile(r"stack below a solve +(\d+) bytes")
 
 
 class Target(NamedTuple):
-    """A machine for which C is measured.
+    """Target for which C is measured.
 
     Attributes:
-        name: for people.
-        macro: end of the names of its macros.
-        compilers: names of compilers; the first one found is taken.
-        size: program that gives the sizes of an object file.
-        flags: that choose the machine.
-        machine: beginning of the machine's name as ``-dumpmachine`` gives it.
+        name: name for people.
+        macro: suffix of the names of its macros.
+        compilers: names of compilers; the first installed one is used.
+        size: program that returns the sizes of an object file.
+        flags: compiler flags that select the target.
+        machine: start of the output of ``-dumpmachine`` for the target.
     """
 
     name: str
@@ -59,12 +58,12 @@ class Figures(NamedTuple):
     """Figures of one target, or the reason why there are none.
 
     Attributes:
-        target: the machine.
-        compiler: first line of its version, and the flags.
-        flash: bytes of code and constants of the library; None where they are not measured.
-        stack: bound of a solve's stack in bytes, without the mathematics library; None where there is none.
-        painted: bytes of stack that a solve from all starting points took, with that library; None where not run.
-        fault: why something is not measured; empty where all is.
+        target: measured target.
+        compiler: first line of the compiler's version, and the flags.
+        flash: bytes of code and constants of the library; None if not measured.
+        stack: bound of a solve's stack in bytes, without the mathematics library; None if there is none.
+        painted: measured bytes of stack of a solve from all starting points, with that library; None if not run.
+        fault: reason for missing figures; empty if all are measured.
     """
 
     target: Target
@@ -76,12 +75,12 @@ class Figures(NamedTuple):
 
     @property
     def with_room(self) -> int | None:
-        """The stack that other compilers may need: a multiple of 16."""
+        """Stack bound with a margin for other compilers: a multiple of 16."""
         return None if self.stack is None else 16 * math.ceil(_ROOM * self.stack / 16)
 
     @property
     def numbers(self) -> tuple[int | None, ...]:
-        """Flash, stack, stack with room, and the measured stack."""
+        """Flash, stack, stack with margin, and measured stack."""
         return self.flash, self.stack, self.with_room, self.painted
 
 
@@ -98,13 +97,13 @@ TARGETS = (X86_64, CORTEX_M7)
 
 
 def measure(files: Mapping[str, str], prefix: str) -> tuple[Figures, ...]:
-    """Compile generated C for every target, all at the same time, and return the figures.
+    """Compile generated C for all targets in parallel, and return the figures.
 
-    The environment variable ``CC`` names another compiler for x86-64, as elsewhere.
+    The environment variable ``CC`` may name another compiler for x86-64.
 
     Args:
-        files: text by file name, as :func:`~screwsynth.nlp.generate_c` returns it.
-        prefix: of the case's names in C.
+        files: text by file name, from :func:`~screwsynth.nlp.generate_c`.
+        prefix: prefix of the case's names in C.
     """
     sources = sorted(name for name in files if name.startswith(prefix) and name.endswith(".c"))
     with tempfile.TemporaryDirectory(prefix="screwsynth.") as root:
@@ -119,7 +118,7 @@ def measure(files: Mapping[str, str], prefix: str) -> tuple[Figures, ...]:
 
 
 class _Running(NamedTuple):
-    """A compiler at work in a folder; without a process, figures that say why."""
+    """Running compiler in a folder; without a process, figures with the reason."""
 
     figures: Figures
     words: tuple[str, ...]
@@ -128,12 +127,12 @@ class _Running(NamedTuple):
 
 
 def _begin(target: Target, files: Mapping[str, str], sources: list[str], folder: Path) -> _Running:
-    """Start a target's compiler."""
+    """Start the compiler of a target."""
     own = os.environ.get("CC")
     names = (own,) if own and target is X86_64 else target.compilers
     found = first_program(names)
     if found is None:
-        fault = f"no compiler for it was found: {' or '.join(names)}"
+        fault = f"no compiler for it is installed: {' or '.join(names)}"
         return _Running(Figures(target, fault=fault), (), folder, None)
     words = (found, *target.flags, *_FLAGS)
     try:
@@ -155,7 +154,7 @@ def _begin(target: Target, files: Mapping[str, str], sources: list[str], folder:
 
 
 def _end(running: _Running, sources: list[str], prefix: str) -> Figures:
-    """Wait for a compiler, and return the figures."""
+    """Wait for a compiler, and return its figures."""
     figures, words, folder, process = running
     if process is None:
         return figures
@@ -175,12 +174,12 @@ def _end(running: _Running, sources: list[str], prefix: str) -> Figures:
     graphs = {path.stem: path.read_text(encoding="utf-8") for path in folder.glob(f"{prefix}*.ci")}
     stack = stack_bound(graphs, prefix)
     if stack is None and not figures.fault:
-        return figures._replace(fault="this compiler writes no call graph, so the stack has no bound here")
+        return figures._replace(fault="this compiler writes no call graph, so there is no stack bound")
     return figures._replace(stack=stack)
 
 
 def _writes_graphs(words: tuple[str, ...], folder: Path) -> bool:
-    """Return whether a compiler writes call graphs."""
+    """Return True if a compiler writes call graphs."""
     (folder / "probe.c").write_text("int probe(void);\nint probe(void) { return 0; }\n", encoding="utf-8")
     try:
         run_program([*words, _GRAPH, "-c", "probe.c"], folder)
@@ -189,7 +188,7 @@ def _writes_graphs(words: tuple[str, ...], folder: Path) -> bool:
     return (folder / "probe.ci").exists()
 
 
-#: Bytes added for each call: the return address, where a compiler does not count it in the frame.
+#: Bytes added for each call: the return address, if a compiler does not count it in the frame.
 _RETURN = 8
 _NODE = re.compile(r'node: \{ title: "([^"]+)" label: "[^"]*?\\n(\d+) bytes \(([a-z,]+)\)')
 _EDGE = re.compile(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"')
@@ -197,14 +196,14 @@ _INDIRECT = "__indirect_call"
 
 
 def stack_bound(graphs: Mapping[str, str], prefix: str) -> int | None:
-    """Return the bytes of the deepest path of calls from the solver.
+    """Return the stack bytes of the deepest call path from the solver.
 
     Args:
-        graphs: call graph of each source by its name without an ending.
-        prefix: of the case's names in C.
+        graphs: call graph of each source, by its name without suffix.
+        prefix: prefix of the case's names in C.
 
     Returns:
-        The bound; None where a frame has no constant size, a function may call itself, or the solver is missing.
+        Stack bound; None if a frame has no constant size, a function may be recursive, or the solver is missing.
     """
     frames: dict[str, int] = {}
     calls: dict[str, set[str]] = {}
@@ -222,16 +221,16 @@ def stack_bound(graphs: Mapping[str, str], prefix: str) -> int | None:
 
 
 def _name(title: str, unit: str) -> str:
-    """Return a function's name; that of a static one, which the graph gives with its file, begins with its unit."""
+    """Return the name of a function; that of a static one begins with its unit, as in the graph."""
     own = title.rpartition(":")[2]
     return f"{unit}:{own}" if ":" in title else own
 
 
 def _called_by_pointer(function: str, frames: Mapping[str, int], prefix: str) -> set[str]:
-    """Return what a function may call by a pointer.
+    """Return the functions that a function may call by a pointer.
 
-    A search calls its program so: the scaled one, or that of the search for a feasible point, which calls the scaled
-    one. The scaled one calls only the caller's deadline, which is not known here.
+    A search calls its program by pointers: the scaled one, or that of the search for a feasible point, which calls the
+    scaled one. The scaled one calls only the caller's deadline, which is unknown here.
     """
     if function.startswith((f"{prefix}_SCALED_", f"{prefix}-scaled:")):
         return set()
@@ -242,7 +241,7 @@ def _called_by_pointer(function: str, frames: Mapping[str, int], prefix: str) ->
 
 
 def _deepest(function: str, frames: Mapping[str, int], calls: Mapping[str, set[str]]) -> int | None:
-    """Return the deepest sum of frames from a function; None where a function may call itself."""
+    """Return the largest sum of frames from a function; None for possible recursion."""
     below: dict[str, set[str]] = {}
     waiting = [function]
     while waiting:
@@ -259,7 +258,7 @@ def _deepest(function: str, frames: Mapping[str, int], calls: Mapping[str, set[s
     return depths[function]
 
 
-#: What stands in the place of the figures where no compiler was run.
+#: Text in place of the figures if no compiler was run.
 NOT_MEASURED = "Flash and stack were not measured when this folder was generated."
 
 
@@ -298,7 +297,7 @@ def figure_words(figures: Figures) -> str:
 
 
 def _macros(prefix: str, figures: Sequence[Figures]) -> str:
-    """Return macros of the header; a comment says what is not measured."""
+    """Return macros of the header, with a comment for missing figures."""
     lines = []
     for each in figures:
         name = each.target.macro
@@ -307,9 +306,9 @@ def _macros(prefix: str, figures: Sequence[Figures]) -> str:
         if each.flash is not None:
             lines.append(f"#define {prefix}_FLASH_BYTES_{name} {each.flash} /* code and constants of the library */")
         if each.stack is not None:
-            painted = "" if each.painted is None else f"; {each.painted} were measured with them, from all seeds"
-            said = f"bound of a solve by that compiler, without functions of math.h{painted}"
-            room = "with room for other compilers, and for functions of math.h"
+            painted = "" if each.painted is None else f"; measured with them, from all seeds: {each.painted}"
+            said = f"bound of a solve with this compiler, without functions of math.h{painted}"
+            room = "with a margin for other compilers and functions of math.h"
             lines.append(f"#define {prefix}_STACK_BYTES_{name}_GCC {each.stack} /* {said} */")
             lines.append(f"#define {prefix}_STACK_BYTES_{name} {each.with_room} /* {room} */")
         if each.fault:
@@ -318,9 +317,9 @@ def _macros(prefix: str, figures: Sequence[Figures]) -> str:
 
 
 def _rows(figures: Sequence[Figures]) -> str:
-    """Return a table for the README; a line says what is not measured."""
-    heads = ("flash, bytes", "bound of the stack, bytes", "with room for others", "stack measured, bytes")
-    lines = [f"| machine | {' | '.join(heads)} | compiler and flags |", "|---|---|---|---|---|---|"]
+    """Return a table for the README, with a line for missing figures."""
+    heads = ("flash, bytes", "stack bound, bytes", "with margin, bytes", "stack measured, bytes")
+    lines = [f"| target | {' | '.join(heads)} | compiler and flags |", "|---|---|---|---|---|---|"]
     for each in figures:
         numbers = " | ".join("-" if own is None else str(own) for own in each.numbers)
         lines.append(f"| {each.target.name} | {numbers} | {comment_text(each.compiler) or '-'} |")

@@ -1,12 +1,11 @@
-"""Limits of a case that C sets at run time, in their own units; and conditions that hold by the case's fixed numbers.
+"""Limits of a case that C sets at run time, in their own units; and conditions on fixed parameters.
 
-A limit is one or more bounds of constraints, each by a reading, such as the cosine of an angle or the square of a
-length. One generated function converts all limits to the bounds. The tables of this module say which constraint each
-bound belongs to.
+A limit is one or more bounds of constraints, each by a conversion, such as to the cosine of an angle or the square of a
+length. One generated function converts all limits to bounds. The tables here assign each bound to its constraint.
 
-Conditions that hold by the fixed numbers are no constraints of the program. In C these numbers are arguments, and an
-answer is judged by all such conditions: loop equations that follow from the others at the case's numbers, lengths of
-fixed directions, and limits on fixed numbers alone.
+Conditions on fixed parameters only are not constraints of the program. In C these parameters are arguments, so an
+answer is checked against all such conditions: loop equations that are dependent for the case, lengths of fixed
+directions, and limits on fixed parameters.
 """
 
 from __future__ import annotations
@@ -29,22 +28,22 @@ from ..program.nlp import Nlp
 from ..program.places import FreeRotation
 from .ctext import NO_BOUND, c_names, comment_text, integer_table, number_table, string_table
 
-#: Depth to which two expressions of one limit are compared: above that of every reading.
+#: Depth for the comparison of two expressions of one limit, larger than that of every conversion.
 _DEPTH = 30
 
 
 @dataclass(frozen=True)
 class RunTimeLimit:
-    """A limit of a case as C sets it.
+    """Limit of a case as set in C.
 
     Attributes:
         key: dotted key below ``limits``; for the angle of a rotation with a free axis, the constraint's name with
             ``.min`` or ``.max``.
-        name: end of its name in C.
-        dimension: of its number.
-        default: the case's number, radians for an angle.
-        above: the number must be larger than this.
-        most: the number may be at most this.
+        name: suffix of its name in C.
+        dimension: dimension of the limit.
+        default: value in the case, radians for an angle.
+        above: exclusive lower bound of allowed values.
+        most: largest allowed value.
     """
 
     key: str
@@ -56,7 +55,7 @@ class RunTimeLimit:
 
 
 class Side(NamedTuple):
-    """A side of a constraint: indices of the constraint and of the converted number, and whether it is the upper."""
+    """Side of a constraint: indices of constraint and converted limit; True for the upper side."""
 
     constraint: int
     is_upper: bool
@@ -64,7 +63,7 @@ class Side(NamedTuple):
 
 
 class Widening(NamedTuple):
-    """Bounds of a variable that follow from the squared radius of a rotation's ball: indices of both."""
+    """Bounds of a variable from the squared radius of a rotation's ball: indices of both."""
 
     variable: int
     converted: int
@@ -72,15 +71,16 @@ class Widening(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class RunTimeLimits:
-    """The limits that C sets, and their conversion to bounds.
+    """Limits that C sets, and their conversion to bounds.
 
     Attributes:
-        limits: the limits, in the order of the constraints.
-        function: the limits' numbers (k, 1) to the converted numbers (m, 1); None where there is no limit.
-        slopes: likewise, and the derivatives of the converted numbers (m, 1), each by the limit that it follows from.
-        sides: sides of constraints that the converted numbers are bounds of.
-        widenings: variables whose bounds follow from converted numbers.
-        owners: index of the limit that each converted number follows from.
+        limits: limits in the order of the constraints.
+        function: function from limits (k, 1) to converted limits (m, 1); None without limits.
+        slopes: function that also returns the derivatives of the converted limits (m, 1), each with respect to its
+            limit; None without limits.
+        sides: sides of constraints with converted limits as bounds.
+        widenings: variables with bounds from converted limits.
+        owners: index of the limit of each converted limit.
     """
 
     limits: tuple[RunTimeLimit, ...]
@@ -92,16 +92,16 @@ class RunTimeLimits:
 
     @property
     def functions(self) -> tuple[ca.Function, ...]:
-        """Both functions; none where there is no limit."""
+        """Both functions; none without limits."""
         return tuple(each for each in (self.function, self.slopes) if each is not None)
 
     @property
     def converted(self) -> int:
-        """Number of converted numbers."""
+        """Number of converted limits."""
         return 0 if self.function is None else int(self.function.numel_out(0))
 
     def places(self, key: str, reading: Reading, *, is_upper: bool) -> list[int]:
-        """Return the constraints whose bound on a side is that of a limit with a key by a reading."""
+        """Return the constraints whose bound on a side is the limit with a key, by a conversion."""
         if self.function is None or key not in (keys := [each.key for each in self.limits]):
             return []
         (values,) = self.function.sx_in()
@@ -113,10 +113,10 @@ class RunTimeLimits:
 def run_time_limits(nlp: Nlp, prefix: str) -> RunTimeLimits:
     """Return the limits of a program that depend on its variables.
 
-    Where a limit is a constraint on fixed numbers too, the C judges answers by that one with the number that is set. A
-    limit that it reads otherwise than the program does cannot be set.
+    If a limit is a condition on fixed parameters too, the C checks answers against this condition with the value at run
+    time. A limit with different conversions in both cannot be set.
 
-    The functions' names begin with the prefix.
+    The names of the functions begin with the prefix.
     """
     balls = {id(each.ball): each for each in nlp.program.places.rotations if isinstance(each, FreeRotation)}
     symbols: dict[str, SX] = {}
@@ -161,12 +161,12 @@ def _squared_sine(angle: SX) -> SX:
     return ca.sin(0.5 * angle) ** 2
 
 
-#: The angle of a rotation about a free axis, as it is set: the squared length of ``q`` is ``sin^2(angle / 2)``.
+#: Conversion of the angle of a rotation about a free axis: the squared length of ``q`` is ``sin^2(angle / 2)``.
 _ROTATION = Reading(Dimension.ANGLE, to_value=_squared_sine, above=0.0, most=MAX_FREE_ROTATION)
 
 
 def _keys(nlp: Nlp, index: int, ball: FreeRotation | None) -> tuple[str, str]:
-    """Return the keys of a constraint's lower and upper number; empty where there is none."""
+    """Return the keys of a constraint's lower and upper limit; empty for none."""
     constraint: Constraint = nlp.program.constraints[index]
     if ball is None:
         return constraint.keys
@@ -174,7 +174,7 @@ def _keys(nlp: Nlp, index: int, ball: FreeRotation | None) -> tuple[str, str]:
 
 
 def _is_settable(nlp: Nlp, key: str) -> bool:
-    """Return whether constraints on fixed numbers read a limit as one of the program's does, whose bound they share."""
+    """Return True if conditions on fixed parameters convert a limit as the program does, with the same bound."""
     number, others = SX.sym("number"), [item.constraint for item in nlp.constant_limits]
     bounds, fixed = (
         [each.reading.to_value(number) for each in constraints if key in each.keys]
@@ -184,19 +184,19 @@ def _is_settable(nlp: Nlp, key: str) -> bool:
 
 
 def _equal(expressions: Sequence[SX], wanted: SX) -> list[int]:
-    """Return the indices of the expressions (1, 1) that equal another one."""
+    """Return the indices of the expressions (1, 1) equal to a given one."""
     return [k for k, each in enumerate(expressions) if ca.is_equal(each, wanted, _DEPTH)]
 
 
 def _limit(key: str, reading: Reading, value: float) -> RunTimeLimit:
-    """Return a limit with its range, in which the case's own number always is, and as yet without a name in C."""
+    """Return a limit with its range, which includes the value in the case, and without a name in C."""
     above = reading.above if value > reading.above else float(np.nextafter(value, -math.inf))
     return RunTimeLimit(key, "", reading.dimension, value, above, max(reading.most, value))
 
 
-def limit_texts(found: RunTimeLimits, prefix: str, columns: Mapping[str, list[Any]]) -> dict[str, str]:
-    """Return the texts for the placeholders about limits, whose names, units and numbers are the columns."""
-    L, limits, sides, widenings = f"{prefix.upper()}_LIMITS", found.limits, found.sides, found.widenings
+def limit_texts(given: RunTimeLimits, prefix: str, columns: Mapping[str, list[Any]]) -> dict[str, str]:
+    """Return the texts of the placeholders for limits; columns contain names, units and values."""
+    L, limits, sides, widenings = f"{prefix.upper()}_LIMITS", given.limits, given.sides, given.widenings
     named = zip(columns["c_name"], limits, columns["unit"], strict=True)
     members = [f"    {name} = {k}, /* {_description(each, unit)} */\n" for k, (name, each, unit) in enumerate(named)]
     tables = [
@@ -211,7 +211,7 @@ def limit_texts(found: RunTimeLimits, prefix: str, columns: Mapping[str, list[An
         integer_table("side_constraints", "SIDES", [each.constraint for each in sides]),
         integer_table("side_is_upper", "SIDES", [int(each.is_upper) for each in sides]),
         integer_table("side_converted", "SIDES", [each.converted for each in sides]),
-        integer_table("converted_limits", "CONVERTED", found.owners),
+        integer_table("converted_limits", "CONVERTED", given.owners),
         integer_table("widened", "WIDENED", [each.variable for each in widenings]),
         integer_table("widened_converted", "WIDENED", [each.converted for each in widenings]),
     ]
@@ -219,8 +219,8 @@ def limit_texts(found: RunTimeLimits, prefix: str, columns: Mapping[str, list[An
         "nlimits": str(len(limits)),
         "limit_members": "".join(members),
         "limit_tables": "\n".join(tables),
-        "nconverted": str(found.converted),
-        "limit_work": str(max((int(each.sz_w()) for each in found.functions), default=0)),
+        "nconverted": str(given.converted),
+        "limit_work": str(max((int(each.sz_w()) for each in given.functions), default=0)),
         "nsides": str(len(sides)),
         "nwidened": str(len(widenings)),
         "widening": repr(WIDENING),
@@ -229,7 +229,7 @@ def limit_texts(found: RunTimeLimits, prefix: str, columns: Mapping[str, list[An
 
 
 def _description(limit: RunTimeLimit, unit: str) -> str:
-    """Return a limit in words for a comment of C: its key, its unit, its default, and the allowed numbers."""
+    """Return a limit for a comment of C: key, default with unit, and allowed values."""
     allowed = [f"above {limit.above:.6g}"] if limit.above > -NO_BOUND else []
     allowed += [f"at most {limit.most:.6g}"] if limit.most < NO_BOUND else []
     shown = f"{limit.default:.6g} {unit}".rstrip()
@@ -237,12 +237,12 @@ def _description(limit: RunTimeLimit, unit: str) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
-    """Constraints that the fixed numbers make hold.
+class FixedConditions:
+    """Constraints that the fixed parameters satisfy.
 
     Attributes:
-        items: the constraints; first those that depend on variables, all of them loop equations.
-        equations: number of these.
+        items: constraints, first those that depend on variables, all of them loop equations.
+        equations: number of these loop equations.
     """
 
     items: tuple[BoundedConstraint, ...]
@@ -254,8 +254,8 @@ class Held:
         return ca.vertcat(SX(0, 1), *[item.constraint.expression for item in self.items])
 
 
-def held_by_fixed_numbers(nlp: Nlp) -> Held:
-    """Return the constraints that the case's fixed numbers make hold."""
+def fixed_conditions(nlp: Nlp) -> FixedConditions:
+    """Return the constraints that the fixed parameters of the case satisfy."""
     pairs = [
         item
         for family in nlp.fixed_families
@@ -266,13 +266,13 @@ def held_by_fixed_numbers(nlp: Nlp) -> Held:
     x = nlp.program.x
     varies = [bool(nlp.n) and any(ca.which_depends(each.constraint.expression, x, 1, True)) for each in items]
     first = tuple(item for item, own in zip(items, varies, strict=True) if own)
-    return Held((*first, *(item for item, own in zip(items, varies, strict=True) if not own)), len(first))
+    return FixedConditions((*first, *(item for item, own in zip(items, varies, strict=True) if not own)), len(first))
 
 
-def held_texts(held: Held, limits: RunTimeLimits) -> dict[str, str]:
-    """Return the texts for the placeholders about what the fixed numbers make hold.
+def fixed_condition_texts(held: FixedConditions, limits: RunTimeLimits) -> dict[str, str]:
+    """Return the texts of the placeholders for constraints that the fixed parameters satisfy.
 
-    A bound that C sets at run time is the tightest one of the constraints that it is a bound of.
+    If a limit set at run time bounds several constraints, the tightest one counts.
     """
     bounds = [np.array([item.lower for item in held.items]), np.array([item.upper for item in held.items])]
     shared: list[tuple[int, int, int]] = []

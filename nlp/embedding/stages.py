@@ -1,7 +1,8 @@
-"""A program's functions in two stages, and the C text of its loops.
+"""Functions of a program in two stages, and the C text of its loops.
 
-The numbers that depend on the arguments alone come first, then the rest at each point. A controller changes the task or
-a dimension rarely and the point always. Sines of fixed angles and the like must not be computed at every point.
+The first stage computes the values that depend only on the arguments, the second the rest at each point. A controller
+changes the task or a dimension rarely and the point always, so sines of fixed angles and the like must not be computed
+at every point.
 """
 
 from __future__ import annotations
@@ -18,20 +19,23 @@ from ..program.program import Program
 from .calls import RobotValues
 from .ctext import short_table
 from .loops import Loop, Loops, find_loops
-from .runtimelimits import Held
+from .runtimelimits import FixedConditions
 
-#: Operations of a Hessian, beside loops, above which C has its product with a direction instead: a third of the code.
+#: Number of operations of a Hessian, without loops, above which C has its product with a direction instead: a third of
+#: the code.
 _LARGE_HESSIAN = 3000
 
 
 class LoopFunctions(NamedTuple):
-    """Functions of a loop, whose derivatives have their structural nonzeros alone, and the places of these.
+    """Functions of a loop, with only the structural nonzeros of derivatives, and their places.
 
     Attributes:
-        values: ``(inputs, constants) -> (values, slopes)``.
-        curvature: ``(inputs, constants, multipliers) -> (gradient, second)`` of the sum of values times multipliers.
-        slopes: value and input of each nonzero of the Jacobian, in the order of the values.
-        second: two inputs of each nonzero of the Hessian's lower triangle, row after row; the second is not larger.
+        values: function ``(inputs, constants) -> (values, slopes)``.
+        curvature: function ``(inputs, constants, multipliers) -> (gradient, second)`` of the sum of values times
+            multipliers.
+        slopes: indices of value and input of each nonzero of the Jacobian, in the order of the values.
+        second: indices of both inputs of each nonzero of the Hessian's lower triangle, row by row; the second is not
+            larger.
     """
 
     values: ca.Function
@@ -42,17 +46,17 @@ class LoopFunctions(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StagedFunctions:
-    """Functions in two stages.
+    """Functions of a program in two stages.
 
     Attributes:
         x: (n, 1) symbols of the free variables.
-        prepare: first stage, ``p -> k``: (count, 1) numbers that depend on the arguments alone; the last ones are the
+        prepare: first stage, ``p -> k``: (count, 1) values that depend only on the arguments; the last ones are the
             constants of the loops.
         functions: second stage, by name: functions of ``(x, k)`` and of further inputs, with dense results.
-        of_loops: the functions of each loop.
-        of_robot: with several poses, functions of the robot's inputs at one of them.
-        loops: the program's loops.
-        by_direction: whether ``curvature`` is the Hessian's product with a direction.
+        of_loops: functions of each loop.
+        of_robot: for several poses, functions of the robot's inputs at one of them.
+        loops: loops of the program.
+        by_direction: True if ``curvature`` is the product of the Hessian with a direction.
     """
 
     x: SX
@@ -65,34 +69,34 @@ class StagedFunctions:
 
     @property
     def all(self) -> tuple[ca.Function, ...]:
-        """Every function, the first stage first."""
+        """All functions, the first stage first."""
         of_loops = (function for own in self.of_loops for function in (own.values, own.curvature))
         return (self.prepare, *self.functions.values(), *self.of_robot.values(), *of_loops)
 
 
-def stage_functions(program: Program, size: SX, prefix: str, held: Held) -> StagedFunctions:
+def stage_functions(program: Program, size: SX, prefix: str, held: FixedConditions) -> StagedFunctions:
     """Return the functions that the generated C calls.
 
-    * ``F``, ``F_gradient``: the objective, and the objective with its gradient; absent with several poses where a
-      loop has the objective;
-    * ``jacobian``, ``rates``, ``rotation``, ``geometry``, with several tasks or poses ``F_of_tasks``: those of the
-      robot at one pose. With several poses they are functions of the robot's inputs, which ``poses`` returns for all;
+    * ``F``, ``F_gradient``: the objective, and the objective with its gradient; absent if a loop computes the objective
+      of several poses;
+    * ``jacobian``, ``rates``, ``rotation``, ``geometry``, with several tasks or poses ``F_of_tasks``: robot functions
+      at one pose. For several poses they are functions of the robot's inputs, which ``poses`` returns for all;
     * ``limits``: constraints with their gradients;
     * ``derivatives``: objective, gradient, constraints, and their gradients;
     * ``curvature``: Hessian of ``weight * F + multipliers . g``, for a weight and multipliers as further inputs;
     * ``magnitude``: size of the objective without cancellation;
-    * ``signs``: numbers that are positive in home's assembly of the joints at every pose; absent without any.
+    * ``signs``: expressions that are positive in the home assembly mode at every pose; absent without any.
     * ``home``: ``signs`` with their gradients; ``home_curvature``: Hessian of ``multipliers . signs``;
-    * ``held``: what the case's fixed numbers make hold, and the gradients of its equations; absent without any.
+    * ``held``: constraints that the fixed parameters satisfy, and gradients of their equations; absent without any.
 
-    Where there are loops, the constraints here are the plain ones alone, ``derivatives`` returns the entries too, with
-    the structural nonzeros of their gradients, entry after entry, ``limits`` is absent, and ``curvature`` takes a
-    multiplier for each entry at the end. A Hessian of very many operations is returned as its product with a direction,
-    which is one more input then.
+    With loops, the constraints here are only the plain ones, ``derivatives`` also returns the entries with the
+    structural nonzeros of their gradients, entry by entry, ``limits`` is absent, and ``curvature`` takes a multiplier
+    for each entry at the end. A Hessian of very many operations is returned as its product with a direction, one more
+    input.
 
-    Matrices are transposed, because CasADi writes column after column and C reads row after row.
+    Matrices are transposed, because CasADi stores them by columns and C by rows.
 
-    Their names begin with the prefix; ``size`` is the size of the objective without cancellation, (1, 1).
+    Names begin with the prefix; ``size`` is the size of the objective without cancellation, (1, 1).
     """
     x, loops = program.x, find_loops(program)
     several = len(program.robots) > 1
@@ -153,9 +157,9 @@ def stage_functions(program: Program, size: SX, prefix: str, held: Held) -> Stag
 
 
 def _robot_expressions(program: Program) -> tuple[Mapping[str, list[SX]], SX]:
-    """Return the robot's expressions by function, and the symbols (k, 1) that they depend on with several poses.
+    """Return the robot's expressions by function, and for several poses the symbols (k, 1) on which they depend.
 
-    They are of the program's symbols, or with several poses of symbols of one pose.
+    The expressions use the program's symbols, or for several poses symbols of one pose.
     """
     robot, inputs = program.robot, SX.sym("inputs", program.robot.inputs.numel())
     if len(program.robots) > 1:
@@ -196,14 +200,14 @@ def _loop_functions(loop: Loop, name: str) -> LoopFunctions:
 
 
 def _extract(p: SX, expressions: Sequence[SX]) -> tuple[list[SX], SX, SX]:
-    """Extract the parts of expressions that depend on ``p`` alone, with symbols ``k`` (count, 1) in their place.
+    """Replace the parts of expressions that depend only on ``p`` by symbols ``k`` (count, 1).
 
     Returns:
-        Expressions of ``(x, k)``, the symbols, and their values as expressions of ``p`` alone.
+        Expressions of ``(x, k)``, the symbols, and their values as expressions of ``p``.
     """
     joined = ca.vertcat(SX(0, 1), *[ca.vec(each) for each in expressions])
     rest, symbols, parts = ca.extract_parametric(joined, p)
-    # An argument that also stands beside variables, such as a component of a twist, is passed on in k as it is.
+    # An argument that is also combined with variables, such as a component of a twist, is copied to k unchanged.
     left = [each for each, used in zip(ca.vertsplit(p), ca.which_depends(rest, p, 1, False), strict=True) if used]
     k, prepared = ca.vertcat(SX(0, 1), *left, *symbols), ca.vertcat(SX(0, 1), *left, *parts)
     replaced, at = [], 0
@@ -214,11 +218,11 @@ def _extract(p: SX, expressions: Sequence[SX]) -> tuple[list[SX], SX, SX]:
 
 
 def loop_texts(staged: StagedFunctions, prefix: str) -> dict[str, str]:
-    """Return the texts for the placeholders about loops."""
+    """Return the texts of the placeholders for loops."""
     loops = staged.loops
     rows = ""
     if loops:
-        what = "limits that repeat, and F over several poses, by loops over functions of `-casadi.c`"
+        what = "repeated limits, and F over several poses, by loops over functions of `-casadi.c`"
         rows += f"| `{prefix}-loops.c` | {what} |\n"
     if loops.spectra:
         rows += f"| `{prefix}-spectrum.c` | limits on singular values of J, with their derivatives, by loops |\n"
@@ -241,7 +245,7 @@ def loop_texts(staged: StagedFunctions, prefix: str) -> dict[str, str]:
         **_largest(staged),
         "ncolumns": str(sum(map(len, _columns(staged)))),
         "casadi_work": str(max(1, *(function.sz_w() for function in staged.all))),
-        # Eigenvalues by another order of operations, and by inverses, lose two digits more.
+        # A different order of operations for eigenvalues, and inverses, lose two more digits.
         "limits_close": "1e-10" if loops.spectra else "1e-12",
     }
 
@@ -267,7 +271,7 @@ def _largest(staged: StagedFunctions) -> dict[str, str]:
         counts["inputs"].append(loop.inputs.numel())
         counts["constants"].append(loop.constants.numel())
         counts["values"].append(loop.values.numel())
-        # The place of the slopes in the workspace has derivatives by the inputs too.
+        # The workspace of the slopes also holds derivatives with respect to the inputs.
         counts["slopes"].append(max(len(own.slopes), loop.inputs.numel()))
         counts["second"].append(len(own.second))
     return {f"most_{name}": str(max(each)) for name, each in counts.items()}

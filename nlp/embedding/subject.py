@@ -1,4 +1,4 @@
-"""The program of a case that C is generated for: of its task, or of several tasks by the case's method."""
+"""Program of a case for the generated C: of its task, or of several tasks by the method of the case."""
 
 from __future__ import annotations
 
@@ -23,36 +23,36 @@ from ..solver.multistart import solve_program
 from ..solver.solve import solve
 from ..solver.status import Status
 
-#: Names of joints that a message shows.
+#: Largest number of joint names in a message.
 _MOST_SHOWN = 8
 
-#: Largest number of constraints on pairs of poses. The solver in C has all of them always: a dozen poses with six legs.
+#: Largest number of constraints on pairs of poses, all of which the solver in C has: a dozen poses with six legs.
 _MOST_PAIRS = 1000
-#: Digits of numbers that come from a solve: few enough to be the same on every machine.
+#: Digits of values from a solve: few enough to be the same on every computer.
 _DIGITS = 9
 
 
 class Subject(NamedTuple):
-    """A program, and its optimal value; None where the search ended at no optimum, or not in home's working mode."""
+    """Program, and its optimal value; None if the search did not end at an optimum in the home working mode."""
 
     nlp: Nlp
     optimum: float | None
 
 
 def find_subject(case: Case) -> Subject:
-    """Return the program of a case that C is generated for.
+    """Return the program of a case for the generated C.
 
-    For a worst case each task is solved first by itself: the worst one is relative to their own optima.
+    For a worst case, each task is solved separately first, because the worst case is relative to the separate optima.
 
     Raises:
-        CaseError: the case contradicts itself, or C cannot be generated for its robot, its tasks or its poses.
-        InputError: its functions have no finite value at any point that is tried.
+        CaseError: the case is inconsistent, or C cannot be generated for its robot, its tasks or its poses.
+        InputError: the functions of the case have no finite value at any trial point.
     """
     if len(case.tasks) > 1 and case.method is Method.AVERAGE:
-        fault = "optimises nothing, so C is not generated for it: must be 'weighted-sum' or 'worst-case'"
+        fault = "optimises nothing, so no C is generated: must be 'weighted-sum' or 'worst-case'"
         raise CaseError("combine.method", fault, case.method.value, case.source)
     if case.tasks[0].measure:
-        fault = "has no C: that is generated for F, with limits on forces, speeds and powers"
+        fault = "is not supported in C: only F is, with limits on forces, speeds and powers"
         raise CaseError("objective.minimise", fault, case.tasks[0].measure, case.source)
     _refuse_nested_loops(case)
     _check_pairs(formulate(case))
@@ -65,24 +65,24 @@ def find_subject(case: Case) -> Subject:
     combination = solve(case).combination
     combined = None if combination is None else combination.combined
     if combined is None:
-        fault = "has a task without an optimum of its own, so there is nothing to combine"
+        fault = "has a task without a separate optimum, so the tasks cannot be combined"
         raise CaseError("combine.method", fault, case.method.value, case.source)
     return Subject(_rounded(with_all_pairs(combined.nlp)), combined.F if combined.status is Status.OPTIMAL else None)
 
 
 def _refuse_nested_loops(case: Case) -> None:
-    """Refuse a robot with nested loops: three made 20 MB of C, which a compiler did not end within four minutes."""
+    """Refuse a robot with nested loops: three of them made 20 MB of C, which did not compile in four minutes."""
     for each in case.model.structure:
         if each.nested:
             shown = ", ".join(each.nested[:_MOST_SHOWN]) + (", ..." if len(each.nested) > _MOST_SHOWN else "")
-            fault = f"has joints that are no limb with branches ({shown}); C is generated for limbs with branches only"
+            fault = f"has joints outside limbs with branches ({shown}); C is generated only for limbs with branches"
             raise CaseError("robot", fault, source=case.source)
 
 
 def magnitude_of(nlp: Nlp) -> SX:
-    """Return the size of a program's objective without cancellation, (1, 1), never below its size.
+    """Return an upper bound (1, 1) on the absolute objective of a program without cancellation.
 
-    With several poses it is estimated from the first one.
+    For several poses, the value is an estimate from the first one.
     """
     case, places = nlp.case, nlp.program.places
     size = nlp.program.robot.magnitude
@@ -101,18 +101,18 @@ def _check_pairs(nlp: Nlp) -> None:
     """Refuse a program with too many pairs of poses.
 
     Raises:
-        CaseError: there are too many.
+        CaseError: the program has too many such pairs.
     """
     families = (*nlp.families, *nlp.fixed_families)
     counts = [family.values.numel() for family in families]
     pairs = sum(count * (count - 1) * len(family.pair(0, 1)) for count, family in zip(counts, families, strict=True))
     if pairs > _MOST_PAIRS:
-        fault = f"gives {pairs} constraints on pairs of poses, and C is generated for at most {_MOST_PAIRS}"
+        fault = f"gives {pairs} constraints on pairs of poses; C is generated for at most {_MOST_PAIRS}"
         raise CaseError("pose", fault, nlp.case.pose_count, nlp.case.source)
 
 
 def _rounded(nlp: Nlp) -> Nlp:
-    """Return a program with fewer digits of the numbers that come from a solve."""
+    """Return a program with fewer digits of the values from a solve."""
     epigraph = nlp.program.places.epigraph
     if epigraph is None:
         return nlp
@@ -141,14 +141,14 @@ def objective_words(nlp: Nlp) -> str:
     return f"the {case.over_poses.value} of F{over}"
 
 
-#: Rounding error of a range of a whole turn.
+#: Rounding error of a range of a full turn.
 _ROUNDING = 1e-12
 
 
 def turning_joints(nlp: Nlp) -> frozenset[int]:
-    """Return the places of the joint positions with a range of a whole turn, of which all functions have period 2 pi.
+    """Return the indices of joint coordinates with a range of a full turn and period 2 pi in all functions.
 
-    A function has that period in a position that enters it by its sine and cosine alone, with either sign.
+    A function has this period if the coordinate enters only by its sine and cosine, with either sign.
     """
     turning = {i for i in nlp.program.places.inner if abs(nlp.upper[i] - nlp.lower[i] - 2 * math.pi) < _ROUNDING}
     if not turning:

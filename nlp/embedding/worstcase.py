@@ -1,34 +1,34 @@
 """Largest numbers of iterations and evaluations of a solve in C, from the constants of the solver.
 
-The generated C takes the constants from here, and those of the search are read from its C.
+The generated C takes its constants from here; those of the search are read from its C.
 """
 
 from __future__ import annotations
 
 #: Largest number of iterations of one search.
 _ITERATIONS = 100
-#: Number of times that F is scaled in one search, and that it looks for a feasible point first.
+#: Largest numbers of rescalings of F, and of searches for a feasible point, in one search.
 _ROUNDS = 3
 _RESTORES = 2
-#: Second derivatives in one iteration: for the step; along the sides that are active at the point, to recognise a
-#: saddle; and again for the step.
+#: Number of second derivatives in one iteration: for the step; along the active sides, to recognise a saddle; and again
+#: for the step.
 _CURVATURES = 3
-#: First derivatives that a search may have for each iteration so far, beside those of one line search. Of 34,000
-#: searches in seven cases none had more than 3.7 for each iteration on the whole.
+#: Number of first derivatives for each iteration so far, in addition to those of one line search. Of 34,000 searches in
+#: seven cases none needed more than 3.7 for each iteration in total.
 _DERIVATIVES = 4
 
 
 def worst_case_texts(searches: int, phases: int, trials: int, programs: int) -> dict[str, str]:
     """Return the texts of the placeholders for the solver's constants and for its worst case.
 
-    A search counts its first derivatives, and may have a few for each point that it has judged beside those of one line
-    search: it judges one point in each iteration, and one at the end of each part, of which it has one for each scale
-    of F and for each feasible point found. The point where it begins, which scales the constraints, is counted too.
+    A search counts its first derivatives. It may have a few for each judged point, in addition to those of one line
+    search: one point in each iteration, one at the end of each part, with one part for each scale of F and each
+    feasible point, and the first point, which scales the constraints.
 
     Args:
         searches: largest number of searches of a solve.
-        phases: number of times that a search begins: again within home's assembly where it has left that one.
-        trials: largest number of trial lengths of a step in one iteration.
+        phases: largest number of starts of a search: a search that leaves the home assembly mode is repeated within it.
+        trials: largest number of step lengths in one iteration.
         programs: largest number of quadratic programs in one iteration.
     """
     parts = phases * (_ROUNDS + _RESTORES)

@@ -1,1 +1,1 @@
-"""Evidence about a point, recomputed from the program and the point alone."""
+"""Evidence about a point, recomputed from the program and the point only."""

@@ -1,16 +1,9 @@
-"""Assembly of a robot's joints at a point, compared with home's along a path from home.
+"""Assembly mode of a robot at a point, compared with the home assembly mode along a path from home.
 
-The same dimensions and pose often allow several values of the internal unknowns, such as an elbow on either side, and
-the same loops several modes of operation, in which the platform moves otherwise. From home, where the robot file states
-the joints, dimensions and pose move along a straight line to those of the point, and Newton's method with least-norm
-steps keeps the loops closed; free positions of driven joints move along it too. Where the line leaves the poses that
-the robot can take, the pose is the nearest one.
-Assemblies and modes meet at singularities of the loop equations, so the smallest singular values of their derivatives
-say how near the path comes to one.
-
-The case may have another unit of length than the robot's own numbers, and a robot of another size has the same
-assemblies. So the path leads from home to the dimensions and the pose made smaller, so that the lengths have the size
-of the robot's own.
+The loop equations often have several solutions for the same dimensions and pose: other assembly modes, and operation
+modes in which the platform has other motions. From home, dimensions and pose move along a straight line to those of
+the point, and Newton's method keeps the loops closed. Where the robot cannot take a pose of the line, the nearest pose
+replaces it. Modes meet at singularities of the loop equations, so the smallest singular values show how near they are.
 """
 
 from __future__ import annotations
@@ -38,36 +31,36 @@ from ..program.program import Kernel, tuple_of
 from .state import RobotState
 from .workingmode import Posture, names_of, turned_limbs
 
-#: First and shortest step of the path, as parts of its length, and largest number of Newton steps at each.
+#: First and shortest step of the path, as parts of its length, and largest number of Newton steps at each step.
 _FIRST = 1 / 16
 _SHORTEST = 1 / 2048
 _STEPS = 11
 #: Largest change of pose and unknowns, of order 1, in a step: a larger one that stays in the shortest step is a jump.
 _LARGE = 0.05
-#: Size of a step of the pose beside one of the unknowns in the norm: the pose only moves where unknowns do not suffice.
+#: Weight of a pose step relative to a step of the unknowns: the pose moves only where the unknowns do not suffice.
 _HEAVY = 1e-3
 #: Largest residual of closed loops; equations are of order 1.
 _CLOSED = 1e-10
-#: Largest residual at home of a robot of another size: rounding of its dimensions.
+#: Largest residual of the loops at home after scaling the robot: rounding of its dimensions.
 _SIMILAR = 1e-7
-#: Singular values below this part of the largest are zero: such a loop moves by itself also at home.
+#: Singular values below this part of the largest are zero: such a loop is mobile at home too.
 _ZERO = 1e-9
 #: A path is near a singularity where a singular value falls below this part of that at home.
 NEAR_SINGULAR = 0.1
-#: Largest difference of an unknown of order 1 within one assembly: in another one it is of order 0.1.
+#: Largest difference of an unknown of order 1 within one assembly mode: in another mode it is of order 0.1.
 _SAME = 1e-4
 
 
 @dataclass(frozen=True)
 class Assembly:
-    """Way in which the joints are assembled at a point.
+    """Assembly mode of the joints at a point, compared with home.
 
     Attributes:
-        is_home: whether the path from home ends at the point's own unknowns.
-        nearness: smallest singular value of the loop equations on the path, as a part of that at home; 0 where the path
-            jumps or does not reach the point's pose.
-        turned: names of the limbs that are in another working mode: their joint positions are not those to which the
-            path leads, and their actuators drive the platform in the other sense than at home.
+        is_home: whether the path from home ends at the internal unknowns of the point.
+        nearness: smallest singular value of the loop equations on the path, as a part of its value at home; 0 where
+            the path jumps or does not reach the pose.
+        turned: names of the limbs in another working mode than at home: the path ends at other joint positions, and
+            the actuators of the limb drive the platform in the opposite sense.
     """
 
     is_home: bool
@@ -76,37 +69,37 @@ class Assembly:
 
     @property
     def brief(self) -> str:
-        """A few words about an assembly that is not that of home, or that may not be; empty for home's."""
+        """Short description of an assembly mode that differs from home, or may differ; empty for the home mode."""
         if self.turned:
             return f"another working mode ({names_of(self.turned)})"
         if not self.is_home:
-            return "another assembly" if self.nearness else "another operation mode or assembly"
-        return "" if self.nearness >= NEAR_SINGULAR else "an operation mode that is perhaps another one"
+            return "another assembly mode" if self.nearness else "another operation or assembly mode"
+        return "" if self.nearness >= NEAR_SINGULAR else "possibly another operation mode"
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """Sentences about an assembly that is not that of home, or that may not be."""
+        """Sentences that describe an assembly mode that differs from home, or may differ."""
         found = []
         if not self.nearness >= NEAR_SINGULAR:
-            part = f"the loops' smallest singular value falls to {100 * self.nearness:.2g} % of home's on the way"
-            jump = "the straight path from there has a jump"
-            reason = part if self.nearness else jump
+            low = f"the smallest singular value of the loops falls to {100 * self.nearness:.2g} % of its value at home"
+            jump = "the straight path from home has a jump"
+            reason = low if self.nearness else jump
             found.append(f"not reached from home without passing near a singularity: {reason}")
         if self.turned:
             who = names_of(self.turned)
-            found.append(f"another working mode than at home: {who} bent the other way, driven in the other sense")
+            found.append(f"another working mode than at home: {who} bent the other way, driven in the opposite sense")
         elif not self.is_home:
-            found.append("another assembly than at home: the straight path from there ends at other joint positions")
+            found.append("another assembly mode than at home: the path from home ends at other joint positions")
         return tuple(found)
 
 
 def assembly_of(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> Assembly | None:
-    """Return the assembly at a point; None for a robot without internal unknowns or without a home.
+    """Return the assembly mode at a point; None for a robot without internal unknowns or without a home.
 
     Args:
-        nlp: the program.
+        nlp: the nonlinear program.
         x: (n,) the point.
-        state: the robot there.
+        state: state of the robot at the point.
         pose: index of the pose.
     """
     model = nlp.program.model
@@ -118,7 +111,7 @@ def assembly_of(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> As
 
 
 def assembly_over_poses(nlp: Nlp, x: FloatArray) -> Assembly | None:
-    """Return the assembly at a point (n,), at all poses together; None as for :func:`assembly_of`."""
+    """Return the assembly mode at a point (n,) over all poses; None as for :func:`assembly_of`."""
     model = nlp.program.model
     if model.generic is None or not model.unknowns:
         return None
@@ -135,11 +128,11 @@ def assembly_over_poses(nlp: Nlp, x: FloatArray) -> Assembly | None:
 
 
 def assembly_at(model: Model, posture: Posture) -> Assembly:
-    """Return the assembly of a robot given joint by joint.
+    """Return the assembly mode of a robot that is described by its joints.
 
     Args:
-        model: the robot.
-        posture: its joints.
+        model: model of the robot.
+        posture: parameters, unknowns and pose of the robot.
     """
     axis, angle = axis_angle_from_matrix(posture.rotation)
     unknowns = posture.unknowns
@@ -151,12 +144,12 @@ def assembly_at(model: Model, posture: Posture) -> Assembly:
     apart[angles] = np.abs(np.remainder(apart[angles] + np.pi, 2 * np.pi) - np.pi)
     if apart.max(initial=0.0) <= _SAME:
         return Assembly(is_home=True, nearness=nearness)
-    # At the same pose, limbs are independent of each other: those whose own unknowns differ are assembled otherwise.
+    # At a fixed pose the limbs are independent: a limb is in another mode if its own unknowns differ.
     return Assembly(is_home=False, nearness=nearness, turned=_turned(model, posture, list(apart > _SAME)))
 
 
 def _turned(model: Model, posture: Posture, differ: Sequence[bool]) -> tuple[str, ...]:
-    """Return the limbs driven in the other sense than at home, among those with an unknown that differs."""
+    """Return the limbs driven in the opposite sense to home, among the limbs with an unknown that differs."""
     owners = [each.limb for each in model.structure for _ in range(each.unknowns)]
     own = {limb for limb, other in zip(owners, differ, strict=True) if other}
     return tuple(limb for limb in turned_limbs(model, posture) if limb in own)
@@ -165,29 +158,28 @@ def _turned(model: Model, posture: Posture, differ: Sequence[bool]) -> tuple[str
 def unknowns_from_home(
     model: Model, parameters: FloatArray, pose: FloatArray, given: FloatArray | None = None
 ) -> FloatArray | None:
-    """Return the internal unknowns (u,) to which the path from home leads at a pose; None where it does not reach it.
+    """Return the internal unknowns (u,) at the end of the path from home to a pose; None where the path ends early.
 
     Args:
-        model: the robot.
+        model: model of the robot.
         parameters: (k,) components of all parameters, radians for angles.
         pose: (6,) rotation vector, radians, and position of the platform.
-        given: (u,) values of the unknowns, of which those count that are free positions of driven joints; home's if
-            left out.
+        given: (u,) values of the unknowns; only free actuator coordinates are read. 0, as at home, if left out.
     """
     return _follow(model, parameters, pose, np.zeros(len(model.unknowns)) if given is None else given)[0]
 
 
 def home_position(model: Model, parameters: FloatArray) -> FloatArray:
-    """Return the position (3,) of the platform at the home of a robot with parameters (k,), at this robot's size."""
+    """Return the position (3,) of the platform at home, for a robot with parameters (k,), scaled to its size."""
     return np.array(model.home) * _path_of(model).factor(parameters)
 
 
 def _follow(
     model: Model, parameters: FloatArray, pose: FloatArray, unknowns: FloatArray
 ) -> tuple[FloatArray | None, float]:
-    """Return the unknowns (u,) at the end of the path from home, None where it ends early, and the nearness on it.
+    """Return the unknowns (u,) at the end of the path from home, and the nearness to a singularity along it.
 
-    Free positions of driven joints go on the path to their values among the given unknowns (u,).
+    The unknowns are None where the path ends early. Free actuator coordinates move on the path to their given values.
     """
     path = _path_of(model)
     dimensions = np.concatenate([np.zeros(0), *[item.typical for item in model.parameters]])
@@ -205,7 +197,7 @@ def _follow(
         part = min(1.0, done + step)
         here = (1 - part) * dimensions + part * parameters
         target = np.concatenate([(1 - part) * start + part * pose, np.where(path.is_free, part * free, at[6:])])
-        # The last step ends at the pose itself, where the unknowns alone close the loops.
+        # The last step ends at the pose itself: here only the unknowns may close the loops.
         closed = path.closed(target, here, with_pose=part < 1.0)
         change = np.inf if closed is None else float(np.linalg.norm((closed - at) / path.scale))
         if change > _LARGE and part - done > _SHORTEST:
@@ -214,7 +206,7 @@ def _follow(
         if closed is None:
             return None, 0.0
         if change > _LARGE:
-            nearness = 0.0  # the path jumps, and goes on elsewhere
+            nearness = 0.0  # the path jumps to another branch
         at, done = closed, part
         step = 2 * step if change < _LARGE / 4 else step
         nearness = min(nearness, float((path.singular_values(at, here)[regular] / at_home[regular]).min(initial=1.0)))
@@ -223,28 +215,29 @@ def _follow(
 
 @lru_cache(maxsize=4)
 def _path_of(model: Model) -> _Path:
-    """Return the loop equations of a robot; those of the last robots are kept, as a search asks for many points."""
+    """Return the loop equations of a robot; the last robots are cached, as a search evaluates many points."""
     return _Path(model)
 
 
 class _Path:
-    """Loop equations of a robot and their derivatives, by rotation vector, position and unknowns in one vector.
+    """Loop equations of a robot and their derivatives, as functions of rotation vector, position and unknowns.
 
-    Unknowns are in parts of their sizes.
+    These are one vector; its unknowns are divided by their sizes. The unit of length of the case may differ from that
+    of the robot file. A scaled robot has the same assembly modes, so the path uses the scale of the robot file.
 
     Args:
-        model: the robot.
+        model: model of the robot.
 
     Attributes:
-        scale: (6 + u,) size of each number: a length of the robot's for positions, 1 for the others.
+        scale: (6 + u,) size of each component: a length of the robot for positions, 1 for the others.
         is_length: (k,) whether each component of the parameters is a length.
-        is_free: (u,) whether each unknown is a free position of a driven joint.
+        is_free: (u,) whether each unknown is a free actuator coordinate.
     """
 
     def __init__(self, model: Model) -> None:
         own = Substitution.identity(model)
         z = SX.sym("z", 6 + len(model.unknowns))
-        # A rotation vector of zero has no direction: half a unit of rounding gives it one.
+        # A rotation vector of zero has no direction: a tiny number avoids 0 / 0.
         angle = ca.sqrt(ca.sumsqr(z[:3]) + np.finfo(float).tiny)
         rotation = matrix_from_axis_angle(z[:3] / angle, angle)
         equations = ca.vertcat(*[each.scaled for each in model.closure])
@@ -252,7 +245,7 @@ class _Path:
         (residual,) = ca.Function("closure", own.all, [equations]).call(
             [own.parameters, z[6:] * sizes, rotation, z[3:6]]
         )
-        # About home, lengths of the robot's own size make the singular values those of equations of order 1.
+        # With lengths of the robot's size, the singular values are those of equations of order 1.
         outputs = [ca.densify(residual), ca.densify(ca.jacobian(residual, z))]
         self._kernel = Kernel(ca.Function("path", [z, own.parameters], outputs), tuple_of)
         self.scale = np.ones(z.numel())
@@ -265,9 +258,9 @@ class _Path:
         self._determined = 6 + np.flatnonzero(~self.is_free)
 
     def factor(self, parameters: FloatArray) -> float:
-        """Return by what the lengths of a robot with parameters (k,) are larger than its own at home.
+        """Return the ratio of the lengths of a robot with parameters (k,) to its typical lengths at home.
 
-        It is 1 for a robot file that has lengths beside its dimensions: its home is none at another size.
+        It is 1 for a robot file with lengths besides the parameters: such a robot cannot be scaled.
         """
         sizes = [float(np.linalg.norm(each[self.is_length])) for each in (parameters, self._typical)]
         if not min(sizes) > 0:
@@ -278,9 +271,9 @@ class _Path:
         return factor if float(np.abs(self._kernel(home, typical)[0]).max(initial=0.0)) <= _SIMILAR else 1.0
 
     def singular_values(self, z: FloatArray, parameters: FloatArray) -> FloatArray:
-        """Return the smallest singular values of the derivatives by determined unknowns alone, and with the pose.
+        """Return the smallest singular values of the derivatives by the determined unknowns, without and with the pose.
 
-        There are none without equations, or without such unknowns.
+        The array is empty without equations, or without such unknowns.
         """
         slopes = self._kernel(z, parameters)[1] * self.scale
         with_pose = np.concatenate([np.arange(6), self._determined])
@@ -288,12 +281,12 @@ class _Path:
         return np.array([np.linalg.svd(part, compute_uv=False)[-1] for part in parts if part.size])
 
     def closed(self, z: FloatArray, parameters: FloatArray, *, with_pose: bool) -> FloatArray | None:
-        """Return the point near another at which the loops are closed, or None.
+        """Return a point (6 + u,) near the given one with closed loops, or None.
 
         Args:
-            z: (6 + u,) the point.
-            parameters: (k,) of the robot.
-            with_pose: whether the pose may move too, and not the determined unknowns alone.
+            z: (6 + u,) given point.
+            parameters: (k,) parameters of the robot.
+            with_pose: If true, the pose may move too; otherwise only the determined unknowns.
         """
         movable = np.concatenate([np.arange(6), self._determined]) if with_pose else self._determined
         scale = self.scale[movable].copy()
@@ -304,13 +297,13 @@ class _Path:
 
 
 def _sizes_of_unknowns(model: Model, parameters: FloatArray) -> FloatArray:
-    """Return the sizes (u,) of a robot's unknowns with its parameters (k,)."""
+    """Return the sizes (u,) of the unknowns of a robot with parameters (k,)."""
     sizes = ca.vertcat(SX(0, 1), *[item.size for item in model.unknowns])
     function = ca.Function("sizes", [Substitution.identity(model).parameters], [ca.densify(sizes)])
     return np.asarray(function(parameters).full().ravel(), dtype=np.float64)
 
 
 def _size(model: Model) -> float:
-    """Return a length of the order of the robot's own: of its lengths and of the place of its home."""
+    """Return a length of the order of the robot's size, from its lengths and its home position."""
     lengths = [value for item in model.parameters if item.dimension is Dimension.LENGTH for value in item.typical]
     return float(np.linalg.norm([*lengths, *model.home])) or length_of(model, model.typical.tolist())

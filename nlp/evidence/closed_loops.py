@@ -1,4 +1,4 @@
-"""Closed loops at points: Newton's method for many poses at once, and the way from home's assembly."""
+"""Closing of loops at many poses at once by Newton's method, in the home assembly mode."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ...models.arrays import FloatArray, values_at
 _CLOSED = 1e-10
 #: Steps of Newton's method.
 _STEPS = 15
-#: Steps from home's assembly, where the equations have residuals at another pose, to closed loops.
+#: Steps from the joints at home, where the equations have residuals at another pose, to closed loops.
 _WAY = 40
 #: Singular values below this part of the largest are zero in a step of more coordinates than equations.
 DEPENDENT = 1e-9
@@ -25,11 +25,11 @@ class Loops:
     """Loop equations as functions of coordinates.
 
     Args:
-        z: (n, 1) symbols.
+        z: (n, 1) symbols of the coordinates.
         equations: (k, 1) expressions that are 0 where the loops are closed.
-        every: all equations, those that follow from others too.
-        signs: (s, 1) expressions that are positive in home's assembly.
-        size: (n,) by which coordinates are comparable: of the order of their ranges.
+        every: (e, 1) all equations, also those that follow from ``equations``.
+        signs: (s, 1) expressions that are positive in the home assembly mode.
+        size: (n,) sizes that make coordinates comparable, of the order of their ranges.
     """
 
     def __init__(self, z: SX, equations: SX, every: SX, signs: SX, size: FloatArray) -> None:
@@ -37,7 +37,7 @@ class Loops:
         self.count = int(equations.numel())
 
     def some(self, which: Sequence[int]) -> Loops:
-        """Return some of the equations."""
+        """Return the loops with the equations of the given indices only."""
         chosen = ca.vertcat(SX(0, 1), *[self.equations[k] for k in which])
         return Loops(self.z, chosen, self.every, self.signs, self.size)
 
@@ -59,27 +59,27 @@ class Loops:
         return values_at(self._function, z.T)[1]
 
     def is_closed(self, z: FloatArray) -> bool:
-        """Return whether all equations hold at a point (n,), in home's assembly."""
+        """Return whether all equations hold at a point (n,), in the home assembly mode."""
         residual, signs = (each.full().ravel() for each in self._every(z))
         return bool((np.abs(residual) <= 1e3 * _CLOSED).all() and (signs > 0).all())
 
     def every_value(self, z: FloatArray) -> FloatArray:
-        """Return the left sides (B, e) of all equations at points (n, B), of those left out too."""
+        """Return the left sides (B, e) of all equations at points (n, B), also of dependent equations."""
         return np.asarray(values_at(self._every, z.T)[0][:, :, 0])
 
     @np.errstate(all="ignore")
     def all_closed(
         self, z: FloatArray, moving: Sequence[int], *, steps: int = 1, zero: float | None = None
     ) -> FloatArray:
-        """Return closed points (n, B) at the ends of ways from points, along which left sides fall to 0.
+        """Return closed points (n, B): along a path from each given point the left sides fall to 0.
 
-        A point that does not close is NaN.
+        A point that cannot be closed is NaN.
 
         Args:
-            z: (n, B) the points.
-            moving: coordinates that move; as many as equations without ``zero``.
-            steps: of the way.
-            zero: part of the largest singular value of the slopes below which others are zero.
+            z: (n, B) the given points.
+            moving: coordinates that move; without ``zero``, as many as there are equations.
+            steps: number of steps of the path.
+            zero: relative size below which singular values of the slopes count as zero; None for regular slopes.
         """
         z, moving = z.copy(), list(moving)
         if not z.size:
@@ -95,7 +95,7 @@ class Loops:
                 z[moving] -= (self.size[moving] * step).T
                 if not np.nanmax(np.abs(step), initial=0.0) > _CLOSED:
                     break
-            # Beyond a fold there are no left sides that fall: steps from there may end in any assembly.
+            # The left sides cannot fall further beyond a fold: steps from there may end in any assembly mode.
             residual = np.abs(self.values(z) - left * first).max(axis=1, initial=0.0)
             z[:, ~(residual <= (off if left else _CLOSED))] = np.nan
         return z
@@ -104,8 +104,8 @@ class Loops:
 def inverses(matrices: FloatArray, zero: float | None = None) -> FloatArray:
     """Return the inverses of matrices (B, k, k); NaN for singular ones.
 
-    With ``zero`` they are pseudo-inverses (B, n, k) of matrices (B, k, n), whose singular values below this part of the
-    largest are zero.
+    With ``zero`` the result is pseudo-inverses (B, n, k) of matrices (B, k, n); singular values below this part of the
+    largest count as zero.
     """
     good = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
     if zero is None:
@@ -116,14 +116,14 @@ def inverses(matrices: FloatArray, zero: float | None = None) -> FloatArray:
 
 
 def closed_from_home(loops: Loops, z: FloatArray, pose: int) -> FloatArray | None:
-    """Return closed loops (n,) at a pose, or near it, in home's assembly; None where none are found.
+    """Return closed loops (n,) at a pose, or near it, in the home assembly mode; None where none are known.
 
-    The unknowns are 0 at home. At another pose the equations have residuals there, which are taken back in steps.
+    The unknowns are 0 at home. At another pose the equations then have residuals, which are reduced to 0 in steps.
 
     Args:
-        loops: the equations.
-        z: (n,) coordinates of the pose, then zeros.
-        pose: number of the pose's coordinates. They move only where the unknowns alone do not close the loops.
+        loops: the loop equations.
+        z: (n,) coordinates of the pose, followed by zeros.
+        pose: number of coordinates of the pose. They move only where the unknowns cannot close the loops.
     """
     if not loops.count:
         return z if loops.is_closed(z) else None

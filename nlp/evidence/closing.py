@@ -1,8 +1,8 @@
-"""Starting points at which the robot's loops are closed, in the assembly of home.
+"""Starting points with closed loops, in the home assembly mode.
 
-Newton's method from home may end in another assembly where the pose is far from there. At the first starting point the
-loops are therefore closed along a path from home. The other starting points take their unknowns from there; those of a
-robot with free positions of driven joints, which are spread over their ranges, have each a path from home.
+Newton's method may end in another assembly mode where the pose is far from home. At the first starting point the loops
+are therefore closed along a path from home, and the other starting points take their unknowns from it. For a robot with
+free actuator coordinates, which are spread over their ranges, each starting point has its own path from home.
 """
 
 from __future__ import annotations
@@ -20,14 +20,15 @@ from .state import CLOSED, evaluate, loops_are_closed
 
 
 def closed_start(nlp: Nlp, others: Iterable[FloatArray] = ()) -> FloatArray:
-    """Return the first starting point (n,) of a program, with the robot's loops closed along a path from home.
+    """Return the first starting point (n,) of a program, with the loops closed along a path from home.
 
     Args:
-        nlp: the program.
-        others: (n,) points of which the first takes its place at which the robot exists, where it does not.
+        nlp: the nonlinear program.
+        others: (n,) further points; where the loops cannot be closed at the program's start, the first of these at
+            which they can be closed replaces it.
 
     Raises:
-        EvaluationError: the robot does not exist at any of these points.
+        EvaluationError: the loops cannot be closed at any of these points.
     """
     fault: EvaluationError | None = None
     for x in (nlp.start, *others):
@@ -39,10 +40,10 @@ def closed_start(nlp: Nlp, others: Iterable[FloatArray] = ()) -> FloatArray:
 
 
 def closed_starts(nlp: Nlp, points: FloatArray) -> FloatArray:
-    """Return starting points (k, n) of a program with the robot's loops closed.
+    """Return starting points (k, n) of a program with closed loops.
 
     Raises:
-        EvaluationError: the robot does not exist at any of these points.
+        EvaluationError: the loops cannot be closed at any of these points.
     """
     home = closed_start(nlp, points)
     close = _closed_along_path if nlp.program.model.free_joints else close_near
@@ -50,7 +51,7 @@ def closed_starts(nlp: Nlp, points: FloatArray) -> FloatArray:
 
 
 def _closed_along_path(nlp: Nlp, first: FloatArray, x: FloatArray) -> FloatArray:
-    """Return a point (n,) with the loops closed along a path from home; near those of another where it is no robot."""
+    """Return a point (n,) with the loops closed along a path from home, or near the first point if that fails."""
     try:
         return close_equations(nlp, _with_unknowns_from_home(nlp, x))
     except EvaluationError:
@@ -58,14 +59,14 @@ def _closed_along_path(nlp: Nlp, first: FloatArray, x: FloatArray) -> FloatArray
 
 
 def closed_in_place(nlp: Nlp, x: FloatArray) -> FloatArray | None:
-    """Return the point with a robot's dimensions and pose, and its joints as :func:`closed_start` has them there.
+    """Return a point with the given dimensions and pose, and with joints on the path from home.
 
     Args:
-        nlp: the program.
-        x: (n,) point whose internal unknowns do not count.
+        nlp: the nonlinear program.
+        x: (n,) given point; its internal unknowns are not read.
 
     Returns:
-        (n,) the point; None where the program's conditions do not hold there, home's working mode among them.
+        (n,) the point; None where a constraint of the program, such as the home working mode, is violated.
     """
     own, target = list(nlp.program.places.inner), x.copy()
     target[own] = nlp.start[own]
@@ -79,12 +80,12 @@ def closed_in_place(nlp: Nlp, x: FloatArray) -> FloatArray | None:
 
 
 def close_near(nlp: Nlp, first: FloatArray, x: FloatArray) -> FloatArray:
-    """Return the point, near a given one, at which the program's equations hold, with unknowns near those of another.
+    """Return a point near the given one at which the equations hold, with unknowns close to those of a first point.
 
     Args:
-        nlp: the program.
+        nlp: the nonlinear program.
         first: (n,) point at which the equations hold.
-        x: (n,) the point; its internal unknowns do not count.
+        x: (n,) given point; its internal unknowns are not read.
 
     Returns:
         (n,) the point, as :func:`.kkt.close_equations` returns it.
@@ -96,7 +97,7 @@ def close_near(nlp: Nlp, first: FloatArray, x: FloatArray) -> FloatArray:
 
 
 def _with_unknowns_from_home(nlp: Nlp, x: FloatArray) -> FloatArray:
-    """Return a point (n,) with the unknowns to which the path from home leads; unchanged where it ends early."""
+    """Return a point (n,) with the unknowns at the end of the path from home; unchanged where the path ends early."""
     model, found = nlp.program.model, x.copy()
     if model.generic is None or not model.unknowns:
         return found

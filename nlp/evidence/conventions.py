@@ -1,9 +1,9 @@
 """Dependence of F on two conventions: the characteristic length, and centres that the joints do not determine.
 
-F of a motion that the platform can make with free actuators depends on neither for almost every robot. For other
-motions the constraints count too: their couples are weighed by the characteristic length, and the couple of a wrench by
-the point about which it is taken. Where a limb has neither a ball joint nor two hinges that meet, this point is that of
-its last passive joint, whose place on the joint's axis is free.
+For almost every robot F does not depend on them if the platform can make the motion with free actuators. For other
+motions constraint wrenches count too: the characteristic length weighs their couples, and a couple depends on the point
+about which it is taken. In a limb without ball joint and without two intersecting hinges, this point is the centre of
+the last passive joint, and its position along the joint axis is arbitrary.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ...models import FloatArray, Model, Substitution, objective
 from ...models.values import dataclass
 from ..program.nlp import Nlp
 
-#: Dependence below this part of F is rounding: F is a sum of squares whose rates are known to 1e-9.
+#: Relative dependence below this is rounding: F is a sum of squares of rates that are known to 1e-9.
 _NEGLIGIBLE = 1e-7
 
 
@@ -27,9 +27,10 @@ class Dependence:
     """Dependence of F on conventions, as parts of F.
 
     Attributes:
-        length: relative derivative ``(l / F) dF/dl`` by the characteristic length; 0 where F does not depend on it.
-        centre: largest relative change of F where all centres that may slide along an axis move by the characteristic
-            length, to either side; None where there is no such centre.
+        length: relative derivative ``(l / F) dF/dl`` with respect to the characteristic length; 0 where F does not
+            depend on it.
+        centre: largest relative change of F if all arbitrary centres move along their joint axes by the characteristic
+            length, to either side; None if all centres are determined.
     """
 
     length: float
@@ -37,10 +38,10 @@ class Dependence:
 
 
 def dependence_of(nlp: Nlp, x: FloatArray) -> Dependence | None:
-    """Return the dependence of the sum of F over the poses on conventions; None for a robot without couples, or F = 0.
+    """Return the dependence of F, summed over the poses, on conventions; None for a robot without couples, or F = 0.
 
     Args:
-        nlp: the program of one task, or of several, of which the first counts.
+        nlp: nonlinear program of one task; of several tasks, the first counts.
         x: (n,) the point.
     """
     model, program = nlp.program.model, nlp.program
@@ -67,15 +68,15 @@ def dependence_of(nlp: Nlp, x: FloatArray) -> Dependence | None:
 
 
 def _settled(value: float) -> float:
-    """Return a part of F, 0 where it is rounding."""
+    """Return a relative change of F, or 0 where it is only rounding."""
     return 0.0 if abs(value) <= _NEGLIGIBLE else value
 
 
 def _objective_function(model: Model) -> ca.Function:
-    """Return the function to F and its derivative by the characteristic length.
+    """Return the function for F and its derivative with respect to the characteristic length.
 
-    Its arguments are parameters, unknowns, rotation and position, the characteristic length, the way by which centres
-    slide, and the twist.
+    Its arguments are parameters, unknowns, rotation and position, the characteristic length, the shift of the centres
+    along their joint axes, and the twist.
     """
     length, way, twist = SX.sym("length"), SX.sym("way"), SX.sym("twist", 6)
     members = [

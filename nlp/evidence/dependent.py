@@ -1,11 +1,9 @@
-"""Coordinates of a pose that a robot cannot choose: which they are over a workspace, and where they lie.
+"""Independent and dependent coordinates of the pose over a workspace.
 
-A robot with fewer than six degrees of freedom chooses as many coordinates of its pose as it has freedoms; the others
-follow from the closed loops, as joint positions do. The independent coordinates are chosen at the middle of the
-workspace among those with ranges, by the largest volume of the freedoms' directions, whatever the widths of the ranges:
-a narrow range of another one is a limit. Fixed ones complete them, angles first where an angle has a range. A dependent
-coordinate that stands still at its stated number over the whole workspace, such as the rotation of a Delta, stays a
-constant.
+A robot with fewer than six degrees of freedom controls as many coordinates of its pose as it has degrees of freedom;
+the others follow from the loop equations. Independent coordinates are chosen at the middle of the workspace among those
+with ranges, where they span the largest volume of feasible directions; fixed coordinates complete them. A coordinate
+that keeps its stated value over the whole workspace, such as a rotation of a Delta robot, is a constant.
 """
 
 from __future__ import annotations
@@ -33,31 +31,31 @@ from .closed_loops import Loops, closed_from_home
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Singular values below this part of the largest are zero, and parts of a size by which a constant is off by rounding.
+#: Singular values below this part of the largest are zero; a relative change below the second number is rounding.
 _ZERO, _STILL = 1e-9, 1e-9
-#: Direction of a freedom, in parts of the largest, that counts as one in which a coordinate moves.
+#: Smallest component of a feasible direction, as a part of the largest, at which a coordinate counts as moving.
 _MOVES = 1e-6
-#: Random poses at which dependent coordinates are computed beside the corners, corners at most, and steps to each.
+#: Number of random poses for dependent coordinates, largest number of corners, steps to each pose, and the seed.
 _POSES, _MOST_CORNERS, _WAY, _SEED = 12, 32, 8, 0
-#: Part of the computed range of a dependent coordinate by which its working range is wider on each side, and parts of
-#: the robot's size, or angle, that it is wider by at least.
+#: Margin of the working range of a dependent coordinate on each side: part of the computed range, and smallest part of
+#: the robot's size, or angle.
 _WIDER, _LEAST = 0.5, 1e-2
-#: Volumes that differ by less than this part are equal: the first is taken. Fixed coordinates that come first are taken
-#: where they have this part of the largest volume.
+#: Volumes with a smaller relative difference are equal: the first is taken. A fixed coordinate that comes first is
+#: taken if it has the second part of the largest volume.
 _TIE, _ENOUGH = 1e-9, 0.2
-#: Weight of a direction of the position, in parts of the robot's size, beside one of the rotation, radians: a task is
-#: more often one of positions.
+#: Weight of a direction of the position, in parts of the robot's size, relative to a rotation in radians: most tasks
+#: are positioning tasks.
 _POSITION = 3.0
 
 
 class LoopSystem(NamedTuple):
-    """Equations of a robot's closed loops where its pose and its unknowns have other symbols.
+    """Equations of a robot's closed loops, with other symbols for pose and unknowns.
 
     Attributes:
         equations: (k, 1) independent equations, divided by their sizes.
-        every: (e, 1) all equations, divided by theirs.
+        every: (e, 1) all equations, divided by their sizes.
         signs: (s, 1) expressions that are positive in the home assembly mode.
-        sizes: (u,) of the unknowns.
+        sizes: (u,) sizes of the unknowns.
     """
 
     equations: SX
@@ -67,12 +65,12 @@ class LoopSystem(NamedTuple):
 
 
 def loop_system(model: Model, given: Substitution, values: Sequence[float]) -> LoopSystem:
-    """Return the equations of a robot's loops.
+    """Return the loop equations of a robot.
 
     Args:
-        model: the robot.
-        given: what its symbols are replaced by.
-        values: of its parameters, at which sizes are taken.
+        model: model of the robot.
+        given: expressions that replace the symbols of the model.
+        values: parameters of the robot, at which the sizes are taken.
     """
     own, every = Substitution.identity(model), (*model.closure, *model.loops)
     outputs = [*(each.expression for each in every), *(each.value for each in model.signs)]
@@ -87,33 +85,33 @@ def loop_system(model: Model, given: Substitution, values: Sequence[float]) -> L
 
 
 def with_dependent(case: Case, workspace: Workspace) -> Workspace:
-    """Return a workspace as :func:`dependent_of` does, or refuse one in which the robot chooses nothing.
+    """Return a workspace with its dependent coordinates, or refuse one whose ranges the robot cannot control.
 
     Raises:
-        CaseError: the robot can choose no coordinate that has a range, or as :func:`dependent_of`.
+        CaseError: the robot controls no coordinate that has a range, or as :func:`dependent_of`.
     """
     found = dependent_of(case, workspace)
     if not found.independent and found.dependent:
         ranged = " and ".join(found.names[k] for k, _ in found.ranged)
         chosen = ", ".join(found.names[k] for k in independent_coordinates(case, found) or ())
-        fault = f"this robot cannot choose {ranged}: give a range to at least one of {chosen}"
+        fault = f"this robot cannot control {ranged}: give a range to at least one of {chosen}"
         raise CaseError("workspace", fault, source=case.source)
     return found
 
 
 def dependent_of(case: Case, workspace: Workspace) -> Workspace:
-    """Return a workspace with the coordinates that follow from the others over it.
+    """Return a workspace with its dependent coordinates and their working ranges.
 
-    Dependent coordinates of a workspace that has some already are kept, and their working ranges computed anew. Where
-    the loops do not close in the middle of the workspace nothing is known, and the workspace is returned as it is.
+    Dependent coordinates that the workspace has already are kept, with new working ranges. Where the loops cannot be
+    closed in the middle of the workspace, the workspace is returned unchanged.
 
     Args:
-        case: with fixed dimensions.
-        workspace: a box of poses.
+        case: case with fixed dimensions.
+        workspace: box of poses.
 
     Raises:
-        CaseError: a coordinate that never changes is stated otherwise, or a rotation about one axis is stated, and the
-            platform turns about others too.
+        CaseError: a coordinate that never changes is stated with another value; or a rotation about one axis is stated,
+            but the platform rotates about other axes too.
     """
     if not _may_depend(case.model):
         return workspace
@@ -145,11 +143,11 @@ def dependent_of(case: Case, workspace: Workspace) -> Workspace:
 
 
 def robot_size(case: Case, position: Sequence[float] | None = None) -> float:
-    """Return the largest distance between two points of a robot's drawing, its unknown joints at home; 1 of a point.
+    """Return the largest distance between points of a robot's drawing, unknown joints at home; 1 for one point.
 
     Args:
-        case: with fixed dimensions.
-        position: (3,) of the platform, not rotated; the model's home for typical dimensions if left out.
+        case: case with fixed dimensions.
+        position: (3,) position of the platform, without rotation; the home position of the model if left out.
     """
     model = case.model
     parts = [value for name in case.parameters for value in case.components(name)]
@@ -162,7 +160,7 @@ def robot_size(case: Case, position: Sequence[float] | None = None) -> float:
 
 
 def _misstated(case: Case, workspace: Workspace, k: int, stated: float, true: float) -> CaseError:
-    """Return the error of a coordinate that this robot keeps at another number than the stated one."""
+    """Return the error for a stated coordinate that this robot keeps at another value."""
     dimension, units = (Dimension.LENGTH if k < 3 else Dimension.ANGLE), case.units
     one, other = (f"{units.shown(each, dimension):.6g} {units.label(dimension)}".rstrip() for each in (stated, true))
     key = f"workspace.position[{k}]" if k < 3 else "workspace.rotation"
@@ -170,9 +168,9 @@ def _misstated(case: Case, workspace: Workspace, k: int, stated: float, true: fl
 
 
 def independent_coordinates(case: Case, workspace: Workspace) -> list[int] | None:
-    """Return the indices of the coordinates of the pose that the robot chooses over a workspace.
+    """Return the indices of the pose coordinates that the robot controls independently over a workspace.
 
-    They are all six for a robot whose poses are all closed; None where the loops do not close in the middle.
+    These are all six for a robot with six degrees of freedom; None where the loops cannot be closed in the middle.
     """
     if not _may_depend(case.model):
         return list(range(6))
@@ -187,7 +185,7 @@ class CompletedPoses(NamedTuple):
     Attributes:
         positions: (N, 3) origins of the platform frame, length.
         rotations: (N, 3, 3) platform to world coordinates.
-        dependent: names of the coordinates that follow from the others, and may differ from those given.
+        dependent: names of the dependent coordinates, whose values may differ from the given values.
     """
 
     positions: FloatArray
@@ -198,13 +196,13 @@ class CompletedPoses(NamedTuple):
 def completed(
     case: Case, positions: FloatArray, rotations: FloatArray, which: NDArray[np.bool_]
 ) -> CompletedPoses | None:
-    """Return poses with the dependent coordinates as they follow from the others; None where all are independent.
+    """Return poses with their dependent coordinates computed; None where all coordinates are independent.
 
     Args:
-        case: with fixed dimensions.
-        positions: (N, 3) length.
-        rotations: (N, 3, 3).
-        which: (N,) the poses whose dependent coordinates are computed; one that does not close is left as it is.
+        case: case with fixed dimensions.
+        positions: (N, 3) origins of the platform frame, length.
+        rotations: (N, 3, 3) platform to world coordinates.
+        which: (N,) poses whose dependent coordinates are computed; poses that cannot be closed stay unchanged.
     """
     if not _may_depend(case.model) or not which.any():
         return None
@@ -221,7 +219,7 @@ def completed(
     to = np.hstack([y[which, :3], np.tan(0.5 * y[which, 3:])])
     closed = chart.reached(middle, chosen, to)
     found, kept = closed[:, :6], np.isfinite(closed).all(axis=1)
-    # A coordinate that never changes, such as the height of a planar robot, is wrong where it is given otherwise.
+    # A constant coordinate, such as the height of a planar robot, cannot have another value.
     off = np.abs(found - to) > _STILL * chart.size[:6]
     kept &= ~(off & chart.is_still(closed)).any(axis=1)
     y = np.hstack([positions, np.tan(0.5 * angles)])
@@ -241,21 +239,21 @@ def _angles(R: FloatArray) -> tuple[float, float, float]:
 
 
 def _may_depend(model: Model) -> bool:
-    """Return whether a robot has fewer than six freedoms, and loops that say so."""
+    """Return whether a robot has fewer than six degrees of freedom and loop equations that determine the rest."""
     return model.generic is not None and model.generic.constraints > 0 and bool(model.closure)
 
 
 class _Chart:
-    """The loops of a robot in six coordinates of its pose, then its unknowns.
+    """The loops of a robot in six coordinates of its pose, followed by its unknowns.
 
-    Rotations have the tangents of half of roll, pitch and yaw, or the components of a Cayley vector: along the axis of
+    Rotations are the tangents of half of roll, pitch and yaw, or the components of a Cayley vector: along the axis of
     a rotation about one axis, and across it.
 
     Attributes:
-        middle: (6 + u,) of the workspace, with unknowns of 0.
+        middle: (6 + u,) middle of the workspace, with unknowns of 0.
         half: (6,) half ranges; 0 for fixed coordinates.
-        ranged: indices of the coordinates that have ranges, wider than rounding.
-        size: (6 + u,) by which coordinates are comparable.
+        ranged: indices of the coordinates whose ranges are wider than rounding.
+        size: (6 + u,) sizes that make coordinates comparable.
     """
 
     def __init__(self, case: Case, workspace: Workspace) -> None:
@@ -282,7 +280,7 @@ class _Chart:
         self.size = np.concatenate([[length] * 3, np.ones(3), system.sizes])
         self.ranged: list[int] = np.flatnonzero(self.half > _STILL * self.size[:6]).tolist()
         constraints = 0 if model.generic is None else model.generic.constraints
-        self._freedoms = 6 - constraints
+        self._mobility = 6 - constraints
         self.loops = Loops(ca.vertcat(y, u), system.equations, system.every, system.signs, self.size)
 
     def ends(self, y: FloatArray) -> FloatArray:
@@ -290,26 +288,26 @@ class _Chart:
         return np.concatenate([y[:3], 2 * np.arctan(y[3:6])])
 
     def closed_middle(self) -> FloatArray | None:
-        """Return closed loops (6 + u,) in the home assembly mode near the middle of the workspace; None without."""
+        """Return closed loops (6 + u,) in the home assembly mode near the middle of the workspace, or None."""
         return closed_from_home(self.loops, self.middle, 6)
 
     def independent(self, z: FloatArray) -> list[int]:
-        """Return the indices of as many coordinates of the pose as the robot has freedoms at a closed point."""
+        """Return the indices of independent pose coordinates at a closed point, one for each degree of freedom."""
         moves = self._moves(z)
         ranged, weighted = self.ranged, moves * np.repeat([_POSITION, 1.0], 3)[:, None]
-        chosen = _largest(weighted, ranged, [], min(_rank(moves[ranged]), self._freedoms))
-        # A case that asks for tilts asks for all of them, and else for positions.
+        chosen = _largest(weighted, ranged, [], min(_rank(moves[ranged]), self._mobility))
+        # A case with one range of a tilt mostly wants all tilts; a case without one wants positions.
         turns_first = any(k >= 3 for k in ranged)
         others = sorted((k for k in range(6) if k not in ranged), key=lambda k: ((k < 3) == turns_first, k))
-        count = min(self._freedoms, _rank(moves)) - len(chosen)
+        count = min(self._mobility, _rank(moves)) - len(chosen)
         return sorted(_largest(weighted, others, chosen, count, enough=_ENOUGH))
 
     def points(self, z: FloatArray, independent: list[int]) -> FloatArray | None:
-        """Return closed loops (P, 6 + u) at the middle, corners and random points of the workspace; None without.
+        """Return closed loops (P, 6 + u) at the middle, corners and random points of the workspace, or None.
 
         Args:
-            z: a closed point near the middle.
-            independent: indices of the coordinates that the robot chooses.
+            z: (6 + u,) closed point near the middle.
+            independent: indices of the independent coordinates.
         """
         ranged = [k for k in independent if k in self.ranged]
         sides = np.array(list(itertools.islice(itertools.product((-1, 1), repeat=len(ranged)), _MOST_CORNERS)))
@@ -321,12 +319,12 @@ class _Chart:
         return found[np.isfinite(found).all(axis=1)] if np.isfinite(found[0]).all() else None
 
     def reached(self, z: FloatArray, independent: list[int], to: FloatArray) -> FloatArray:
-        """Return closed loops (P, 6 + u) on the way from a closed point to others; NaN where they end.
+        """Return closed loops (P, 6 + u) at the ends of paths from a closed point; NaN where a path ends early.
 
         Args:
-            z: the closed point.
-            independent: indices of the coordinates that the robot chooses.
-            to: (P, 6 or more) of which these are reached.
+            z: (6 + u,) the closed point.
+            independent: indices of the independent coordinates.
+            to: (P, 6 or more) targets; only their independent coordinates are read.
         """
         moving = [k for k in range(len(z)) if k not in independent]
         points, way = np.tile(z, (len(to), 1)), (to[:, independent] - z[independent])
@@ -337,14 +335,14 @@ class _Chart:
         return points
 
     def is_still(self, z: FloatArray) -> NDArray[np.bool_]:
-        """Return whether each coordinate (6,) of the pose is the same at closed points (P, 6 + u), and all around."""
+        """Return whether each pose coordinate (6,) is constant at and about closed points (P, 6 + u)."""
         z = z[np.isfinite(z).all(axis=1)]
         moves = np.max([np.linalg.norm(self._moves(each), axis=1) for each in z], axis=0, initial=0.0)
         spread = np.ptp(z[:, :6], axis=0) if len(z) else np.zeros(6)
         return np.asarray((moves <= _MOVES) & (spread <= _STILL * self.size[:6]))
 
     def _moves(self, z: FloatArray) -> FloatArray:
-        """Return the directions (6, m) in which the pose can move at a closed point, for coordinates of size 1."""
+        """Return a basis (6, m) of the feasible pose directions at a closed point, in coordinates of size 1."""
         _, values, right = np.linalg.svd(self.loops.slopes(z[:, None])[0] * self.size)
         rank = int(np.count_nonzero(values > _ZERO * values.max(initial=0.0)))
         return np.asarray(right[rank:, :6].T)
@@ -353,9 +351,9 @@ class _Chart:
 def _largest(
     moves: FloatArray, among: Sequence[int], chosen: list[int], count: int, enough: float = 1 - _TIE
 ) -> list[int]:
-    """Return the chosen rows of a matrix and as many more as span the largest volume with them.
+    """Return the chosen rows of a matrix, with ``count`` more rows that span the largest volume together with them.
 
-    Of several the first is taken that has enough of it, as a part.
+    Among several choices, the first one that has at least the part ``enough`` of the largest volume is taken.
     """
     every = [[*chosen, *more] for more in itertools.combinations(among, max(count, 0))]
     squares = [max(float(np.linalg.det(moves[rows] @ moves[rows].T)), 0.0) for rows in every]
@@ -364,13 +362,13 @@ def _largest(
 
 
 def _rank(moves: FloatArray) -> int:
-    """Return the number of directions in which coordinates move."""
+    """Return the number of independent directions in which coordinates move."""
     values = np.linalg.svd(moves, compute_uv=False) if len(moves) else np.zeros(0)
     return int(np.count_nonzero(values > _MOVES))
 
 
 def _rotation(turns: Turns, y: SX) -> SX:
-    """Return the rotation (3, 3) with three coordinates (3, 1) of a chart."""
+    """Return the rotation (3, 3) as a function of three rotation coordinates (3, 1)."""
     if turns.kind is TurnKind.ROLL_PITCH_YAW:
         factors = [2 / (1 + y[k] * y[k]) for k in range(3)]
         about = [turn_about(k, factor - 1, factor * y[k]) for k, factor in enumerate(factors)]

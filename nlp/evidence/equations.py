@@ -1,4 +1,4 @@
-"""A program's equations alone, linearised: Newton's method on them needs nothing else of the program."""
+"""Linearised equations of a nonlinear program, for Newton's method on the equations only."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from ..program.nlp import Nlp
 
 
 class Equations(NamedTuple):
-    """The equations of a program at a point, in scaled variables, as :class:`.kkt.Linearisation` has them.
+    """Equations of a program at a point, in the scaled variables of :class:`.kkt.Linearisation`.
 
     Attributes:
         x: (n,) the point, unscaled.
         residual: (k,) signed residuals.
-        normals: (k, n) directions of their gradients.
-        is_defined: whether the program has a finite value there.
+        normals: (k, n) unit vectors along the gradients of the residuals.
+        is_defined: whether the program has a finite value at the point.
     """
 
     x: FloatArray
@@ -29,13 +29,13 @@ class Equations(NamedTuple):
 
 
 class ProgramEquations:
-    """The equations of a program for Newton's method, with steps inside the bounds of the variables.
+    """Equations of a program for Newton's method, with steps inside the bounds of the variables.
 
     Args:
-        nlp: the program.
+        nlp: the nonlinear program.
         movable: indices of the variables that move.
-        closed: largest residual where the equations hold.
-        no_gradient: gradient of a constraint, as a part of its typical size, that counts as zero.
+        closed: largest residual at which the equations count as satisfied.
+        no_gradient: relative size below which the gradient of a constraint counts as zero.
     """
 
     def __init__(self, nlp: Nlp, movable: Sequence[int], closed: float, no_gradient: float) -> None:
@@ -61,21 +61,21 @@ class ProgramEquations:
         return Linear(at.residual, at.normals[:, self._movable])
 
     def moved(self, at: Equations, step: FloatArray) -> Equations:
-        """Return the equations after a step of the variables that move."""
+        """Return the equations after a step of the movable variables."""
         x = at.x.copy()
         x[self._movable] += self._nlp.scale[self._movable] * step
         return self.at(np.clip(x, self._nlp.lower, self._nlp.upper))
 
 
 def gradient_sizes(gradients: FloatArray, longest: FloatArray, no_gradient: float) -> FloatArray:
-    """Return (k,) sizes by which constraints are divided: the lengths of their gradients.
+    """Return the lengths (k,) of the gradients of constraints, which turn residuals into distances.
 
-    Where the gradient of a constraint is zero there is no distance to it; the residual itself replaces the distance.
+    Where the gradient of a constraint is zero its typical length is returned, as there is no distance.
 
     Args:
         gradients: (k, n) gradients in scaled variables.
         longest: (k,) longest gradient of each constraint at a few points; 0 where there is none.
-        no_gradient: gradient, as a part of the typical size, that counts as zero.
+        no_gradient: relative size below which a gradient counts as zero.
     """
     sizes = np.sqrt(np.einsum("ij,ij->i", gradients, gradients))
     typical = np.where(longest > 0, np.minimum(longest, 1.0), 1.0)

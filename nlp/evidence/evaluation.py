@@ -1,4 +1,4 @@
-"""The robot of a case at a point, with its numbers by name in the units of the case. Nothing is optimised."""
+"""Evaluation of a case at a point without optimisation, with its parameters by name in the units of the case."""
 
 from __future__ import annotations
 
@@ -21,30 +21,30 @@ from .state import RobotState, stated_poses
 
 @renamed_argument("nlp", "case")
 def evaluate(case: Case | Nlp, x: FloatArray | None = None, pose: int = 0) -> RobotState:
-    """Return the robot of a case at a point, as the command ``evaluate`` does.
+    """Return the state of a case's robot at a point, as the command ``evaluate`` does.
 
     Args:
-        case: the case, with its first task; or a program.
-        x: (n,) values of the free variables of the program. Left out, they are at their starts, or in the middle of
-            their ranges, with the robot's loops closed in the home assembly mode.
+        case: case, whose first task is used; or a nonlinear program.
+        x: (n,) values of the free variables of the program. If left out: their starts, or the middle of their ranges,
+            with the robot's loops closed in the home assembly mode.
         pose: index of the pose, in a case with several poses.
 
     Returns:
-        The robot with the rates of the program's task, or of its first task where the program combines several.
+        The state with the rates of the program's task; of several combined tasks, the first one counts.
 
     Raises:
-        CaseError: the fixed numbers of the case contradict each other.
-        EvaluationError: a number is not finite at this point, as where a limb has zero length.
+        CaseError: the fixed values of the case contradict each other.
+        EvaluationError: a value is not finite at this point, for example because a limb has zero length.
     """
     nlp = formulate(without_speeds(case)) if isinstance(case, Case) else case
     return states.evaluate(nlp, starting_point(nlp) if x is None else x, pose)
 
 
 def starting_point(nlp: Nlp) -> FloatArray:
-    """Return the point (n,) of a program that is evaluated where none is given: the first starting point, closed.
+    """Return the point (n,) at which a program is evaluated by default: its first starting point with closed loops.
 
     Raises:
-        EvaluationError: the robot does not exist there.
+        EvaluationError: the loops cannot be closed.
     """
     return with_exact_level(nlp, closed_start(nlp))
 
@@ -56,7 +56,7 @@ def without_speeds(case: Case) -> Case:
 
 
 def shown_parameters(case: Case, state: RobotState) -> Mapping[str, float | Vector]:
-    """Return the robot's parameters by name, in the case's units: several numbers for a point or direction."""
+    """Return the robot's parameters by name, in the case's units; a point or direction has several components."""
     shown: dict[str, float | Vector] = {}
     for parameter in case.model.parameters:
         values = [case.units.shown(float(value), parameter.dimension) for value in state.parameters[parameter.name]]
@@ -64,13 +64,13 @@ def shown_parameters(case: Case, state: RobotState) -> Mapping[str, float | Vect
     return MappingProxyType(shown)
 
 
-def shown_numbers(nlp: Nlp, x: FloatArray, state: RobotState) -> Mapping[str, float | Vector]:
-    """Return the numbers of a case at a point in its units, by the names that ``--set`` has for them.
+def shown_values(nlp: Nlp, x: FloatArray, state: RobotState) -> Mapping[str, float | Vector]:
+    """Return the parameters and pose coordinates of a case at a point in its units, by their names for ``--set``.
 
     Args:
-        nlp: the program.
+        nlp: the nonlinear program.
         x: (n,) the point.
-        state: the robot there.
+        state: state of the robot at the point.
 
     Returns:
         Parameters and their components, then position, angle and axis of each stated pose.

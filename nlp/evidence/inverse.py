@@ -1,9 +1,9 @@
-"""Inverse kinematics of a machine at many poses: positions of all joints, J and rates of the actuators, as arrays.
+"""Inverse kinematics of a robot at many poses: joint positions, Jacobian and actuator rates, as arrays.
 
-Unknowns that limbs have in closed form are expressions of the pose. The others are followed, for many poses at once,
-along paths of the pose: from home's assembly, or from the pose before. Newton's method closes the loops at each step of
-a path, from joints that are extrapolated. Where it corrects these by more than a little, it may have found another
-assembly, and the steps are made shorter. Driven joints that the pose does not determine are held at home.
+Unknowns with a closed form are expressions of the pose. The others are followed along paths of the pose, for many poses
+at once: from the home assembly mode, or from the previous pose. Newton's method closes the loops at each step from
+extrapolated joints. A large correction may lead to another assembly mode, so such a path is repeated with shorter
+steps.
 """
 
 from __future__ import annotations
@@ -37,46 +37,46 @@ from .state import CLOSED, ZERO_SINGULAR_VALUE
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-#: Poses that are worked on at once: what they need stays in a processor's cache.
+#: Number of poses in one block: the arrays of a block fit into the cache of a processor.
 _BLOCK = 256
-#: Numbers of a pose: the rotation column after column, then the position.
+#: Components of a pose: the rotation column by column, then the position.
 _POSE = 12
-#: Ways along a path: number of its steps, and the largest correction of an unknown of order 1 in a step, beyond the
-#: extrapolation of the steps before. The last one is that of :mod:`.assembly`, beyond which a step is a jump.
+#: Attempts along a path: number of its steps, and largest correction of an extrapolated unknown of order 1 in a step.
+#: The last attempt has the step limit of :mod:`.assembly`, beyond which a step is a jump.
 _WAYS = ((4, 0.2), (16, 0.1), (64, 0.05))
-#: Between poses that follow each other, one step is tried first.
+#: Between consecutive poses, one step is tried first.
 _NEXT = ((1, 0.05), *_WAYS)
-#: Number of the given poses from which home's assembly is sought, where the machine has not home's own pose.
+#: Number of given poses at which the home assembly mode is sought, if it cannot be closed at the home pose.
 _REFERENCES = 8
-#: Part of the largest determinant of J'J by which its rank is 6 for sure: the smallest singular value is then at least
-#: 1e-6 of the largest. Below, singular values are computed.
+#: Part of the largest determinant of J'J above which the rank is provably 6: the smallest singular value is then at
+#: least 1e-6 of the largest. Below it, singular values are computed.
 _REGULAR = 1e-10
-#: Quantities that are the positions of actuators.
+#: Quantities that are actuator coordinates.
 _MEASURES = ("actuator_angle", "actuator_length")
 
 
 @dataclass(frozen=True, eq=False)
 class InversePoses:
-    """Joints, J and rates of a machine at N poses; NaN at poses that are not closed. Angles are radians.
+    """Joint coordinates, Jacobian and rates of a robot at N poses; NaN at poses that are not closed. Angles in radians.
 
     Attributes:
         actuators: (a,) names of the actuators.
-        held: labels of the driven joints that the pose does not determine: they are held at home, with rates of 0.
-        measures: (a,) the quantity that each coordinate is: ``leg_length``, the distance between a leg's joints, of
-            robots given by their rows; ``actuator_angle`` or ``actuator_length``, away from home, of others.
-        joints: (u,) names of the passive joints' positions that are unknowns of the robot.
-        coordinates: (N, a) of the actuators, radians or length.
-        unknowns: (N, u) positions of these passive joints, from home, radians or length.
+        held: labels of the driven joints that the pose does not determine; they stay at home, with rates of 0.
+        measures: (a,) quantity of each coordinate: ``leg_length``, the distance between the joints of a leg, for robots
+            given by rows of ``J``; else ``actuator_angle`` or ``actuator_length``, measured from home.
+        joints: (u,) names of the passive joint coordinates that are unknowns of the robot.
+        coordinates: (N, a) actuator coordinates, radians or length.
+        unknowns: (N, u) coordinates of these passive joints, from home, radians or length.
         jacobian: (N, m, 6) ``J``: unit wrenches, force, then moment about the world origin, couples times the
-            characteristic length. For a limb whose wrenches follow from its joints, all rows of the projector on them,
-            of which results show a basis: ``J'J`` is the same.
-        rates: (N, a, 6) of the actuators for a unit of each component of the platform's motion: angular velocity, then
-            velocity of its origin, in the world frame. They hold for motions that the platform can make.
-        closed: (N,) whether all loops close at the pose, in the assembly that is followed. Limits do not count.
-        singular: (N,) whether J has not the rank 6 at a closed pose, or rates are not finite.
+            characteristic length. For a limb whose wrenches follow from its joints, all rows of the projector onto
+            them; results show a basis of these rows, with the same ``J'J``.
+        rates: (N, a, 6) actuator rates for a unit of each component of the platform's motion: angular velocity, then
+            velocity of its origin, in the world frame. They are valid for motions that the platform can make.
+        closed: (N,) whether all loops close at the pose, in the followed assembly mode. Limits do not count.
+        singular: (N,) whether J has a rank below 6 at a closed pose, or rates are not finite.
         positions: (N, 3) origins of the platform frame at the poses, length.
         rotations: (N, 3, 3) platform to world coordinates.
-        dependent: names of the coordinates that the robot cannot choose, and that differ from those given.
+        dependent: names of the dependent coordinates whose values differ from the given values.
     """
 
     actuators: tuple[str, ...]
@@ -102,28 +102,25 @@ def inverse(
     rpy: ArrayLike | None = None,
     follow: Literal["home", "previous"] = "home",
 ) -> InversePoses:
-    """Return positions of all joints, J and rates of the actuators at many poses.
+    """Return joint coordinates, Jacobian and actuator rates at many poses.
 
-    No pose raises an error: where the loops do not close, or the numbers are no pose, ``closed`` is False. Of a pose
-    that a robot with fewer than six freedoms cannot take, the coordinates that it cannot choose are those that follow
-    from the others.
+    No pose raises an error: ``closed`` is False where the loops do not close, or the arrays are not a rotation and a
+    finite position. A robot with fewer than six degrees of freedom cannot take every pose: there, dependent coordinates
+    of the pose are computed from the others. Driven joints that the pose does not determine stay at home.
 
     Args:
-        case: whose robot has fixed dimensions; its poses, limits and tasks do not count.
+        case: case with fixed dimensions; its poses, limits and tasks are not read.
         positions: (N, 3) origins of the platform frame in the world frame, length.
-        rotations: (N, 3, 3) platform to world coordinates, orthogonal to 1e-6; left out for no rotation.
-        rpy: (N, 3) roll, pitch and yaw of each pose instead, radians, about the world's axes x, y and z in this order,
-            as the columns ``roll``, ``pitch`` and ``yaw`` of a CSV file state them.
-        follow: the assembly of the joints where loops are not closed by formulas: that of ``"home"``, or that to which
-            the way from the closed pose ``"previous"`` to each one leads, which takes one pose after the other. Angles
-            of actuators then have no jumps by a turn either.
-
-    Driven joints that the pose does not determine are held at home.
+        rotations: (N, 3, 3) platform to world coordinates, orthogonal to 1e-6; the identity if left out.
+        rpy: (N, 3) roll, pitch and yaw of each pose in place of ``rotations``, radians, about the world's axes x, y and
+            z in this order, like the columns ``roll``, ``pitch`` and ``yaw`` of a CSV file.
+        follow: assembly mode where the loops have no closed form: ``"home"``, or ``"previous"`` to follow the joints
+            from each closed pose to the next. With ``"previous"``, actuator angles have no jumps by a full turn.
 
     Raises:
         CaseError: a dimension of the case's robot is free.
         InputError: the arrays have other shapes, rotations are stated in two forms, an angle is more than a whole turn,
-            the positions of the robot's actuators are not known, or ``follow`` is another word.
+            ``follow`` is another word, or an actuator coordinate is not known.
     """
     if rotations is not None and rpy is not None:
         raise InputError("rpy: conflicts with rotations; state the rotations in one form")
@@ -135,11 +132,11 @@ def inverse(
         R = np.broadcast_to(np.eye(3), shape) if rotations is None else np.array(rotations, dtype=np.float64)
     if p.ndim != 2 or p.shape[1] != 3 or R.shape != shape:
         hint = "; rows of roll, pitch and yaw are the argument rpy" if R.shape == (*shape[:1], 3) else ""
-        raise InputError(f"poses must be arrays (N, 3) and (N, 3, 3), got {p.shape} and {R.shape}{hint}")
+        raise InputError(f"poses: expected arrays (N, 3) and (N, 3, 3), got {p.shape} and {R.shape}{hint}")
     if follow not in ("home", "previous"):
         raise InputError(f"follow = {follow!r}: must be 'home' or 'previous'")
     found = _inverse(case, p, R, follow)
-    # Joints that are held have no part in what follows from what.
+    # Joints that stay at home cannot determine other coordinates.
     held = replace(case, model=with_joints_at_home(case.model)) if case.model.free_joints else case
     near = None if found.closed.all() else completed(held, p, R, ~found.closed & _are_poses(R, p))
     if near is None or not near.dependent:
@@ -151,11 +148,11 @@ def _rpy_rows(rpy: ArrayLike, count: int) -> FloatArray:
     """Return rows (N, 3) of roll, pitch and yaw, radians.
 
     Args:
-        rpy: the rows.
-        count: number of the poses.
+        rpy: (N, 3) roll, pitch and yaw, radians.
+        count: number of poses.
 
     Raises:
-        InputError: they have another shape, or an angle is more than a whole turn.
+        InputError: the array has another shape, or an angle is more than a whole turn.
     """
     rows = np.array(rpy, dtype=np.float64)
     if rows.shape != (count, 3):
@@ -170,14 +167,14 @@ def _rpy_rows(rpy: ArrayLike, count: int) -> FloatArray:
 
 
 def _inverse(case: Case, p: FloatArray, R: FloatArray, follow: str) -> InversePoses:
-    """Return the joints at positions (N, 3) with rotations (N, 3, 3), as they are."""
-    machine = _machine_of(case)
+    """Return the joints at positions (N, 3) with rotations (N, 3, 3), without changing dependent coordinates."""
+    robot = _functions_of(case)
     poses = np.concatenate([R.transpose(0, 2, 1).reshape(-1, 9), p], axis=1)
     is_pose = _are_poses(R, p)
-    moving = np.full((len(p), len(machine.size)), np.nan)
-    if len(machine.size) and is_pose.any():
-        moving[is_pose] = machine.followed(poses[is_pose], one_by_one=follow == "previous")
-    blocks = [machine.at(poses[k : k + _BLOCK], moving[k : k + _BLOCK]) for k in range(0, max(len(p), 1), _BLOCK)]
+    moving = np.full((len(p), len(robot.size)), np.nan)
+    if len(robot.size) and is_pose.any():
+        moving[is_pose] = robot.followed(poses[is_pose], one_by_one=follow == "previous")
+    blocks = [robot.at(poses[k : k + _BLOCK], moving[k : k + _BLOCK]) for k in range(0, max(len(p), 1), _BLOCK)]
     q, unknowns, J, rates, margin, residual, signs, modes = (np.concatenate(each) for each in zip(*blocks, strict=True))
     with np.errstate(invalid="ignore"):
         closed = is_pose & np.isfinite(q).all(axis=1) & np.isfinite(unknowns).all(axis=1)
@@ -188,18 +185,18 @@ def _inverse(case: Case, p: FloatArray, R: FloatArray, follow: str) -> InversePo
     singular[unsure] = _ranks(J[unsure], p[unsure]) < 6
     for each in (q, unknowns, J, rates):
         each[~closed] = np.nan
-    turning = machine.turning
+    turning = robot.turning
     if follow == "previous" and turning:
         q[np.ix_(closed, turning)] = np.unwrap(q[np.ix_(closed, turning)], axis=0)
     arrays = q, unknowns, J, rates, closed, singular, p.copy(), R.copy()
     for each in arrays:
         each.flags.writeable = False
-    names = machine.actuators, case.model.free_joints, machine.measures, machine.joints
+    names = robot.actuators, case.model.free_joints, robot.measures, robot.joints
     return InversePoses(*names, *arrays)
 
 
 class _Values(NamedTuple):
-    """Numbers at B poses: those of :class:`InversePoses`, and those by which poses are judged."""
+    """Values at B poses: those of :class:`InversePoses`, and those that decide on ``closed`` and ``singular``."""
 
     coordinates: FloatArray
     unknowns: FloatArray
@@ -212,19 +209,19 @@ class _Values(NamedTuple):
 
 
 @lru_cache(maxsize=4)
-def _machine_of(case: Case) -> _Machine:
-    """Return the functions of a case's robot; those of the last cases are kept, as a controller asks again."""
-    return _Machine(case)
+def _functions_of(case: Case) -> _RobotFunctions:
+    """Return the functions of a case's robot; the last cases are cached, as a controller calls repeatedly."""
+    return _RobotFunctions(case)
 
 
-class _Machine:
-    """A robot with fixed dimensions, as functions of the pose and of the unknowns that have no closed form.
+class _RobotFunctions:
+    """A robot with fixed dimensions, as functions of the pose and of the unknowns without a closed form.
 
     Args:
-        case: its case.
+        case: case with fixed dimensions.
 
     Attributes:
-        actuators, measures, joints: those of :class:`InversePoses`.
+        actuators, measures, joints: names and quantities of :class:`InversePoses`.
         turning: indices of the actuators that turn.
         size: (f,) sizes of the unknowns without a closed form.
     """
@@ -234,7 +231,7 @@ class _Machine:
         model, drives = case.model, driven_joints(case.model)
         self.joints = tuple(each.name for each in model.unknowns)
         if self.joints:
-            # Among the quantities, the unknowns that are replaced by expressions have these as values.
+            # As a quantity, eliminated unknowns keep their values as expressions.
             all_of_them = ca.vertcat(*[each.symbol for each in model.unknowns])
             listed = Quantity("every unknown", self.joints, all_of_them, Dimension.NUMBER, "of joints")
             model = replace(model, quantities=(*model.quantities, listed))
@@ -255,7 +252,7 @@ class _Machine:
         }
         self.actuators = tuple(each.name for each in drives)
         if not set(self.actuators) <= set(known) or not drives:
-            raise InputError(f"the positions of the actuators of {model.name!r} are not known")
+            raise InputError(f"inverse kinematics: robot {model.name!r} has no expression for an actuator coordinate")
         self.measures = tuple(known[name][0] for name in self.actuators)
         self.turning = [k for k, each in enumerate(drives) if each.dimension is Dimension.ANGLE]
         sizes = ca.Function("sizes", [model.symbols], [ca.vertcat(SX(0, 1), *[each.size for each in own])])
@@ -279,21 +276,21 @@ class _Machine:
             robot.signs[[k for k, mode in enumerate(is_mode) if mode], :],
         ]
         self._function = ca.Function("inverse", [z], [ca.densify(each) for each in outputs])
-        # CasADi finds a mapped function again as long as it is held: making it takes as long as evaluating it.
+        # CasADi caches a mapped function while it is referenced: making it takes as long as evaluating it.
         self._mapped = self._function.map(_BLOCK)
 
     def at(self, poses: FloatArray, moving: FloatArray) -> _Values:
-        """Return the numbers at poses (B, 12) with unknowns (B, f)."""
+        """Return the values at poses (B, 12) with unknowns (B, f)."""
         # CasADi's columns are NumPy's rows: the transposes are contiguous.
         found = [each.transpose(0, 2, 1) for each in values_at(self._function, np.hstack([poses, moving]))]
         return _Values(*(each if k in (2, 3) else each[:, 0] for k, each in enumerate(found)))
 
     def followed(self, poses: FloatArray, *, one_by_one: bool) -> FloatArray:
-        """Return the unknowns (N, f) without closed form at poses (N, 12); NaN where they are not found.
+        """Return the unknowns (N, f) without closed form at poses (N, 12); NaN where a path ends early.
 
         Args:
-            poses: the poses.
-            one_by_one: whether each pose is reached from the one before.
+            poses: (N, 12) the poses.
+            one_by_one: If true, follow the joints from each pose to the next.
         """
         found = np.full((len(poses), len(self.size)), np.nan)
         start = self._start(poses)
@@ -310,7 +307,7 @@ class _Machine:
         return found
 
     def _start(self, poses: FloatArray) -> FloatArray | None:
-        """Return a pose with its unknowns (12 + f,) in home's assembly: home itself, or one of the given poses."""
+        """Return a pose with its unknowns (12 + f,) in the home assembly mode: home, or one of the given poses."""
         at_home = np.concatenate([np.eye(3).ravel(), home_position(self._model, self._parameters)])
         chosen = poses[np.unique(np.linspace(0, len(poses) - 1, _REFERENCES).astype(int))]
         for pose in (at_home, *chosen):
@@ -321,7 +318,7 @@ class _Machine:
         return None
 
     def _independent(self, start: FloatArray) -> Sequence[int]:
-        """Return as many loop equations as there are unknowns, which determine these about a point (12 + f,)."""
+        """Return the indices of independent loop equations, which determine the unknowns about a point (12 + f,)."""
         rng = np.random.default_rng(0)
         spread = 0.1 * self._loops.size
         spread[:_POSE] = 0.0
@@ -332,7 +329,7 @@ class _Machine:
     def _reached(
         self, loops: Loops, start: FloatArray, poses: FloatArray, ways: Sequence[tuple[int, float]]
     ) -> FloatArray:
-        """Return the unknowns (B, f) at poses (B, 12), to which ways from a closed point (12 + f,) lead, or NaN."""
+        """Return the unknowns (B, f) at poses (B, 12), followed from a closed point (12 + f,); NaN where that fails."""
         found = np.full((len(poses), len(self.size)), np.nan)
         left = np.arange(len(poses))
         for steps, largest in ways:
@@ -359,7 +356,7 @@ class _Machine:
 
 
 def _path(start: FloatArray, poses: FloatArray, steps: int) -> Iterator[FloatArray]:
-    """Yield poses (B, 12) on straight ways from a pose (12,), with the turn to each about one axis."""
+    """Yield poses (B, 12) along straight paths from a pose (12,), each with a rotation about a fixed axis."""
     begin = start[:9].reshape(3, 3).T
     turns = [axis_angle_from_matrix(each.reshape(3, 3).T @ begin.T) for each in poses[:, :9]]
     angles = np.array([each.angle for each in turns])[:, None, None]
@@ -373,7 +370,7 @@ def _path(start: FloatArray, poses: FloatArray, steps: int) -> Iterator[FloatArr
 
 
 def _are_poses(R: FloatArray, p: FloatArray) -> NDArray[np.bool_]:
-    """Return whether positions (N, 3) are finite and matrices (N, 3, 3) rotations."""
+    """Return whether positions (N, 3) are finite and matrices (N, 3, 3) are rotations."""
     with np.errstate(invalid="ignore", over="ignore"):
         x, y, z = R.transpose(1, 0, 2)
         off = np.abs(R @ R.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2), initial=0.0)
@@ -382,9 +379,10 @@ def _are_poses(R: FloatArray, p: FloatArray) -> NDArray[np.bool_]:
 
 
 def _margin(rows: SX) -> SX:
-    """Return a number (1, 1) that is small where rows (m, 6), moments in front, are nearly dependent.
+    """Return a relative determinant (1, 1) of ``J'J``, which is small where rows (m, 6) are nearly dependent.
 
-    It is the determinant of ``J'J``, with moments in parts of the longest, over the largest one with these squares.
+    Rows begin with moments, which are divided by the longest one. The determinant is divided by the largest possible
+    one with the same squares.
     """
     arm = SX(0)
     for row in ca.vertsplit(rows):

@@ -1,13 +1,12 @@
-"""First-order geometry of a program at a point: gradient, active sides, multipliers, and a Newton correction.
+"""First-order analysis of a program at a point: gradient, active sides, multipliers, and a Newton correction.
 
-Everything is in scaled variables ``s = (x - centre) / scale``, which run from -1 to 1, and for the objective
-``phi = sign * F / objective_scale``, which is minimised. Every bound and constraint becomes *sides* ``slack >= 0`` with
-an outward unit normal ``a``, so that ``slack`` is, to first order, a distance in scaled variables. A point is
-stationary when
+All quantities are in scaled variables ``s = (x - centre) / scale``, which run from -1 to 1; the scaled objective
+``phi = sign * F / objective_scale`` is minimised. A bound or constraint has one or two *sides* ``slack >= 0`` with an
+outward unit normal ``a``: ``slack`` is, to first order, a distance in scaled variables. A point is stationary if
 
     grad phi + sum_j mu_j a_j = 0,    mu_j >= 0 on inequalities,    mu_j = 0 where slack_j > 0.
 
-The module uses no solver: every number comes from the program and the point.
+No solver is used: everything is computed from the program and the point.
 """
 
 from __future__ import annotations
@@ -25,28 +24,27 @@ from ..program.nlp import Nlp, Side
 from .equations import ProgramEquations, gradient_sizes
 
 #: Largest slack of an active side, in scaled variables: well above the rounding error of a corrected point, well below
-#: any distance that matters in a design.
+#: any distance that is relevant to a design.
 ACTIVE = 1e-7
 #: Largest scaled derivative of the Lagrangian at a stationary point: F can then still improve by at most about this
 #: part of its size over the whole range of a variable along which it is linear.
 STATIONARY = 1e-7
-#: Largest distance outside a side, in scaled variables, of a feasible point.
+#: Largest violation of a side at a feasible point, in scaled variables.
 FEASIBLE = 1e-9
-#: Gradient of a constraint, as a part of its typical size, that counts as zero.
+#: Relative size below which the gradient of a constraint counts as zero.
 NO_GRADIENT = 1e-9
-#: Rounding error of a constraint's distance, in rounding units of its bound, and the smallest that is allowed for.
+#: Rounding error of a constraint's distance, in rounding units of its bound, and its smallest allowance.
 ROUNDINGS = 4
 NOTABLE = 1e-10
-#: Largest number of Newton steps of a correction. Two or three reach rounding error from an interior-point solution; a
-#: change of the active set, or an optimum where F is flatter than a parabola, takes more.
+#: Largest number of Newton steps of a correction. From an interior-point solution, two or three reach rounding error; a
+#: change of the active set, or an optimum where F is flatter than a parabola, needs more.
 _NEWTON_STEPS = 40
-#: Steps with some of the variables only, before more may move: from home, loops close in five or six.
+#: Steps with a subset of the variables before more may move: from home, loops close in five or six.
 _FIRST_STEPS = 12
 #: Largest step of a correction in a scaled variable: a correction improves a point and does not search.
 _LONGEST_STEP = 0.1
-#: Singular values below this part of the largest are zero in the Newton system, which is singular at optima that are
-#: not isolated. Where second derivatives are nearly zero, the first value gives too long a step, and the next value is
-#: tried.
+#: Relative thresholds of zero singular values in the Newton system, which is singular at optima that are not isolated.
+#: Where second derivatives are nearly zero, the first threshold gives too long a step, and the next one is tried.
 _NEWTON_RCOND = (1e-11, 1e-8, 1e-6)
 #: Residual of the stationarity conditions that is rounding error. Newton's method converges quadratically: the step
 #: that reaches this value mostly reaches 1e-16.
@@ -66,11 +64,11 @@ class Linearisation:
         gradient: (n,) gradient of phi in scaled variables.
         sides: the k sides of all bounds and constraints.
         slack: (k,) distance to each side, negative outside; for an equation, minus the size of the residual.
-        residual: (k,) signed residual ``expression - limit``, positive outside, as the same distance.
+        residual: (k,) signed residual ``expression - limit``, positive outside, scaled to the same distance.
         normals: (k, n) outward unit normals in scaled variables; for an equation, the gradient's direction.
-        per_unit: (k,) change of the slack per unit by which the limit of a side is relaxed.
-        noise: (k,) rounding error of the slack, where narrow ranges make it notable; else 0.
-        rounding: rounding error of the conditions of stationarity.
+        per_unit: (k,) change of the slack per unit by which a side's limit is relaxed.
+        noise: (k,) rounding error of the slack where narrow ranges make it notable; else 0.
+        rounding: rounding error of the stationarity conditions.
     """
 
     x: FloatArray
@@ -87,13 +85,13 @@ class Linearisation:
 
     @property
     def violation(self) -> float:
-        """Largest distance outside a side; 0 at a feasible point, ``inf`` where the program is not defined."""
+        """Largest distance outside a side; 0 at a feasible point, ``inf`` where the program has no finite value."""
         if not (np.isfinite(self.phi) and np.isfinite(self.slack).all()):
             return float("inf")
         return float(max(0.0, -(self.slack + self.noise).min(initial=0.0)))
 
     def active(self, tolerance: float = ACTIVE) -> tuple[int, ...]:
-        """Return the indices of the active set: the sides on which, or outside of which, the point lies.
+        """Return the indices of the active set: the sides whose slack is at most the tolerance.
 
         Args:
             tolerance: largest slack of an active side.
@@ -111,7 +109,7 @@ def linearise(nlp: Nlp, x: FloatArray) -> Linearisation:
     residual = sides.sign * (np.concatenate([x, g.ravel()])[sides.place] - sides.limit) * per_unit
     outward = sides.sign * per_unit
     normals = outward[:, None] * np.concatenate([np.diag(scale), rows])[sides.place]
-    # Of a constraint the value is rounded, and the variables that it depends on are.
+    # Rounding of a constraint comes from its value and from its variables.
     steps = np.abs(normals) @ (np.abs(x) / scale)
     noise = ROUNDINGS * np.finfo(float).eps * (np.abs(sides.limit) * per_unit + steps)
     noise[sides.place < nlp.n] = 0.0
@@ -136,9 +134,9 @@ class Multipliers(NamedTuple):
     """Multipliers of the sides at a point.
 
     Attributes:
-        mu: (k,) not negative on inequalities and zero on inactive sides.
-        residual: largest component of ``grad phi + sum mu a``, which is zero where ``-grad phi`` lies in the cone of
-            the outward normals; ``inf`` where the gradient is not finite.
+        mu: (k,) multipliers: never negative on inequalities, zero on inactive sides.
+        residual: largest component of ``grad phi + sum mu a``; zero where ``-grad phi`` lies in the cone of the outward
+            normals, ``inf`` where the gradient is not finite.
     """
 
     mu: FloatArray
@@ -146,11 +144,11 @@ class Multipliers(NamedTuple):
 
 
 def multipliers(at: Linearisation, active: Sequence[int]) -> Multipliers:
-    """Return the multipliers that make a point as nearly stationary as possible.
+    """Return the multipliers that minimise the residual of the stationarity conditions.
 
     Args:
-        at: the program at the point.
-        active: indices of the sides whose multipliers may differ from zero.
+        at: linearised program at the point.
+        active: indices of the sides with multipliers that may differ from zero.
     """
     mu = np.zeros(len(at.sides))
     if not np.isfinite(at.gradient).all():
@@ -169,8 +167,8 @@ def constraint_weights(nlp: Nlp, at: Linearisation, mu: FloatArray) -> FloatArra
     """Return the weight of each constraint's expression, (c,), in the Lagrangian ``phi + sum mu residual``.
 
     Args:
-        nlp: the program.
-        at: the program at the point.
+        nlp: the nonlinear program.
+        at: linearised program at the point.
         mu: (k,) multipliers of the sides.
     """
     sides = nlp.sides
@@ -182,8 +180,8 @@ def lagrangian_hessian(nlp: Nlp, at: Linearisation, mu: FloatArray) -> FloatArra
     """Return the Hessian of the Lagrangian ``phi + sum mu residual`` in scaled variables, (n, n).
 
     Args:
-        nlp: the program.
-        at: the program at the point.
+        nlp: the nonlinear program.
+        at: linearised program at the point.
         mu: (k,) multipliers of the sides.
     """
     weights = constraint_weights(nlp, at, mu)
@@ -192,19 +190,19 @@ def lagrangian_hessian(nlp: Nlp, at: Linearisation, mu: FloatArray) -> FloatArra
 
 
 def correct_point(nlp: Nlp, x: FloatArray, active: Sequence[int]) -> Linearisation:
-    """Correct a point near a stationary one by Newton's method on the stationarity conditions with an active set.
+    """Return a point corrected by Newton's method on the stationarity conditions with an active set.
 
-    A side that a step would cross joins the active set; a side whose multiplier becomes negative leaves the active set.
-    The steps are least-norm, so that a point on a manifold of optima does not move along the manifold.
+    A side that a step would cross joins the active set; a side with a negative multiplier leaves it. Steps are
+    least-norm, so that a point on a manifold of optima does not move along the manifold.
 
     Args:
-        nlp: the program.
-        x: (n,) point near a stationary one.
+        nlp: the nonlinear program.
+        x: (n,) point near a stationary point.
         active: indices (into ``nlp.sides``) of the first active set.
 
     Returns:
-        The program at the corrected point, inside the variables' bounds; where Newton's method does not converge, at
-        the iterate with the smallest residual since the last change of the active set.
+        The linearised program at the corrected point, inside the variables' bounds; where Newton's method does not
+        converge, at the iterate with the smallest residual since the last change of the active set.
     """
     at = linearise(nlp, _move_onto_bounds(nlp, np.clip(x, nlp.lower, nlp.upper), active))
     conditions = _Stationarity(nlp, at, active)
@@ -216,15 +214,15 @@ def correct_point(nlp: Nlp, x: FloatArray, active: Sequence[int]) -> Linearisati
 
 
 class _Stationarity:
-    """Conditions of stationarity with an active set, as equations in scaled variables and multipliers.
+    """Stationarity conditions with an active set, as equations in scaled variables and multipliers.
 
     Args:
-        nlp: the program.
-        at: the program at the first point.
+        nlp: the nonlinear program.
+        at: linearised program at the first point.
         active: indices of the first active set.
 
     Attributes:
-        best: the point with the smallest residual since the last change of the active set.
+        best: linearised program at the point with the smallest residual since the last change of the active set.
     """
 
     def __init__(self, nlp: Nlp, at: Linearisation, active: Sequence[int]) -> None:
@@ -250,9 +248,9 @@ class _Stationarity:
         return Linear(residual, matrix) if np.isfinite(matrix).all() and np.isfinite(residual).all() else None
 
     def moved(self, at: Linearisation, step: FloatArray) -> Linearisation | None:
-        """Return the program after a step; None where it is long, or the residual grows.
+        """Return the program after a step; None where the step is too long, or the residual grows.
 
-        Where the step would cross a side, it ends there, and the side joins the active set.
+        Where the step would cross a side, it ends on the side, which joins the active set.
         """
         nlp, active = self._nlp, self._active
         step = step[: nlp.n]
@@ -272,7 +270,7 @@ class _Stationarity:
         return after
 
     def drops_side(self, at: Linearisation) -> bool:
-        """Take the side with the most negative multiplier off the active set; return whether there is one."""
+        """Remove the side with the most negative multiplier from the active set; return whether there is one."""
         wrong = np.where(self._nlp.sides.equal, 0.0, self._mu)
         converged = max(_CONVERGED, 4 * at.rounding)
         if not self._left or not self._error <= converged or wrong.min(initial=0.0) >= -converged:
@@ -289,13 +287,13 @@ class _Stationarity:
 def _residual(at: Linearisation, active_set: list[int]) -> tuple[FloatArray, float]:
     """Return least-squares multipliers (k,) of an active set, and the residual of the KKT conditions.
 
-    The residual is the largest of the derivatives of the Lagrangian, the distances from the sides of the active set,
-    inside as well as outside, and the violation.
+    The residual is the largest of three values: the derivatives of the Lagrangian, the distances from the active sides
+    to either direction, and the violation.
     """
     mu = np.zeros(len(at.sides))
     if active_set and np.isfinite(at.gradient).all():
         A = at.normals[active_set]
-        # Normals of variables' bounds are orthonormal, and most active sets consist of such bounds alone.
+        # Normals of variables' bounds are orthonormal, and most active sets have no other sides.
         orthonormal = np.array_equal(A @ A.T, np.eye(len(active_set)))
         mu[active_set] = -A @ at.gradient if orthonormal else least_squares(A.T, -at.gradient)
     left = at.gradient + at.normals.T @ mu
@@ -304,7 +302,7 @@ def _residual(at: Linearisation, active_set: list[int]) -> tuple[FloatArray, flo
 
 
 def _move_onto_bounds(nlp: Nlp, x: FloatArray, active_set: Sequence[int]) -> FloatArray:
-    """Return a point (n,) with the variables whose bounds are in the active set exactly on these bounds."""
+    """Return a point (n,) with the variables of active bounds exactly on these bounds."""
     sides, moved = nlp.sides, x.copy()
     for j in active_set:
         variable = sides.sides[j].variable
@@ -314,16 +312,16 @@ def _move_onto_bounds(nlp: Nlp, x: FloatArray, active_set: Sequence[int]) -> Flo
 
 
 def close_equations(nlp: Nlp, x: FloatArray, *, in_place: bool = False) -> FloatArray:
-    """Return the point, nearest to the given one to first order, at which the program's equations hold.
+    """Return the point at which the program's equations hold, nearest to the given one to first order.
 
-    Newton's method with least-norm steps on the equations alone: unit lengths of directions and closure of loops. Where
-    the robot has internal unknowns, those that the loops determine move alone if that closes the loops, else with free
-    positions of driven joints, else with the pose, else with all.
+    Newton's method with least-norm steps solves only the equations: unit lengths of directions and closure of loops.
+    Where the robot has internal unknowns, first only those that the loops determine move; where that fails, free
+    actuator coordinates move too, then the pose, then all variables.
 
     Args:
-        nlp: the program.
-        x: (n,) the point.
-        in_place: whether nothing but internal unknowns may move.
+        nlp: the nonlinear program.
+        x: (n,) given point.
+        in_place: If true, only internal unknowns may move.
 
     Returns:
         (n,) the point inside the variables' bounds; the last iterate where Newton's method does not converge.
@@ -340,7 +338,7 @@ def close_equations(nlp: Nlp, x: FloatArray, *, in_place: bool = False) -> Float
 
 
 def _movable(nlp: Nlp) -> list[list[int]]:
-    """Return the indices of the variables that close a program's equations: the unknowns, then more, then all."""
+    """Return the sets of variables that may move, in the order in which they are tried."""
     places, every = nlp.program.places, list(range(nlp.n))
     unknowns = [sorted(places.determined), sorted({index for at_pose in places.unknowns for index in at_pose})]
     unknowns = unknowns if len(unknowns[0]) < len(unknowns[1]) else unknowns[:1]

@@ -1,8 +1,8 @@
-"""Forces and speeds of actuators at a point, and the wrenches by which limbs' constraints hold the loads.
+"""Actuator forces and speeds at a point, and the constraint wrenches of the limbs that balance the loads.
 
-The wrenches of a limb's constraints are those that do no work in its actuators: the part of its row forces that is
-orthogonal to what its actuators drive. Statics determines them where the wrenches of the limb are independent of those
-of all others; else limbs can load each other with wrenches that no load determines.
+The constraint wrenches of a limb do no work in its actuators: they are the part of its row forces that is orthogonal to
+the space that its actuators drive. Statics determines them if the wrenches of the limb are independent of those of all
+other limbs; else the robot is overconstrained, and the limbs can load each other without any external load.
 """
 
 from collections.abc import Mapping, Sequence
@@ -33,20 +33,20 @@ from ..system.jsonvalues import (
 from .paths import velocities_at
 from .state import RobotState, evaluate
 
-#: Work rates of a limb's rows below this part of the largest are none of its actuators'.
+#: Work rates of a limb's rows below this part of the largest count as zero.
 _DRIVES = 1e-9
 
 
 class ActuatorLoad(JsonObject):
-    """Force of an actuator under a load, or torque of one that turns; null at a singular pose.
+    """Force or torque of an actuator under a load; null at a singular pose.
 
     Attributes:
-        actuator: its name.
-        value: the force of the largest size, positive in the sense of the actuator's rate.
-        smallest: smallest force where the load is of any direction; the same value for others.
-        largest: largest force.
-        unit: of these numbers.
-        power: largest size of the force times the largest speed; absent without motions.
+        actuator: name of the actuator.
+        value: force or torque with the largest absolute value, positive in the sense of the actuator rate.
+        smallest: smallest force or torque over all directions of the load; equal to ``value`` for a fixed load.
+        largest: largest force or torque over all directions of the load.
+        unit: unit of ``value``, ``smallest`` and ``largest``.
+        power: largest absolute force times largest speed; absent without motions.
     """
 
     actuator: str
@@ -58,12 +58,12 @@ class ActuatorLoad(JsonObject):
 
 
 class ConstraintLoad(JsonObject):
-    """Wrench by which the constraints of a limb hold a load.
+    """Constraint wrench of a limb under a load.
 
     Attributes:
-        limb: its name.
-        wrench: on the platform, force, then moment about the world origin; null where statics does not determine it,
-            because limbs can load each other.
+        limb: name of the limb.
+        wrench: wrench on the platform: force, then moment about the world origin; null where statics does not
+            determine it, because limbs can load each other.
     """
 
     limb: str
@@ -71,12 +71,12 @@ class ConstraintLoad(JsonObject):
 
 
 class PlatformDeflection(JsonObject):
-    """Displacement of the platform under a load, as its actuators give way.
+    """Displacement of the platform under a load, from the compliance of the actuators.
 
     Attributes:
-        translation: of its origin, without the part of any direction; null at a singular pose.
-        rotation: vector of the turn, in the unit of angles.
-        largest: upper bound of the size of the translation with loads of any direction.
+        translation: displacement of the platform's origin under the fixed part of the load; null at a singular pose.
+        rotation: rotation vector of the platform, in the unit of angles.
+        largest: upper bound of the translation's length over all directions of the load.
     """
 
     translation: Vector3 | None
@@ -85,15 +85,15 @@ class PlatformDeflection(JsonObject):
 
 
 class HeldLoad(JsonObject):
-    """A load and what holds it.
+    """A load with the actuator forces and constraint wrenches that balance it.
 
     Attributes:
-        name: of the load.
-        pose: number of the pose, from 1 on; absent where there is one.
-        wrench: force, then moment about the world origin, without its part of any direction.
-        actuators: forces of the actuators.
-        constraints: wrenches of the limbs' constraints; absent for a robot without any.
-        deflection: of the platform; absent where the actuators' stiffness is not known.
+        name: name of the load.
+        pose: number of the pose, from 1 on; absent where there is only one pose.
+        wrench: force, then moment about the world origin, without the part of any direction.
+        actuators: forces or torques of the actuators.
+        constraints: constraint wrenches of the limbs; absent for a robot without constraints.
+        deflection: displacement of the platform; absent where the stiffness of an actuator is not known.
     """
 
     name: str
@@ -105,7 +105,7 @@ class HeldLoad(JsonObject):
 
     @property
     def forces(self) -> FloatArray:
-        """Force (a,) of each actuator with the largest size; not numbers at a singular pose."""
+        """Force (a,) with the largest absolute value of each actuator; NaN at a singular pose."""
         return np.array([each.value for each in self.actuators], dtype=np.float64)
 
 
@@ -113,11 +113,11 @@ class TopSpeed(JsonObject):
     """Largest speed of an actuator in the platform's fastest motions; null at a singular pose.
 
     Attributes:
-        actuator: its name.
-        pose: number of the pose, from 1 on; absent where there is one.
-        value: the speed.
-        unit: of the speed.
-        dimension: of the speed, in radians for an actuator that turns.
+        actuator: name of the actuator.
+        pose: number of the pose, from 1 on; absent where there is only one pose.
+        value: largest speed.
+        unit: unit of the speed.
+        dimension: dimension of the speed, in radians for an actuator that turns.
     """
 
     actuator: str
@@ -128,13 +128,14 @@ class TopSpeed(JsonObject):
 
 
 class ActuatorLoading(JsonObject):
-    """Forces and speeds of actuators at every pose.
+    """Forces and speeds of the actuators at every pose.
 
     Attributes:
-        loads: every load at every pose; absent without loads.
-        speeds: every actuator at every pose; absent without motions.
-        compliance: at the first pose, displacement of the platform, translation of its origin and turn in radians, by
-            force and moment about it; absent where the actuators' stiffness is not known, and at a singular pose.
+        loads: balance of every load at every pose; absent without loads.
+        speeds: largest speed of every actuator at every pose; absent without motions.
+        compliance: compliance of the platform at the first pose: translation of its origin and rotation in radians, by
+            force and moment about the origin; absent at a singular pose, or where the stiffness of an actuator is not
+            known.
     """
 
     loads: Absent[tuple[HeldLoad, ...]]
@@ -143,13 +144,13 @@ class ActuatorLoading(JsonObject):
 
 
 class PoseLoads(NamedTuple):
-    """Forces of all load cases at a pose, and what does not depend on loads.
+    """Forces of all load cases at a pose, with speeds and compliance, which do not depend on loads.
 
     Attributes:
-        loads: the load cases.
-        speeds: the largest speeds of the actuators; empty without a motion.
-        compliance: (6, 6) displacement of the platform, turn and translation of its origin, by moment and force about
-            it; empty where the actuators' stiffness is not known.
+        loads: load cases with their balance.
+        speeds: largest speeds of the actuators; empty without a motion.
+        compliance: (6, 6) displacement of the platform (rotation, then translation of its origin) by moment and force
+            about the origin; empty where the stiffness of an actuator is not known.
     """
 
     loads: tuple[HeldLoad, ...]
@@ -161,15 +162,15 @@ def loading_of(nlp: Nlp, x: FloatArray, state: RobotState) -> ActuatorLoading:
     """Return forces and speeds of the actuators at every pose of a point, in the case's units.
 
     Args:
-        nlp: the program.
+        nlp: the nonlinear program.
         x: (n,) the point.
-        state: the robot there, at the first pose.
+        state: state of the robot at the point, at the first pose.
     """
     poses = range(len(nlp.program.robots))
     found, units = [loads_at(nlp, x, evaluate(nlp, x, k) if k else state, k) for k in poses], nlp.case.units
     compliance = found[0].compliance
     known = compliance.size and np.isfinite(compliance).all()
-    order = [3, 4, 5, 0, 1, 2]  # force before moment, and translation before turn
+    order = [3, 4, 5, 0, 1, 2]  # force before moment, and translation before rotation
     return ActuatorLoading(
         loads=HeldLoad.of_each([load for each in found for load in each.loads], units) or None,
         speeds=TopSpeed.of_each([speed for each in found for speed in each.speeds], units) or None,
@@ -181,9 +182,9 @@ def loads_at(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> PoseL
     """Return forces and speeds of the actuators of a robot at a pose.
 
     Args:
-        nlp: the program.
+        nlp: the nonlinear program.
         x: (n,) the point.
-        state: the robot there.
+        state: state of the robot at the point.
         pose: index of the pose.
     """
     model, loading = nlp.program.model, nlp.case.loading
@@ -202,7 +203,7 @@ def loads_at(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> PoseL
 
 
 def largest_of(found: PoseLoads, measure: str) -> float:
-    """Return the largest number of the actuators at a pose: ``actuator_force``, ``actuator_speed`` or ``..._power``."""
+    """Return the largest ``actuator_force``, ``actuator_speed`` or ``actuator_power`` over the actuators at a pose."""
     speeds = np.array([each.value for each in found.speeds], dtype=np.float64)
     if measure == "actuator_speed":
         return float(speeds.max())
@@ -211,7 +212,7 @@ def largest_of(found: PoseLoads, measure: str) -> float:
 
 
 def _top_speeds(nlp: Nlp, speeds: FloatArray, pose: int | None) -> tuple[TopSpeed, ...]:
-    """Return the largest speeds (a,) of the actuators, none without a motion, at a pose by its number."""
+    """Return the largest speeds (a,) of the actuators at a pose, given by its number; empty without a motion."""
     return tuple(
         TopSpeed(
             actuator=joint.name,
@@ -233,7 +234,7 @@ def _load(
     speeds: Sequence[TopSpeed],
     pose: int | None,
 ) -> HeldLoad:
-    """Return what holds one load case; ``held`` has the matrix from row forces to the wrench of each limb."""
+    """Return the balance of one load case; ``held`` has the matrix from row forces to the wrench of each limb."""
     phi = _numbers(posed.statics.row_forces(case.wrench), state) if held else np.zeros(0)
     ends = zip(_numbers(case.smallest, state).tolist(), _numbers(case.largest, state).tolist(), strict=True)
     actuators = []
@@ -276,18 +277,18 @@ def _deflection(case: CaseForces, posed: PosedForces, state: RobotState) -> Plat
 
 
 def _numbers(expression: SX, state: RobotState) -> FloatArray:
-    """Return the values (k,) of a constant expression (k, 1), not numbers at a singular pose."""
+    """Return the values (k,) of a constant expression (k, 1); NaN at a singular pose."""
     values = np.array(ca.DM(expression), dtype=np.float64).reshape(-1)
     return np.full(values.shape, np.nan) if state.is_singular else values
 
 
 def _about_world(wrench: FloatArray, position: FloatArray) -> FloatArray:
-    """Return a wrench (6,) about the platform's origin with its moment about the world origin."""
+    """Return a wrench (6,) about the world origin, from one about the platform's origin."""
     return np.concatenate([wrench[:3], wrench[3:] + np.cross(position, wrench[:3])])
 
 
 def _constraints(nlp: Nlp, statics: Statics) -> "dict[str, FloatArray | None]":
-    """Return the matrix (6, m) from row forces to the wrench of each limb's constraints; None where not determined."""
+    """Return the matrix (6, m) from row forces to each limb's constraint wrench; None where it is not determined."""
     model = nlp.program.model
     rows, driven = (np.array(ca.DM(each), dtype=np.float64) for each in (statics.rows, statics.driven))
     limbs = np.array([row.limb for row in model.frame_rows])

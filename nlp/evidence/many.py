@@ -1,8 +1,8 @@
-"""Optima of one program judged many at a time, where its numbers differ from point to point.
+"""Evidence of optimality for many points of one program at once, with other data at each point.
 
-The conditions are those of :mod:`.kkt` and :mod:`.optimality`, on arrays with one row for each point. A verdict is
-given only where they decide plainly: a feasible, stationary point with independent active normals, positive multipliers
-and a positive reduced Hessian. :func:`~.optimality.examine` judges every other point, one at a time.
+The conditions are those of :mod:`.kkt` and :mod:`.optimality`, on arrays with one row for each point. A point is
+reported as a strict optimum only in the clear case: feasible and stationary, with independent active normals, positive
+multipliers and a positive reduced Hessian. :func:`~.optimality.examine` judges every other point, one at a time.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from .optimality import CURVED, STRONG
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Singular value of active normals, which have length 1, below which they count as dependent: that of ``examine``.
+#: Singular value below which active normals of length 1 count as dependent, as in ``examine``.
 _DEPENDENT = 1e-9
 
 
 class Numbers(NamedTuple):
-    """Numbers of one program at N points.
+    """Arguments, bounds and constraint limits of one program at N points.
 
     Attributes:
         arguments: (N, k) arguments.
-        lower: (N, n) bounds of the variables.
-        upper: likewise.
-        g_lower: (N, c) sides of the constraints, infinite and equal in the same places as those of the program.
-        g_upper: likewise.
+        lower: (N, n) lower bounds of the variables.
+        upper: (N, n) upper bounds of the variables.
+        g_lower: (N, c) lower sides of the constraints, infinite and equal in the same places as in the program.
+        g_upper: (N, c) upper sides of the constraints, likewise.
     """
 
     arguments: FloatArray
@@ -44,11 +44,11 @@ class Numbers(NamedTuple):
     g_upper: FloatArray
 
     def at(self, rows: NDArray[np.intp]) -> Numbers:
-        """Return the numbers at some of the points."""
+        """Return the data of some of the points."""
         return Numbers(*(each[rows] for each in self))
 
     def put_into(self, nlp: Nlp, k: int) -> Nlp:
-        """Return a program with the numbers of point k; the start is moved between the bounds."""
+        """Return a program with the data of point k; its start is moved between the bounds."""
         lower, upper = self.lower[k], self.upper[k]
         return replace(
             nlp,
@@ -63,18 +63,18 @@ class Numbers(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Verdicts:
-    """Verdicts on N points of a program.
+    """Evidence of optimality at N points of a program.
 
     Attributes:
-        is_strict: (N,) whether the point is a strict local optimum by conditions that decide plainly.
+        is_strict: (N,) whether the point is clearly a strict local optimum.
         F: (N,) objective.
         stationarity: (N,) largest scaled derivative of the Lagrangian; infinite where the active normals are dependent.
-        feasibility: (N,) largest distance outside a side, in half ranges.
-        curvature: (N,) smallest eigenvalue of the reduced Hessian; infinite where no direction is left, NaN where it is
-            not computed.
+        feasibility: (N,) largest violation of a side, in half ranges.
+        curvature: (N,) smallest eigenvalue of the reduced Hessian; infinite where the active sides leave no direction,
+            NaN where it is not computed.
         active: (N, k) whether each side of the program is active.
-        multipliers: (N, k) of the sides, scaled.
-        weights: (N, k) factors from scaled multipliers to F per unit of a side's own bound.
+        multipliers: (N, k) scaled multipliers of the sides.
+        weights: (N, k) factors from scaled multipliers to F per unit of the side's bound.
     """
 
     is_strict: NDArray[np.bool_]
@@ -88,7 +88,7 @@ class Verdicts:
 
 
 class _Scales(NamedTuple):
-    """Scales at N points: of the variables (N, n), of the objective (N,), of the constraints' gradients (N, c)."""
+    """Scales at N points: variables (N, n), objective (N,), gradients of the constraints (N, c)."""
 
     scale: FloatArray
     objective: FloatArray
@@ -96,7 +96,7 @@ class _Scales(NamedTuple):
 
 
 class _Linear(NamedTuple):
-    """A program linearised at N points, as :class:`~.kkt.Linearisation` has it for one."""
+    """A program linearised at N points, in the terms of :class:`~.kkt.Linearisation`."""
 
     F: FloatArray
     gradient: FloatArray
@@ -107,12 +107,12 @@ class _Linear(NamedTuple):
 
 
 def judge_many(nlp: Nlp, x: FloatArray, numbers: Numbers) -> Verdicts:
-    """Return verdicts on points of a program.
+    """Return the evidence of optimality at points of a program.
 
     Args:
-        nlp: the program, with every constraint of its limits on pairs.
+        nlp: nonlinear program with every constraint of its limits on pairs.
         x: (N, n) the points.
-        numbers: the program's numbers at the points.
+        numbers: data of the program at the points.
     """
     count, sides = len(x), nlp.sides
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
@@ -150,7 +150,7 @@ def judge_many(nlp: Nlp, x: FloatArray, numbers: Numbers) -> Verdicts:
 def _scales(nlp: Nlp, numbers: Numbers) -> _Scales:
     """Return the scales of :class:`~..program.nlp.Nlp` at every point; NaN where the robot is not defined at the start.
 
-    There, the objective's size would be sought around the start: such points are left to ``examine``.
+    For one point the objective's size would then be sought around the start: such points are left to ``examine``.
     """
     scale, centre = (numbers.upper - numbers.lower) / 2, (numbers.upper + numbers.lower) / 2
     count = len(scale)
@@ -208,11 +208,11 @@ def _linearise(nlp: Nlp, x: FloatArray, numbers: Numbers, scales: _Scales) -> _L
     )
 
 
-class _Found(NamedTuple):
-    """Multipliers (m, k) of one active set at m points, and what belongs to them.
+class _Multipliers(NamedTuple):
+    """Multipliers of one active set of k sides at m points.
 
     Attributes:
-        mu: the multipliers.
+        mu: (m, k) multipliers.
         stationarity: (m,) largest derivative of the Lagrangian.
         is_independent: (m,) whether the normals are independent.
         tangents: (m, n, n - k) orthonormal bases of the normals' null spaces.
@@ -224,12 +224,14 @@ class _Found(NamedTuple):
     tangents: FloatArray
 
 
-def _multipliers(gradient: FloatArray, A: FloatArray) -> _Found:
+def _multipliers(gradient: FloatArray, A: FloatArray) -> _Multipliers:
     """Return the multipliers of active sides with normals A (m, k, n) at points with gradients (m, n)."""
     m, k, n = A.shape
     if not k:
         identity = np.broadcast_to(np.eye(n), (m, n, n))
-        return _Found(np.zeros((m, 0)), np.abs(gradient).max(axis=1, initial=0.0), np.ones(m, dtype=bool), identity)
+        return _Multipliers(
+            np.zeros((m, 0)), np.abs(gradient).max(axis=1, initial=0.0), np.ones(m, dtype=bool), identity
+        )
     U, sizes, V = np.linalg.svd(A)
     smallest = sizes[:, -1]
     safe = np.where(smallest > _DEPENDENT, 1.0, np.nan)[:, None] / sizes
@@ -237,13 +239,13 @@ def _multipliers(gradient: FloatArray, A: FloatArray) -> _Found:
     mu = -np.einsum("mij,mj->mi", U, along * safe)
     left = gradient + np.einsum("mki,mk->mi", A, mu)
     stationarity = np.where(smallest > _DEPENDENT, np.abs(left).max(axis=1), np.inf)
-    return _Found(np.nan_to_num(mu), stationarity, smallest > _DEPENDENT, np.swapaxes(V[:, k:], 1, 2))
+    return _Multipliers(np.nan_to_num(mu), stationarity, smallest > _DEPENDENT, np.swapaxes(V[:, k:], 1, 2))
 
 
 def _groups(
     active: NDArray[np.bool_], regular: NDArray[np.bool_], most: int
 ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-    """Yield the points with the same active set, and the sides of the set; sets of more sides are left out."""
+    """Yield the points with the same active set, and the sides of the set; sets with too many sides are left out."""
     chosen = np.flatnonzero(regular)
     if not len(chosen):
         return
@@ -256,7 +258,7 @@ def _groups(
 def _hessians(
     nlp: Nlp, x: FloatArray, numbers: Numbers, mu: FloatArray, scales: _Scales, at: _Linear, rows: NDArray[np.intp]
 ) -> FloatArray:
-    """Return the Hessians (m, n, n) of the Lagrangians in scaled variables at the points of the given rows."""
+    """Return the Hessians (m, n, n) of the Lagrangians in scaled variables, at the points of the given rows."""
     n, sides = nlp.n, nlp.sides
     terms = sides.sign * mu * at.per_unit[rows]
     weights = np.zeros((len(rows), n + len(nlp.program.constraints)))
@@ -265,7 +267,7 @@ def _hessians(
     weight = nlp.sign / scales.objective[rows]
     found = nlp.program.hessian(x.T, numbers.arguments.T, weight[None], weights[:, n:].T).full()
     scale = scales.scale[rows]
-    # The matrices stand side by side; a Hessian is symmetric.
+    # CasADi returns the matrices side by side; a Hessian is symmetric.
     return np.asarray(found.T.reshape(len(rows), n, n) * scale[:, :, None] * scale[:, None, :], dtype=np.float64)
 
 

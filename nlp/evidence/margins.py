@@ -1,9 +1,10 @@
-"""Margins of a point in each of the case's limits, and the cost of each limit.
+"""Margins of a point in each limit of the case, and the cost of each limit.
 
-The cost of a limit is the derivative of the optimal F by the number that stands in the case, from the multipliers: with
-the Lagrangian ``phi + sum_j mu_j (g_j - c_j)`` of :mod:`.kkt`, ``d phi* / d c_j = -mu_j``. A number that
-limits several legs or poses costs the sum of its costs at each of them. The derivative is two-sided where the
-active limits have independent normals and positive multipliers, which :mod:`screwsynth.nlp.evidence.optimality` says.
+The cost of a limit is the derivative of the optimal F with respect to the limit's value in the case. It follows from
+the multipliers: with the Lagrangian ``phi + sum_j mu_j (g_j - c_j)`` of :mod:`.kkt`, ``d phi* / d c_j = -mu_j``. A
+value that limits several legs or poses costs the sum of its costs at each of them. The derivative is two-sided where
+the active limits have independent normals and positive multipliers, which :mod:`screwsynth.nlp.evidence.optimality`
+checks.
 """
 
 from collections.abc import Sequence
@@ -23,7 +24,7 @@ from ..system.jsonvalues import Hidden, JsonObject, Known, Measure, Shown, Slope
 from ..units import rate_unit
 from .kkt import FEASIBLE, Linearisation, linearise, multipliers
 
-#: Beginning of the names of constraints on the rates of actuators.
+#: First words of the names of constraints on actuator rates.
 _RATE = "actuator_rate actuator "
 
 
@@ -31,17 +32,17 @@ class Margin(JsonObject):
     """Margin of a point in a limit at one leg, joint or pose.
 
     Attributes:
-        name: the limit, and where.
-        key: dotted key, below limits, of the number in the case.
-        bound: side of it.
-        value: measured there; null where it is not finite.
-        limit: number of the case.
-        margin: distance from the limit, positive inside.
-        unit: of value, limit and margin.
+        name: name of the limit, with the leg, joint or pose.
+        key: dotted key of the limit's value in the case, below limits.
+        bound: side of the limit.
+        value: measured value; null where it is not finite.
+        limit: value of the limit in the case.
+        margin: distance from the limit, positive where the limit is satisfied.
+        unit: unit of value, limit and margin.
         active: whether the point lies on the limit.
-        violated: whether the point lies outside of the limit by more than rounding error.
-        cost: derivative of the optimal F by the limit; null where the point is no optimum.
-        dimension: of value, limit and margin, which are in radians for angles.
+        violated: whether the point violates the limit by more than rounding error.
+        cost: derivative of the optimal F with respect to the limit; null where the point is no optimum.
+        dimension: dimension of value, limit and margin, which are in radians for angles.
     """
 
     name: str
@@ -58,12 +59,12 @@ class Margin(JsonObject):
 
 
 def unit_of_side(case: Case, name: str, dimension: Dimension) -> str:
-    """Return the unit of a bound's or a limit's number; empty for a plain number.
+    """Return the unit of a bound's or a limit's value; empty for a plain number.
 
     Args:
         case: the case.
-        name: of the variable or the constraint.
-        dimension: of the number; a limit on actuators' rates has one number for angles and lengths.
+        name: name of the variable or the constraint.
+        dimension: dimension of the value; a limit on actuator rates has the same value for angles and lengths.
     """
     if not name.startswith(_RATE):
         return case.units.label(dimension)
@@ -74,35 +75,35 @@ def unit_of_side(case: Case, name: str, dimension: Dimension) -> str:
 
 
 def measured_slack(nlp: Nlp, x: FloatArray, at: Linearisation, numbers: Sequence[float] | None = None) -> FloatArray:
-    """Return the distances (k,) of a point from all sides, negative outside, from measured singular values.
+    """Return the distances (k,) of a point from all sides, negative outside, with measured singular values.
 
-    The constraints of a program estimate singular values and condition numbers on the safe side. So an estimate may be
-    beyond a limit that the measured value keeps.
+    The constraints of a program estimate singular values and condition numbers on the safe side. An estimate may
+    therefore violate a limit that the measured value satisfies.
 
     Args:
-        nlp: the program.
+        nlp: the nonlinear program.
         x: (n,) the point.
-        at: the program there.
-        numbers: measured numbers of the constraints, from :func:`measured_numbers`; computed if left out.
+        at: linearised program at the point.
+        numbers: measured values of the constraints, from :func:`measured_values`; computed if left out.
     """
     slack, constraints = at.slack.copy(), nlp.program.constraints
     sides = [(j, side.constraint) for j, side in enumerate(at.sides) if side.constraint is not None]
     for j, k in sides:
         if constraints[k].measure is not None:
-            numbers = measured_numbers(nlp, x) if numbers is None else numbers
+            numbers = measured_values(nlp, x) if numbers is None else numbers
             value = float(constraints[k].reading.to_value(SX(numbers[k])))
             slack[j] = -float(nlp.sides.sign[j] * (value - nlp.sides.limit[j]) * at.per_unit[j])
     return slack
 
 
 def measured_violation(nlp: Nlp, x: FloatArray) -> float:
-    """Return how far a point (n,) lies outside of a side by the measured numbers; ``inf`` where it is not defined."""
+    """Return the largest violation of a side at a point (n,), from measured values; ``inf`` where it is not defined."""
     at = linearise(nlp, x)
     return replace(at, slack=measured_slack(nlp, x, at)).violation
 
 
-def measured_numbers(nlp: Nlp, x: FloatArray) -> list[float]:
-    """Return the number that each constraint of a program limits at a point (n,), radians for angles; NaN for none."""
+def measured_values(nlp: Nlp, x: FloatArray) -> list[float]:
+    """Return the measured value of each constraint's limit at a point (n,), radians for angles; NaN without a limit."""
     return _measured(nlp, x, nlp.program.constraints, nlp.evaluate(x)[1])
 
 
@@ -110,9 +111,9 @@ def margins_of(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
     """Return the margins of a point in every limit of the case, in the order of the program's constraints.
 
     Args:
-        nlp: the program.
+        nlp: the nonlinear program.
         x: (n,) the point.
-        optimal: whether the point is an optimum, so that costs mean something.
+        optimal: whether the point is an optimum; costs are given only there.
     """
     if not nlp.case.limits:
         return []
@@ -121,7 +122,7 @@ def margins_of(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
     active = set(at.active())
     mu, _ = multipliers(at, sorted(active)) if optimal else (np.zeros(len(at.sides)), 0.0)
     gained = -mu * nlp.sides.sign * at.per_unit * nlp.objective_scale * nlp.sign
-    measured = measured_numbers(nlp, x)
+    measured = measured_values(nlp, x)
     slack = measured_slack(nlp, x, at, measured)
     rows = []
     for j, side in enumerate(nlp.sides.sides):
@@ -146,7 +147,7 @@ def margins_of(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
 
 
 def _without_cost(nlp: Nlp, x: FloatArray, limits: Sequence[BoundedConstraint], *, optimal: bool) -> list[Margin]:
-    """Return the margins in limits that cost nothing: they hold whatever is chosen, or are pairs that do not bind."""
+    """Return the margins in limits of cost 0: limits on constants, and inactive limits on pairs."""
     if not limits:
         return []
     constraints = [item.constraint for item in limits]
@@ -161,7 +162,7 @@ def _without_cost(nlp: Nlp, x: FloatArray, limits: Sequence[BoundedConstraint], 
 
 
 class _LimitSide(NamedTuple):
-    """A side of a constraint with the key of its number, and its bound in the program's terms."""
+    """A side of a constraint, with the key of its limit in the case and its bound in the program's terms."""
 
     bound: Bound
     key: str
@@ -178,7 +179,7 @@ def _margin(
     violated: bool,
     cost: float | None,
 ) -> Margin:
-    """Return the margin of a measured value in a side of a constraint."""
+    """Return the margin of a measured value from a side of a constraint."""
     limit, dimension = constraint.reading.from_value(side.limit), constraint.reading.dimension
     distance = value - limit if side.bound == "min" else limit - value
     return Margin(
@@ -206,13 +207,13 @@ def _sides(item: BoundedConstraint) -> list[_LimitSide]:
 
 
 def _measured(nlp: Nlp, x: FloatArray, constraints: Sequence[Constraint], values: FloatArray) -> list[float]:
-    """Return the number that each limit measures, radians for angles; NaN for a constraint that is no limit.
+    """Return the measured value of each limit, radians for angles; NaN for a constraint that is no limit.
 
     Args:
-        nlp: the program.
+        nlp: the nonlinear program.
         x: (n,) the point.
-        constraints: of the program, or constant ones.
-        values: (c,) their expressions at the point.
+        constraints: constraints of the program, or constant ones.
+        values: (c,) expressions of the constraints at the point.
     """
     exact = {k: each.exact for k, each in enumerate(constraints) if each.exact is not None}
     measured = [

@@ -1,8 +1,8 @@
-"""Freedoms, actuator rates and kinds of singularity of a robot given joint by joint, at one point.
+"""Degrees of freedom, actuator rates and singularities of a robot with given joints, at one point.
 
-With ``C`` the wrenches that do no work in the actuated joints, the platform of a robot with free actuators has ``6 -
-rank C`` freedoms, and can make a twist where ``C`` does no work in it. The rates of a limb's actuators for a twist
-minimise the motion that the limb resists (:mod:`screwsynth.models.actuation`).
+With ``C`` the constraint wrenches, which do no work in the actuated joints, the platform has ``6 - rank C`` degrees of
+freedom if the actuators are free, and can make a twist in which ``C`` does no work. The actuator rates of a limb for a
+twist minimise the motion that the limb resists (:mod:`screwsynth.models.actuation`).
 """
 
 from collections.abc import Mapping
@@ -24,18 +24,18 @@ from .singularities import (
 )
 from .state import RobotState
 
-#: A twist is feasible where the constraints carry less than this part of F's size: the rates are then below 1e-6.
+#: A twist is feasible where the constraint part of F is below this part of F's size: the rates are then below 1e-6.
 _FEASIBLE = 1e-12
 
 
 class LimbPart(JsonObject):
-    """The part of F that a limb has.
+    """Part of F from one limb.
 
     Attributes:
-        limb: its name.
-        F: sum of the squared work rates of its wrenches; of actuation and constraints.
-        actuation: part that its actuators can move with.
-        constraints: part that no actuator can move with: 0 in every limb for a motion that is possible.
+        limb: name of the limb.
+        F: sum of the squared work rates of its wrenches: ``actuation`` plus ``constraints``.
+        actuation: part of F from the motion that the limb's actuators can follow.
+        constraints: part of F from the rest of the motion: 0 in every limb for a motion that the platform can make.
     """
 
     limb: str
@@ -46,16 +46,16 @@ class LimbPart(JsonObject):
 
 @dataclass(frozen=True, eq=False)
 class Mobility:
-    """Freedoms and rates at a point.
+    """Degrees of freedom and actuator rates at a point.
 
     Attributes:
-        freedoms: of the platform with free actuators.
-        constraint_rank: rank of the constraints.
+        freedoms: degrees of freedom of the platform with free actuators.
+        constraint_rank: rank of the constraint wrenches.
         actuator_rates: rate of each actuator for the program's task: rad or length per unit of time; infinite where the
-            actuator cannot drive the platform, and not a number where the motion does not determine it.
-        constrained: part of F that the constraints carry, 0 to 1; 0 where the platform can make the motion.
-        parts: actuation and constraint in F of each limb.
-        singularities: all that were found.
+            actuator cannot drive the platform, NaN where the motion does not determine it.
+        constrained: part of F from constraint wrenches, 0 to 1; 0 where the platform can make the motion.
+        parts: actuation and constraint part of F for each limb.
+        singularities: all singularities at the point.
     """
 
     freedoms: int
@@ -67,12 +67,12 @@ class Mobility:
 
 
 def mobility_of(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> Mobility | None:
-    """Return the mobility of a robot given joint by joint; None for a robot given by its rows.
+    """Return the mobility of a robot with given joints; None for a robot given by rows of J.
 
     Args:
-        nlp: the program.
+        nlp: the nonlinear program.
         x: (n,) the point.
-        state: the robot there.
+        state: state of the robot at the point.
         pose: index of the pose.
     """
     model = nlp.program.model
@@ -96,12 +96,12 @@ def mobility_of(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> Mo
         }
     left = sum(constraint for _, constraint in by_limb.values())
     is_feasible = left <= _FEASIBLE * state.size
-    if is_feasible:  # what is left is rounding
+    if is_feasible:  # the rest is rounding
         by_limb = {limb: (actuation, 0.0) for limb, (actuation, _) in by_limb.items()}
     found = limb_singularities(nlp, x, state, pose)
     if not found:
         found = _idle_limb(drives, model.generic)
-    # The wrenches of a limb whose passive joints are dependent are not those of its model, so J says nothing.
+    # A limb with dependent passive joints has other wrenches than its model, so J is not valid there.
     if all(each.kind is not SingularityKind.PASSIVE for each in found):
         generic = model.generic.constraints, model.generic.jacobian
         found += platform_singularities(state, constraints, (constraint_rank, state.rank), generic)
@@ -121,9 +121,9 @@ def mobility_of(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> Mo
 
 
 def _idle_limb(drives: Mapping[str, LimbDrive], generic: GenericRanks) -> list[Singularity]:
-    """Return the serial singularity of a limb whose actuators have more rates without a motion than elsewhere.
+    """Return the serial singularity of a limb whose actuators have more idle rates than at almost all points.
 
-    The joints of each of its members alone may be independent.
+    The joints of each of its members may be independent all the same.
     """
     idle = {limb: each.drive.idle.shape[1] for limb, each in drives.items() if each.drive.idle.shape[1]}
     if sum(idle.values()) <= generic.idle:

@@ -1,13 +1,12 @@
-"""Evidence that a point is an optimum, recomputed from the program and the point alone.
+"""Evidence that a point is an optimum, recomputed from the program and the point only.
 
-The paper checks each of its solutions by the derivatives and the Hessian's eigenvalues of the objective. With bounds
-that is not enough, so this module checks the whole of the first- and second-order conditions (J. Nocedal and
-S. Wright, *Numerical Optimization*, 2nd edition, sections 12.3 to 12.5), in the scaled terms of
-:mod:`screwsynth.nlp.evidence.kkt`, and gives a verdict in words.
+The paper checks its solutions by derivatives and Hessian eigenvalues of the objective. With bounds this is not enough:
+this module checks the complete first- and second-order conditions (J. Nocedal and S. Wright, *Numerical Optimization*,
+2nd edition, sections 12.3 to 12.5), in the scaled terms of :mod:`screwsynth.nlp.evidence.kkt`.
 
-Sign convention of multipliers: a multiplier is the rate at which the optimal F **improves** (grows for a maximum, falls
-for a minimum) per unit by which the limit is **relaxed**, in F per the case's unit of that limit. A multiplier is never
-negative on an inequality; on an equation it is the improvement per unit by which the equation's right-hand side grows.
+Sign of multipliers: a multiplier is the rate at which the optimal F **improves** (grows for a maximum, falls for a
+minimum) per unit by which the limit is **relaxed**, in F per the case's unit of that limit. It is never negative on an
+inequality; on an equation it is the improvement per unit by which the right-hand side grows.
 """
 
 import enum
@@ -29,21 +28,21 @@ from .kkt import FEASIBLE, STATIONARY, Linearisation, correct_point, lagrangian_
 from .margins import unit_of_side
 from .singularities import is_passive_singular
 
-#: Multiplier, in scaled terms, below which an active side is weakly active.
+#: Scaled multiplier below which an active side is weakly active.
 STRONG = 1e-9
 #: Eigenvalue of the scaled reduced Hessian below which it counts as zero: over half a variable's range F then changes
 #: by less than this part of its size.
 CURVED = 1e-8
-#: Length of the step along a flat direction that tests whether F keeps its value, in half ranges.
+#: Length of the trial step along a flat direction, in half ranges: F must keep its value.
 _FLAT_STEP = 0.02
-#: Largest number of changes of a flat direction by corrections of such steps.
+#: Largest number of corrections of a flat direction by such steps.
 _DIRECTION_CHANGES = 4
-#: Cosine between two directions above which they are the same.
+#: Cosine between two directions above which they count as equal.
 _SAME_DIRECTION = 0.999
-#: Flat directions from such steps are accurate to a few parts in a hundred: singular values below this part of the
-#: largest belong to no direction of their own.
+#: Flat directions from such steps are accurate to a few percent: singular values below this part of the largest do not
+#: belong to a separate direction.
 _INDEPENDENT = 0.05
-#: For the same reason, components of a flat direction below this part of the largest are left out.
+#: For the same reason, components of a flat direction below this part of the largest are omitted.
 _NEGLIGIBLE = 1e-2
 
 
@@ -67,15 +66,15 @@ class PointKind(enum.Enum):
 
 
 class ActiveSide(JsonObject):
-    """A bound or limit that the point lies on.
+    """A bound or limit on which the point lies.
 
     Attributes:
-        name: variable or constraint.
-        bound: side of it.
-        value: the limit.
-        unit: of the value; left out for a plain number.
+        name: name of the variable or constraint.
+        bound: side of the bound or limit.
+        value: value of the bound or limit.
+        unit: unit of the value; left out for a plain number.
         multiplier: improvement of F per unit by which the limit is relaxed.
-        dimension: of the value, in radians for an angle.
+        dimension: dimension of the value, in radians for an angle.
     """
 
     name: str
@@ -87,19 +86,19 @@ class ActiveSide(JsonObject):
 
 
 class Evidence(JsonObject):
-    """Evidence of optimality, from the program and the point alone.
+    """Evidence of optimality, from the program and the point only.
 
     Attributes:
-        kind: of point.
+        kind: kind of the point, such as a strict local optimum or a saddle.
         stationarity: largest scaled derivative of the Lagrangian.
-        feasibility: largest distance outside a limit, in half ranges.
+        feasibility: largest violation of a limit, in half ranges.
         complementarity: largest product of a multiplier and its slack, scaled.
         licq: whether the active normals are linearly independent.
-        active: bounds and limits that the point lies on.
-        eigenvalues: of the reduced Hessian, ascending: of the scaled Lagrangian's Hessian on the tangent space of the
-            strongly active sides. Positive means that F gets worse on leaving the point.
-        flat: rates of the variables along which F keeps its optimal value. In a result that of the variable that moves
-            most in its range is 1; else they are in the variables' own units, for a step of half a range of that one.
+        active: bounds and limits on which the point lies.
+        eigenvalues: eigenvalues of the reduced Hessian, ascending: the scaled Hessian of the Lagrangian on the tangent
+            space of the strongly active sides. A positive one means that F gets worse along its direction.
+        flat: rates of the variables along directions in which F keeps its optimal value. In a result, the variable that
+            moves most in its range has rate 1; else rates are in the variables' units, for a step of half a range.
         violated: names of the variables and constraints of violated sides.
     """
 
@@ -119,10 +118,10 @@ class Evidence(JsonObject):
 
 
 def examine(nlp: Nlp, x: FloatArray) -> Evidence:
-    """Return the evidence about a point of a program.
+    """Return the evidence of optimality of a point.
 
     Args:
-        nlp: the program.
+        nlp: the nonlinear program.
         x: (n,) the point.
     """
     nlp = with_pairs_at(nlp, [x])
@@ -164,7 +163,7 @@ def examine(nlp: Nlp, x: FloatArray) -> Evidence:
 
 
 def _is_independent(normals: FloatArray) -> bool:
-    """Return whether gradients (k, n) of active sides are linearly independent; those without finite values are not."""
+    """Return whether finite gradients (k, n) of active sides are linearly independent."""
     if not len(normals):
         return True
     return bool(np.isfinite(normals).all() and np.linalg.matrix_rank(normals, tol=1e-9) == len(normals))
@@ -212,11 +211,11 @@ def _second_order_test(nlp: Nlp, at: Linearisation, mu: FloatArray) -> tuple[Poi
 
 
 def _has_improving_direction(H: FloatArray, strong: FloatArray, weak: FloatArray) -> bool:
-    """Return whether F improves to second order along a direction in which the active sides allow a step.
+    """Return whether F improves to second order along a feasible direction.
 
-    A certain answer is a hard problem (copositivity of H on a cone). The test covers the directions of negative
-    curvature with all, all but one, and none of the weakly active sides as equations, and each of these directions
-    corrected to the inside of the weakly active sides.
+    An exact answer is a hard problem (copositivity of H on a cone). The test covers the directions of negative
+    curvature with all, all but one, and none of the weakly active sides as equations. Each of these directions is also
+    tried after a correction to the inside of the weakly active sides.
 
     Args:
         H: (n, n) Hessian of the Lagrangian in scaled variables.
@@ -255,14 +254,14 @@ def _reduced_eigenpairs(H: FloatArray, normals: FloatArray) -> tuple[FloatArray,
 
 
 def _follow_flat_direction(nlp: Nlp, at: Linearisation, direction: FloatArray) -> "FloatArray | None":
-    """Return a direction in which F keeps its value over a finite step, near the given one; None when there is none.
+    """Return a direction near the given one along which F keeps its value over a finite step; None if there is none.
 
     Newton's method corrects a step along the direction back onto the optimal set. Where the correction changes the
     direction, the new direction is tried next.
 
     Args:
-        nlp: the program.
-        at: the program at an optimum.
+        nlp: the nonlinear program.
+        at: linearised program at an optimum.
         direction: (n,) unit vector in scaled variables, along which the curvature is zero.
     """
     for _ in range(_DIRECTION_CHANGES):
@@ -278,9 +277,9 @@ def _follow_flat_direction(nlp: Nlp, at: Linearisation, direction: FloatArray) -
 
 
 def _step_on_optimal_set(nlp: Nlp, at: Linearisation, direction: FloatArray) -> "FloatArray | None":
-    """Return the step (n,), in scaled variables, to the corrected end of a short step along a direction.
+    """Return the scaled step (n,) from the point to another optimum: a short step along a direction, corrected.
 
-    None stands for a step that leaves the box, changes F or returns to the point.
+    None is returned for a step that leaves the box, changes F or returns to the point.
     """
     away = at.x + _FLAT_STEP * nlp.scale * direction
     if np.any(away < nlp.lower) or np.any(away > nlp.upper):
@@ -292,7 +291,7 @@ def _step_on_optimal_set(nlp: Nlp, at: Linearisation, direction: FloatArray) -> 
 
 
 def _independent_directions(directions: FloatArray) -> list[FloatArray]:
-    """Return a basis (n,) each of the span of directions (k, n), sparse, in the order of their first components."""
+    """Return a sparse basis of vectors (n,) of the span of directions (k, n), ordered by first components."""
     _, sizes, rows = np.linalg.svd(directions, full_matrices=False)
     basis = echelon_basis(rows[sizes > _INDEPENDENT * sizes[0]])
     return sorted(np.where(np.abs(basis) > _NEGLIGIBLE, basis, 0.0), key=lambda row: int(np.argmax(row != 0)))

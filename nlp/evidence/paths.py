@@ -1,4 +1,4 @@
-"""Screws of joints and equations of nested loops at one point, and the robot's numbers there with these loops."""
+"""Screws of joints and velocity equations of nested loops at one point, and the robot's state with these loops."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from ..program.program import RobotNumbers
 
 
 def paths_at(nlp: Nlp, x: FloatArray, numbers: RobotNumbers, pose: int = 0) -> list[PathScrews]:
-    """Return the paths of joints of a robot, of those whose screws are known, at a point.
+    """Return the joint paths of a robot whose screws are known, at a point.
 
     Args:
-        nlp: the program.
+        nlp: the nonlinear program.
         x: (n,) the point.
-        numbers: of the robot there.
+        numbers: values of the robot at the point.
         pose: index of the pose.
     """
     paths = nlp.program.model.joint_screws
@@ -29,7 +29,7 @@ def paths_at(nlp: Nlp, x: FloatArray, numbers: RobotNumbers, pose: int = 0) -> l
 
 
 def velocities_at(nlp: Nlp, x: FloatArray, numbers: RobotNumbers, pose: int = 0) -> Velocities:
-    """Return the velocity equations of the platform and the actuators; the arguments are those of :func:`paths_at`."""
+    """Return the velocity equations of the platform and the actuators; for arguments see :func:`paths_at`."""
     model = nlp.program.model
     is_nested = any(each.is_nested for each in model.joint_screws)
     nested = [each for each in paths_at(nlp, x, numbers, pose) if each.path.is_nested] if is_nested else []
@@ -37,12 +37,12 @@ def velocities_at(nlp: Nlp, x: FloatArray, numbers: RobotNumbers, pose: int = 0)
 
 
 def numbers_at(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotNumbers:
-    """Return the robot's numbers at a point, with nested loops as they are there.
+    """Return the robot's values at a point, with the rank of nested loops at this point.
 
-    Where loops lose their rank, the program's expressions are 0 / 0, and their values are rounding errors.
+    Where loops lose rank, the program's expressions are 0 / 0, and their values are rounding errors.
 
     Args:
-        nlp: the program.
+        nlp: the nonlinear program.
         x: (n,) the point.
         pose: index of the pose.
     """

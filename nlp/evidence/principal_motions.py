@@ -1,13 +1,13 @@
-"""The motions that a robot resists least and most at a fixed point (the task analysis of Wolf and Shoham).
+"""Motions that a robot resists least and most at a fixed point (the task analysis of Wolf and Shoham).
 
 F is a quadratic form in the twist, ``F = |M omega + N v|^2`` with moments ``M`` and forces ``N`` of J.
-Among all twists of unit rotation F has no maximum, since any translation may be added. Its stationary values under
-``|omega| = 1`` are well defined: they are the finite part of the generalised eigenproblem
+Over all twists with ``|omega| = 1``, F has no maximum, since any translation may be added. It has stationary values:
+the finite eigenvalues of the generalised eigenproblem
 
     D J' J D chi = F diag(1, 1, 1, 0, 0, 0) chi
 
-whose three solutions are eigenvectors of the Schur complement ``M' (I - N N^+) M``, each with the translation that
-makes F least for it. The pure translations, with ``|v| = 1``, are eigenvectors of ``N' N``.
+Its three solutions are eigenvectors of the Schur complement ``M' (I - N N^+) M``, each with the translation that
+minimises F. The pure translations, with ``|v| = 1``, are eigenvectors of ``N' N``.
 
 Source: A. Wolf and M. Shoham, *Investigation of parallel manipulators using linear complex approximation*, Journal of
 Mechanical Design 125 (2003), reference [4] of the paper.
@@ -20,7 +20,7 @@ from ...models.basis import settled_basis
 from ..system.jsonvalues import Inline, JsonObject
 from .screwvalues import ScrewMotion, motion_of
 
-#: Singular values that differ by less than this part of the largest are the same: rounding.
+#: Singular values with a smaller relative difference count as equal.
 _SAME = 1e-9
 
 
@@ -28,8 +28,8 @@ class PrincipalMotion(JsonObject):
     """A motion at which F is stationary.
 
     Attributes:
-        F: objective for it.
-        motion: of unit rotation, or a translation of unit speed.
+        F: objective for this motion.
+        motion: twist of unit rotation, or a translation of unit speed.
     """
 
     F: float
@@ -37,16 +37,16 @@ class PrincipalMotion(JsonObject):
 
     @property
     def twist(self) -> FloatArray:
-        """Angular velocity, then velocity at the world origin (6,)."""
+        """Angular velocity, then velocity at the world origin, (6,)."""
         return frozen_array(self.motion.twist, (6,))
 
 
 class TaskAnalysis(JsonObject):
-    """Motions at which F is stationary, each three by ascending F.
+    """Motions at which F is stationary: three rotations and three translations, by ascending F.
 
     Attributes:
-        rotations: among twists of unit rotation.
-        translations: among translations of unit speed.
+        rotations: stationary motions among twists of unit rotation.
+        translations: stationary motions among translations of unit speed.
     """
 
     rotations: tuple[PrincipalMotion, ...]
@@ -57,7 +57,7 @@ def analyse_tasks(jacobian: FloatArray) -> TaskAnalysis:
     """Return the principal motions of a robot at one point.
 
     Args:
-        jacobian: (m, 6) rows force, then moment about the world origin.
+        jacobian: (m, 6) rows of unit wrenches: force, then moment about the world origin.
     """
     N, M = jacobian[:, :3], jacobian[:, 3:]
     least_squares = np.linalg.pinv(N, rcond=1e-10)
@@ -75,8 +75,8 @@ def analyse_tasks(jacobian: FloatArray) -> TaskAnalysis:
 def _right_singular_vectors(matrix: FloatArray) -> FloatArray:
     """Return the right singular vectors of a matrix (m, 3) as rows (3, 3).
 
-    Singular values ascend; the largest component of each vector is positive. Those of equal singular values are a basis
-    that follows from their space alone.
+    Singular values ascend; the largest component of each vector is positive. Vectors of equal singular values are a
+    basis that depends only on the space that they span.
     """
     rows, values = np.linalg.svd(matrix)[2][::-1], np.zeros(3)
     values[: len(matrix)] = np.linalg.svd(matrix, compute_uv=False)[: len(matrix)]
@@ -85,6 +85,6 @@ def _right_singular_vectors(matrix: FloatArray) -> FloatArray:
 
 
 def _principal_motion(jacobian: FloatArray, twist: FloatArray) -> PrincipalMotion:
-    """Return a twist (6,) with F for a Jacobian (m, 6)."""
+    """Return a twist (6,) with its F for a Jacobian (m, 6)."""
     rates = jacobian[:, 3:] @ twist[:3] + jacobian[:, :3] @ twist[3:]
     return PrincipalMotion(F=float(rates @ rates), motion=motion_of(twist))

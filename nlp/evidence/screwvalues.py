@@ -1,4 +1,4 @@
-"""Motions and wrenches as values of results: six coordinates with the axis, the point and the pitch of their screw."""
+"""Motions and wrenches in results: six coordinates, with the axis, the point and the pitch of their screw."""
 
 import math
 from typing import TYPE_CHECKING, Literal, TypedDict
@@ -18,7 +18,7 @@ class ScrewMotion(JsonObject):
     Attributes:
         twist: angular velocity, then velocity at the world origin.
         axis: unit direction of the screw axis.
-        point: the axis's point nearest to the world origin; null for a translation.
+        point: point of the axis nearest to the world origin; null for a translation.
         pitch: length per radian; "inf" for a translation.
     """
 
@@ -29,12 +29,12 @@ class ScrewMotion(JsonObject):
 
 
 class ScrewWrench(JsonObject):
-    """A wrench of unit force, or a unit couple.
+    """A wrench of unit force, or a unit couple without a force.
 
     Attributes:
         wrench: force, then moment about the world origin.
         axis: unit direction of the screw axis.
-        point: the axis's point nearest to the world origin; null for a couple.
+        point: point of the axis nearest to the world origin; null for a couple.
         pitch: moment along the axis per unit of force, length; "inf" for a couple.
     """
 
@@ -63,7 +63,7 @@ class _Axis(TypedDict):
 
 
 def _axis_of(coordinates: "ArrayLike") -> _Axis:
-    """Return axis, point and pitch of a screw (6,); one of infinite pitch has no point."""
+    """Return axis, point and pitch of a screw (6,); a screw of infinite pitch has no point."""
     screw = axis_from_screw(coordinates)
     infinite = math.isinf(screw.pitch)
     point = None if infinite else vector(screw.point)

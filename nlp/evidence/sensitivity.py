@@ -1,11 +1,10 @@
-"""Sensitivity of the optimal F to the numbers that a case fixes.
+"""Sensitivity of the optimal F to the parameters that a case fixes.
 
-By the envelope theorem the derivative of the optimal F with respect to an argument is that of the Lagrangian, at the
-optimum and with its multipliers held fixed, without a further solution (A. V. Fiacco, *Introduction to Sensitivity and
-Stability Analysis in Nonlinear Programming*, 1983, chapter 3). The theorem requires that the normals of the active
-sides are independent and that the second-order conditions hold strictly. Where the normals are dependent, there is a
-derivative only if it is the same for all multipliers: if the variables can follow the argument, to first order, so that
-all active sides stay active. And there is none where the loops of the robot close at one value of the argument only.
+By the envelope theorem the derivative of the optimal F with respect to an argument is that of the Lagrangian at the
+optimum, with constant multipliers (A. V. Fiacco, *Introduction to Sensitivity and Stability Analysis in Nonlinear
+Programming*, 1983, chapter 3). It needs independent active normals and strict second-order conditions. With dependent
+normals the derivative exists only if it is the same for all multipliers, that is, if the variables can follow the
+argument to first order with all active sides active. It does not exist where the loops close at one value only.
 """
 
 import enum
@@ -23,28 +22,28 @@ from .kkt import constraint_weights, linearise, multipliers
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Part of a vector's length by which it may be outside of a space that it lies in: rounding of derivatives. Singular
-#: values below this part of the largest are zero, and so are vectors below the second part of the longest.
+#: Relative rounding of derivatives, below which distances of vectors from a space, and singular values, count as zero;
+#: and relative size below which vectors count as zero.
 _OUTSIDE, _ZERO = 1e-7, 1e-12
 
 
 class Hindrance(enum.Enum):
-    """Why the optimal F has no derivative by a fixed number."""
+    """Reason why the optimal F has no derivative with respect to a fixed parameter."""
 
-    NO_CHOICE = "the robot has no choice of it"
-    CORNER = "F has a corner there"
+    LOOPS = "loops close at no other value"
+    CORNER = "F has a kink at this value"
 
 
 class Sensitivity(JsonObject):
-    """Sensitivity of the optimal F to a fixed number.
+    """Sensitivity of the optimal F to a fixed parameter.
 
     Attributes:
-        name: of the number.
-        value: of the number.
-        unit: of the value.
-        derivative: of the optimal F by the number; absent where there is none.
-        hindrance: why there is none, in words.
-        dimension: of the number, in radians for an angle.
+        name: name of the parameter.
+        value: value of the parameter.
+        unit: unit of the value.
+        derivative: derivative of the optimal F with respect to the parameter; absent where it does not exist.
+        hindrance: reason why the derivative does not exist, in words.
+        dimension: dimension of the parameter, in radians for an angle.
     """
 
     name: str
@@ -56,10 +55,10 @@ class Sensitivity(JsonObject):
 
 
 def sensitivities(nlp: Nlp, x: FloatArray) -> list[Sensitivity]:
-    """Return the sensitivities of the optimal F to the fixed numbers of the robot and the poses, in the case's order.
+    """Return the sensitivities of the optimal F to the fixed parameters of robot and poses, in the case's order.
 
     Args:
-        nlp: the program.
+        nlp: the nonlinear program.
         x: (n,) an optimum.
     """
     places = [place.index for place in nlp.program.places.numbers if place.vector == "p"]
@@ -78,7 +77,7 @@ def sensitivities(nlp: Nlp, x: FloatArray) -> list[Sensitivity]:
     without_choice = ~_can_follow(*_loop_derivatives(nlp, x))
     arguments, found = nlp.program.arguments, []
     for k in places:
-        hindrance = Hindrance.NO_CHOICE if without_choice[k] else Hindrance.CORNER if cornered[k] else None
+        hindrance = Hindrance.LOOPS if without_choice[k] else Hindrance.CORNER if cornered[k] else None
         found.append(
             Sensitivity(
                 name=arguments[k].name,
@@ -93,11 +92,11 @@ def sensitivities(nlp: Nlp, x: FloatArray) -> list[Sensitivity]:
 
 
 def _can_follow(by_variable: FloatArray, by_argument: FloatArray) -> "NDArray[np.bool_]":
-    """Return whether the variables can follow each argument, (k,), so that some functions keep their values.
+    """Return whether the variables can follow each argument, (k,), so that the given functions keep their values.
 
     Args:
-        by_variable: (m, n) derivatives of the functions by the variables.
-        by_argument: (m, k) derivatives by the arguments.
+        by_variable: (m, n) derivatives of the functions with respect to the variables.
+        by_argument: (m, k) derivatives of the functions with respect to the arguments.
     """
     if not by_variable.size:
         return np.asarray(~by_argument.any(axis=0), dtype=np.bool_)
@@ -107,9 +106,9 @@ def _can_follow(by_variable: FloatArray, by_argument: FloatArray) -> "NDArray[np
 
 
 def _loop_derivatives(nlp: Nlp, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the derivatives of all loop equations of the robot by scaled variables (m, n) and by the arguments (m, k).
+    """Return the derivatives of all loop equations by scaled variables (m, n) and by the arguments (m, k).
 
-    The program has those alone that are independent at the numbers that the case fixes.
+    The program itself has only the equations that are independent at the fixed parameters.
     """
     program = nlp.program
     loops = ca.vertcat(SX(0, 1), *[robot.loops for robot in program.robots])

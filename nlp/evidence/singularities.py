@@ -1,19 +1,19 @@
-"""Kinds of singularity of a robot given joint by joint, with the motions gained or the wrenches that lock them.
+"""Kinds of singularity of a robot with given joints, with the motions gained or the wrenches that lock them.
 
 Ranks at the point are compared with those at almost all dimensions and closed configurations:
 
-* passive: the passive screws of a limb have a smaller rank, so that its wrenches ``W`` gain a dimension and F jumps; or
-  nested loops leave more motions with locked actuators, so that the wrenches lose one;
-* serial: all screws of a limb have a smaller rank, so that an actuator does no work in any wrench of the limb, and the
-  platform loses a freedom; or those of each of its members keep their ranks, but the actuators can move without it;
-* constraint: all wrenches that do no work in the actuated joints have a smaller rank;
-* actuation: all wrenches have a smaller rank, so that the platform moves with every actuator locked.
+* passive: the passive screws of a limb lose rank, so that its wrenches ``W`` gain a dimension and F jumps; or nested
+  loops leave more motions with locked actuators, so that the wrenches lose one;
+* serial: all screws of a limb lose rank, so that an actuator does no work in any wrench of the limb, and the platform
+  loses a degree of freedom; or its members keep their ranks, but its actuators can move while the platform rests;
+* constraint: the constraint wrenches, which do no work in the actuated joints, lose rank;
+* actuation: all wrenches lose rank, so that the platform moves with every actuator locked.
 
-A limb whose screws become dependent has more wrenches than at almost all nearby points. The wrenches of nearby points
-are known to first order: with rates ``n`` for which ``sum n_j s_j = 0``, a wrench ``w`` of the point is also one of
-nearby points where ``w`` does no work in the change ``sum n_j ds_j``, and ``ds_j = sum_(i<j) [s_i, s_j] dq_i`` by the
-motions ``dq_i`` of the joints before. The additional wrenches are those of the point that do work in such changes. Of
-nested loops the change is not known: joints and wrenches are not reported.
+Where the screws of a limb become dependent, it has more wrenches than at almost all nearby points. The wrenches there
+follow to first order. With rates ``n`` for which ``sum n_j s_j = 0``, a wrench ``w`` persists at a nearby point if it
+does no work in ``sum n_j ds_j``, where ``ds_j = sum_(i<j) [s_i, s_j] dq_i`` for motions ``dq_i`` of the preceding
+joints. The additional wrenches do work in such changes. For nested loops the changes are not known, so their joints
+and wrenches are not reported.
 """
 
 import enum
@@ -31,11 +31,11 @@ from .paths import paths_at
 from .screwvalues import ScrewMotion, ScrewWrench, motion_of, wrench_of
 from .state import RobotState
 
-#: Screws of unit size whose singular values are below this part of the largest are dependent, as for the rank of J.
+#: Screws of unit size are dependent if a singular value is below this part of the largest, as for the rank of J.
 DEPENDENT = 1e-7
-#: Motions that nested loops leave, below this part of the largest, are rounding errors, and must not be scaled up.
+#: Relative size below which motions that nested loops leave are rounding errors, and must not be scaled up.
 _NEGLIGIBLE = 1e-9
-#: Rates of dependent joints below this part of the largest are zero: such a joint takes no part.
+#: Rates of dependent joints below this part of the largest are zero: such a joint is not among the dependent ones.
 _TAKES_PART = 1e-6
 
 
@@ -50,14 +50,16 @@ class SingularityKind(enum.Enum):
 
     @property
     def clause(self) -> str:
-        """The kind as a clause for people."""
+        """Short description of the kind, as a clause."""
         return _CLAUSES[self]
 
 
 _CLAUSES = {
     SingularityKind.PASSIVE: "passive joints are dependent: F jumps here, and the point is no optimum to build",
-    SingularityKind.SERIAL: "joints are dependent: its actuator cannot drive the platform, which loses a freedom",
-    SingularityKind.CONSTRAINT: "the constraints are dependent: the platform gains a freedom even with free actuators",
+    SingularityKind.SERIAL: "joints are dependent: its actuator cannot drive the platform, "
+    "which loses a degree of freedom",
+    SingularityKind.CONSTRAINT: "the constraints are dependent: the platform gains a degree of freedom "
+    "even with free actuators",
     SingularityKind.ACTUATION: "the platform can move with every actuator locked",
     SingularityKind.ARCHITECTURE: "the rank is below six at all dimensions and poses: the platform can always move",
 }
@@ -67,15 +69,14 @@ class Singularity(JsonObject):
     """A singularity.
 
     Attributes:
-        kind: its kind.
-        limb: limb that it belongs to; absent for one of the whole robot.
-        joints: dependent joints of the limb, by label, none for nested loops; absent for one of the whole robot.
-        words: the same as a clause.
-        gained: basis of the motions that the platform gains; absent for one of a limb. Of a constraint singularity that
-            leaves other motions to resist or not, all that no constraint resists.
-        locking: wrenches that the limb resists with in addition, so that the platform loses the motions in which they
-            do work; absent for one of the whole robot. Of more than one, it depends on the way to the point which
-            combinations are additional.
+        kind: kind of the singularity.
+        limb: name of the limb; absent for a singularity of the whole robot.
+        joints: labels of the dependent joints of the limb, empty for nested loops; absent for the whole robot.
+        words: description of the singularity, as a clause.
+        gained: basis of the motions that the platform gains; absent for a singularity of a limb. For a constraint
+            singularity with an ambiguous gain, all motions that no constraint resists.
+        locking: additional wrenches of the limb, so that the platform loses the motions in which they do work; absent
+            for the whole robot. Several such wrenches may depend on the path to the point.
     """
 
     kind: SingularityKind
@@ -93,7 +94,7 @@ def singularity(
     gained: "FloatArray | None" = None,
     locking: Sequence[ScrewWrench] | None = None,
 ) -> Singularity:
-    """Return a singularity: of a limb, or of the whole robot, with the twists (k, 6) that its platform gains."""
+    """Return a singularity of a limb, or of the whole robot with the twists (k, 6) that its platform gains."""
     words = kind.clause
     if limb is not None:
         named = f" {', '.join(joints)}" if joints else ""
@@ -110,12 +111,12 @@ def singularity(
 
 
 def limb_singularities(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> list[Singularity]:
-    """Return the singularities of limbs: screws of their joints with a smaller rank than at almost all other points.
+    """Return the singularities of limbs: joint screws with a lower rank than at almost all other points.
 
     Args:
-        nlp: the program.
+        nlp: the nonlinear program.
         x: (n,) the point.
-        state: the robot there.
+        state: state of the robot at the point.
         pose: index of the pose.
     """
     model = nlp.program.model
@@ -135,7 +136,7 @@ def limb_singularities(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0
 
 
 def is_passive_singular(nlp: Nlp, x: FloatArray, pose: int = 0) -> bool:
-    """Return whether passive joints of a limb are dependent at a point (n,), at one of the poses, so that F jumps."""
+    """Return whether passive joints of a limb are dependent at one of the poses of a point (n,), so that F jumps."""
     if not nlp.program.model.joint_screws:
         return False
     numbers = nlp.program.kernels.robot_states[pose](x, nlp.arguments)
@@ -153,21 +154,21 @@ def platform_singularities(
 ) -> list[Singularity]:
     """Return the constraint and actuation singularities at a point.
 
-    A constraint singularity is mostly one of actuation too: then both have the same motions, and it is listed once.
+    Most constraint singularities are actuation singularities with the same motions: they are listed only once.
 
     Args:
-        state: the robot there.
-        constraints: (k, 6) wrenches that do no work in the actuated joints.
-        ranks: of the constraints and of J, at the point.
-        generic: the same at almost all points.
+        state: state of the robot at the point.
+        constraints: (k, 6) constraint wrenches, which do no work in the actuated joints.
+        ranks: ranks of the constraints and of J at the point.
+        generic: the same ranks at almost all points.
     """
     found = []
     lost = generic[0] - ranks[0]
     if lost > 0:
-        alone = len(state.free_twists) == lost
-        gained = state.free_twists if alone else _null_twists(constraints, state.position)
+        has_same_motions = len(state.free_twists) == lost
+        gained = state.free_twists if has_same_motions else _null_twists(constraints, state.position)
         found.append(singularity(SingularityKind.CONSTRAINT, gained=gained))
-        if alone:
+        if has_same_motions:
             return found
     if ranks[1] < generic[1]:
         found.append(singularity(SingularityKind.ACTUATION, gained=state.free_twists))
@@ -175,7 +176,7 @@ def platform_singularities(
 
 
 class _Motions(NamedTuple):
-    """Screws (6, k) of a path of joints; of nested loops the motions that they leave, first those of passive joints."""
+    """Screws (6, k) of a path of joints; for nested loops the motions that they allow, passive joints first."""
 
     path: JointScrews
     screws: FloatArray
@@ -201,17 +202,17 @@ def _null_space(loops: FloatArray) -> FloatArray:
 
 
 def _without_rounding(screws: FloatArray, centre: FloatArray) -> FloatArray:
-    """Return motions (6, k) with zeros for those that are rounding errors of the others."""
+    """Return motions (6, k) with zeros for those that are rounding errors relative to the others."""
     lengths = np.linalg.norm(_homogeneous(screws, centre, _reach(screws, centre)), axis=0)
     return np.asarray(np.where(lengths <= _NEGLIGIBLE * lengths.max(initial=0.0), 0.0, screws))
 
 
 def _singularity_of(motions: _Motions, own: FloatArray, centre: FloatArray) -> Singularity | None:
-    """Return the singularity of one path of joints; None without one.
+    """Return the singularity of one path of joints, or None.
 
     Args:
-        motions: the path; screws are not finite for a joint whose axis has no direction at the point.
-        own: (m, 6) rows of its limb in J.
+        motions: screws of the path; not finite for a joint whose axis has no direction at the point.
+        own: (m, 6) rows of the path's limb in J.
         centre: (3,) the platform's origin, length.
     """
     each, screws, passive = motions
@@ -250,10 +251,10 @@ def _changes(
     reach: float,
     centre: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the changes (6, c) of dependent combinations of screws by motions of joints, and their rates (n, k).
+    """Return the changes (6, c) of dependent screw combinations by motions of joints, and their rates (n, k).
 
-    Rates whose combination has no change are left out where others have one: such a combination is zero near by too, as
-    the spin of a rod between two ball joints is.
+    Rates whose combination has no change are left out where others have one: such a combination is zero nearby too, as
+    for the spin of a rod between two ball joints.
     """
     rank = _rank(unit)
     kernel = np.linalg.svd(unit)[2][rank:].T
@@ -275,18 +276,18 @@ def _changes(
 
 
 def _bracket(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return the change of a twist (6,) for unit motion along another (6,): their Lie bracket."""
+    """Return the change of a twist (6,) for unit motion along another twist (6,): their Lie bracket."""
     (w, v), (omega, velocity) = np.split(first, 2), np.split(second, 2)
     return np.concatenate([np.cross(w, omega), np.cross(w, velocity) + np.cross(v, omega)])
 
 
 def _homogeneous(screws: FloatArray, centre: FloatArray, reach: float) -> FloatArray:
-    """Return twists (6, n) with velocities of a centre (3,) in parts of a length."""
+    """Return twists (6, n) with velocities of a centre (3,), divided by a length."""
     return np.vstack([screws[:3], (screws[3:] + np.cross(screws[:3].T, centre).T) / reach])
 
 
 def _unit_columns(screws: FloatArray, centre: FloatArray) -> tuple[FloatArray, float]:
-    """Return twists (6, n), velocities of a centre in parts of the largest, each of unit size; and this largest."""
+    """Return twists (6, n) of unit size, with velocities of a centre divided by the largest one, and the latter."""
     reach = _reach(screws, centre)
     scaled = _homogeneous(screws, centre, reach)
     lengths = np.linalg.norm(scaled, axis=0)
@@ -294,7 +295,7 @@ def _unit_columns(screws: FloatArray, centre: FloatArray) -> tuple[FloatArray, f
 
 
 def _reach(screws: FloatArray, centre: FloatArray) -> float:
-    """Return the largest velocity of a centre (3,) by twists (6, n) that turn; 1 without one."""
+    """Return the largest velocity of a centre (3,) over twists (6, n) with a rotation; 1 without such a twist."""
     velocities = _homogeneous(screws, centre, 1.0)[3:]
     turning = np.linalg.norm(screws[:3], axis=0) > 0
     return float(np.linalg.norm(velocities[:, turning], axis=0).max(initial=0.0)) or 1.0
@@ -315,14 +316,14 @@ def _span_of(columns: FloatArray) -> FloatArray:
 
 
 def _dual(wrenches: FloatArray, centre: FloatArray, reach: float) -> FloatArray:
-    """Return an orthonormal basis (6, r) of wrenches (m, 6): moments in parts of a length, then forces."""
+    """Return an orthonormal basis (6, r) of wrenches (m, 6): moments divided by a length, then forces."""
     moments = wrenches[:, 3:] - np.cross(centre, wrenches[:, :3])
     rows = np.hstack([moments / reach, wrenches[:, :3]])
     return _span_of(rows.T) if len(rows) else np.zeros((6, 0))
 
 
 def _unit_wrenches(duals: FloatArray, centre: FloatArray, reach: float) -> list[ScrewWrench]:
-    """Return wrenches of unit force, or unit couples, from a basis (k, 6) as :func:`_dual` has it."""
+    """Return wrenches of unit force, or unit couples, from a basis (k, 6) of :func:`_dual`."""
     if not len(duals):
         return []
     rows = echelon_basis(duals)
@@ -349,6 +350,6 @@ def _are_alike(one: Singularity | None, other: Singularity) -> bool:
 
 
 def _together(one: Singularity, other: Singularity) -> Singularity:
-    """Return one singularity for two paths of a limb."""
+    """Return one singularity of a limb from those of two paths."""
     joints = tuple(dict.fromkeys([*(one.joints or ()), *(other.joints or ())]))
     return singularity(one.kind, one.limb, joints, locking=(*(one.locking or ()), *(other.locking or ())))

@@ -1,4 +1,4 @@
-"""The robot at one point, in numbers: pose, Jacobian, rates, F, rank and free twists."""
+"""State of the robot at one point: pose, Jacobian, rates, F, rank and free twists."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -21,7 +21,7 @@ from ...models.basis import settled_basis
 from ...models.linalg import echelon_basis
 from ...models.values import dataclass
 from ..case.case import Case
-from ..case.existence import fault_of_dimensions
+from ..case.existence import assembly_fault
 from ..errors import EvaluationError
 from ..program.nlp import Nlp
 from ..program.places import HeldRotation
@@ -29,35 +29,35 @@ from ..system.jsonvalues import JsonObject, Key, Vector3, matrix, vector
 from ..system.strictjson import Size
 from .paths import numbers_at
 
-#: F below this part of its size without cancellation is zero: the rates are then below 1e-6 of their sizes.
+#: Relative value, compared with F without cancellation, below which F is zero: the rates are then below 1e-6.
 ZERO_F = 1e-12
 #: Singular values below this part of the largest, with moments divided by their longest arm, count as zero. The part is
-#: the square root of the rounding unit of double precision: a point known to rounding error gives no better accuracy.
+#: the square root of the rounding unit of double precision: points are known to rounding error only.
 ZERO_SINGULAR_VALUE = 1.5e-8
-#: Largest residual of a loop equation, of order 1, of a closed loop: in another assembly it is of order 0.1.
+#: Largest residual of a closed loop's equation, of order 1: in another assembly mode it is of order 0.1.
 CLOSED = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class RobotState:
-    """The robot at one point.
+    """State of the robot at one point.
 
     Attributes:
         parameters: components of each parameter, by parameter name; radians for angles.
         position: (3,) ``p``, origin of the platform frame in the world frame, length.
         rotation: (3, 3) ``R``, platform to world coordinates.
         axis: unit axis of the rotation (3,).
-        angle: angle of the rotation, radians; with a sign about an axis that is held fixed.
+        angle: angle of the rotation, radians; signed if the axis is fixed.
         jacobian: (m, 6) unit wrenches, force, then moment about the world origin.
         rates: (m,) work rates ``L_i ^ chi``; for a leg driven along its axis, the rate of its length.
         F: ``sum(rates^2)``.
-        size: F without cancellation; F counts as zero when it is small in comparison.
+        size: F without cancellation; F counts as zero when it is small compared with it.
         singular_values: (min(m, 6),) singular values of the Jacobian with moments about the platform's origin, divided
             by their longest arm, largest first: plain numbers, the same in every unit of length.
-        rank: number of singular values that are not zero.
-        free_twists: (6 - rank, 6) basis of the twists that no row of the Jacobian resists, in reduced echelon form; the
-            largest component of each angular velocity is 1 or -1, or of the velocity of a translation.
-        quantities: the model's quantities by name, each (n,); radians for angles.
+        rank: number of non-zero singular values.
+        free_twists: (6 - rank, 6) basis of the twists that no row of the Jacobian resists, in reduced echelon form. The
+            largest component of each angular velocity, or of the velocity of a translation, is 1 or -1.
+        quantities: quantities of the model by name, each (n,); radians for angles.
     """
 
     parameters: Mapping[str, FloatArray]
@@ -76,7 +76,7 @@ class RobotState:
 
     @property
     def is_zero(self) -> bool:
-        """Whether F is zero, so that the platform can make the task's motion with every actuator locked."""
+        """Whether F is zero: the platform can make the task's motion with every actuator locked."""
         return ZERO_F * self.size >= self.F
 
     @property
@@ -100,12 +100,12 @@ class WorkspacePose(JsonObject):
 
 
 class PlatformPose(WorkspacePose):
-    """A pose of the platform.
+    """A pose of the platform with its rotation matrix.
 
     Attributes:
-        position: of the platform's origin, in the world frame.
+        position: position of the platform's origin in the world frame.
         axis: unit axis of the rotation.
-        angle: of the rotation about the axis, with a sign about an axis that is held fixed.
+        angle: angle of the rotation about the axis; signed if the axis is fixed.
         rotation: rows of the rotation matrix.
     """
 
@@ -113,18 +113,18 @@ class PlatformPose(WorkspacePose):
 
 
 def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
-    """Return the robot at a point of the program.
+    """Return the state of the robot at a point of the program.
 
     Args:
-        nlp: the program.
+        nlp: the nonlinear program.
         x: (n,) values of its free variables.
         pose: index of the pose, in a case with several poses.
 
     Returns:
-        The robot with the rates of the program's task, or of its first task where the program combines several.
+        The state with the rates of the program's task; of several combined tasks, the first one counts.
 
     Raises:
-        EvaluationError: a number is not finite at this point, as where a limb has zero length.
+        EvaluationError: a value is not finite at this point, for example because a limb has zero length.
     """
     model, case = nlp.program.model, nlp.case
     where = f"{case.source}: " if case.source else ""
@@ -134,7 +134,7 @@ def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
     parts = np.split(numbers.parameters.ravel(), np.cumsum(sizes)[:-1]) if sizes else []
     if not all(np.isfinite(each).all() for each in (numbers.squares, numbers.jacobian, numbers.rates, rotation)):
         dimensions = {item.name: part for item, part in zip(model.parameters, parts, strict=True)}
-        if fault := fault_of_dimensions(model, dimensions, case.units):
+        if fault := assembly_fault(model, dimensions, case.units):
             raise EvaluationError(f"{where}{fault}")
     for row, square in zip(model.wrenches, numbers.squares.ravel(), strict=True):
         if square == 0:
@@ -173,7 +173,7 @@ def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
 
 
 def legs_at(nlp: Nlp, x: FloatArray, pose: int = 0) -> tuple[FloatArray, FloatArray]:
-    """Return the base joints (k, 3) of straight legs at a point, and the vectors (k, 3) to their platform joints."""
+    """Return the base joints (k, 3) of straight legs, and the vectors (k, 3) from them to the platform joints."""
     legs = nlp.program.robots[pose].legs
     ends = [ca.horzcat(ca.SX(3, 0), *[getattr(leg, each) for leg in legs]) for each in ("base", "span")]
     function = ca.Function("legs", [nlp.program.x, nlp.program.p], [ca.densify(each) for each in ends])
@@ -182,9 +182,9 @@ def legs_at(nlp: Nlp, x: FloatArray, pose: int = 0) -> tuple[FloatArray, FloatAr
 
 
 def loops_are_closed(nlp: Nlp, x: FloatArray) -> bool:
-    """Return whether all loop equations of the robot hold at a point (n,), those beyond the program's own included.
+    """Return whether all loop equations of the robot hold at a point (n,), including those that the program omits.
 
-    The program has independent equations only, which other ways to assemble the joints fulfil too.
+    The program has independent equations only, which other assembly modes satisfy too.
     """
     if not nlp.program.model.loops:
         return True
@@ -193,7 +193,7 @@ def loops_are_closed(nlp: Nlp, x: FloatArray) -> bool:
 
 
 def stated_poses(nlp: Nlp, x: FloatArray) -> list[PlatformPose]:
-    """Return the poses that a case states, at a point (n,), before their displacements."""
+    """Return the poses that a case states at a point (n,), before their displacements."""
     found: dict[int, PlatformPose] = {}
     for k, (stated, step) in enumerate(_pose_displacements(nlp.case)):
         if stated not in found:
@@ -208,11 +208,11 @@ def stated_poses(nlp: Nlp, x: FloatArray) -> list[PlatformPose]:
 
 
 def _stated_axis_angle(nlp: Nlp, x: FloatArray, stated: int, rotation: FloatArray) -> tuple[FloatArray, float]:
-    """Return a stated pose's rotation as a unit axis (3,) and radians; an axis held fixed has a signed angle.
+    """Return a stated pose's rotation as unit axis (3,) and angle in radians; signed if the axis is fixed.
 
     Args:
         nlp: the program.
-        x: (n,) values of its free variables.
+        x: (n,) values of the free variables.
         stated: index of the stated pose.
         rotation: (3, 3) ``R`` of the stated pose.
     """
@@ -253,7 +253,7 @@ def _rank_and_free_twists(jacobian: FloatArray, centre: FloatArray) -> tuple[int
 
 
 def state_or_none(nlp: Nlp, x: FloatArray) -> RobotState | None:
-    """Return the robot at a point (n,), or None where its equations have no value."""
+    """Return the state of the robot at a point (n,), or None where its equations have no finite value."""
     try:
         return evaluate(nlp, x)
     except EvaluationError:

@@ -1,9 +1,9 @@
-"""The loss of F by inexact joint centres.
+"""Loss of F from errors of the joint centres.
 
-Every joint centre may have an error vector of at most a given length. To first order F changes by
-``sum_j grad_j F . e_j`` over the joints. The largest loss is the tolerance times ``sum_j |grad_j F|``, where each error
-is parallel to the gradient of its joint. The platform has the same pose with the errors as without: a calibrated
-machine reaches that pose with other leg lengths.
+Every joint centre may have an error vector up to a given length. To first order F changes by ``sum_j grad_j F . e_j``
+over the joints. The largest loss is the tolerance times ``sum_j |grad_j F|``, where each error is parallel to the
+gradient of its joint. The pose of the platform is the nominal one: a calibrated robot reaches it with other leg
+lengths.
 """
 
 from collections.abc import Sequence
@@ -19,17 +19,17 @@ from ..program.epigraph import total_over_poses, worst_value
 from ..program.nlp import Nlp
 from ..system.jsonvalues import JsonObject, Key, Vector3, vector
 
-#: Poses whose F differs from the worst one by at most this part of it are all worst poses.
+#: All poses whose F differs from the worst one by at most this relative amount are worst poses.
 _SAME_VALUE = 1e-7
 
 
 class JointGradient(JsonObject):
-    """Derivatives of F by the error of a joint centre.
+    """Derivatives of F with respect to the error of a joint centre.
 
     Attributes:
-        limb: of the joint.
-        plate: base or platform.
-        gradient: in the plate's frame.
+        limb: name of the joint's limb.
+        plate: body that carries the joint: base or platform.
+        gradient: derivatives of F in the frame of this body.
     """
 
     limb: str
@@ -38,13 +38,13 @@ class JointGradient(JsonObject):
 
 
 class ToleranceLoss(JsonObject):
-    """Loss of F by inexact joint centres.
+    """Loss of F from errors of the joint centres.
 
     Attributes:
         tolerance: largest error of every joint centre.
-        loss: worst loss of F, to first order.
-        loss_there: loss of F with the errors that are worst to first order.
-        joints: derivatives of F by each joint's error.
+        loss: largest loss of F, to first order.
+        loss_there: exact loss of F with the errors that are worst to first order.
+        joints: derivatives of F with respect to each joint's error.
     """
 
     tolerance: Annotated[float, Key("joint_centre")]
@@ -57,8 +57,8 @@ class ToleranceEvaluation(NamedTuple):
     """F with errors of the joint centres.
 
     Attributes:
-        F: over the poses.
-        gradients: (k, 3) each, by the errors: one, or one for each of the worst poses.
+        F: objective over the poses.
+        gradients: one or more (k, 3) derivatives with respect to the errors: one for each of the worst poses.
     """
 
     F: float
@@ -69,7 +69,7 @@ class BuiltRobot:
     """F of a program's first task at a point, as a function of the errors of the joint centres.
 
     Args:
-        nlp: a program whose model gives rows with errors (``built``).
+        nlp: nonlinear program whose model gives rows with errors (``built``).
         x: (n,) the point.
     """
 
@@ -90,7 +90,7 @@ class BuiltRobot:
 
         Args:
             values: parameters (k, 1), ``R`` (3, 3) and ``p`` (3, 1) at the pose.
-            e: (3 k, 1) symbols of the joints' errors.
+            e: (3 k, 1) symbols of the joint errors.
             twist: (6,) twist of the task.
         """
         model, length = self._nlp.program.model, self._nlp.case.characteristic_length
@@ -120,10 +120,10 @@ class BuiltRobot:
 
 
 def tolerance_loss(nlp: Nlp, x: FloatArray, tolerance: float) -> ToleranceLoss:
-    """Return the largest first-order loss of F by a tolerance on every joint centre.
+    """Return the largest first-order loss of F for a tolerance on every joint centre.
 
     Args:
-        nlp: a program whose model gives rows with errors (``built``).
+        nlp: nonlinear program whose model gives rows with errors (``built``).
         x: (n,) the point.
         tolerance: largest error of each joint centre, length.
     """

@@ -1,17 +1,15 @@
 """Working modes: the sense in which the actuators of each limb drive the platform, compared with home.
 
-A limb's actuators drive the platform by wrenches that are reciprocal to its passive joints. Where the joints bend the
-other way, such as an elbow, an actuator that moves forwards does negative work in a wrench in which it did positive
-work at home. Between the two is a serial singularity, where it does none. The sense is the sign of
+The actuators of a limb drive the platform by wrenches that are reciprocal to its passive joints. If a limb bends the
+other way, such as an elbow, the power of an actuator in its wrench has the opposite sign to home. Between the two modes
+lies a serial singularity, where this power is zero. The sense is the sign of
 
-* ``det(A_home' A)``, with the work rates ``A`` of the limb's wrenches, whose directions are expressions that change
-  smoothly, in the actuated screws; or
-* ``det[passive, actuated, Z]`` beside that of home for a limb whose wrenches have no such expressions, where the
-  columns ``Z`` complete the screws of all joints, turned to those of home.
+* ``det(A_home' A)``, with the work rates ``A`` in the actuated screws of wrenches with smooth expressions; or
+* ``det[passive, actuated, Z]`` relative to home for a limb whose wrenches have no such expressions; the columns ``Z``
+  complete the screws of all joints, and are aligned with those at home.
 
-Actuators whose positions the pose leaves free count as locked in both. The sense is compared point by point, without a
-path from home, so that a limb which has turned by more than a right angle may have the other sign in the same working
-mode. A difference of the sense alone is therefore no verdict.
+Free actuator coordinates count as locked in both. The sense is compared without a path from home, so a limb that has
+turned by more than a right angle may have the other sign in the same working mode: the sense is only an indication.
 """
 
 from __future__ import annotations
@@ -28,18 +26,18 @@ from ...models import FloatArray, Model, Substitution, driven
 from ..program.nlp import Nlp
 from ..program.program import Kernel, tuple_of
 
-#: A determinant of unit columns below this has no sign: the limb is singular there.
+#: Smallest determinant of unit columns with a sign: below it the limb is singular.
 _SINGULAR = 1e-9
 
 
 class Posture(NamedTuple):
-    """A robot's joints at a point.
+    """Joints of a robot at a point.
 
     Attributes:
         parameters: (k,) components of all parameters, radians for angles.
         unknowns: (u,) internal unknowns.
-        rotation: (3, 3) of the platform.
-        position: (3,) of the platform's origin, length.
+        rotation: (3, 3) rotation matrix of the platform.
+        position: (3,) position of the platform's origin, length.
     """
 
     parameters: FloatArray
@@ -49,13 +47,13 @@ class Posture(NamedTuple):
 
 
 def turned_limbs(model: Model, posture: Posture) -> tuple[str, ...]:
-    """Return the names of the limbs whose actuators drive the platform in the other sense than at home.
+    """Return the names of the limbs whose actuators drive the platform in the opposite sense to home.
 
     Limbs that are singular at home or at the point, and limbs with dependent passive joints, are left out.
 
     Args:
-        model: the robot.
-        posture: its joints at the point.
+        model: model of the robot.
+        posture: joints of the robot at the point.
     """
     modes = _modes_of(model)
     now, home = modes.at(posture), modes.home
@@ -65,7 +63,7 @@ def turned_limbs(model: Model, posture: Posture) -> tuple[str, ...]:
 
 
 def turned_over_poses(nlp: Nlp, x: FloatArray) -> tuple[tuple[str, ...], ...]:
-    """Return the limbs driven in the other sense than at home, at each pose of a point (n,)."""
+    """Return the limbs driven in the opposite sense to home, at each pose of a point (n,)."""
     model = nlp.program.model
     if not (model.actuators and model.unknowns):
         return ()
@@ -79,19 +77,19 @@ def turned_over_poses(nlp: Nlp, x: FloatArray) -> tuple[tuple[str, ...], ...]:
 
 @lru_cache(maxsize=4)
 def _modes_of(model: Model) -> _Modes:
-    """Return the functions of a robot; those of the last robots are kept, as a search asks for many points."""
+    """Return the functions of a robot; the last robots are cached, as a search evaluates many points."""
     return _Modes(model)
 
 
 class _Modes:
-    """Numbers that tell the working modes of a robot's limbs.
+    """Matrices that distinguish the working modes of a robot's limbs.
 
     Args:
-        model: the robot.
+        model: model of the robot.
 
     Attributes:
         limbs: names of the limbs that have a sense.
-        home: their numbers at home.
+        home: matrices of these limbs at home.
     """
 
     def __init__(self, model: Model) -> None:
@@ -123,7 +121,7 @@ class _Modes:
         outputs.append(values)
 
     def at(self, posture: Posture) -> list[FloatArray]:
-        """Return the numbers of each limb: works of wrenches in actuated screws, or the screws of all joints."""
+        """Return the matrix of each limb: work rates of wrenches in actuated screws, or the screws of all joints."""
         rotation = np.asarray(posture.rotation).ravel(order="F")
         values = self._kernel(posture.parameters, posture.unknowns, rotation, np.ravel(posture.position))
         found = []
@@ -132,7 +130,7 @@ class _Modes:
         return found
 
     def sign(self, limb: str, now: FloatArray, home: FloatArray) -> int:
-        """Return 1 where a limb has the sense of home, -1 where it has the other one, and 0 where that is not known."""
+        """Return 1 where a limb has the same sense as at home, -1 for the opposite one, 0 where it is not known."""
         if not (np.isfinite(now).all() and np.isfinite(home).all()):
             return 0
         if self._passive[self.limbs.index(limb)] is None:
@@ -143,20 +141,20 @@ class _Modes:
 
 
 def _about(screws: FloatArray, centre: FloatArray) -> FloatArray:
-    """Return twists (6, n) with velocities of a centre in parts of the largest, each of unit size."""
+    """Return twists (6, n) of unit size, with velocities of a centre divided by the largest one."""
     velocities = screws[3:] + np.cross(screws[:3].T, centre).T
     reach = float(np.linalg.norm(velocities, axis=0).max(initial=0.0)) or 1.0
     return _unit(np.vstack([screws[:3], velocities / reach]))
 
 
 def _unit(columns: FloatArray) -> FloatArray:
-    """Return columns of unit size; zero ones as they are."""
+    """Return columns of unit size; zero columns stay zero."""
     lengths = np.linalg.norm(columns, axis=0)
     return np.asarray(columns / np.where(lengths > 0, lengths, 1.0))
 
 
 def _oriented(columns: FloatArray) -> FloatArray:
-    """Return columns (6, n) with an orthonormal basis (6, 6 - n) of their complement behind them."""
+    """Return columns (6, n) followed by an orthonormal basis (6, 6 - n) of their complement."""
     return np.hstack([columns, np.linalg.svd(columns)[0][:, columns.shape[1] :]])
 
 

@@ -1,6 +1,5 @@
-"""Robots in the formats of other programs.
+"""Import and export of robots in the formats of other programs.
 
-The rooms: ``reading`` takes descriptions in; ``solved`` makes a mechanism of a solved case, and ``writing`` makes files
-of a mechanism; ``export`` does both. ``frames`` (places and rotations) and ``extra`` (libraries that only some formats
-need) serve all of them.
+``reading`` imports MJCF and URDF; ``solved`` converts a solved case to a mechanism, ``writing`` a mechanism to files,
+and ``export`` runs both. ``frames`` (frames and rotations) and ``extra`` (optional libraries) are used by all of them.
 """

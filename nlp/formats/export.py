@@ -1,4 +1,4 @@
-"""The files of a solved case for other programs."""
+"""Export of a solved case to files for other programs."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from .writing.readme import readme_text
 from .writing.tables import joints_csv, links_csv
 from .writing.urdf import urdf_of
 
-#: The formats that can be asked for.
+#: Names of the formats.
 FORMATS = ("mjcf", "urdf", "csv", "dxf")
-#: Largest difference of J'J of a result from that of its numbers, in parts of its largest entry: results are closed to
-#: the solver's accuracy, and another assembly of the joints differs by parts of 1.
+#: Largest difference of J'J between a result and its recomputed robot, relative to the largest entry: loops of results
+#: are closed to the solver's accuracy, and another assembly mode differs by order 1.
 _SAME = 1e-6
 
 if TYPE_CHECKING:
@@ -39,37 +39,39 @@ def export_robot(solution: Solution, formats: Collection[str] = ("all",), *, pos
     """Return the files of a solved robot for other programs, as text by file name.
 
     Args:
-        solution: the answer to a case.
-        formats: ``mjcf``, ``urdf``, ``csv`` and ``dxf``, any of them; or ``all``.
+        solution: solution of a case.
+        formats: one or more of ``mjcf``, ``urdf``, ``csv`` and ``dxf``; or ``all``.
         pose: number of the pose, from 1.
 
     Returns:
-        The texts, with a ``README.md`` of frames, units and choices. Lengths are in the unit of the case.
+        Text of each file by name, with a ``README.md`` about frames, units and assumptions. Lengths are in the unit of
+        the case.
 
     Raises:
-        InputError: the solve gave no answer, the case has no such pose, there is no such format, the joints of the
-            robot's limbs are not known, or ``dxf`` is asked for and ezdxf is not installed.
-        EvaluationError: a loop of the robot is open.
+        InputError: the solve has no result, there is no such pose or format, the joints of the robot's limbs are not
+            known, or ``dxf`` is requested without ezdxf.
+        EvaluationError: the loops of the robot cannot be closed.
     """
     check_formats(formats)
     check_pose(solution.case, pose)
     if not solution.status.is_answer:
-        raise InputError(f"the solve of {solution.case.name!r} is {solution.status.value}: there is nothing to export")
+        fault = f"the solve of {solution.case.name!r} ended as {solution.status.value}"
+        raise InputError(f"{fault}, without a design to export; only a feasible result can be exported")
     return files_at(solution.outcomes[0].own.nlp, solution.x, formats, pose)
 
 
 def files_at(nlp: Nlp, x: FloatArray, formats: Collection[str], pose: int) -> dict[str, str]:
-    """Return the files of the robot at a point of its program; the rest is as for :func:`export_robot`.
+    """Return the files of the robot at a point of its nonlinear program; see :func:`export_robot`.
 
     Args:
-        nlp: the program of a task.
-        x: (n,) the point.
-        formats: as for :func:`export_robot`.
-        pose: as for :func:`export_robot`.
+        nlp: nonlinear program of a task.
+        x: (n,) point of the program.
+        formats: one or more of ``mjcf``, ``urdf``, ``csv`` and ``dxf``; or ``all``.
+        pose: number of the pose, from 1.
 
     Raises:
-        InputError: the joints of the robot's limbs are not known, or a format needs more than the robot has.
-        EvaluationError: a loop of the robot is open.
+        InputError: the joints of the robot's limbs are not known, or a format does not support the robot.
+        EvaluationError: the loops of the robot cannot be closed.
     """
     try:
         return exported_files(mechanism_of(nlp, x, pose), formats)
@@ -78,11 +80,11 @@ def files_at(nlp: Nlp, x: FloatArray, formats: Collection[str], pose: int) -> di
 
 
 def fixed_point(case: Case, joints: Mapping[str, float]) -> tuple[Nlp, FloatArray] | None:
-    """Return the program of the first task and its point where nothing of a case is free; None where something is.
+    """Return the program of the first task and its only point, for a case without free variables; else None.
 
     Args:
         case: the case.
-        joints: positions of driven joints that the pose does not determine, by the names of their variables.
+        joints: values of free actuator coordinates by the names of their variables.
     """
     values = [value for name in case.parameters for value in case.components(name)]
     values += [value for pose in case.poses for value in (*pose.position, pose.rotation.angle)]
@@ -93,25 +95,25 @@ def fixed_point(case: Case, joints: Mapping[str, float]) -> tuple[Nlp, FloatArra
 
 
 def check_same_robot(nlp: Nlp, x: FloatArray, jacobian: FloatArray) -> None:
-    """Refuse a point whose Jacobian is not that of a result, up to the basis of the wrenches of a member.
+    """Refuse a point whose Jacobian differs from that of a result.
 
-    F of every twist follows from J'J, which no choice of orthonormal wrenches within a member changes.
+    J'J is compared, because it gives F for every twist and does not depend on the basis of the wrenches of a member.
 
     Args:
-        nlp: the program.
-        x: (n,) the point.
-        jacobian: (m, 6) of the result, at the first pose.
+        nlp: the nonlinear program.
+        x: (n,) point of the program.
+        jacobian: (m, 6) Jacobian of the result, at the first pose.
 
     Raises:
-        InputError: the same numbers give another Jacobian.
+        InputError: the point has another Jacobian.
     """
     J = evaluate(nlp, x).jacobian
-    # Moments in parts of their largest entry: J'J then has no units.
+    # Forces and moments are divided by their largest entries, so that J'J has no unit.
     scale = np.repeat([np.abs(jacobian[:, :3]).max() or 1.0, np.abs(jacobian[:, 3:]).max() or 1.0], 3)
-    own, other = ((each / scale).T @ (each / scale) for each in (J, jacobian))
-    if J.shape != jacobian.shape or not np.abs(own - other).max() <= _SAME * np.abs(other).max():
-        fault = "another assembly of its joints than the path from home leads to, or of another version of the case"
-        raise InputError(f"the result is of {fault}: export the case without it")
+    again, given = ((each / scale).T @ (each / scale) for each in (J, jacobian))
+    if J.shape != jacobian.shape or not np.abs(again - given).max() <= _SAME * np.abs(given).max():
+        fault = "the result is of another assembly mode than the home assembly mode, or of another version of the case"
+        raise InputError(f"{fault}: export the case without --of")
 
 
 def check_pose(case: Case, pose: int) -> None:
@@ -125,14 +127,14 @@ def check_pose(case: Case, pose: int) -> None:
 
 
 def check_formats(formats: Collection[str]) -> tuple[str, ...]:
-    """Return the formats that are asked for, each once; ``all`` is all of them.
+    """Return the requested formats without duplicates; ``all`` stands for all formats.
 
     Raises:
         InputError: there is no such format, or a library that it needs is not installed.
     """
     for name in formats:
         if name not in (*FORMATS, "all"):
-            raise InputError(f"--format {name}: is no format; {nearest(name, (*FORMATS, 'all'))}")
+            raise InputError(f"--format {name}: no such format; {nearest(name, (*FORMATS, 'all'))}")
     chosen = tuple(name for name in FORMATS if name in formats or "all" in formats)
     if "dxf" in chosen:
         required_dxf()
@@ -140,11 +142,11 @@ def check_formats(formats: Collection[str]) -> tuple[str, ...]:
 
 
 def exported_files(exported: Exported, formats: Collection[str]) -> dict[str, str]:
-    """Return the texts of the files of a robot by name, with a page that explains them.
+    """Return the text of each file of a robot by name, with a README that explains them.
 
     Args:
-        exported: the robot.
-        formats: ``mjcf``, ``urdf``, ``csv``, ``dxf``, or ``all``.
+        exported: the robot as a mechanism.
+        formats: one or more of ``mjcf``, ``urdf``, ``csv`` and ``dxf``; or ``all``.
 
     Raises:
         InputError: there is no such format, or a library that it needs is not installed.

@@ -1,4 +1,4 @@
-"""Libraries of the extra ``robots``, which only some formats need."""
+"""Optional libraries of the extra ``robots``, for some formats only."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ def required(library: str, purpose: str, package: str = "") -> Any:  # noqa: ANN
     """Return a library of the extra ``robots``.
 
     Args:
-        library: name by which it is imported.
-        purpose: what needs it, a plural for the message.
-        package: name by which it is installed, where it is another.
+        library: import name of the library.
+        purpose: files that need the library, in the plural, for the message.
+        package: package name of the library; empty for the import name.
 
     Raises:
-        InputError: it is not installed.
+        InputError: the library is not installed.
     """
     try:
         return import_module(library)

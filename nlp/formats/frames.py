@@ -1,4 +1,4 @@
-"""Places of bodies, composed and inverted, and rotations in the words of MJCF and URDF, both ways."""
+"""Frames of bodies, and conversions between rotation matrices, quaternions and the angles of URDF."""
 
 from __future__ import annotations
 
@@ -8,28 +8,28 @@ import numpy as np
 
 from ...models.arrays import FloatArray
 
-#: Rotation below which the axis of a small rotation is taken from its skew part alone, rad.
+#: Sine of a rotation angle below which the axis is not computed from the skew part of the matrix.
 _SMALL = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """A place of a body, or of a frame on it.
+    """Frame of a body, or frame on a body.
 
     Attributes:
-        position: (3,) its origin, length.
-        rotation: (3, 3) its axes as columns.
+        position: (3,) origin of the frame, length.
+        rotation: (3, 3) axes of the frame as columns.
     """
 
     position: FloatArray = field(default_factory=lambda: np.zeros(3))
     rotation: FloatArray = field(default_factory=lambda: np.eye(3))
 
     def __matmul__(self, inner: Frame) -> Frame:
-        """Return the place of a frame that is given in this one."""
+        """Return a frame given in this frame, in the outer coordinates."""
         return Frame(self.position + self.rotation @ inner.position, self.rotation @ inner.rotation)
 
     def inverse(self) -> Frame:
-        """Return the place of the world in this frame."""
+        """Return the world frame in the coordinates of this frame."""
         return Frame(-self.rotation.T @ self.position, self.rotation.T)
 
 
@@ -46,7 +46,7 @@ def rotation_from_roll_pitch_yaw(roll: float, pitch: float, yaw: float) -> Float
 
 
 def rotation_from_quaternion(quaternion: FloatArray) -> FloatArray:
-    """Return the rotation (3, 3) of a quaternion (4,), real part first, of any length."""
+    """Return the rotation (3, 3) of a quaternion (4,), scalar part first, of any length."""
     w, *v = quaternion / np.linalg.norm(quaternion)
     K = cross_matrix(np.array(v))
     return np.asarray(np.eye(3) + 2 * w * K + 2 * K @ K)
@@ -90,8 +90,8 @@ def axis_frame(point: FloatArray, axis: FloatArray) -> Frame:
 def quaternion_of(R: FloatArray) -> FloatArray:
     """Return the unit quaternion (4,), scalar part first and not negative, of a rotation matrix (3, 3).
 
-    The largest component is found from the diagonal, the others by division by it (S. W. Shepperd, "Quaternion from
-    rotation matrix", 1978), so that no digits are lost.
+    The largest component is computed from the diagonal, and the others are divided by it, so that no digits are lost
+    (S. W. Shepperd, "Quaternion from rotation matrix", 1978).
     """
     squares = np.array(
         [
@@ -110,9 +110,9 @@ def quaternion_of(R: FloatArray) -> FloatArray:
 
 
 def roll_pitch_yaw_of(R: FloatArray) -> FloatArray:
-    """Return the angles (3,), radians, with which ``R = Rz(yaw) Ry(pitch) Rx(roll)``, as URDF has them.
+    """Return roll, pitch and yaw (3,) of URDF, radians, with ``R = Rz(yaw) Ry(pitch) Rx(roll)``.
 
-    The roll is computed after the yaw is taken out, so that the three together stay accurate at a pitch of 90 degrees.
+    The roll is computed after the yaw is removed, so that the result stays accurate at a pitch of 90 degrees.
     """
     pitch = np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0]))
     yaw = np.arctan2(R[1, 0], R[0, 0]) if np.hypot(R[0, 0], R[1, 0]) > 0 else 0.0

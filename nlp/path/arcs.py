@@ -1,7 +1,7 @@
 """Circular arcs and helices in a plane of two axes: centre, radius and angle, by the rules of LinuxCNC.
 
-The radius grows linearly with the angle where the two ends differ in their distance from the centre by rounding. An
-angle is positive from the plane's first axis to its second.
+If the distances of both ends from the centre differ by rounding, the radius changes linearly with the angle. An angle
+is positive from the plane's first axis to its second.
 """
 
 from __future__ import annotations
@@ -13,25 +13,25 @@ from numpy.polynomial.legendre import leggauss
 
 from ...models import FloatArray
 
-#: The two axes of a plane, then the one along which a helix advances, by the code that selects it: 0, 1, 2 for x, y, z.
+#: Both axes of a plane, then the axis of a helix, by the code of the plane: 0, 1, 2 for x, y, z.
 PLANES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
-#: Largest part of the radius by which those of the two ends may differ.
+#: Largest relative difference of the radii of both ends.
 _SPIRAL = 0.001
-#: Part by which a chord may be longer than the diameter that is programmed, and angle, that count as rounding.
+#: Relative excess of a chord over the programmed diameter, and angle, that count as rounding.
 _TINY = 1e-12
-#: Nodes, between 0 and 1, and weights by which lengths of arcs are integrated (Gauss and Legendre): exact but for
-#: rounding where the radius does not grow.
+#: Gauss-Legendre nodes, between 0 and 1, and weights for lengths of arcs: exact except for rounding if the radius is
+#: constant.
 _NODES = [(float(node + 1) / 2, float(weight) / 2) for node, weight in zip(*leggauss(5), strict=True)]
-#: A number, or as many as there are arcs.
+#: Number, or array with a number for each arc.
 _Numbers = TypeVar("_Numbers", float, FloatArray)
 
 
 class ArcError(Exception):
-    """Error of an arc that does not exist; the message says why."""
+    """Error of an impossible arc; the message gives the reason."""
 
 
 class Tolerances(NamedTuple):
-    """Lengths below which ends of arcs agree.
+    """Tolerances on the ends of arcs, length.
 
     Attributes:
         radius: smallest radius, and excess of half a chord over it.
@@ -48,7 +48,7 @@ class Tolerances(NamedTuple):
         return Tolerances(self.radius * scale, self.spiral * scale, self.closed * scale)
 
 
-#: By the code of the unit in which a program is written, in that unit.
+#: Tolerances in the unit of a program, by the code of this unit.
 TOLERANCES = {
     20: Tolerances(5e-5, 0.002 * math.sqrt(2), 1e-8),
     21: Tolerances(5e-5 * 25.4, 0.02 * math.sqrt(2), 1e-8),
@@ -56,14 +56,14 @@ TOLERANCES = {
 
 
 class Arc(NamedTuple):
-    """An arc from an angle on, in a plane.
+    """Arc in a plane, from a start angle.
 
     Attributes:
         first, second: coordinates of the centre along the plane's axes.
-        radius: at the start.
-        growth: of the radius, up to the end.
-        angle: of the start, radians.
-        sweep: from the start to the end, radians; its sign is the sense.
+        radius: radius at the start.
+        growth: change of the radius from start to end.
+        angle: angle of the start, radians.
+        sweep: signed angle from start to end, radians.
     """
 
     first: float
@@ -78,14 +78,14 @@ Point = tuple[float, float]
 
 
 def arc_about(centre: Point, start: Point, end: Point, turns: int, tolerances: Tolerances) -> Arc:
-    """Return the arc about a centre.
+    """Return the arc with a given centre.
 
     Args:
         centre: coordinates in the plane.
         start: first point.
-        end: last point; the first one again for a full circle.
+        end: last point; equal to the first for a full circle.
         turns: 1 for at most one turn, 2 for one more, and so on; negative for clockwise.
-        tolerances: in the unit of the coordinates.
+        tolerances: tolerances in the unit of the coordinates.
 
     Raises:
         ArcError: an end is at the centre, or the ends are at different distances from it.
@@ -111,26 +111,28 @@ def arc_about(centre: Point, start: Point, end: Point, turns: int, tolerances: T
 
 
 def centre_of_radius(radius: float, start: Point, end: Point, is_clockwise: bool, tolerances: Tolerances) -> Point:
-    """Return the centre of an arc that is given by its radius.
+    """Return the centre of an arc given by its radius.
 
     Args:
         radius: positive for at most half a turn, negative for more.
         start: first point.
         end: last point.
-        is_clockwise: the sense.
-        tolerances: in the unit of the coordinates.
+        is_clockwise: True for a clockwise arc.
+        tolerances: tolerances in the unit of the coordinates.
 
     Raises:
-        ArcError: the ends are one point, or farther apart than two radii.
+        ArcError: the ends coincide, or are farther apart than two radii.
     """
     chord = (end[0] - start[0], end[1] - start[1])
     length, size = math.hypot(*chord), abs(radius)
     if length <= tolerances.closed:
-        raise ArcError("an arc with R ends where it starts, so that its centre is not determined; state it by I, J, K")
+        raise ArcError(
+            "an arc with R must not end at its start, because its centre is undetermined; give I, J, K instead"
+        )
     if length / 2 - size > tolerances.radius:
         raise ArcError(f"the ends of the arc are {length:.7g} apart, more than two radii of {size:.7g}")
     height = 0.0 if length / 2 > size * (1 - _TINY) else math.sqrt((size - length / 2) * (size + length / 2))
-    # The centre is on the right of the chord of a clockwise arc of less than half a turn.
+    # The centre is to the right of the chord of a clockwise arc of less than half a turn.
     height = (-height if is_clockwise == (radius > 0) else height) / length
     return (start[0] + chord[0] / 2 - height * chord[1], start[1] + chord[1] / 2 + height * chord[0])
 
@@ -139,10 +141,10 @@ def arc_length(radius: _Numbers, growth: _Numbers, sweep: _Numbers, rise: _Numbe
     """Return the length of an arc or a helix, or of several.
 
     Args:
-        radius: at the start.
-        growth: of the radius.
-        sweep: radians.
-        rise: along the axis.
+        radius: radius at the start.
+        growth: change of the radius from start to end.
+        sweep: angle from start to end, radians.
+        rise: advance along the axis.
     """
     length = 0 * radius
     for node, weight in _NODES:

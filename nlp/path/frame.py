@@ -1,7 +1,7 @@
-"""Frame of a path in the world: its origin and rotation, and bounds of the rounding of what it moves.
+"""Frame of a path in the world frame: origin, rotation, and bounds of rounding errors.
 
-A path keeps its pieces in its frame: arcs in planes of the axes, angles that change linearly. The pose in the world is
-``t + R p`` and ``R R(angles)``. Entries of R that the three angles leave at zero are exactly zero.
+Segments keep their parameters in the path's frame: arcs in planes of its axes, angles that change linearly. The pose in
+the world frame is ``t + R p`` and ``R R(angles)``. Entries of R that vanish for the three angles are exactly zero.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from .orientation import ORDERS, quaternion_products, quaternions_from_angles
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Part of the sizes of the numbers in ``t + R p`` by which the computed one may be off. An entry of R is a sum of two
-#: products of three cosines or sines, off by at most 17 roundings (2^-53); with those of the sum there are 21 of 32.
+#: Relative error of the computed ``t + R p``, with respect to the absolute values of its terms. An entry of R is a sum
+#: of two products of three cosines or sines, with at most 17 roundings (2^-53); the sum adds 4, in total 21 of 32.
 _OFF = 2.0**-48
 
 
 @dataclass(frozen=True, eq=False)
 class PathFrame:
-    """Place of a path's frame in the world.
+    """Frame of a path in the world frame.
 
     Attributes:
-        origin: (3,) in the world.
+        origin: (3,) origin in the world frame, length.
         angles: (3,) roll, pitch and yaw, radians.
     """
 
@@ -37,12 +37,12 @@ class PathFrame:
 
     @cached_property
     def rotation(self) -> FloatArray:
-        """Rotation matrix (3, 3): path to world coordinates."""
+        """Rotation matrix (3, 3) from path to world coordinates."""
         return np.asarray(np.linalg.multi_dot([self._about(axis) for axis in ORDERS["rpy"]]))
 
     @cached_property
     def pattern(self) -> NDArray[np.bool_]:
-        """Whether each entry (3, 3) of the rotation may differ from zero."""
+        """True for each entry (3, 3) of the rotation that may differ from zero."""
         first, second, third = ((self._about(axis) != 0).astype(int) for axis in ORDERS["rpy"])
         return np.asarray(first @ second @ third > 0)
 
@@ -61,26 +61,26 @@ class PathFrame:
         return matrix
 
     def positions(self, points: FloatArray) -> FloatArray:
-        """Return positions (n, 3) in the world of points (n, 3) of the frame."""
+        """Return world positions (n, 3) of points (n, 3) of the frame."""
         return np.asarray(self.vectors(points) + self.origin)
 
     def vectors(self, vectors: FloatArray) -> FloatArray:
-        """Return vectors (n, 3) in the world of vectors (n, 3) of the frame."""
+        """Return world vectors (n, 3) of vectors (n, 3) of the frame."""
         return np.asarray(vectors @ self.rotation.T)
 
     def orientations(self, quaternions: FloatArray) -> FloatArray:
-        """Return quaternions (n, 4) in the world of unit quaternions (n, 4) in the frame."""
+        """Return world quaternions (n, 4) of unit quaternions (n, 4) of the frame."""
         return quaternion_products(self.quaternion, quaternions)
 
     def sizes(self, points: FloatArray) -> FloatArray:
-        """Return the sums (n, 3) of the sizes of the numbers from which positions of points (n, 3) are computed."""
+        """Return the sums (n, 3) of the absolute terms in the positions of points (n, 3)."""
         return np.asarray(np.abs(points) @ self.pattern.T + np.abs(self.origin))
 
     def off_positions(self, points: FloatArray) -> FloatArray:
-        """Return how far computed positions (n, 3) of points may be off; zero where nothing is rounded."""
+        """Return error bounds (n, 3) of computed positions of points (n, 3); zero without rounding."""
         is_exact = (self.pattern.sum(axis=1) == 1) & (self.origin == 0)
         return np.where(is_exact, 0.0, _OFF * self.sizes(points))
 
     def off_vectors(self, vectors: FloatArray) -> FloatArray:
-        """Return how far computed vectors (n, 3) may be off; zero where nothing is rounded."""
+        """Return error bounds (n, 3) of computed vectors (n, 3); zero without rounding."""
         return np.where(self.pattern.sum(axis=1) == 1, 0.0, _OFF * (np.abs(vectors) @ self.pattern.T))

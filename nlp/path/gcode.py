@@ -1,8 +1,8 @@
-"""Programs of G-code as paths, by the rules of LinuxCNC's interpreter.
+"""G-code programs as tool paths, by the rules of LinuxCNC's interpreter.
 
-What moves is read as LinuxCNC reads it, and in the order in which it does so within a line; everything else is refused
-with its line and word, or collected where it moves nothing. The reader keeps the point at which the machine stands, in
-machine coordinates: lengths in the unit of the case, and angles in degrees.
+Motions are read as by LinuxCNC, in its order within a line. Other words are refused with line and word, or listed as
+ignored if they cause no motion. The reader tracks the current point in machine coordinates: lengths in the unit of the
+case, and angles in degrees.
 """
 
 from __future__ import annotations
@@ -24,38 +24,38 @@ from .path import Kind, ProgrammedPath
 from .standing import duration_at, turns_between, without_rests
 from .words import AXES, Block, WordError, block_of
 
-#: A way of the position, in millimetres or inches, that is none: a motion so short turns the platform alone.
+#: Length of a translation, in millimetres or inches, that counts as none: so short a motion is a pure rotation.
 _NO_WAY = 1e-7
-#: Letters that may stand on each line.
+#: Letters that are allowed on each line.
 _ANYWHERE = frozenset("XYZABCFST")
 _CENTRE = "IJK"
-#: Largest number of an arc's turns, so that its angle has digits behind the point.
+#: Largest number of turns of an arc, so that its angle keeps enough digits.
 _MOST_TURNS = 10_000
 
 
 def read_program(lines: Iterable[str], source: str, units: Units, options: PathOptions) -> ProgrammedPath:
-    """Return the path of a program.
+    """Return the tool path of a G-code program.
 
     Args:
-        lines: of the program.
-        source: its name, for messages.
-        units: of the case.
+        lines: lines of the program.
+        source: name of the program, for messages.
+        units: units of the case.
         options: choices that the program leaves open.
 
     Raises:
-        InputError: the program holds anything that is not read, has no end, or moves nowhere.
+        InputError: the program contains an unsupported word, has no end, or makes no motion.
     """
     return _Machine(source, units, options).run(lines)
 
 
 class _Machine:
-    """The state of a machine that runs a program, and the path that it has made."""
+    """State of a machine that runs a program, and the path so far."""
 
     def __init__(self, source: str, units: Units, options: PathOptions) -> None:
         self.source, self.units, self.options = source, units, options
         self.order, self.between = order_named(options.angles), options.between or Between.ANGLES
         self.line = 0
-        # Modes, as LinuxCNC begins.
+        # Initial modes of LinuxCNC.
         self.motion: float = 80
         self.plane = 17
         self.is_incremental = self.has_absolute_centres = self.is_inverse_time = False
@@ -80,7 +80,7 @@ class _Machine:
         self.idle: dict[str, list[int]] = {}
 
     def run(self, lines: Iterable[str]) -> ProgrammedPath:
-        """Return the path of a program; the errors are those of :func:`read_program`."""
+        """Return the tool path of a program; the errors are those of :func:`read_program`."""
         try:
             has_end = self._run(lines)
         except (WordError, ArcError) as error:
@@ -95,12 +95,12 @@ class _Machine:
             )
         if not self.lines:
             unknown = [letter for letter, axis in AXES.items() if math.isnan(self.now[axis])]
-            reason = f"the start of {' and '.join(unknown)} is not known" if unknown else "the program moves nowhere"
+            reason = f"the start of {' and '.join(unknown)} is not known" if unknown else "the program makes no motion"
             raise InputError(f"{self.source}: there is no path: {reason}")
         knots = np.array(self.knots).reshape(-1, 6)
         if not (np.abs(knots) <= LARGEST).all():
             line = self.lines[max(int(np.argmin((np.abs(knots) <= LARGEST).all(axis=1))) - 1, 0)]
-            raise InputError(f"{self.source}: line {line}: must be finite, of a size of at most {LARGEST:g}")
+            raise InputError(f"{self.source}: line {line}: must be finite and at most {LARGEST:g} in size")
         knots[:, 3:] = np.radians(knots[:, 3:])
         path = ProgrammedPath(
             self.source,
@@ -117,7 +117,7 @@ class _Machine:
         return without_rests(path, are_timed=False)
 
     def _run(self, lines: Iterable[str]) -> bool:
-        """Run a program, and return whether it has an end."""
+        """Run a program; return True if it has an end."""
         is_first, has_percent = True, False
         for line in lines:
             self.line += 1
@@ -134,11 +134,11 @@ class _Machine:
         return False
 
     def _note(self, word: str) -> None:
-        """Remember a word that moves nothing."""
+        """Record a word that causes no motion."""
         self.idle.setdefault(word, [self.line, 0])[1] += 1
 
     def _execute(self, block: Block) -> bool:
-        """Execute a line, and return whether it ends the program."""
+        """Execute a line; return True if it ends the program."""
         codes, stops, words = block
         motion = self._motion_of(block)
         if not _ANYWHERE.issuperset(words):
@@ -157,27 +157,29 @@ class _Machine:
         return stops.get("stop") in (2, 30)
 
     def _motion_of(self, block: Block) -> float | None:
-        """Return the code of the motion that a line makes, given on it or before; None for none."""
+        """Return the motion code of a line, modal or given on it; None for no motion."""
         codes, _, words = block
         once, has_axes = codes.get("once"), not AXES.keys().isdisjoint(words)
         motion = codes.get("motion")
         if once in (10, 92):
             if motion not in (None, 80):
-                raise WordError(f"G{once:g}", f"cannot stand beside G{motion:g}: both take the words of axes")
+                raise WordError(f"G{once:g}", f"conflicts with G{motion:g}: both use axis words")
             return motion
         if motion is None and (has_axes or (self.motion in (2, 3) and not words.keys().isdisjoint(_CENTRE))):
             motion = self.motion
             if motion == 80:
                 word = next(letter for letter in words if letter in AXES)
-                raise WordError(f"{word}{words[word]:g}", "there is no motion: none of G0, G1, G2, G3 is in force")
+                raise WordError(
+                    f"{word}{words[word]:g}", "axis word without an active motion mode; program G0, G1, G2 or G3 first"
+                )
         if motion == 80 and has_axes:
-            raise WordError("G80", "cannot stand beside words of axes")
+            raise WordError("G80", "conflicts with axis words")
         if once == 53 and motion not in (0, 1):
             raise WordError("G53", "needs G0 or G1")
         return motion
 
     def _note_all(self, block: Block) -> None:
-        """Remember the words of a line that move nothing."""
+        """Record the words of a line that cause no motion."""
         for code in block.stops.values():
             self._note(f"M{code:g}")
         for letter in ("S", "T"):
@@ -185,7 +187,7 @@ class _Machine:
                 self._note(f"{letter}{block.words[letter]:g}")
 
     def _set_modes(self, codes: dict[str, float], words: dict[str, float]) -> None:
-        """Set the modes that a line states and that its feed depends on."""
+        """Set the modes of a line on which its feed depends."""
         if "feed" in codes:
             self.is_inverse_time = codes["feed"] == 93
             self.feed = self.turn_feed = 0.0
@@ -204,21 +206,21 @@ class _Machine:
     def _length(self, value: float) -> float:
         """Return a length of the program in the unit of the case."""
         if self.unit is None:
-            raise WordError("", "the unit of lengths is not known: state G20 or G21 before")
+            raise WordError("", "the unit of length is not known: program G20 or G21 first")
         # Two factors, so that a millimetre is the nearest number to a thousandth of a metre.
         return value * self.scale[0] / self.scale[1]
 
     def _set_feed(self, value: float, motion: float | None) -> None:
-        """Set the feed of a line: lengths or degrees per minute, or the inverse of its minutes."""
+        """Set the feed of a line: length or degrees per minute, or the inverse of the time in minutes."""
         if value < 0:
             raise WordError(f"F{value:g}", "is negative")
         if not self.is_inverse_time:
             self.feed, self.turn_feed = self._length(value), value
         elif motion not in (1, 2, 3):
-            raise WordError(f"F{value:g}", "is the inverse of a motion's time in G93, and the line has no G1, G2 or G3")
+            raise WordError(f"F{value:g}", "is an inverse time in G93, but the line has no G1, G2 or G3")
 
     def _act(self, codes: dict[str, float], words: dict[str, float]) -> None:
-        """Execute the codes of a line that make no motion, in LinuxCNC's order."""
+        """Execute the codes of a line that cause no motion, in LinuxCNC's order."""
         once = codes.get("once")
         if once == 4:
             self._dwell(words)
@@ -246,16 +248,16 @@ class _Machine:
             self._add(Kind.DWELL, self.now, words["P"])
 
     def _axis_words(self, words: dict[str, float], code: str) -> dict[int, float]:
-        """Return the numbers of a line by their axes, for a code that needs at least one."""
+        """Return the axis words of a line by axis, for a code that needs at least one."""
         found = {AXES[a]: self._length(v) if AXES[a] < 3 else v for a, v in words.items() if a in AXES}
         if not found:
-            raise WordError(code, "needs the words of axes")
+            raise WordError(code, "needs axis words")
         return found
 
     def _set_origin(self, words: dict[str, float]) -> None:
         """Set the origin of a coordinate system (G10)."""
         if words.get("L") not in (2, 20):
-            raise WordError("G10", "is read with L2 and L20 alone")
+            raise WordError("G10", "is supported only with L2 and L20")
         number = words.get("P", -1)
         if number not in range(len(SYSTEMS) + 1):
             raise WordError(
@@ -269,18 +271,18 @@ class _Machine:
             self.origins[system][axis] = origin
 
     def _set_axis_offsets(self, words: dict[str, float]) -> None:
-        """Set the offsets of axes, so that the point has the coordinates of the line (G92)."""
+        """Set the axis offsets, so that the point has the coordinates of the line (G92)."""
         for axis, value in self._axis_words(words, "G92").items():
             self.axis_offsets[axis] = self._stated(axis, "G92") - self.origins[self.system][axis] - value
 
     def _stated(self, axis: int, code: str) -> float:
-        """Return a coordinate of the point, which a code needs to be known."""
+        """Return a coordinate of the point; refuse a code that needs it if it is unknown."""
         if math.isnan(self.now[axis]):
             raise WordError(code, f"depends on {'XYZABC'[axis]} of the point, which is not known yet; give the start")
         return self.now[axis]
 
     def _move(self, motion: float, words: dict[str, float], is_machine: bool) -> None:
-        """Make a motion, if the line states where to, and keep its code for the lines that follow."""
+        """Make a motion if the line has axis words, and keep its code for the following lines."""
         self.motion = motion
         if motion == 80:
             return
@@ -312,7 +314,7 @@ class _Machine:
         return end
 
     def _seconds(self, length: float, end: list[float], words: dict[str, float]) -> float:
-        """Return the time of a motion at the feed, whose position has a way of a length."""
+        """Return the time, seconds, of a motion at the feed, for a given length of the translation."""
         if self.is_inverse_time:
             return 60 / words["F"]
         still = _NO_WAY * self.scale[0] / self.scale[1]
@@ -342,11 +344,11 @@ class _Machine:
         self._add(Kind.ARC, end, self._seconds(length, end, words), arc)
 
     def _centre(self, words: dict[str, float], given: list[str], first: int, second: int) -> tuple[float, float]:
-        """Return the centre that I, J and K state."""
+        """Return the centre given by I, J and K."""
         letters = [_CENTRE[first], _CENTRE[second]]
         for letter in given:
             if letter not in letters:
-                raise WordError(f"{letter}{words[letter]:g}", f"is no offset in the plane of G{self.plane}")
+                raise WordError(f"{letter}{words[letter]:g}", f"is not an offset in the plane of G{self.plane}")
         if not self.has_absolute_centres:
             offsets = [self._length(words.get(letter, 0)) for letter in letters]
             return self.now[first] + offsets[0], self.now[second] + offsets[1]
@@ -356,7 +358,7 @@ class _Machine:
         return one + self.shift[first], other + self.shift[second]
 
     def _add(self, kind: Kind, end: list[float], seconds: float, arc: Arc | None = None) -> None:
-        """Add a segment from the point to an end, or, where the point is not known, move there without one."""
+        """Add a segment from the point to an end; from an unknown point, only move there."""
         self.now = end
         if not self.is_known:
             self._note("motion before the path")
@@ -373,10 +375,10 @@ class _Machine:
 
 
 def _check_letters(codes: dict[str, float], words: dict[str, float], motion: float | None) -> None:
-    """Refuse letters that no code of the line uses, and a P that two of them use.
+    """Refuse letters that no code of the line uses, and a P that two codes use.
 
     Raises:
-        WordError: there is one.
+        WordError: the line has such a letter.
     """
     is_arc, once, is_blending = motion in (2, 3), codes.get("once"), codes.get("control") == 64
     times = [is_arc, once in (4, 10), is_blending].count(True)

@@ -1,6 +1,6 @@
-"""Options of reading a path, and the units of its file.
+"""Options for reading a path, and the units of its file.
 
-Numbers of a path are in the length unit of the case, and angles of options in degrees, as in programs.
+Lengths of a path are in the unit of the case, and angles of options in degrees, as in G-code.
 """
 
 from __future__ import annotations
@@ -15,22 +15,22 @@ from ..errors import InputError, listing, nearest
 from ..units import Units
 from .orientation import order_named
 
-#: Lengths in millimetres of the units of programs, by the code that selects them.
+#: Lengths of program units in millimetres, by their codes.
 MILLIMETRES = {20: Fraction(127, 5), 21: Fraction(1)}
-#: Lengths in millimetres of the units of cases, by their labels.
+#: Lengths of case units in millimetres, by their labels.
 _LABELS = {
     "um": Fraction(1, 1000), "mm": Fraction(1), "cm": Fraction(10), "dm": Fraction(100), "m": Fraction(1000),
     "in": MILLIMETRES[20], "ft": 12 * MILLIMETRES[20],
 }  # fmt: skip
-#: Names of coordinate systems in LinuxCNC, the first of which is number 1.
+#: Names of coordinate systems in LinuxCNC, numbered from 1.
 SYSTEMS = (54, 55, 56, 57, 58, 59, 59.1, 59.2, 59.3)
 
 
 class Between(enum.Enum):
-    """Motion between two points of a path.
+    """Interpolation between two points of a path.
 
-    ``ANGLES``: the three angles change linearly, as LinuxCNC moves the axes A, B and C; ``SLERP``: one turn about a
-    fixed axis by the smallest angle. The position changes linearly, or along an arc, in both.
+    ``ANGLES``: the three angles change linearly, as LinuxCNC moves the axes A, B and C. ``SLERP``: one rotation about a
+    fixed axis by the smallest angle. In both, the position changes linearly or along an arc.
     """
 
     ANGLES = "angles"
@@ -39,21 +39,22 @@ class Between(enum.Enum):
 
 @dataclass(frozen=True)
 class PathOptions:
-    """Choices that a path's file leaves open.
+    """Options that a path's file does not state.
 
     Attributes:
-        between: motion between two points; None for linear angles, and for ``SLERP`` where a table of poses states
+        between: interpolation between two points; None for linear angles, or for ``SLERP`` if a table of poses states
             quaternions, or axes and angles.
-        angles: convention of a program's A, B and C; see :data:`.orientation.ORDERS`.
-        unit: ``"mm"`` or ``"in"``, of a program before G20 or G21; None for that of the case if it is one of these.
-        start: (6,) X, Y, Z, A, B, C at which the machine stands before a program, in machine coordinates; None where
-            this is not known: the path then begins at the first point of which the program has stated X, Y and Z.
-        offsets: (6,) origins of the coordinate systems in machine coordinates, by their names, such as ``"G54"``; those
-            left out are 0.
-        skips_deleted: whether lines that begin with a slash are left out, as LinuxCNC does unless told otherwise.
+        angles: convention of a program's angles A, B and C; see :data:`.orientation.ORDERS`.
+        unit: length unit of a program before G20 or G21, ``"mm"`` or ``"in"``; None for that of the case if it is one
+            of these.
+        start: (6,) position X, Y, Z, A, B, C of the machine before a program, in machine coordinates; None if unknown:
+            the path then begins at the first point with known X, Y and Z.
+        offsets: (6,) origin of each coordinate system in machine coordinates, by its name, such as ``"G54"``; 0 for the
+            others.
+        skips_deleted: If true, lines that begin with a slash are skipped, as by default in LinuxCNC.
 
     Raises:
-        InputError: an option has another value.
+        InputError: the value of an option is not allowed.
     """
 
     between: Between | None = None
@@ -76,11 +77,11 @@ class PathOptions:
 
 
 def code_of_unit(unit: str | None, units: Units) -> int | None:
-    """Return the code of the unit in which a program begins; None where it is not known.
+    """Return the code of the initial unit of a program; None if it is unknown.
 
     Args:
-        unit: as in :class:`PathOptions`.
-        units: of the case.
+        unit: unit as in :class:`PathOptions`.
+        units: units of the case.
     """
     return {"mm": 21, "in": 20}.get(unit or units.length)
 
@@ -89,12 +90,12 @@ def program_unit(code: int, units: Units, source: str) -> Fraction:
     """Return the length of a program's unit in the unit of the case.
 
     Args:
-        code: of the program's unit, 20 or 21.
-        units: of the case.
+        code: code of the program's unit, 20 or 21.
+        units: units of the case.
         source: name of the program, for messages.
 
     Raises:
-        InputError: the case's unit has no known length.
+        InputError: the unit of the case has no known length.
     """
     if units.length not in _LABELS:
         fault = f"the case's unit of lengths, {units.length!r}, has no known length in millimetres"

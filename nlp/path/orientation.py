@@ -1,8 +1,8 @@
-"""Orientations of a path: three angles about the axes x, y and z, quaternions, and rotation matrices. Radians.
+"""Orientations of a path, radians: three angles about the axes x, y and z, quaternions, and rotation matrices.
 
-Conventions: ``rpy``, roll, pitch and yaw, is the rotation ``Rz(C) Ry(B) Rx(A)`` of the angles A, B and C, as in a
-case file and in LinuxCNC's kinematics of hexapods. The other names are those of the factors from left to right: ``xyz``
-is ``Rx(A) Ry(B) Rz(C)``. A quaternion is ``(w, x, y, z)``.
+Convention ``rpy`` (roll, pitch and yaw) is the rotation ``Rz(C) Ry(B) Rx(A)`` of the angles A, B and C, as in a case
+file and in LinuxCNC's kinematics of hexapods. Other names list the factors from left to right: ``xyz`` is ``Rx(A) Ry(B)
+Rz(C)``. A quaternion is ``(w, x, y, z)``.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ..errors import InputError, nearest
 
 #: Axes of the factors of a rotation from left to right: 0, 1, 2 for x, y, z.
 Order: TypeAlias = "tuple[int, int, int]"
-#: By the convention's name.
+#: Orders of the factors, by name of the convention.
 ORDERS: Mapping[str, Order] = {
     "rpy": (2, 1, 0),
     **{"".join("xyz"[axis] for axis in (a, b, c)): (a, b, c) for a, b, c in itertools.permutations(range(3))},
@@ -28,10 +28,10 @@ ORDERS: Mapping[str, Order] = {
 
 
 def order_named(name: str) -> Order:
-    """Return the factors of a rotation by the convention's name.
+    """Return the order of a rotation's factors by the name of the convention.
 
     Raises:
-        InputError: no convention has this name.
+        InputError: the convention is unknown.
     """
     if name not in ORDERS:
         raise InputError(f"angles = {name!r}: no such convention; {nearest(name, ORDERS)}")
@@ -69,10 +69,10 @@ def matrices_from_quaternions(quaternions: FloatArray) -> FloatArray:
 
 
 def roll_pitch_yaw(quaternions: FloatArray) -> FloatArray:
-    """Return the angles (n, 3) of convention ``rpy`` of unit quaternions (n, 4); the pitch is within a right angle.
+    """Return the ``rpy`` angles (n, 3) of unit quaternions (n, 4), with a pitch of at most a right angle.
 
-    At a pitch of a right angle only one combination of roll and yaw is determined. The roll is therefore the angle that
-    is left when the yaw is undone, so that the three give the rotation there too.
+    At a pitch of a right angle only one combination of roll and yaw is determined. The roll is the remaining angle
+    after removal of the yaw, so that the three angles give the rotation there too.
     """
     R = matrices_from_quaternions(quaternions)
     pitch = np.arctan2(-R[:, 2, 0], np.hypot(R[:, 0, 0], R[:, 1, 0]))
@@ -83,11 +83,11 @@ def roll_pitch_yaw(quaternions: FloatArray) -> FloatArray:
 
 
 def shortest_turns(start: FloatArray, end: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the axes (n, 3), in the world, and the angles (n,), in [0, pi], that turn one orientation into another.
+    """Return the axes (n, 3), world frame, and angles (n,), in [0, pi], of the rotations between orientations.
 
     Args:
         start: (n, 4) unit quaternions.
-        end: (n, 4) those after the turns.
+        end: (n, 4) unit quaternions after the rotations.
     """
     turn = quaternion_products(end, start * [1, -1, -1, -1])
     turn[turn[:, 0] < 0] *= -1
@@ -97,7 +97,7 @@ def shortest_turns(start: FloatArray, end: FloatArray) -> tuple[FloatArray, Floa
 
 
 def turned(start: FloatArray, axes: FloatArray, angles: FloatArray) -> FloatArray:
-    """Return the quaternions (n, 4) after turns about axes (n, 3) of the world by angles (n,)."""
+    """Return the quaternions (n, 4) after rotations about world axes (n, 3) by angles (n,)."""
     return quaternion_products(np.hstack([np.cos(angles / 2)[:, None], np.sin(angles / 2)[:, None] * axes]), start)
 
 
@@ -108,7 +108,7 @@ def symbolic_rotation(angles: SX, order: Order) -> SX:
 
 
 def _about(axis: int, angle: SX) -> SX:
-    """Return the rotation matrix about a coordinate axis: its entries are sine, cosine, 0 and 1 alone."""
+    """Return the rotation matrix about a coordinate axis, with entries sine, cosine, 0 and 1 only."""
     first, second = (axis + 1) % 3, (axis + 2) % 3
     matrix = SX.eye(3)
     matrix[first, first] = matrix[second, second] = ca.cos(angle)

@@ -1,9 +1,9 @@
-"""Programmed paths: points, and the lines, arcs, helices and dwells between them, in columns of numbers.
+"""Tool paths: points, and the lines, arcs, helices and dwells between them, as arrays.
 
-A path of a million segments is a few arrays; a :class:`Segment` is a view of one of them that is made when it is asked
-for. Along each segment a parameter goes from 0 to 1: the position is a linear or circular function of it, and so is the
-orientation. Poses are those of the platform frame in the world frame; machine coordinates of a program are the world's,
-unless the path has a frame of its own. Angles are radians.
+A path of a million segments is a few arrays; a :class:`Segment` is a view of one segment, made on demand. Along each
+segment a parameter runs from 0 to 1: position and orientation are linear or circular functions of it. Poses are those
+of the platform frame in the world frame. Machine coordinates are world coordinates unless the path has a frame. Angles
+are in radians.
 """
 
 from __future__ import annotations
@@ -64,11 +64,11 @@ class SymbolicPose(NamedTuple):
 
 
 class Shape(NamedTuple):
-    """What segments share whose poses are the same expressions of their numbers.
+    """Common form of segments whose poses are the same expressions of their parameters.
 
     Attributes:
         plane: code of the plane of an arc; None for a line and a dwell.
-        order: convention of angles that change linearly; None for a turn about an axis.
+        order: convention of linearly changing angles; None for a rotation about an axis.
     """
 
     plane: int | None
@@ -76,15 +76,15 @@ class Shape(NamedTuple):
 
     @property
     def size(self) -> int:
-        """Number of a segment's numbers."""
+        """Number of a segment's parameters."""
         return (6 if self.plane is None else 8) + (13 if self.order is None else 6)
 
     def pose(self, numbers: SX, s: SX) -> SymbolicPose:
-        """Return the pose at a parameter of a segment, in the path's frame where it has one.
+        """Return the pose at a path parameter of a segment, in the path's frame if it has one.
 
         Args:
-            numbers: (size, 1) of the segment, as numbers or symbols; see :attr:`Segment.numbers`.
-            s: (1, 1) from 0 at the start to 1 at the end.
+            numbers: (size, 1) parameters of the segment, as numbers or symbols; see :attr:`Segment.numbers`.
+            s: (1, 1) path parameter, from 0 at the start to 1 at the end.
         """
         count = 6 if self.plane is None else 8
         return SymbolicPose(self._position(numbers[:count], s), self._rotation(numbers[count:], s))
@@ -108,21 +108,22 @@ class Shape(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ProgrammedPath:
-    """A path of n segments, of which m are arcs.
+    """Tool path of n segments, m of them arcs.
 
     Attributes:
         source: name of the file.
-        knots: (n + 1, 6) position and angles of the ends: segment k goes from knot k to knot k + 1. These numbers, and
-            those of arcs, are coordinates of the frame, if there is one, else of the world.
-        lines: (n,) lines of the file, or rows of a table, that make the segments.
-        kinds: (n,) kinds of the segments.
-        durations: (n,) seconds; NaN where the file states neither time nor feed, as for rapid motions.
-        arcs: (m, 6) centre, radius, growth of the radius, angle and sweep of every arc; see :class:`.arcs.Arc`.
-        planes: (m,) codes of their planes.
+        knots: (n + 1, 6) position and angles of the segment ends: segment k goes from knot k to knot k + 1. Knots and
+            arcs are in the path's frame if there is one, else in the world frame.
+        lines: (n,) line of the file, or row of a table, for each segment.
+        kinds: (n,) kind of each segment.
+        durations: (n,) duration of each segment, seconds; NaN if the file states neither time nor feed, as for rapid
+            motions.
+        arcs: (m, 6) centre, radius, growth of the radius, angle and sweep of each arc; see :class:`.arcs.Arc`.
+        planes: (m,) code of the plane of each arc.
         order: convention of the angles.
-        between: motion between two points.
-        idle: what moves nothing.
-        frame: place of the path in the world; None where its numbers are those of the world.
+        between: interpolation between two points.
+        idle: ignored words and lines, which cause no motion.
+        frame: frame of the path in the world frame; None if the path is in world coordinates.
     """
 
     source: str
@@ -157,22 +158,22 @@ class ProgrammedPath:
 
     @cached_property
     def untimed(self) -> NDArray[np.intp]:
-        """Indices of the segments whose time the file does not state."""
+        """Indices of the segments without a stated time."""
         return np.flatnonzero(np.isnan(self.durations))
 
     @property
     def is_timed(self) -> bool:
-        """Whether the file states the time of a motion."""
+        """True if the file states the time of a motion."""
         return bool(np.isfinite(self.durations[self.kinds != Kind.DWELL]).any())
 
     @property
     def time(self) -> float:
-        """Seconds of the segments whose time is stated."""
+        """Total time of the segments with a stated time, seconds."""
         return math.fsum(self.durations[np.isfinite(self.durations)].tolist())
 
     @cached_property
     def lengths(self) -> FloatArray:
-        """Lengths (n,) of the ways of the position."""
+        """Length (n,) of the translation in each segment."""
         lengths = np.asarray(np.linalg.norm(np.diff(self.knots[:, :3], axis=0), axis=1))
         k, axis = self.arc_segments, _AXES[self.planes - 17, 2]
         rises = self.knots[k + 1, axis] - self.knots[k, axis]
@@ -180,11 +181,11 @@ class ProgrammedPath:
         return lengths
 
     def poses_at(self, segments: Sequence[int] | NDArray[np.intp], s: ArrayLike) -> Poses:
-        """Return the poses at points of segments, in NumPy.
+        """Return the poses at points of segments, computed by NumPy.
 
         Args:
             segments: (k,) indices of segments.
-            s: (k,) parameters, from 0 to 1, or one for all.
+            s: (k,) path parameters, from 0 to 1, or one for all.
         """
         index = np.asarray(segments, dtype=np.intp)
         parameter = np.broadcast_to(np.asarray(s, dtype=np.float64), index.shape)[:, None]
@@ -208,12 +209,12 @@ class ProgrammedPath:
         return Poses(positions, matrices_from_quaternions(quaternions))
 
     def arc_of(self, segment: int) -> tuple[Arc, int]:
-        """Return the arc of a segment that is one, and the code of its plane."""
+        """Return the arc of an arc segment, and the code of its plane."""
         row = int(np.searchsorted(self.arc_segments, segment))
         return Arc(*self.arcs[row].tolist()), int(self.planes[row])
 
     def shapes(self) -> dict[Shape, NDArray[np.intp]]:
-        """Return the indices of the segments of each shape: as many expressions describe the whole path."""
+        """Return the indices of the segments of each shape; the path needs as many expressions as it has shapes."""
         order = None if self.between is Between.SLERP else self.order
         found = {Shape(None, order): np.flatnonzero(self.kinds != Kind.ARC)}
         found |= {Shape(plane, order): self.arc_segments[self.planes == plane] for plane in PLANES}
@@ -222,11 +223,11 @@ class ProgrammedPath:
 
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """A segment of a path.
+    """Segment of a path.
 
     Attributes:
         path: the path.
-        index: of the segment in it.
+        index: index of the segment in the path.
     """
 
     path: ProgrammedPath
@@ -254,12 +255,12 @@ class Segment:
 
     @property
     def length(self) -> float:
-        """Length of the way of the position."""
+        """Length of the translation."""
         return float(self.path.lengths[self.index])
 
     @property
     def duration(self) -> float | None:
-        """Seconds; None where the file does not state them."""
+        """Duration, seconds; None if the file does not state it."""
         seconds = float(self.path.durations[self.index])
         return None if np.isnan(seconds) else seconds
 
@@ -271,10 +272,10 @@ class Segment:
 
     @property
     def numbers(self) -> FloatArray:
-        """The numbers (size,) from which :meth:`Shape.pose` makes this segment's pose.
+        """Parameters (size,) of the segment for :meth:`Shape.pose`.
 
-        Of a line the start and the change of the position; of an arc its six numbers, and start and change along the
-        axis. Then start and change of the angles, or the first rotation matrix column by column, axis and angle.
+        For a line: start and change of the position; for an arc: its six parameters, and start and change along the
+        axis. Then start and change of the angles; or the first rotation matrix column by column, axis and angle.
         """
         start, change = self.start, self.end - self.start
         position = [start[:3], change[:3]]
@@ -289,12 +290,12 @@ class Segment:
         return np.concatenate([*position, matrices_from_quaternions(first)[0].ravel(order="F"), axes[0], angles])
 
     def pose_at(self, s: float) -> Poses:
-        """Return position (3,) and rotation matrix (3, 3) at a parameter from 0 to 1."""
+        """Return position (3,) and rotation matrix (3, 3) at a path parameter from 0 to 1."""
         positions, rotations = self.path.poses_at([self.index], s)
         return Poses(positions[0], rotations[0])
 
     def expressions(self, s: SX) -> SymbolicPose:
-        """Return the pose as expressions of the parameter (1, 1)."""
+        """Return the pose as expressions of the path parameter (1, 1)."""
         pose, frame = self.shape.pose(SX(self.numbers), s), self.path.frame
         if frame is None:
             return pose

@@ -1,8 +1,8 @@
-"""A path in another place: its frame moved and turned in the world.
+"""Placement of a path: translation and rotation of its frame in the world frame.
 
-Lines stay lines wherever the frame is, and arcs in the plane XY stay such after a turn about z. These paths have their
-numbers in the world. An arc in a tilted plane, and angles that change linearly before another turn, have none there:
-such a path keeps its numbers, and has a frame.
+Lines stay lines for every placement, and arcs in the plane XY stay such after a rotation about z: these paths are
+converted to world coordinates. Arcs in tilted planes, and linearly changing angles before another rotation, cannot be:
+such a path keeps its coordinates and has a frame.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from .path import ProgrammedPath
 
 
 def placed(path: ProgrammedPath, place: Sequence[float]) -> ProgrammedPath:
-    """Return a path whose frame has another place.
+    """Return a path with its frame placed in the world frame.
 
     Args:
-        path: in the frame.
-        place: (6,) of the frame: position, then roll, pitch and yaw, radians.
+        path: path in its frame.
+        place: (6,) placement of the frame: position, then roll, pitch and yaw, radians.
     """
     frame = _frame(np.array(place, dtype=np.float64))
     position, angles = frame.origin, frame.angles
@@ -55,11 +55,11 @@ def placed(path: ProgrammedPath, place: Sequence[float]) -> ProgrammedPath:
 
 
 def _has_numbers_in_world(path: ProgrammedPath, *, about_z: bool) -> bool:
-    """Return whether a turned path has arcs in planes of the world's axes, and angles that change linearly there.
+    """Return True if a rotated path can be converted to world coordinates.
 
     Args:
-        path: in its frame.
-        about_z: whether the turn is about z alone.
+        path: path in its frame.
+        about_z: True if the rotation is about z only.
     """
     if len(path.arcs) and not (about_z and (path.planes == 17).all()):
         return False
@@ -68,17 +68,16 @@ def _has_numbers_in_world(path: ProgrammedPath, *, about_z: bool) -> bool:
 
 
 def in_world(place: FloatArray, position: FloatArray, rotation: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return position (3,) and rotation (3, 3) in the world of a pose in a frame with a place (6,)."""
+    """Return world position (3,) and rotation (3, 3) of a pose in a frame with a placement (6,)."""
     R = _frame(place).rotation
     return place[:3] + R @ position, R @ rotation
 
 
 def in_frame(place: FloatArray, position: FloatArray, rotation: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return position and rotation in a frame with a place of a pose in the world: the inverse of the above."""
+    """Return position and rotation of a world pose in a frame with a placement (6,), inverse to :func:`in_world`."""
     R = _frame(place).rotation
     return R.T @ (position - place[:3]), R.T @ rotation
 
 
 def _frame(place: FloatArray) -> PathFrame:
-    """Return the frame with a place (6,)."""
     return PathFrame(place[:3], place[3:])

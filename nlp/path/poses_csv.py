@@ -1,7 +1,6 @@
-"""Paths as tables of poses: each row of a CSV file is a point, in the columns of a case's poses.
+"""Tool paths from tables of poses: each row of a CSV file is a point, with the pose columns of a case.
 
-Columns ``t``, seconds, or ``feed``, lengths or angles per second, state the times. Numbers are in the units of the
-case.
+Columns ``t`` (seconds) or ``feed`` (length or angle per second) state the times. Values are in the units of the case.
 """
 
 from __future__ import annotations
@@ -16,13 +15,13 @@ from ..units import Units
 from .options import Between, PathOptions
 from .orientation import ORDERS, order_named, roll_pitch_yaw
 from .path import Kind, ProgrammedPath
-from .standing import duration_at, still_way, turns_between, without_rests
+from .standing import duration_at, rest_length, turns_between, without_rests
 
-#: Columns of poses, and of the time.
+#: Columns of poses and of times.
 _ROWS = POSE_ROWS._replace(others={**POSE_ROWS.others, "t": ("t",), "feed": ("feed",)})
-#: Cells of a rotation that a row leaves out; 0 for all others.
+#: Default values of empty rotation cells; 0 for all others.
 _LEFT_OUT = {"qw": "1", "axis_z": "1"}
-#: Largest distance of a quaternion's size from 1, as in a case file.
+#: Largest deviation of a quaternion's norm from 1, as in a case file.
 _ROUNDING = 1e-6
 
 
@@ -30,21 +29,23 @@ def read_poses(text: str, source: str, units: Units, options: PathOptions) -> Pr
     """Return the path through the rows of a table.
 
     Args:
-        text: of the file.
-        source: its name, for messages.
-        units: of the case.
-        options: of which the motion between two rows counts here; a convention of angles is for programs alone.
+        text: text of the file.
+        source: name of the file, for messages.
+        units: units of the case.
+        options: options for reading; only the interpolation between rows has an effect.
 
     Raises:
         InputError: the table has a fault, or fewer than two points.
     """
     if order_named(options.angles) != ORDERS["rpy"]:
-        raise InputError(f"{source}: angles = {options.angles!r}: is for programs; tables have roll, pitch and yaw")
+        raise InputError(f"{source}: angles = {options.angles!r}: is only for G-code; tables have roll, pitch and yaw")
     table = _read_table(text, source)
     has_angles = not {"qw", "axis_x", "angle"} & table.columns.keys()
     between = options.between or (Between.ANGLES if has_angles else Between.SLERP)
     if between is Between.ANGLES and not has_angles:
-        raise InputError(f"{source}: linear angles need columns roll, pitch, yaw; other rotations are joined by slerp")
+        raise InputError(
+            f"{source}: linear angles need columns roll, pitch, yaw; other rotations are interpolated by slerp"
+        )
     knots = np.hstack([table.block("x y z"), _angles(table, units)])
     if len(knots) < 2:
         raise InputError(f"{source}: there is no path: fewer than two points below a row that names the columns")
@@ -59,15 +60,15 @@ def read_poses(text: str, source: str, units: Units, options: PathOptions) -> Pr
         ORDERS["rpy"],
         between,
     )
-    # A point that is there twice is a dwell where its time is stated, and no segment where it is not.
+    # A repeated point is a dwell if its time is stated, else no segment.
     return without_rests(path, are_timed="t" in table.columns)
 
 
 def _read_table(text: str, source: str) -> NumberTable:
-    """Return the numbers of a file.
+    """Return the values of a file.
 
     Raises:
-        InputError: it is no table, has columns that are not those of a path, or a cell is no number.
+        InputError: the file is not a table, has unknown columns, or a cell is not a number.
     """
     records = csv_rows(text, source)
     top, header = next(records, (0, []))
@@ -75,12 +76,12 @@ def _read_table(text: str, source: str) -> NumberTable:
         raise InputError(f"{source}: has no rows below a row that names the columns")
     found = check_header(header, _ROWS, lambda fault: CaseError(f"row {top}", fault, source=source))
     if {"t", "feed"} <= found.keys():
-        raise CaseError(f"row {top}", "column 'feed' cannot stand beside 't'; state the time in one way", source=source)
+        raise CaseError(f"row {top}", "column 'feed' conflicts with 't'; keep one of them", source=source)
     turns = [names for key, names in found.items() if key in POSE_ROWS.others]
     left_out = [{header.index(name): _LEFT_OUT.get(name, "0") for name in names} for names in turns]
     table = number_table(records, header, source, left_out)
     for name, column in table.columns.items():
-        table.refuse(~(np.abs(column) <= LARGEST), name, f"must be finite, of a size of at most {LARGEST:g}")
+        table.refuse(~(np.abs(column) <= LARGEST), name, f"must be finite and at most {LARGEST:g} in size")
     return table
 
 
@@ -103,7 +104,7 @@ def _angles(table: NumberTable, units: Units) -> FloatArray:
 
 
 def _durations(table: NumberTable, knots: FloatArray, between: Between, units: Units) -> FloatArray:
-    """Return the times (n - 1,) from each row to the next, in seconds; NaN where none is stated."""
+    """Return the times (n - 1,) from each row to the next, seconds; NaN if not stated."""
     durations = np.full(len(knots) - 1, np.nan)
     if "t" in table.columns:
         durations = np.diff(table.columns["t"])
@@ -115,5 +116,5 @@ def _durations(table: NumberTable, knots: FloatArray, between: Between, units: U
         ways = np.linalg.norm(np.diff(knots[:, :3], axis=0), axis=1)
         turns = turns_between(knots[:, 3:], ORDERS["rpy"], between)
         both = feeds[1:], feeds[1:] * units.to_internal(1, Dimension.ANGLE)
-        durations = duration_at(ways, turns, both, still_way(knots[:, :3]))
+        durations = duration_at(ways, turns, both, rest_length(knots[:, :3]))
     return durations

@@ -1,4 +1,4 @@
-"""Files of paths: G-code, and tables of poses, whose names end in ``.csv``."""
+"""Reading of tool-path files: G-code, and tables of poses with names that end in ``.csv``."""
 
 from __future__ import annotations
 
@@ -20,28 +20,28 @@ from .path import ProgrammedPath
 from .placing import placed
 from .poses_csv import read_poses
 
-#: Size of the largest file, bytes: some ten million lines.
+#: Largest size of a file, bytes: some ten million lines.
 _LARGEST = 2**28
-#: Smallest distance of a shortest turn from half a turn, radians: nearer, rounding would choose its sense.
+#: Smallest difference of a shortest rotation from half a turn, radians: below it, rounding would choose the direction.
 _HALF_TURN = 1e-9
 
 
 def read_path(file: str | Path, units: Units, options: PathOptions | None = None) -> ProgrammedPath:
-    """Return the path in a file.
+    """Return the tool path of a file.
 
     Args:
         file: name of the file.
-        units: of the case.
+        units: units of the case.
         options: choices that the file leaves open.
 
     Raises:
-        InputError: the file cannot be read, or holds anything that is not read.
+        InputError: the file cannot be read, or contains an unsupported word.
     """
     return path_of_text(text_of_path(file), str(file), units, options)
 
 
 def text_of_path(file: str | Path) -> str:
-    """Return the text of a path's file, with the line ends of Unix.
+    """Return the text of a path's file, with Unix line ends.
 
     Raises:
         InputError: the file cannot be read.
@@ -52,27 +52,27 @@ def text_of_path(file: str | Path) -> str:
             return text_of_bytes(content)
         except UnicodeDecodeError:
             raise InputError(f"{file}: cannot be read: it is not UTF-8 text") from None
-    # Comments may be in any encoding; a word of a program is ASCII.
+    # Comments may have any encoding; words of G-code are ASCII.
     text = content.removeprefix(b"\xef\xbb\xbf").decode("ascii", "replace")
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def is_table(file: str) -> bool:
-    """Return whether a file of a path is a table of poses, by its name; else it is a program."""
+    """Return True if a file is a table of poses, by its name; otherwise it is G-code."""
     return file.lower().endswith(".csv")
 
 
 def path_of_text(text: str, source: str, units: Units, options: PathOptions | None = None) -> ProgrammedPath:
-    """Return the path in the text of a file.
+    """Return the tool path of a file's text.
 
     Args:
-        text: the text, with the line ends of Unix.
-        source: name of the file, which tells tables from programs.
-        units: of the case.
+        text: text with Unix line ends.
+        source: name of the file, which distinguishes tables from G-code.
+        units: units of the case.
         options: choices that the file leaves open.
 
     Raises:
-        InputError: the text holds anything that is not read.
+        InputError: the text contains an unsupported word.
     """
     options = options or PathOptions()
     if is_table(source):
@@ -85,60 +85,60 @@ def path_of_text(text: str, source: str, units: Units, options: PathOptions | No
 
 
 def path_of_case(case: Case, options: PathOptions | None = None) -> ProgrammedPath:
-    """Return the path that a case states, in its place.
+    """Return the tool path of a case, in its placement.
 
     Args:
         case: the case.
-        options: in the place of those that the case states.
+        options: options that replace those of the case.
 
     Raises:
-        CaseError: it states none, or a number of its place is free.
-        InputError: its file cannot be read, or holds anything that is not read.
+        CaseError: the case has no path, or a parameter of its placement is free.
+        InputError: the path's file cannot be read, or contains an unsupported word.
     """
     return in_place_of_case(stated_path(case, options), case)
 
 
 def in_place_of_case(path: ProgrammedPath, case: Case) -> ProgrammedPath:
-    """Return the path of a case's file in the place that the case states.
+    """Return the path of a case's file in the placement that the case states.
 
     Raises:
-        CaseError: a number of its place is free.
+        CaseError: a parameter of the placement is free.
     """
     stated = case.path
     numbers = () if stated is None else stated.place
     fixed = [value for value in numbers if not isinstance(value, Free)]
     if stated is not None and stated.free:
-        fault = "is free, and a path is judged in one place: give it with --set, or a result with --of"
+        fault = "is free, but a path needs one placement: fix it with --set, or give a result with --of"
         raise CaseError(f"path.place.{stated.free[0]}", fault, source=case.source)
     return placed(path, fixed)
 
 
 def stated_path(case: Case, options: PathOptions | None = None) -> ProgrammedPath:
-    """Return the path that a case states, in its own frame; arguments and errors are those of :func:`path_of_case`."""
+    """Return the tool path of a case, in its frame; arguments and errors are those of :func:`path_of_case`."""
     stated = case.path
     if stated is None:
         raise CaseError("path", "is missing: give the table [path], or the file of a path", source=case.source)
-    # What is wrong is told with the file's whole name, and results have the stated one.
+    # Messages name the file with its whole path; results use the stated name.
     path = read_path(stated.name, case.units, options or options_of(stated))
     return replace(path, source=stated.file)
 
 
 def options_of(stated: PathFile) -> PathOptions:
-    """Return the options of reading a path that a case states."""
+    """Return the options for reading the path of a case."""
     between = None if stated.between is None else Between(stated.between)
     return PathOptions(between, stated.angles, stated.unit, stated.start, stated.offsets)
 
 
 def _check_turns(path: ProgrammedPath) -> None:
-    """Refuse a segment between orientations that two shortest turns join.
+    """Refuse a segment with two shortest rotations between its orientations.
 
     Raises:
-        InputError: there is one.
+        InputError: the path has such a segment.
     """
     quaternions = quaternions_from_angles(path.knots[:, 3:], path.order)
     _, angles = shortest_turns(quaternions[:-1], quaternions[1:])
     if (angles > np.pi - _HALF_TURN).any():
         line = path.lines[int(np.argmax(angles))]
         raise InputError(
-            f"{path.source}: line {line}: turns by half a turn, which may go either way; add a point between"
+            f"{path.source}: line {line}: rotates by half a turn, so its direction is ambiguous; add a point between"
         )

@@ -1,4 +1,4 @@
-"""Points spread over a path, the way to them, and velocities there: for pictures."""
+"""Sample points of a path, progress along it, and velocities, for pictures."""
 
 from __future__ import annotations
 
@@ -14,48 +14,48 @@ from .path import Kind, ProgrammedPath
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Points beside the ends of segments, where these leave room for them.
+#: Number of points in addition to the ends of segments, if these leave room.
 _INSIDE = 600
-#: Part of a segment over which a velocity is a difference: a rotation in it is small, and its rounding too.
+#: Fraction of a segment for a difference quotient: small rotations, and small rounding.
 _STEP = 1e-5
 
 
 class Points(NamedTuple):
-    """Points of a path, in its order: indices (P,) of segments, and parameters (P,) from 0 to 1."""
+    """Points of a path in order: segment indices (P,), and path parameters (P,) from 0 to 1."""
 
     segments: NDArray[np.intp]
     parameters: FloatArray
 
 
-class WayKind(enum.Enum):
-    """Number that says how far a path has come."""
+class ProgressKind(enum.Enum):
+    """Quantity that measures the progress along a path."""
 
     TIME = "time"
     LENGTH = "length along the path"
     SEGMENTS = "segments"
 
 
-class Way(NamedTuple):
-    """How far a path has come at the knots (n + 1,): seconds, length, or number of segments."""
+class Progress(NamedTuple):
+    """Progress along a path at the knots (n + 1,): seconds, length, or number of segments."""
 
-    kind: WayKind
+    kind: ProgressKind
     knots: FloatArray
 
     def at(self, points: Points) -> FloatArray:
-        """Return the numbers (P,) at points."""
+        """Return the progress (P,) at points."""
         start = self.knots[points.segments]
         return np.asarray(start + points.parameters * (self.knots[points.segments + 1] - start))
 
 
 def spread_points(path: ProgrammedPath, most: int, also: Sequence[tuple[int, float]] = ()) -> Points:
-    """Return points spread over a path by the sizes of its motions, positions and angles alike.
+    """Return points spread over a path by the sizes of its motions, translations and rotations alike.
 
-    Both ends of each segment are among them, unless the path has too many for that.
+    Both ends of each segment are included, unless there are too many.
 
     Args:
         path: the path.
         most: number of points.
-        also: segments and parameters of further points.
+        also: segments and path parameters of further points.
     """
     count, turned = len(path), np.abs(np.diff(path.knots[:, 3:], axis=0)).sum(axis=1)
     shares = path.lengths / (path.lengths.sum() or 1.0) + turned / (turned.sum() or 1.0)
@@ -76,20 +76,20 @@ def spread_points(path: ProgrammedPath, most: int, also: Sequence[tuple[int, flo
     return Points(every[:, 0].astype(np.intp), every[:, 1])
 
 
-def way_of(path: ProgrammedPath) -> Way:
-    """Return how far a path has come: its time if that is known throughout, else its length, if each motion has one."""
-    kinds = ((WayKind.TIME, path.durations), (WayKind.LENGTH, path.lengths))
+def progress_of(path: ProgrammedPath) -> Progress:
+    """Return the progress along a path: time if known throughout, else length if each motion has one, else segments."""
+    kinds = ((ProgressKind.TIME, path.durations), (ProgressKind.LENGTH, path.lengths))
     for kind, sizes in kinds:
-        moves = (path.kinds != Kind.DWELL) if kind is WayKind.LENGTH else np.ones(len(path), dtype=bool)
+        moves = (path.kinds != Kind.DWELL) if kind is ProgressKind.LENGTH else np.ones(len(path), dtype=bool)
         if np.isfinite(sizes).all() and (sizes[moves] > 0).all() and sizes.any():
-            return Way(kind, np.concatenate([[0.0], np.cumsum(sizes)]))
-    return Way(WayKind.SEGMENTS, np.arange(len(path) + 1.0))
+            return Progress(kind, np.concatenate([[0.0], np.cumsum(sizes)]))
+    return Progress(ProgressKind.SEGMENTS, np.arange(len(path) + 1.0))
 
 
 def twists_at(path: ProgrammedPath, points: Points) -> FloatArray:
-    """Return motions (P, 6) of the platform: angular velocity, then that of its origin, both in the world frame.
+    """Return platform twists (P, 6): angular velocity, then velocity of the platform's origin, in the world frame.
 
-    They are per second where the durations of segments are known, and NaN elsewhere.
+    Twists are per second for segments with a known duration, else NaN.
     """
     segments, s = points
     ends = np.clip(s - _STEP, 0.0, 1.0), np.clip(s + _STEP, 0.0, 1.0)

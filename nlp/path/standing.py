@@ -1,7 +1,7 @@
-"""Points of a path at which the platform stands: a pose that is stated again, up to the rounding of its digits.
+"""Points of a path without motion: repetitions of a pose up to the rounding of its digits.
 
-Such a motion has no direction, and its feed gives it a time of rounding size, in which any speed is possible. It is no
-segment; with a time of its own it is a dwell.
+Such a motion has no direction, and at a feed its time is rounding error, so that any speed would be possible. It is not
+a segment; with a stated time it is a dwell.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from .path import Kind, ProgrammedPath
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Way, as a part of the largest coordinate of a path, and turn, radians, up to which the platform stands: of numbers
-#: with eleven digits the last one.
+#: Translation, relative to the largest coordinate of a path, and rotation, radians, that count as rest: the last of
+#: eleven digits.
 STILL = 1e-11
 
 
 def turns_between(angles: FloatArray, order: Order, between: Between) -> FloatArray:
-    """Return the sizes (n,) of the turns from each of n + 1 orientations to the next, radians.
+    """Return the rotation angles (n,) between successive orientations, n + 1 of them, radians.
 
     Args:
         angles: (n + 1, 3) angles of the orientations, radians.
         order: convention of the angles.
-        between: motion between two of them: a shortest turn, or three angles that change.
+        between: interpolation between two orientations.
     """
     if between is Between.ANGLES:
         return np.asarray(np.linalg.norm(np.diff(angles, axis=0), axis=1))
@@ -39,52 +39,52 @@ def turns_between(angles: FloatArray, order: Order, between: Between) -> FloatAr
     return shortest_turns(quaternions[:-1], quaternions[1:])[1]
 
 
-def still_way(positions: FloatArray) -> float:
-    """Return the length of a way between positions (n, 3) up to which the platform stands."""
+def rest_length(positions: FloatArray) -> float:
+    """Return the length of a translation between positions (n, 3) up to which the platform is at rest."""
     return STILL * float(np.abs(positions).max(initial=0.0))
 
 
 def standing(knots: FloatArray, order: Order, between: Between) -> NDArray[np.intp]:
-    """Return for each knot (n,) the one at which the platform stands then: itself, or one before it.
+    """Return for each knot (n,) the knot of its rest: itself, or an earlier one.
 
     Args:
         knots: (n, 6) positions and angles.
         order: convention of the angles.
-        between: motion between two knots.
+        between: interpolation between two knots.
     """
-    most, at = still_way(knots[:, :3]), np.arange(len(knots))
+    most, at = rest_length(knots[:, :3]), np.arange(len(knots))
 
     def stands(one: FloatArray) -> NDArray[np.bool_]:
         ways = np.linalg.norm(np.diff(one[:, :3], axis=0), axis=1)
         return np.asarray((ways <= most) & (turns_between(one[:, 3:], order, between) <= STILL))
 
     for k in (np.flatnonzero(stands(knots)) + 1).tolist():
-        # Many short steps one after the other are a motion.
+        # Many short steps in succession are a motion.
         if at[k - 1] == k - 1 or stands(knots[[at[k - 1], k]])[0]:
             at[k] = at[k - 1]
     return at
 
 
 def duration_at(way: FloatArray, turn: FloatArray, feeds: tuple[FloatArray, FloatArray], still: float) -> FloatArray:
-    """Return the times of motions at a feed, seconds: of the way, or, for a turn in place, of the turn.
+    """Return the times of motions at a feed, seconds: of the translation, or of a pure rotation.
 
     Args:
-        way: lengths.
-        turn: radians.
-        feeds: lengths, and radians, per second.
-        still: way up to which the platform turns in place.
+        way: lengths of the translations.
+        turn: rotation angles, radians.
+        feeds: feeds of translation (length per second) and of rotation (radians per second).
+        still: length of a translation that counts as a pure rotation.
     """
     of_way, of_turn = way / feeds[0], turn / feeds[1]
-    # Neither of both is a motion: a part of one.
+    # Neither translation nor rotation is a motion by itself: a part of one.
     of_rest = np.where(turn > STILL, of_turn, np.maximum(of_way, of_turn))
     return np.asarray(np.where(way > still, of_way, of_rest))
 
 
 def _times_of_steps(path: ProgrammedPath, at: NDArray[np.intp]) -> FloatArray:
-    """Return the times of segments, where short steps one after the other are one motion in the time of them all."""
+    """Return the times of segments; successive short steps share the time of their motion."""
     found = path.durations.copy()
     ways, turns = path.lengths, turns_between(path.knots[:, 3:], path.order, path.between)
-    most = still_way(path.knots[:, :3])
+    most = rest_length(path.knots[:, :3])
     for k in np.flatnonzero((ways <= most) & (turns <= STILL) & (at[1:] == np.arange(1, len(path.knots)))).tolist():
         ends = path.knots[[at[k], k + 1]]
         way = float(np.linalg.norm(ends[1, :3] - ends[0, :3]))
@@ -96,18 +96,18 @@ def _times_of_steps(path: ProgrammedPath, at: NDArray[np.intp]) -> FloatArray:
 
 
 def without_rests(path: ProgrammedPath, *, are_timed: bool) -> ProgrammedPath:
-    """Return a path without the lines along which the platform stands.
+    """Return a path without the lines in which the platform is at rest.
 
     Args:
         path: the path.
-        are_timed: whether the times of lines are stated by themselves: such a line is a dwell then.
+        are_timed: True if lines have their own times; such a line becomes a dwell.
 
     Raises:
-        InputError: no segment is left.
+        InputError: the path has no other segment.
     """
     at = standing(path.knots, path.order, path.between)
     still = (at[1:] < np.arange(1, len(path.knots))) & (path.kinds == Kind.LINE)
-    # A dwell behind points that are left out is where the platform stands.
+    # A dwell after removed points is where the platform is at rest.
     knots = path.knots[at]
     if not still.any():
         return path if np.array_equal(knots, path.knots) else replace(path, knots=knots)
@@ -115,7 +115,7 @@ def without_rests(path: ProgrammedPath, *, are_timed: bool) -> ProgrammedPath:
         return replace(path, knots=knots, kinds=np.where(still, Kind.DWELL, path.kinds).astype(np.uint8))
     kept, durations = ~still, _times_of_steps(path, at)
     if not kept.any():
-        raise InputError(f"{path.source}: there is no path: all of its points are one pose")
+        raise InputError(f"{path.source}: there is no path: all points are the same pose")
     return replace(
         path,
         knots=knots[np.concatenate([[True], kept])],

@@ -1,1 +1,1 @@
-"""The nonlinear program of a case."""
+"""Nonlinear program of a case."""

@@ -1,9 +1,9 @@
 """Largest force, speed or power of the actuators as the objective, over loads, actuators and poses.
 
-It is the worst of many values, and so an epigraph variable is minimised: :mod:`.epigraph`. Its square bounds their
-squares, which are smooth where a force changes its sense, and are what a search of a whole box bounds best.
+The objective is a minimised epigraph variable (:mod:`.epigraph`). Its square bounds the squares of the forces, speeds
+or powers, which are smooth where a force changes its sign, and which a search over boxes bounds best.
 
-It is in the case's unit, degrees per second where angles are in degrees, and so are its bounds, slopes and multipliers.
+The objective is in the unit of the case, such as degrees per second, and so are its bounds, slopes and multipliers.
 """
 
 from __future__ import annotations
@@ -30,26 +30,26 @@ from .sampling import starting_points
 
 #: Number of points at which the size of the objective is evaluated.
 _SIZE_POINTS = 32
-#: Upper bound of the level, as a multiple of the median of that size.
+#: Upper bound of the level, as a multiple of the median of these sizes.
 _LEVEL_BOUND = 8.0
 
 
-#: End of the name of the square of a force in the other sense.
+#: Suffix of the name of a squared force in the other sense.
 OTHER_SENSE = ", other sense"
 
 
 class Measured(NamedTuple):
-    """A number of an actuator, (1, 1), and its name."""
+    """Value (1, 1) of an actuator quantity, with its name."""
 
     name: str
     value: SX
 
 
 def formulate_actuators(layout: Layout) -> Nlp:
-    """Return the program that makes the largest number of the actuators as small as possible.
+    """Return the program that minimises the largest actuator force, speed or power.
 
     Args:
-        layout: a case with one task, which has a measure.
+        layout: layout of a case with one task, whose objective is an actuator quantity.
 
     Raises:
         CaseError: a limb has zero length at every point of the box.
@@ -63,7 +63,7 @@ def formulate_actuators(layout: Layout) -> Nlp:
 
 
 def _values(layout: Layout) -> Iterator[Measured]:
-    """Yield the squares of the numbers of all actuators, under each load case and at each pose."""
+    """Yield the squared values of all actuators, under each load case and at each pose."""
     case, robots = layout.case, layout.robots
     for k, robot in enumerate(robots):
         where = f" pose {k + 1}" if len(robots) > 1 else ""
@@ -73,12 +73,12 @@ def _values(layout: Layout) -> Iterator[Measured]:
 
 
 def squares_of(case: Case, forces: PosedForces) -> Iterator[Measured]:
-    """Yield the squares of the numbers of all actuators at a pose, under each load case, in the case's unit."""
+    """Yield the squared values of all actuators at a pose, under each load case, in the case's unit."""
     measure = case.tasks[0].measure
     for k, joint in enumerate(forces.joints):
         name = f"{measure} actuator {joint.name}"
         if measure == "actuator_speed":
-            # The objective alone is in degrees where the case is, so that all that derives from it is, too.
+            # Only the objective is in degrees if the case is, so that all derived values are in degrees, too.
             unit = case.units.to_internal(1.0, dimension_of_speed(joint))
             yield Measured(name, (forces.speeds[k] / unit) ** 2)
             continue
@@ -89,13 +89,13 @@ def squares_of(case: Case, forces: PosedForces) -> Iterator[Measured]:
 
 
 def level_constraints(nlp: Nlp, forces: PosedForces, names: Collection[str], where: str) -> list[BoundedConstraint]:
-    """Return the constraints by which the level of a program bounds numbers of actuators at a further pose.
+    """Return the constraints by which the level of a program bounds actuator values at a further pose.
 
     Args:
-        nlp: the program that minimises them.
-        forces: of the actuators at the pose.
-        names: of the numbers that are meant.
-        where: end of the names of the constraints.
+        nlp: program that minimises the actuator values.
+        forces: actuator forces at the pose.
+        names: names of the bounded values.
+        where: suffix of the names of the constraints.
     """
     epigraph, program = nlp.program.places.epigraph, nlp.program
     if epigraph is None:
@@ -111,7 +111,7 @@ def level_constraints(nlp: Nlp, forces: PosedForces, names: Collection[str], whe
 
 
 def _size(nlp: Nlp, values: list[SX]) -> float:
-    """Return the size of the objective, from squares: the median at a few points; 1 where none is known."""
+    """Return the size of the objective from squares: the median at a few points; 1 if unknown."""
     program = nlp.program
     function = ca.Function("largest", [program.x, program.p], [ca.sqrt(ca.mmax(ca.vertcat(*values)))])
     found = np.array([float(function(x, nlp.arguments)) for x in starting_points(nlp, _SIZE_POINTS, 0)])

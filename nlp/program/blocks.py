@@ -1,8 +1,8 @@
-"""Blocks of a program: parts with variables, objective and constraints of their own, such as poses of a fixed robot.
+"""Blocks of a program: independent parts with their own variables, objective terms and constraints.
 
-Where nothing but the poses is free, each pose has its own optimum. A search of the whole program from a sampled point
-finds few of them at once: of 160 poses hardly any point is good at all, and most lie outside of some pose's limits. So
-starting points are put together block by block, and so are the points at which searches end.
+If only the poses are free, each pose has its own optimum. A search of the whole program from a sampled point finds few
+of them at once: hardly any point is good for all of 160 poses, and most violate a limit of some pose. Starting points
+and end points of searches are therefore combined block by block.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from .program import Program
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Violation of a constraint, in half ranges, that is none.
+#: Largest violation, in half ranges, that counts as none.
 _FEASIBLE = 1e-9
 
 
 class Block(NamedTuple):
-    """A part of a program.
+    """Independent part of a program.
 
     Attributes:
-        variables: indices of its variables.
-        terms: indices of its terms of the objective.
-        constraints: indices of its constraints.
+        variables: indices of the variables of the block.
+        terms: indices of the terms of the objective.
+        constraints: indices of the constraints.
     """
 
     variables: tuple[int, ...]
@@ -43,9 +43,9 @@ class Block(NamedTuple):
 
 
 class Blocks:
-    """The blocks of a program, none where all of it is one part.
+    """Blocks of a program; none if the program has no independent parts.
 
-    A level of a worst case belongs to no block.
+    The level of a worst case belongs to no block.
 
     Args:
         nlp: the program.
@@ -58,17 +58,17 @@ class Blocks:
         self.blocks: tuple[Block, ...] = ()
         if terms:
             self._function = ca.Function("terms", [nlp.program.x, nlp.program.p], [ca.densify(ca.vertcat(*terms))])
-            self.blocks = self._found()
+            self.blocks = self._blocks()
 
     def columns(self, block: Block) -> list[int]:
-        """Return the indices of the variables of the program of a block."""
+        """Return the indices of the variables of a block's program."""
         epigraph = self._nlp.program.places.epigraph
         return [*block.variables, *(() if epigraph is None else (epigraph.level,))]
 
     def program(self, block: Block) -> Nlp:
-        """Return the program of a block alone, with the block's variables, then the level of a worst case.
+        """Return the program of a single block, with its variables, then the level of a worst case.
 
-        It has no places of the case's numbers: it serves for searches, and for no evidence.
+        It has no places of the case's parameters: it serves for searches, not for evidence.
         """
         nlp, program, places = self._nlp, self._nlp.program, self._nlp.program.places
         columns, rows = self.columns(block), list(block.constraints)
@@ -99,7 +99,7 @@ class Blocks:
         )
 
     def orders(self, points: FloatArray) -> Iterator[NDArray[np.intp]]:
-        """Yield the order (k,) of points (k, n) for each block: the best within limits first, the farthest out last."""
+        """Yield the order (k,) of points (k, n) for each block: the best feasible one first, the most violated last."""
         nlp = self._nlp
         epigraph = nlp.program.places.epigraph
         values = slack_levels(nlp, points.T) if epigraph else self._function(points.T, nlp.arguments).full()
@@ -109,15 +109,15 @@ class Blocks:
         own = {nlp.program.constraints.index(each) for each in epigraph.constraints} if epigraph else set[int]()
         for block in self.blocks:
             terms = nlp.sign * values[list(block.terms)]
-            # Of a worst case that is minimised or maximised, the largest of the terms counts.
+            # In a worst case the largest of the terms counts, for both senses.
             cost = terms.max(axis=0) if epigraph else terms.sum(axis=0)
             limits = [k for k in block.constraints if k not in own]
             violation = outside[limits].max(axis=0, initial=0.0)
             violation = np.where(np.isfinite(violation) & np.isfinite(cost), violation, np.inf)
             yield np.lexsort((cost, np.where(violation <= _FEASIBLE, 0.0, violation)))
 
-    def _found(self) -> tuple[Block, ...]:
-        """Return the blocks by the sparsity of objective and constraints."""
+    def _blocks(self) -> tuple[Block, ...]:
+        """Return the blocks from the sparsity of objective and constraints."""
         nlp = self._nlp
         epigraph = nlp.program.places.epigraph
         of_terms = _dependence(self._function, 0)
@@ -143,14 +143,14 @@ class Blocks:
 
 
 def _terms(nlp: Nlp) -> list[SX]:
-    """Return what an objective is the sum of, F at each pose, weighted; empty where it is no such sum.
+    """Return the terms of an objective that is a sum, the weighted F of each pose; empty for another objective.
 
     With a level, the terms are those of its constraints.
     """
     program = nlp.program
     epigraph = program.places.epigraph
     if epigraph is not None:
-        # A relaxation of a program with a level has another objective.
+        # The relaxation of a program with a level has another objective.
         of_level = np.flatnonzero(_dependence(program.values, 0)[0]).tolist() == [epigraph.level]
         return [each.expression for each in epigraph.constraints] if of_level else []
     if program.objective_call is None:
@@ -161,12 +161,12 @@ def _terms(nlp: Nlp) -> list[SX]:
 
 
 def _dependence(function: ca.Function, output: int) -> NDArray[np.bool_]:
-    """Return which entries of an output (k, 1) depend on which variables, (k, n) of booleans."""
+    """Return the dependence (k, n), booleans, of the entries of an output (k, 1) on the variables."""
     return np.asarray(ca.DM(function.jac_sparsity(output, 0)).full() != 0)
 
 
 def _labels(rows: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Return a number (n,) for each variable, the same for those that occur in one row together or by way of others."""
+    """Return a label (n,) for each variable, equal for variables connected by common rows."""
     labels = np.arange(rows.shape[1])
     while True:
         before = labels.copy()

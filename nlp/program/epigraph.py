@@ -1,12 +1,12 @@
-"""F over several poses, and the worst case as an epigraph.
+"""F over several poses, and epigraph formulations of the worst case.
 
-The worst of several values is not a smooth function. The epigraph formulation is smooth: an epigraph variable
+The worst of several values is not a smooth function. The epigraph formulation is smooth: the epigraph variable
 ``level`` replaces the values as the objective, with one constraint for each value.
 
-* Poses, F to be maximised: the largest ``level`` with ``F_k >= level`` at every pose; F to be minimised: the smallest
-  ``level`` with ``F_k <= level``.
-* Tasks, all to be maximised: the largest ``level`` with ``F_j >= w_j level`` for every task.
-* Tasks, all to be minimised: the smallest ``level`` with ``w_j F_j <= level``.
+* Poses, F maximised: the largest ``level`` with ``F_k >= level`` at every pose; F minimised: the smallest ``level``
+  with ``F_k <= level``.
+* Tasks, all maximised: the largest ``level`` with ``F_j >= w_j level`` for every task.
+* Tasks, all minimised: the smallest ``level`` with ``w_j F_j <= level``.
 * Tasks of both senses: the smallest ``level`` with ``w_j loss_j <= level``, where ``loss_j`` is the distance of ``F_j``
   from the task's own optimum. (The worst of values of opposite senses has no meaning.)
 """
@@ -36,21 +36,21 @@ from .sampling import starting_points
 
 #: Number of points at which the size of F over several poses is evaluated.
 _SIZE_POINTS = 32
-#: Upper bound of the level of a worst pose, as a multiple of that size: mostly above any F.
+#: Upper bound of the level of a worst pose, as a multiple of that size: usually above any F.
 _LEVEL_BOUND = 2.0
-#: Distance of a level from its bound, in parts of their range, at which the bound may hold the level back; and by what
-#: the range then grows.
+#: Relative distance of a level from its bound at which the bound may be active; and the factor by which the range then
+#: grows.
 _AT_BOUND, _WIDER = 1e-6, 4.0
 
 Number = TypeVar("Number", SX, float, FloatArray)
 
 
 def total_over_poses(values: Sequence[Number], how: OverPoses) -> Number:
-    """Return the sum or the mean of values at several poses; for the worst pose, the sum.
+    """Return the sum or the mean of values at several poses; the sum for a worst pose.
 
     Args:
-        values: one for each pose, at least one; all of one shape.
-        how: how a case combines F over its poses.
+        values: value at each pose, at least one; all of one shape.
+        how: combination of F over the poses of a case.
     """
     total = values[0]
     for value in values[1:]:
@@ -59,18 +59,18 @@ def total_over_poses(values: Sequence[Number], how: OverPoses) -> Number:
 
 
 def worst_value(values: Sequence[float] | FloatArray, sense: Sense) -> float:
-    """Return the worst of several values of F: the smallest where F is maximised, the largest where it is minimised."""
+    """Return the worst of several values of F: the smallest for a maximum, the largest for a minimum."""
     return float(np.min(values) if sense is Sense.MAX else np.max(values))
 
 
 def formulate_worst_pose(layout: Layout, sense: Sense) -> Nlp:
-    """Return the program of the best level that F keeps at every pose.
+    """Return the program of the best level of F that all poses keep.
 
-    The bounds of the level come from the size of F without cancellation at a few points. Where F has other values, a
+    The bounds of the level come from the size of F without cancellation at a few points. If F has other values, a
     search widens them: :func:`with_wider_level`.
 
     Args:
-        layout: a case with one task.
+        layout: layout of a case with one task.
         sense: sense of the task.
 
     Raises:
@@ -92,9 +92,9 @@ def level_constraint(nlp: Nlp, F: SX, name: str) -> BoundedConstraint | None:
     """Return the constraint by which the level of a worst pose bounds F at a further pose.
 
     Args:
-        nlp: the program, of one task; without a level there is no constraint.
-        F: (1, 1) at the pose.
-        name: of the constraint.
+        nlp: program of one task; without a level there is no constraint.
+        F: (1, 1) F at the pose.
+        name: name of the constraint.
     """
     epigraph = nlp.program.places.epigraph
     first = None if epigraph is None else epigraph.constraints[0]
@@ -109,12 +109,12 @@ def formulate_worst(case: Case, weights: Sequence[float], best: Sequence[float],
 
     Args:
         case: a case with several tasks.
-        weights: one for each task.
-        best: each task's own optimum, for the losses.
-        ceiling: a positive level that no answer exceeds.
+        weights: weight of each task.
+        best: separate optimum of each task, for the losses.
+        ceiling: positive level above all answers.
 
     Raises:
-        CaseError: a limb has zero length at every point of the box, or fixed numbers contradict each other.
+        CaseError: a limb has zero length at every point of the box, or fixed parameters contradict each other.
     """
     layout = lay_out(case, case.tasks)
     F = ca.horzcat(*[robot.F for robot in layout.robots])
@@ -142,8 +142,8 @@ def level_of_tasks(case: Case, values: Sequence[float], weights: Sequence[float]
     Args:
         case: a case with several tasks.
         values: F of each task.
-        weights: one for each task.
-        best: each task's own optimum, for the losses.
+        weights: weight of each task.
+        best: separate optimum of each task, for the losses.
     """
     senses = {task.sense for task in case.tasks}
     if senses == {Sense.MAX}:
@@ -157,11 +157,11 @@ def level_of_tasks(case: Case, values: Sequence[float], weights: Sequence[float]
 
 
 def with_exact_level(nlp: Nlp, x: FloatArray) -> FloatArray:
-    """Return a point with the level of a worst case of one task set to its best there; another point unchanged.
+    """Return a point with the level of a worst case of one task set to its best value; another point unchanged.
 
     Args:
         nlp: the program.
-        x: (n,) the point.
+        x: (n,) point.
     """
     epigraph = nlp.program.places.epigraph
     if epigraph is None or len(nlp.program.places.twists) > 1:
@@ -172,9 +172,9 @@ def with_exact_level(nlp: Nlp, x: FloatArray) -> FloatArray:
 
 
 def with_wider_level(nlp: Nlp, x: FloatArray) -> Nlp | None:
-    """Return a program with wider bounds of its level where they hold the level back at a point (n,); else None.
+    """Return a program with wider bounds of its level if they may be active at a point (n,); else None.
 
-    The bounds are estimates, and no limits of the case: a level on its bound is no answer.
+    The bounds are estimates, not limits of the case: a level on its bound is not an answer.
     """
     epigraph = nlp.program.places.epigraph
     if epigraph is None:
@@ -194,18 +194,18 @@ def exact_levels(nlp: Nlp, points: FloatArray) -> FloatArray:
 
     Args:
         nlp: a program with a level.
-        points: (n, k) one point a column.
+        points: (n, k) points, one in each column.
     """
     levels = slack_levels(nlp, points)
     return np.asarray(levels.min(axis=0) if nlp.sense is Sense.MAX else levels.max(axis=0))
 
 
 def slack_levels(nlp: Nlp, points: FloatArray) -> FloatArray:
-    """Return the level (c, k) that each of the c objectives of a worst case has at each of several points.
+    """Return the level (c, k) of each of the c objectives of a worst case at several points.
 
     Args:
         nlp: a program with a level.
-        points: (n, k) one point a column.
+        points: (n, k) points, one in each column.
     """
     epigraph = nlp.program.places.epigraph
     own = [each.expression for each in nlp.program.constraints if epigraph and each in epigraph.constraints]
@@ -216,7 +216,7 @@ def slack_levels(nlp: Nlp, points: FloatArray) -> FloatArray:
         at = np.array(points)
         at[epigraph.level if epigraph else -1] = level
         ends.append(slacks(at, nlp.arguments).full())
-    with np.errstate(all="ignore"):  # where the robot has no value
+    with np.errstate(all="ignore"):  # at points where the robot is undefined
         levels = ends[0] / (ends[0] - ends[1])
         return np.asarray(np.sqrt(levels) if epigraph and epigraph.power == 2 else levels)
 
@@ -267,13 +267,13 @@ def _constant(slope: float, value: float) -> float:  # noqa: ARG001 - a slope is
 
 
 class EpigraphBuilder:
-    """An epigraph under construction: the epigraph variable, last of the program's variables, and its constraints.
+    """Epigraph under construction: the epigraph variable, last of the program's variables, and its constraints.
 
     Args:
-        layout: the case as symbols, to which the epigraph variable is added.
+        layout: layout to which the epigraph variable is added.
         bounds: bounds and start of the epigraph variable.
-        ceiling: positive size by which the constraints are divided.
-        power: 2 where the level is the root of the worst of squares.
+        ceiling: positive divisor of the constraints.
+        power: 2 if the level is the root of the worst of squares.
     """
 
     def __init__(self, layout: Layout, bounds: Free, ceiling: float, power: int = 1) -> None:
@@ -289,9 +289,9 @@ class EpigraphBuilder:
         """Add the constraint ``slack >= 0``, divided by the ceiling, so that its gradient is of order 1.
 
         Args:
-            name: of the constraint.
-            slack: form of ceiling, level and inputs.
-            inputs: F of a task at each pose, then the task's own numbers.
+            name: name of the constraint.
+            slack: function of ceiling, level and inputs.
+            inputs: F of a task at each pose, then the separate values of the task.
         """
         call = Call(slack, ca.vertcat(self._size, self.level, *reversed(inputs)))
         constraint = Constraint(name, call.value, self._reading, call=call)
@@ -302,7 +302,7 @@ class EpigraphBuilder:
 
         Args:
             sense: sense of the level.
-            best: indices in ``p`` of each task's own optimum.
+            best: indices in ``p`` of the separate optimum of each task.
             weights: indices in ``p`` of the tasks' weights.
 
         Raises:

@@ -1,8 +1,7 @@
-"""The nonlinear programs of a case.
+"""Nonlinear programs of a case.
 
-The objective is F, the sum over the rows of the Jacobian of the squared reciprocal product with the task's twist
-(equations 5 and 14); :mod:`screwsynth.models.instance` writes it. Several tasks become one program in two ways: the
-weighted sum of their objectives here, and the worst of them in :mod:`.epigraph`.
+The objective is F (equations 5 and 14), written in :mod:`screwsynth.models.instance`. Several tasks become one program
+in two ways: the weighted sum of their objectives here, and the worst of them in :mod:`.epigraph`.
 
 Source: A. Wolf and co-workers, *Screw theory tools for the synthesis of the geometry of a parallel robot for a given
 instantaneous task*; equation and section numbers throughout this package are that paper's.
@@ -31,14 +30,14 @@ from .program import Program
 
 
 def formulate(case: Case, task: int = 0) -> Nlp:
-    """Return the nonlinear program of one of a case's tasks.
+    """Return the nonlinear program of one task of a case.
 
     Args:
         case: the case.
         task: index of the task.
 
     Raises:
-        CaseError: a limb has zero length at every point of the box, or fixed numbers contradict each other.
+        CaseError: a limb has zero length at every point of the box, or fixed parameters contradict each other.
     """
     layout = lay_out(case, [case.tasks[task]])
     sense = case.tasks[task].sense
@@ -56,7 +55,7 @@ def formulate_everywhere(case: Case) -> Nlp:
         case: a case with one task.
 
     Raises:
-        CaseError: a limb has zero length at every point of the box, or fixed numbers contradict each other.
+        CaseError: a limb has zero length at every point of the box, or fixed parameters contradict each other.
     """
     return formulate_worst_pose(lay_out(case, case.tasks), case.tasks[0].sense)
 
@@ -64,10 +63,10 @@ def formulate_everywhere(case: Case) -> Nlp:
 def formulate_each(case: Case) -> list[Nlp]:
     """Return the programs of all tasks of a case.
 
-    They share their symbols: the programs differ by twist and sense alone.
+    The programs share their symbols, and differ only by twist and sense.
 
     Raises:
-        CaseError: a limb has zero length at every point of the box, or fixed numbers contradict each other.
+        CaseError: a limb has zero length at every point of the box, or fixed parameters contradict each other.
     """
     first = formulate(case)
     (twist,) = first.program.places.twists
@@ -80,7 +79,7 @@ def formulate_each(case: Case) -> list[Nlp]:
 
 
 def scaled_weights(case: Case) -> list[float]:
-    """Return the tasks' weights scaled to sum to the number of tasks, as equation 15 needs them."""
+    """Return the tasks' weights scaled to sum to the number of tasks, as in equation 15."""
     given = [task.weight for task in case.tasks]
     total, n = sum(given), len(given)
     return given if abs(total - n) <= 1e-12 * n else [weight * n / total for weight in given]
@@ -89,15 +88,15 @@ def scaled_weights(case: Case) -> list[float]:
 def formulate_weighted(case: Case, weights: Sequence[float]) -> Nlp:
     """Return the program of the weighted sum of the tasks' objectives.
 
-    Where all tasks have one sense, the objective is ``sum w_j F_j`` with that sense. Where both senses occur, the sum
-    is maximised, and the tasks to be minimised have negative signs in it.
+    If all tasks have one sense, the objective is ``sum w_j F_j`` with that sense. If both senses occur, the sum is
+    maximised with negative signs for the tasks to be minimised.
 
     Args:
         case: a case with several tasks.
-        weights: one for each task.
+        weights: weight of each task.
 
     Raises:
-        CaseError: a limb has zero length at every point of the box, or fixed numbers contradict each other.
+        CaseError: a limb has zero length at every point of the box, or fixed parameters contradict each other.
     """
     layout = lay_out(case, case.tasks)
     senses = {task.sense for task in case.tasks}
@@ -112,7 +111,7 @@ def formulate_weighted(case: Case, weights: Sequence[float]) -> Nlp:
 
 
 def _weighted_call(layout: Layout, weights: Sequence[SX]) -> Call:
-    """Return the weighted sum of the tasks' objectives, (1, 1) each weight, over all poses."""
+    """Return the weighted sum of the tasks' objectives over all poses, with weights (1, 1)."""
     form = Form(weighted_total, (len(weights), layout.case.over_poses is OverPoses.MEAN))
     return Call(form, ca.vertcat(*weights, *[robot.F for robot in layout.robots]))
 
@@ -133,13 +132,13 @@ def proximity_program(program: Program) -> Program:
 def with_proximity_term(nlp: Nlp, extended: Program, target: FloatArray, strength: float) -> Nlp:
     """Return a program with a cost on the squared distance from a point added to its objective.
 
-    Where the optima of the original program form a set, the optimum of the new program tends to the point of that set
+    If the optima of the original program form a set, the optimum of the new program tends to the point of that set
     nearest to the target as the strength tends to zero. Distances are in half ranges of the variables.
 
     Args:
         nlp: the original program.
         extended: :func:`proximity_program` of the original's program, built once for all points and strengths.
-        target: (n,) the point.
+        target: (n,) target point.
         strength: cost of a distance of 1, as a multiple of the objective's scale.
     """
     values = [*nlp.arguments, *target, *nlp.scale, nlp.sign * strength * nlp.objective_scale]

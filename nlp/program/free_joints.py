@@ -1,8 +1,7 @@
-"""Driven joints whose positions the pose does not determine: variables of the program, with ranges from their limits.
+"""Free actuator coordinates: variables of the program that the pose does not determine, with ranges from limits.
 
-A limit on the position of one such joint gives the range of its variable, which is a little wider than the limit: a
-bound that coincides with a constraint would share its multiplier. A joint without a limit is searched in the range that
-the robot gives its unknown.
+A limit on a free actuator coordinate gives the range of its variable, slightly wider than the limit, because a bound
+that coincides with a constraint would share its multiplier. Without a limit, the range is that of the robot's unknown.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -19,12 +18,12 @@ from ..system.jsonvalues import Hidden, JsonObject, Shown
 from .nlp import Nlp
 from .places import SymbolTable
 
-#: Part of its width by which the range of a variable is wider than the limits of the joint, on each side.
+#: Relative widening of a variable's range on each side of the limits.
 _BEYOND = 0.25
 
 
 class _Side(NamedTuple):
-    """A limit on the position of a joint: its value, whether it is an upper one, and the name of its constraint."""
+    """Limit on a joint coordinate: value, True for an upper limit, and name of the constraint."""
 
     value: float
     is_upper: bool
@@ -32,19 +31,19 @@ class _Side(NamedTuple):
 
 
 class FreeJoint(JsonObject):
-    """Position of a driven joint that the pose does not determine, at one pose: a variable of the program.
+    """Free actuator coordinate at one pose: a variable of the program that the pose does not determine.
 
     Attributes:
-        name: of the variable.
+        name: name of the variable.
         joint: limb and place of the joint.
-        kind: ``angle`` or ``length``.
-        value: position from home.
-        lower: smallest position: of the limits on it, or where there is none, of the search.
-        upper: likewise the largest.
-        limits: names of the limits on it; empty where it has none.
-        lower_is_limit: whether the smallest position is a limit of the case.
-        upper_is_limit: whether the largest position is a limit of the case.
-        dimension: of the positions, in radians for an angle.
+        kind: kind of the coordinate: ``angle`` or ``length``.
+        value: coordinate, 0 at home.
+        lower: smallest coordinate: by its limits, or by the search range if it has none.
+        upper: largest coordinate: by its limits, or by the search range if it has none.
+        limits: names of the limits on the coordinate; empty for none.
+        lower_is_limit: True if ``lower`` is a limit of the case.
+        upper_is_limit: True if ``upper`` is a limit of the case.
+        dimension: dimension of the coordinate; radians for an angle.
     """
 
     name: str
@@ -60,7 +59,7 @@ class FreeJoint(JsonObject):
 
 
 def free_joints(nlp: Nlp, x: FloatArray) -> Iterator[FreeJoint]:
-    """Yield the driven joints whose positions at a point (n,) are variables of a program, pose after pose."""
+    """Yield the free actuator coordinates at a point (n,) of a program, pose after pose."""
     program = nlp.program
     if not program.model.free_joints:
         return
@@ -90,18 +89,18 @@ def free_joints(nlp: Nlp, x: FloatArray) -> Iterator[FreeJoint]:
 
 
 def begun_at(nlp: Nlp, joints: Mapping[str, float]) -> Nlp:
-    """Return a program whose start has some positions of free joints, by the names of their variables."""
+    """Return a program with a start at given free actuator coordinates, by the names of their variables."""
     start = [joints.get(each.name, value) for each, value in zip(nlp.program.variables, nlp.start, strict=True)]
     return replace(nlp, start=frozen_vector(start))
 
 
 def set_ranges(table: SymbolTable, indices: Sequence[int], limits: Iterable[BoundedConstraint]) -> None:
-    """Set the ranges of the variables of free joints from the limits of a case, each with home as its start.
+    """Set the ranges of free actuator coordinates from the limits of a case, each with home as its start.
 
     Args:
-        table: the numbers of the program, of which the ranges are set.
-        indices: of the variables.
-        limits: of the case.
+        table: symbols of the program with the ranges to set.
+        indices: indices of the variables.
+        limits: limits of the case.
     """
     found = _sides(list(limits), [table.variables_vector, table.arguments_vector], table.values, indices)
     for k, sides in found.items():
@@ -110,7 +109,7 @@ def set_ranges(table: SymbolTable, indices: Sequence[int], limits: Iterable[Boun
         upper = min((each.value for each in sides if each.is_upper), default=None)
         low, high = searched.lower if lower is None else lower, searched.upper if upper is None else upper
         if not low < high:
-            # One limit is beyond the range that is searched, or two exclude each other: a search then shows it.
+            # A limit lies outside the search range, or two limits exclude each other: a search then shows it.
             low, high = min(low, high, searched.lower), max(low, high, searched.upper)
         room = _BEYOND * (high - low)
         first = min(max(0.0, low), high)
@@ -121,7 +120,7 @@ def set_ranges(table: SymbolTable, indices: Sequence[int], limits: Iterable[Boun
 def _sides(
     limits: Sequence[BoundedConstraint], symbols: Sequence[ca.SX], arguments: Sequence[float], indices: Sequence[int]
 ) -> Mapping[int, list[_Side]]:
-    """Return the limits on each variable that are bounds of a linear function of this variable alone."""
+    """Return the limits on each variable that bound a linear function of this variable only."""
     found: dict[int, list[_Side]] = {k: [] for k in indices}
     if not limits or not indices:
         return found

@@ -1,17 +1,16 @@
-"""A case as symbols: free variables, fixed arguments, the robot's expressions in them; and the program that they make.
+"""Case as symbols: free variables, fixed arguments, and the robot's expressions; and the program assembled from them.
 
 The variables are the free components of the parameters, of the position ``p``, and of the rotation:
 
 * axis and angle fixed: none;
-* axis held fixed, angle free: the angle;
+* axis fixed, angle free: the angle;
 * axis free: the vector part ``q`` of the unit quaternion, with ``|q|^2`` between the squared sines of half of the
-  smallest and half of the largest allowed angle, one smooth constraint named ``angle``.
+  smallest and of the largest allowed angle, one smooth constraint named ``angle``.
 
-A parameter that is a direction has its three components as variables and its unit length as an equation, so that the
-coordinates have no poles. The unit length implies the bounds -1 and 1 of a component. The program moves these bounds
-outwards, so that they are never active together with the equation.
+A direction parameter has three components as variables and its unit length as an equation, so that the coordinates have
+no poles. Its components have bounds beyond -1 and 1, so that these are never active together with the equation.
 
-Several poses share the robot's dimensions. Each stated pose has its own position and rotation, and the poses along a
+Several poses share the robot's dimensions. Each stated pose has its own position and rotation; the poses of a
 trajectory or a grid follow from it by fixed displacements.
 """
 
@@ -43,7 +42,7 @@ from ...models import (
 from ...models.instance import length_of, sizes_at
 from ...models.values import dataclass
 from ..case.case import Case
-from ..case.choices import check_no_choice
+from ..case.choices import check_no_catalogue
 from ..case.limits.constraint import BoundedConstraint, Call, Constraint, PairFamily, Reading, squared
 from ..case.pose import Free, Pose, Value, sizes_of_turn
 from ..case.task import Sense, Task
@@ -62,35 +61,36 @@ def _angle_from(value: float) -> float:
 
 
 def _angle_slope(value: float) -> float:
-    """Return the derivative of ``sin^2(angle / 2)`` with respect to the angle, at a value of it."""
+    """Return the derivative of ``sin^2(angle / 2)`` with respect to the angle, at a given value."""
     return math.sqrt(max(value * (1 - value), 0.0))
 
 
-#: The constraint ``|q|^2 = sin^2(angle / 2)`` read as the angle itself.
+#: Conversion of the constraint ``|q|^2 = sin^2(angle / 2)`` to the angle.
 ROTATION_ANGLE = Reading(Dimension.ANGLE, from_value=_angle_from, slope=_angle_slope)
-#: The constraint ``|u|^2 = 1`` read as the length itself.
+#: Conversion of the constraint ``|u|^2 = 1`` to the length.
 _LENGTH_OF_DIRECTION = replace(squared(Dimension.NUMBER), to_value=Reading(Dimension.NUMBER).to_value)
-#: Largest size, as a variable, of a component of a free unit vector, or of a rotation's ``q`` in radii of its ball.
+#: Largest absolute value of a component of a free unit vector, or of a rotation's ``q`` in radii of its ball, as a
+#: variable.
 WIDENING = 1.25
-#: Largest residual of an equation among fixed numbers that counts as none: files give them with a dozen digits.
+#: Largest residual of an equation of fixed parameters that counts as satisfied: files state a dozen digits.
 _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """A case as symbols, before an objective is chosen.
+    """Case as symbols, before an objective is chosen.
 
     Attributes:
         case: the case.
-        table: its numbers as symbols.
-        places: typed places of these numbers.
+        table: symbols of the variables and arguments.
+        places: typed places of the variables and arguments.
         robots: the robot at each pose.
-        constraints: constraints that depend on a variable, and limits that do not hold.
-        constant_limits: limits that depend on no variable and hold.
-        families: limits on many pairs, which are no constraints yet.
-        implied: equations that the fixed numbers make hold, so that they are no constraints: those of loops that follow
-            from the others, and lengths of fixed directions.
-        fixed_families: limits on many pairs of fixed values, of which the tightest one stands for all.
+        constraints: constraints that depend on a variable, and violated limits.
+        constant_limits: satisfied limits that depend on no variable.
+        families: limits on many pairs, not yet constraints.
+        implied: equations that the fixed parameters satisfy, so that they are not constraints: dependent loop
+            equations, and lengths of fixed directions.
+        fixed_families: limits on many pairs of fixed values, each represented by its tightest pair.
     """
 
     case: Case
@@ -105,16 +105,16 @@ class Layout:
 
 
 class StatedPoseSymbols(NamedTuple):
-    """A stated pose as symbols.
+    """Stated pose as symbols.
 
     Attributes:
-        rotation: (3, 3) ``R``.
-        position: (3, 1) ``p``, length.
-        numbers: places of the case's own numbers of the pose.
-        symbols: symbols of these numbers.
+        rotation: (3, 3) ``R``, platform to world coordinates.
+        position: (3, 1) ``p``, origin of the platform frame, length.
+        numbers: places of the case's parameters of the pose.
+        symbols: symbols of these parameters.
         places: places of the rotation's variables.
         constraints: constraints on the rotation.
-        displacements: of the pose.
+        displacements: displacements from the pose.
     """
 
     rotation: SX
@@ -126,22 +126,22 @@ class StatedPoseSymbols(NamedTuple):
     displacements: tuple[Displacement, ...]
 
 
-#: Adds a stated pose, with the prefix of the names of its numbers, to a table of symbols.
+#: Function that adds a stated pose, with a prefix of its names, to a symbol table.
 AddPose: TypeAlias = Callable[[Pose, str, SymbolTable], StatedPoseSymbols]
 
 
 def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) -> Layout:
-    """Return symbols for every number that a case fixes or frees, and the robot's expressions in these symbols.
+    """Return symbols of all parameters that a case fixes or frees, and the robot's expressions in them.
 
     Args:
         case: the case.
-        tasks: tasks whose twists become arguments, one or more.
-        add_pose: adds a stated pose in other coordinates than those above.
+        tasks: one or more tasks, with twists as arguments.
+        add_pose: function that adds a stated pose in other coordinates than those above.
 
     Raises:
-        CaseError: an equation among fixed numbers does not hold, or a dimension has a few values to choose from.
+        CaseError: an equation of fixed parameters is violated, or a dimension has a list of values to choose from.
     """
-    check_no_choice(case)
+    check_no_catalogue(case)
     table, model = SymbolTable(), case.model
     parameters = [
         table.add_each(case.component_names(item), item.dimension, _component_values(case, item))
@@ -228,9 +228,9 @@ def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) 
 
 
 def reference_of(case: Case) -> tuple[float, ...]:
-    """Return the middle of the range of each component of the parameters, at which sizes of equations are taken.
+    """Return the mid-range value of each parameter component, for the sizes of equations.
 
-    The numbers are lengths of the case, so that its equations do not depend on its unit of length.
+    The values are in the unit of the case, so that its equations do not depend on the unit of length.
     """
     values = [value for item in case.model.parameters for value in case.components(item.name)]
     return tuple((each.lower + each.upper) / 2 if isinstance(each, Free) else float(each) for each in values)
@@ -242,14 +242,14 @@ def robot_length(case: Case) -> float:
 
 
 def _name_of(unknown: Unknown, pose: int) -> str:
-    """Return the name of an unknown's variable at a pose, the first of which is 1; 0 stands for the only one."""
+    """Return the name of an unknown's variable at a pose, counted from 1; 0 for a single pose."""
     if unknown.is_free:
         return f"joint.{unknown.joint}{f' pose {pose}' if pose else ''}"
     return f"at{pose}_{unknown.name}" if pose else unknown.name
 
 
 def _ranges_of_unknowns(model: Model, reference: tuple[float, ...]) -> list[Free]:
-    """Return the range of each of a model's unknowns at values of the parameters."""
+    """Return the range of each unknown of a model for values of the parameters."""
     sizes = sizes_at(model, model.unknowns, reference, SX.ones(len(model.unknowns)))
     values = [float(size) for size in ca.vertsplit(sizes)] if model.unknowns else []
     pairs = zip(model.unknowns, values, strict=True)
@@ -257,7 +257,7 @@ def _ranges_of_unknowns(model: Model, reference: tuple[float, ...]) -> list[Free
 
 
 def _unit_length(name: str, direction: SX) -> BoundedConstraint:
-    """Return the equation that a direction (3, 1) has the length 1."""
+    """Return the unit-length equation of a direction (3, 1)."""
     return BoundedConstraint(Constraint(f"|{name}|", ca.sumsqr(direction), _LENGTH_OF_DIRECTION), 1.0, 1.0)
 
 
@@ -272,7 +272,7 @@ def _displace(rotation: SX, position: SX, step: Displacement) -> tuple[SX, SX]:
 def _component_values(case: Case, parameter: Parameter) -> tuple[Value, ...]:
     """Return the values of a parameter's components.
 
-    Components of a free direction get bounds beyond -1 and 1, and a start that is not zero.
+    Components of a free direction get bounds beyond -1 and 1, and a nonzero start.
     """
     values = case.components(parameter.name)
     if not (parameter.is_direction and any(isinstance(value, Free) for value in values)):
@@ -293,10 +293,10 @@ def _component_values(case: Case, parameter: Parameter) -> tuple[Value, ...]:
 def _divided(
     case: Case, constraints: Sequence[BoundedConstraint], table: SymbolTable
 ) -> tuple[list[BoundedConstraint], list[BoundedConstraint]]:
-    """Return the constraints that depend on a variable, and the others, and refuse one of these that does not hold.
+    """Return the constraints that depend on a variable, and the others; refuse a violated one of the others.
 
     Raises:
-        CaseError: a constraint that depends on fixed numbers alone does not hold.
+        CaseError: a constraint of fixed parameters only is violated.
     """
     x, p = table.variables_vector, table.arguments_vector
     variable: list[BoundedConstraint] = []
@@ -315,11 +315,11 @@ def _divided(
 
 
 def _add_pose(pose: Pose, prefix: str, table: SymbolTable) -> StatedPoseSymbols:
-    """Add the numbers of a stated pose, position, then rotation, and return its symbols.
+    """Add the parameters of a stated pose, position, then rotation, and return its symbols.
 
     Args:
         pose: the pose.
-        prefix: prefix of the names of its numbers.
+        prefix: prefix of the parameters' names.
         table: the symbols of the program.
     """
     position = table.add_vector(f"{prefix}p", Dimension.LENGTH, tuple(pose.position))
@@ -343,8 +343,8 @@ def _add_pose(pose: Pose, prefix: str, table: SymbolTable) -> StatedPoseSymbols:
         )
     inner = math.sin(smallest / 2)
     start = angle.start if isinstance(angle, Free) and angle.start is not None else smallest
-    # The ball implies |q_x| <= radius and so on: a bound that touches the ball would share its multiplier where the
-    # ball is active.
+    # The ball implies |q_x| <= radius and so on: a bound tangent to the ball would share its multiplier where the ball
+    # constraint is active.
     bound = min(WIDENING * radius, 1.0)
     along_z = Free(-bound, bound, math.sin(start / 2))
     vector = table.add_vector(f"{prefix}q", Dimension.NUMBER, (Free(-bound, bound), Free(-bound, bound), along_z))
@@ -372,11 +372,11 @@ def assemble(
     """Return the program of a layout.
 
     Args:
-        layout: the case as symbols.
-        objective: (1, 1) expression in them, or the call whose value it is.
-        sense: whether the objective is maximised or minimised.
+        layout: case as symbols.
+        objective: (1, 1) expression of the symbols, or the call that returns it.
+        sense: maximisation or minimisation of the objective.
         constraints: constraints in addition to those of the layout.
-        epigraph: places of the epigraph, where the objective is an epigraph variable.
+        epigraph: places of the epigraph, if the objective is an epigraph variable.
         weights: indices in ``p`` of the tasks' weights; empty for one task.
 
     Raises:
@@ -416,10 +416,10 @@ def assemble(
 
 
 def _check_limbs(nlp: Nlp) -> None:
-    """Refuse a limb whose direction is zero, or has no finite value, at every point of the box.
+    """Refuse a limb with zero or undefined direction at every point of the box.
 
     Raises:
-        CaseError: there is such a limb.
+        CaseError: the robot has such a limb.
     """
     program = nlp.program
     for robot, kernel in zip(program.robots, program.kernels.robot_states, strict=True):

@@ -1,4 +1,4 @@
-"""The limits of a case as constraints of its program."""
+"""Limits of a case as constraints of its program."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ from ..errors import CaseError
 from .places import SymbolTable
 from .repeated import without_repeated
 
-#: Largest number of values at which every pair is a constraint from the start: of 3 poses there are 6 pairs. With 4, a
-#: choice among them takes half of the time already.
+#: Largest number of values for which every pair is a constraint from the start: 3 poses have 6 pairs. With 4, choosing
+#: pairs already halves the time.
 _ALL_PAIRS = 3
 #: Relative tolerance on a limit that involves only fixed parameters. A proof allows more, so that an evaluation at a
 #: pose that refutes a claim shows the violated limit too.
 _ROUNDING = 1e-10
-#: The same for a limit near 0, relative to the robot's size: parameters are written with a dozen digits.
+#: Absolute tolerance on such a limit near 0, relative to the robot's size: parameters are written with a dozen digits.
 _WRITTEN = 1e-11
 
 
 class LimitConstraints(NamedTuple):
-    """The limits of a case as constraints.
+    """Limits of a case as constraints.
 
     Attributes:
-        varying: those that depend on the variables, and those that do not hold.
-        constant: those that hold whatever is chosen, because they depend on fixed numbers alone.
-        families: constraints on many pairs, none of which is among ``varying``.
-        fixed_families: those whose values are fixed; the tightest pair of each is among the others.
+        varying: limits that depend on the variables, and violated ones.
+        constant: satisfied limits of fixed parameters only.
+        families: limits on many pairs, none of which is in ``varying``.
+        fixed_families: families of fixed values; the tightest pair of each is in ``varying`` or ``constant``.
     """
 
     varying: tuple[BoundedConstraint, ...]
@@ -56,11 +56,11 @@ def limit_constraints(
     Args:
         case: the case.
         robots: the robot at each pose.
-        named: symbols of the case's own numbers by name, radians for angles.
-        table: the program's numbers as symbols.
+        named: symbols of the case's parameters by name, radians for angles.
+        table: symbols of the variables and arguments.
 
     Raises:
-        CaseError: a limit that depends on fixed numbers alone has no finite value, or one on speeds has no motion.
+        CaseError: a limit of fixed parameters only has no finite value, or a limit on speeds has no motion.
     """
     if not case.limits:
         return LimitConstraints((), ())
@@ -86,7 +86,7 @@ def limit_constraints(
         low, high = (max(_ROUNDING * abs(end), least) for end in (item.lower, item.upper))
         holds = item.lower - low <= number <= item.upper + high
         if holds and not varies and not math.isfinite(value):
-            # An infinite value is above every bound, and keeps none.
+            # An infinite value exceeds every bound.
             key = next(filter(None, item.constraint.keys))
             raise CaseError(f"limits.{key}", f"has no finite value: {item.constraint.name}", source=case.source)
         (constant if holds and not varies else varying).append(item)
@@ -94,7 +94,7 @@ def limit_constraints(
 
 
 def _size_of(item: BoundedConstraint, length: float) -> float:
-    """Return the typical size of a limited quantity; 0 where it is not known.
+    """Return the typical size of a limited quantity; 0 if unknown.
 
     Args:
         item: the limit.
@@ -109,9 +109,9 @@ def _size_of(item: BoundedConstraint, length: float) -> float:
 def _sorted_families(
     families: Sequence[PairFamily], table: SymbolTable
 ) -> tuple[list[tuple[BoundedConstraint, ...]], tuple[PairFamily, ...], tuple[PairFamily, ...]]:
-    """Return pairs that are constraints from the start, families whose pairs come when needed, and fixed families.
+    """Return pairs that are constraints from the start, families with pairs added on demand, and fixed families.
 
-    The pairs are all those of few values, and the tightest one of fixed values.
+    The first are all pairs of small families, and the tightest pair of each fixed family.
     """
     x, p = table.variables_vector, table.arguments_vector
     pairs: list[tuple[BoundedConstraint, ...]] = []
@@ -132,7 +132,6 @@ def _sorted_families(
 
 
 def _families(case: Case, robots: Sequence[RobotInstance], named: Mapping[str, SX]) -> Iterator[PairFamily]:
-    """Yield the constraints on pairs of every limit."""
     design = Design(case.as_limited, tuple(robots), named)
     for limit in sorted(case.limits, key=attrgetter("order")):
         yield from limit.on_pairs(design)
@@ -144,7 +143,7 @@ def _constraints(
     named: Mapping[str, SX],
     pairs: Sequence[tuple[BoundedConstraint, ...]],
 ) -> Iterator[BoundedConstraint]:
-    """Yield the constraints of every limit: of both plates, of the whole design, of few pairs, then of each pose."""
+    """Yield the constraints of every limit: on both plates, on the whole design, on few pairs, then on each pose."""
     limits = sorted(case.limits, key=attrgetter("order"))
     legs, model = robots[0].legs, case.model
     base = Plate("base", tuple(PlateJoint(leg.name, leg.base) for leg in legs))

@@ -1,9 +1,9 @@
-"""The loop equations that a program needs: those that depend on the others where a case fixes numbers are left out.
+"""Loop equations that a program needs, without those that become dependent when a case fixes parameters.
 
-A model has the equations that are independent when all dimensions and the pose are free. With fewer free numbers some
-of them may follow from the others: the platform of a Delta that is held without rotation fulfils the equations of its
-rotation by itself. A local solver stops at dependent equations, so the program has independent ones alone. They are
-found at closed points of the case's box, and all equations of the robot are checked at every answer.
+The equations of a model are independent if all dimensions and the pose are free. With fewer free parameters some may
+follow from others: the platform of a Delta with fixed rotation satisfies its rotation equations by itself. A local
+solver stops at dependent equations, so the program has only independent ones. They are determined at closed points of
+the case's box, and all loop equations are checked at every answer.
 """
 
 from __future__ import annotations
@@ -19,25 +19,26 @@ from ...models.newton import VectorEquations, newton
 from ...models.rows import independent_rows
 from .places import SymbolTable
 
-#: Points of the box from which closed points are searched, the first starting point among them.
+#: Number of points of the box from which closed points are searched, including the first starting point.
 _POINTS = 6
-#: Share of the box in which the points lie, about its middle.
+#: Fraction of the box, about its middle, with these points.
 _SPREAD = 0.6
-#: Newton steps to a closed point, with the unknowns alone and with all variables. From home six are enough.
+#: Largest number of Newton steps to a closed point, with only the unknowns and with all variables. From home six are
+#: enough.
 _STEPS = (11, 39)
 #: Largest residual of a closed point; equations are of order 1.
 _CLOSED = 1e-10
-#: Singular values below this part of the largest are zero in a step, so that rounding moves nothing.
+#: Relative size below which singular values are zero in a step, so that rounding moves nothing.
 _DEPENDENT = 1e-9
 
 
 def needed_equations(equations: Sequence[SX], table: SymbolTable, unknowns: Sequence[int]) -> list[int]:
-    """Return the indices of the loop equations that a program needs, in order; all where no closed point is found.
+    """Return the indices of the loop equations that a program needs, in order; all if there is no closed point.
 
     Args:
         equations: (1, 1) expressions of the variables and arguments, zero where the loops are closed.
-        table: the numbers of the case as symbols.
-        unknowns: indices of the robot's internal unknowns among the variables.
+        table: symbols of the variables and arguments.
+        unknowns: indices of the robot's unknowns among the variables.
     """
     every = list(range(len(equations)))
     if not equations or not table.x:
@@ -53,7 +54,7 @@ def needed_equations(equations: Sequence[SX], table: SymbolTable, unknowns: Sequ
     jacobians = []
     for k in range(_POINTS):
         point = start if k == 0 else (lower + upper) / 2 + _SPREAD * scale * rng.uniform(-1.0, 1.0, len(start))
-        point[own] = start[own]  # home, from which the loops close without another assembly
+        point[own] = start[own]  # home, from which the loops close in the home assembly mode
         closed = _closed_point(function, table.values, point, scale, own)
         if closed is not None:
             jacobians.append(closed * scale)
@@ -61,18 +62,18 @@ def needed_equations(equations: Sequence[SX], table: SymbolTable, unknowns: Sequ
 
 
 def _closed_point(
-    function: ca.Function, arguments: Sequence[float], start: FloatArray, scale: FloatArray, own: list[int]
+    function: ca.Function, arguments: Sequence[float], start: FloatArray, scale: FloatArray, unknowns: list[int]
 ) -> FloatArray | None:
-    """Return the Jacobian (c, n) of the equations at a closed point; None where Newton's method finds none.
+    """Return the Jacobian (c, n) of the equations at a closed point; None if Newton's method fails.
 
     Args:
-        function: of the variables and arguments, to the equations and their Jacobian.
+        function: function from variables and arguments to the equations and their Jacobian.
         arguments: values of the arguments.
-        start: (n,) where Newton's method starts.
+        start: (n,) start of Newton's method.
         scale: (n,) half range of each variable.
-        own: indices of the unknowns, which move alone if this closes the loops.
+        unknowns: indices of the unknowns, the only moving variables if this closes the loops.
     """
-    for movable, steps in zip((own, list(range(len(start)))), _STEPS, strict=True):
+    for movable, steps in zip((unknowns, list(range(len(start)))), _STEPS, strict=True):
         equations = VectorEquations(
             lambda x: [each.full() for each in function(x, arguments)], _CLOSED, movable, scale[movable]
         )

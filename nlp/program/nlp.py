@@ -1,4 +1,4 @@
-"""The nonlinear program with its numbers: bounds, arguments, scale and the sides of bounds and constraints."""
+"""Nonlinear program with values: bounds, arguments, scale, and sides of bounds and constraints."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-#: Golden section: its multiples modulo 1 are spread evenly over the unit interval.
+#: Golden ratio: its multiples modulo 1 are spread evenly over the unit interval.
 _GOLDEN = 0.6180339887498949
-#: Change of the objective between the bounds, as a part of its size, below which it is scaled by the change: tolerances
-#: of 1e-7 would be more than 2e-5 of all that can be gained. Ordinary cases have 0.01 to 1.
+#: Relative change of the objective between the bounds below which the change is the scale: tolerances of 1e-7 would
+#: otherwise exceed 2e-5 of the possible gain. Ordinary cases have 0.01 to 1.
 _NARROW = 5e-3
-#: Smallest scale of the objective, as a part of its size: smaller changes drown in the rounding of its derivatives.
+#: Smallest relative scale of the objective: smaller changes drown in the rounding of its derivatives.
 _SMALLEST_CHANGE = 1e-8
 #: Number of points at which changes are measured.
 _POINTS = 9
-#: Rounding units by which an objective is inexact, beside its size: a few for each of its operations in a row.
+#: Relative inexactness of an objective in rounding units: a few for each of its successive operations.
 _ROUNDINGS = 16
 
-#: A side of a limit: from below, from above, or both at once.
+#: Sides of a limit: lower, upper, or both at once.
 Bound: TypeAlias = Literal["min", "max", "equal"]
 
 
 class PairPlace(NamedTuple):
-    """Place of a pair of values: index of its family, and of its first and its second value in the family."""
+    """Place of a pair of values: index of its family, and of both values in the family."""
 
     family: int
     first: int
@@ -59,9 +59,9 @@ class Side:
 
     Attributes:
         name: name of the variable or constraint.
-        bound: ``min`` or ``max``; ``equal`` for an equation, which has one side.
-        variable: index of the variable, or None for a constraint.
-        constraint: index of the constraint, or None for a variable's bound.
+        bound: kind of the side: ``min`` or ``max``; ``equal`` for an equation, which has one side.
+        variable: index of the variable; None for a constraint.
+        constraint: index of the constraint; None for a variable's bound.
     """
 
     name: str
@@ -75,12 +75,11 @@ class Sides:
     """All sides of a program as arrays: those of the variables' bounds, then those of the constraints.
 
     Attributes:
-        sides: the k sides.
-        place: (k,) index of each side's expression among the variables, followed by the constraints.
-        sign: (k,) -1 for a lower and +1 for an upper side: the sign of a change of the expression that leaves the
-            feasible side; +1 for an equation.
+        sides: sides, k of them.
+        place: (k,) index of each side's expression among the variables followed by the constraints.
+        sign: (k,) -1 for a lower and +1 for an upper side, the sign of an infeasible change; +1 for an equation.
         limit: (k,) bound of each side, in the units of its expression.
-        equal: (k,) whether the side is an equation.
+        equal: (k,) True for an equation.
     """
 
     sides: tuple[Side, ...]
@@ -92,28 +91,26 @@ class Sides:
 
 @dataclass(frozen=True, eq=False)
 class Nlp(Whole):
-    """A program with its numbers, on which every solver, certificate and report is based.
+    """Nonlinear program with values, the basis of every solver, certificate and report.
 
     Attributes:
-        program: the symbols.
+        program: symbols of the program.
         case: the case of the program, for names and units.
-        sense: whether the objective is maximised or minimised.
+        sense: maximisation or minimisation of the objective.
         arguments: (k,) values of the program's arguments.
         lower: (n,) lower bounds of the variables.
         upper: (n,) upper bounds, ``lower < upper``.
         start: (n,) first starting point.
         g_lower: (c,) lower sides of the constraints, infinite where there is none.
-        g_upper: (c,) upper sides; those of an equation are its lower ones.
-        constant_limits: limits of the case that depend on no variable and hold, so that they are no constraints of the
-            program.
-        families: limits on many pairs of values. Of their pairs only those in ``pairs`` are constraints; see
-            :mod:`.pairs`.
-        implied: constraints that the fixed numbers make hold, as in :class:`~.layout.Layout`.
-        fixed_families: families of pairs that they make hold.
-        pairs: family, first and second index of these pairs; their constraints are the program's last.
-        pair_count: number of constraints that these pairs have.
-        in_home_mode: whether a search of the whole box keeps to home's working mode of a robot given joint by joint.
-        size: positive size of the objective, where the objective does not consist of the robot's F.
+        g_upper: (c,) upper sides of the constraints; equal to the lower ones for an equation.
+        constant_limits: satisfied limits that depend on no variable, so that they are not constraints.
+        families: limits on many pairs of values. Only the pairs in ``pairs`` are constraints; see :mod:`.pairs`.
+        implied: equations that the fixed parameters satisfy, as in :class:`~.layout.Layout`.
+        fixed_families: families of fixed values.
+        pairs: family, first and second index of the pairs that are the program's last constraints.
+        pair_count: number of constraints of these pairs.
+        in_home_mode: True if a search of the whole box keeps to the home working mode of a robot given joint by joint.
+        size: positive size of the objective, if the objective does not consist of the robot's F; else None.
     """
 
     program: Program
@@ -144,7 +141,7 @@ class Nlp(Whole):
 
     @property
     def is_fixed(self) -> bool:
-        """Whether the case leaves nothing free: loops determine all variables, but the level of a worst pose."""
+        """True if loops determine all variables except the level of a worst pose."""
         places = self.program.places
         own = set(places.inner)
         own |= set() if places.epigraph is None else {places.epigraph.level}
@@ -152,12 +149,12 @@ class Nlp(Whole):
 
     @property
     def is_overdetermined(self) -> bool:
-        """Whether there are more equations than variables, so that no local solver has a step to choose."""
+        """True if there are more equations than variables, so that a local solver has no freedom of choice."""
         return int(np.count_nonzero(self.g_lower == self.g_upper)) > self.n
 
     @cached_property
     def scale(self) -> FloatArray:
-        """(n,) half of each variable's range, so that scaled variables run from -1 to 1 between the bounds."""
+        """(n,) half of each variable's range: scaled variables run from -1 to 1 between the bounds."""
         return (self.upper - self.lower) / 2
 
     @property
@@ -167,11 +164,11 @@ class Nlp(Whole):
 
     @property
     def sign(self) -> float:
-        """Factor that turns the objective into one to be minimised: -1 for a maximum, 1 for a minimum."""
+        """Factor of the objective for minimisation: -1 for a maximum, 1 for a minimum."""
         return -self.sense.sign
 
     def stated_limit(self, j: int) -> float:
-        """Return the bound of side j as the case states it, in the units of its expression."""
+        """Return the bound of side j in the case, in the units of its expression."""
         side = self.sides.sides[j]
         stated = None if side.constraint is None else self.program.constraints[side.constraint].stated
         return float(self.sides.limit[j]) if stated is None else stated[0 if side.bound == "min" else 1]
@@ -205,7 +202,7 @@ class Nlp(Whole):
 
     @cached_property
     def family_values(self) -> Kernel[FloatArray]:
-        """``(x, p)`` to the values of all families one below the other, (sum of N, 1)."""
+        """``(x, p)`` to the values of all families, one below the other, (sum of N, 1)."""
         values = ca.densify(ca.vertcat(*[family.values for family in self.families]))
         return Kernel(ca.Function("family_values", [self.program.x, self.program.p], [values]), single_output)
 
@@ -216,9 +213,9 @@ class Nlp(Whole):
 
     @cached_property
     def objective_scale(self) -> float:
-        """Scale of the objective: its size, or, where the ranges are narrow, what it changes by between the bounds.
+        """Scale of the objective: its size or, for narrow ranges, its change between the bounds.
 
-        The change is the largest sum of its scaled derivatives at a few points.
+        The change is the largest sum of scaled derivatives at a few points.
         """
         size = self.objective_size
         if not self.has_scale_of_changes:
@@ -229,12 +226,12 @@ class Nlp(Whole):
 
     @cached_property
     def rounding(self) -> float:
-        """Rounding error of the scaled objective and of its derivatives: of order 1e-15, and more for narrow ranges."""
+        """Rounding error of the scaled objective and its derivatives: of order 1e-15, and larger for narrow ranges."""
         return _ROUNDINGS * float(np.finfo(float).eps) * self.objective_size / self.objective_scale
 
     @cached_property
     def row_sizes(self) -> FloatArray:
-        """(c,) longest gradient of each constraint in scaled variables at a few points; 0 where there is none."""
+        """(c,) longest gradient of each constraint in scaled variables at a few points; 0 if undefined."""
         rows = [np.linalg.norm(each[1:], axis=1) for each in self._scaled_rows]
         return np.asarray(np.nan_to_num(np.array(rows), nan=0.0, posinf=0.0).max(axis=0), dtype=np.float64)
 
@@ -257,12 +254,12 @@ class Nlp(Whole):
 
     @property
     def has_scale_of_changes(self) -> bool:
-        """Whether the objective's scale may be its change between the bounds: a free direction is never narrow."""
+        """True if the objective's scale may be its change between the bounds; False with free directions."""
         return bool(self.n) and self.size is None and not self.program.places.directions
 
     @property
     def shares(self) -> list[FloatArray]:
-        """Points (n,) at which changes are measured, in half ranges from the middle of the box."""
+        """Points (n,) for measuring changes, in half ranges from the middle of the box."""
         return [np.zeros(self.n), *(2 * self._spread(k) for k in range(1, _POINTS))]
 
     def _spread(self, k: int) -> FloatArray:
@@ -271,10 +268,10 @@ class Nlp(Whole):
 
     @cached_property
     def objective_size(self) -> float:
-        """Size of the objective without cancellation at the first starting point: positive also where F is 0.
+        """Size of the objective without cancellation at the first starting point: positive even if F is 0.
 
-        Where the robot is not defined at that point, as with limbs of zero length, the size is evaluated at the first
-        of a few points around the middle of the box at which the robot is defined; 1 where there is none.
+        If the robot is undefined at that point, as with limbs of zero length, the size is that at the first of a few
+        points around the middle of the box with a defined robot; 1 if there is none.
         """
         if self.size is not None:
             return self.size
@@ -287,5 +284,5 @@ class Nlp(Whole):
 
 
 def scale_of_change(size: FloatArray, change: FloatArray) -> FloatArray:
-    """Return the scale of objectives from their sizes and from what they change by between the bounds."""
+    """Return the scale of objectives from their sizes and their changes between the bounds."""
     return np.where(change >= _NARROW * size, size, np.maximum(change, _SMALLEST_CHANGE * size))

@@ -1,8 +1,8 @@
-"""Limits on many pairs of values, of which only those that a point would violate become constraints.
+"""Limits on many pairs of values, with only violated pairs as constraints.
 
-A stroke over N poses limits ``N (N - 1)`` pairs of lengths for each leg. A program without some of them has a larger
-feasible set. An optimum of it that keeps every pair is therefore an optimum of the whole program too. So a solver
-searches a program with few pairs, adds those that its points violate, and searches again until there is none.
+A stroke over N poses limits ``N (N - 1)`` pairs of lengths for each leg. An optimum of a program without some pairs is
+an optimum of the whole program if it satisfies every pair. A solver therefore starts with few pairs, adds the violated
+ones, and searches again until there are none.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from ..case.limits.constraint import BoundedConstraint
 from .nlp import Nlp, PairPlace
 from .repeated import without_repeated
 
-#: Violation of a pair, as a part of the largest value of its family, above which it is no rounding of the values.
+#: Violation of a pair, relative to the largest value of its family, above which it is not rounding.
 _ROUNDING = 1e-13
 
 
 def with_pairs_at(nlp: Nlp, points: Iterable[FloatArray]) -> Nlp:
-    """Return a program with the tightest pair of each family that a point violates; the same program if it has them.
+    """Return a program with the tightest violated pair of each family at given points; unchanged if it has them.
 
     Args:
         nlp: the program.
-        points: each (n,).
+        points: (n,) points.
     """
     missing = [place for x in points for place in violated_pairs(nlp, x)] if nlp.families else []
     return with_pairs(nlp, missing) if missing else nlp
 
 
 def with_pairs(nlp: Nlp, places: Iterable[PairPlace]) -> Nlp:
-    """Return a program with further pairs as its last constraints; the same program where it has them all.
+    """Return a program with further pairs as its last constraints; unchanged if it has them all.
 
-    Two pairs of a symmetric robot may be the same function, and become one constraint.
+    Pairs of a symmetric robot that are the same function become one constraint.
     """
     fresh = [place for place in dict.fromkeys(places) if place not in set(nlp.pairs)]
     if not fresh:
@@ -48,13 +48,13 @@ def with_pairs(nlp: Nlp, places: Iterable[PairPlace]) -> Nlp:
 
 
 def with_shared_pairs(nlps: Sequence[Nlp], places: Iterable[PairPlace]) -> list[Nlp]:
-    """Return programs that share their symbols with further pairs, sharing their symbols again."""
+    """Return programs with common symbols and further pairs, again with common symbols."""
     first = with_pairs(nlps[0], places)
     return [replace(first, arguments=nlp.arguments, sense=nlp.sense) for nlp in nlps]
 
 
 def with_all_pairs(nlp: Nlp) -> Nlp:
-    """Return a program with every pair of its families, in an order that does not depend on the pairs that it has."""
+    """Return a program with every pair of its families, in an order independent of its present pairs."""
     if not nlp.families:
         return nlp
     places = [
@@ -87,7 +87,7 @@ def tightest_pairs(nlp: Nlp, x: FloatArray) -> Iterator[PairPlace]:
 
 
 def violated_pairs(nlp: Nlp, x: FloatArray) -> list[PairPlace]:
-    """Return the tightest pair of each family that a point (n,) violates and that is no constraint of the program."""
+    """Return the tightest violated pair of each family at a point (n,) that is not a constraint of the program."""
     if not nlp.families:
         return []
     values, known = _values(nlp, x), set(nlp.pairs)

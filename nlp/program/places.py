@@ -1,7 +1,7 @@
-"""Typed places of a program's numbers: indices among the variables ``x`` or among the arguments ``p``.
+"""Typed places of a program's variables and arguments: indices in ``x`` or in ``p``.
 
-The package finds a symbol by its typed place and never by the text of its name. Names are for people alone, so a robot
-may give its parameters any names.
+A symbol is found by its typed place and never by its name. Names are only for people, so a robot may give its
+parameters any names.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from ..case.pose import Free, Value
 
 @dataclass(frozen=True)
 class Scalar:
-    """A named scalar of a program: a free variable or an argument that a case fixes.
+    """Named scalar of a program: a free variable, or an argument that a case fixes.
 
     Attributes:
-        name: for people.
-        dimension: length, angle (radians) or plain number.
+        name: name for people.
+        dimension: length, angle (radians) or dimensionless number.
     """
 
     name: str
@@ -45,7 +45,7 @@ class FreeRotation:
 
     Attributes:
         q: indices in ``x`` of the vector part ``q`` of the unit quaternion.
-        ball: the constraint on ``|q|^2``.
+        ball: constraint on ``|q|^2``.
     """
 
     q: tuple[int, int, int]
@@ -54,7 +54,7 @@ class FreeRotation:
 
 @dataclass(frozen=True)
 class HeldRotation:
-    """Place of a rotation whose axis is held fixed.
+    """Place of a rotation with a fixed axis.
 
     Attributes:
         angle: place of the angle, radians.
@@ -63,7 +63,7 @@ class HeldRotation:
     angle: Place
 
 
-#: None stands for no rotation: a free axis with an angle of zero.
+#: Places of a rotation; None for a free axis with an angle of zero.
 RotationPlaces: TypeAlias = FreeRotation | HeldRotation | None
 
 
@@ -72,11 +72,11 @@ class Epigraph:
     """Places of the epigraph of a worst case: a variable that bounds several objectives.
 
     Attributes:
-        level: index in ``x`` of the epigraph variable, which is the last variable.
-        ceiling: index in ``p`` of the size by which the constraints are divided.
-        constraints: one for each objective.
-        best: indices in ``p`` of each task's own optimum; empty for a worst pose.
-        power: 2 where the level is the root of the worst of squares.
+        level: index in ``x`` of the epigraph variable, the last variable.
+        ceiling: index in ``p`` of the divisor of the constraints.
+        constraints: constraint of each objective.
+        best: indices in ``p`` of the separate optimum of each task; empty for a worst pose.
+        power: 2 if the level is the root of the worst of squares.
     """
 
     level: int
@@ -88,18 +88,18 @@ class Epigraph:
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Places of a program's numbers.
+    """Places of a program's variables and arguments.
 
     Attributes:
-        numbers: places of the case's own numbers, in the order of :attr:`screwsynth.nlp.case.case.Case.scalars`.
+        numbers: places of the case's parameters, in the order of :attr:`screwsynth.nlp.case.case.Case.scalars`.
         rotations: places of the rotation of each stated pose.
-        unknowns: indices in ``x`` of the robot's internal unknowns, at each pose.
-        joints: those of them that are free positions of driven joints, at each pose.
+        unknowns: indices in ``x`` of the robot's unknowns, at each pose.
+        joints: indices in ``x`` of the free actuator coordinates among the unknowns, at each pose.
         twists: indices in ``p`` of the six numbers of each task's twist.
         directions: indices in ``x`` of the three components of each unit vector with three free components.
-        epigraph: places of the epigraph of a worst case; None where the objective consists of F itself.
+        epigraph: places of the epigraph of a worst case; None if the objective consists of F.
         weights: indices in ``p`` of the tasks' weights; empty for one task.
-        further: indices in ``x`` of unknowns, and dependent numbers, at poses of a workspace that are constraints.
+        further: indices in ``x`` of unknowns and dependent coordinates at workspace poses that are constraints.
     """
 
     numbers: tuple[Place, ...]
@@ -125,14 +125,14 @@ class Places:
 
 
 class PlacedSymbols(NamedTuple):
-    """Symbols of n numbers, (n, 1), and the place of each number."""
+    """Symbols of n scalars, (n, 1), and their places."""
 
     symbols: SX
     places: tuple[Place, ...]
 
 
 class SymbolTable:
-    """The symbols of a program under construction: free variables and fixed arguments, in the order of addition.
+    """Symbols of a program under construction: free variables and fixed arguments, in the order of addition.
 
     Attributes:
         variables: names of the free variables.
@@ -153,17 +153,17 @@ class SymbolTable:
         self._names: set[str] = set()
 
     def add(self, name: str, dimension: Dimension, value: Value) -> PlacedSymbols:
-        """Add a number, as a variable where it is free and as an argument where it is fixed.
+        """Add a scalar, as a variable if it is free and as an argument if it is fixed.
 
-        A name that an earlier number already has gets the prefix ``program.``.
+        A name that is already in use gets the prefix ``program.``.
 
         Args:
-            name: for people.
-            dimension: length, angle (radians) or plain number.
-            value: the number, or its bounds.
+            name: name for people.
+            dimension: length, angle (radians) or dimensionless number.
+            value: fixed value, or bounds.
 
         Returns:
-            The symbol (1, 1) and its place.
+            Symbol (1, 1) and its place.
         """
         name = f"program.{name}" if name in self._names else name
         self._names.add(name)
@@ -179,7 +179,7 @@ class SymbolTable:
         return PlacedSymbols(symbol, (Place("p", len(self.p) - 1),))
 
     def add_each(self, names: Sequence[str], dimension: Dimension, values: Sequence[Value]) -> PlacedSymbols:
-        """Add several numbers with the given names, and return their symbols (n, 1) and places."""
+        """Add several scalars with the given names, and return their symbols (n, 1) and places."""
         added = [self.add(name, dimension, value) for name, value in zip(names, values, strict=True)]
         symbols = ca.vertcat(SX(0, 1), *[each.symbols for each in added])
         return PlacedSymbols(symbols, tuple(each.places[0] for each in added))
@@ -187,7 +187,7 @@ class SymbolTable:
     def add_vector(self, name: str, dimension: Dimension, values: Sequence[Value]) -> PlacedSymbols:
         """Add the components of a vector, and return their symbols (n, 1) and places.
 
-        Their names are ``name_x, name_y, name_z``; with more than three components ``name_0, name_1`` and so on.
+        The names are ``name_x, name_y, name_z``; for more than three components ``name_0, name_1`` and so on.
         """
         names = component_names(name, len(values)) if len(values) <= 3 else [f"{name}_{i}" for i in range(len(values))]
         return self.add_each(names, dimension, values)

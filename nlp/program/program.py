@@ -1,12 +1,11 @@
-"""The symbols and compiled functions of a nonlinear program; its numbers are in :class:`~.nlp.Nlp`.
+"""Symbols and compiled functions of a nonlinear program; its values are in :class:`~.nlp.Nlp`.
 
-A program belongs to a *structure*: a robot with a choice of free numbers. Every number that a case fixes (dimensions,
-pose, twist) is an argument, so one program serves every start, every task and every point of a sweep. Variables are in
-the units of the case (radians for angles); division by :attr:`~.nlp.Nlp.scale` makes them of order 1.
+A program belongs to a *structure*: a robot with a set of free parameters. All fixed values of a case (dimensions, pose,
+twist) are arguments, so one program serves every start, task and point of a sweep. Variables are in the units of the
+case (radians for angles); division by :attr:`~.nlp.Nlp.scale` makes them of order 1.
 
-CasADi's functions are evaluated on NumPy arrays in place. A call through CasADi's general interface converts every
-argument and result, which takes twenty times as long as evaluating the functions of a parallel robot. A kernel keeps
-the memory that the function reads and writes.
+CasADi's functions are evaluated on NumPy arrays in place, by kernels that keep the memory of arguments and results: the
+conversions of CasADi's general interface take twenty times as long as the functions of a parallel robot.
 """
 
 from __future__ import annotations
@@ -42,11 +41,11 @@ def single_output(output: FloatArray) -> FloatArray:
 
 
 class Kernel(Generic[T]):
-    """A CasADi function with NumPy arrays as arguments and results; calls from several threads are safe.
+    """CasADi function with NumPy arrays as arguments and results; calls from several threads are safe.
 
     Args:
-        function: any number of dense inputs and outputs.
-        result: makes the value of a call from new arrays (rows, columns), one for each output.
+        function: function with any number of dense inputs and outputs.
+        result: function that makes the value of a call from new arrays (rows, columns), one for each output.
     """
 
     def __init__(self, function: ca.Function, result: Callable[..., T]) -> None:
@@ -63,10 +62,10 @@ class Kernel(Generic[T]):
         """Return the function's value.
 
         Args:
-            arguments: one for each input: a number, or a vector with as many numbers as the input has.
+            arguments: number, or vector of the input's size, for each input.
 
         Raises:
-            ValueError: the number or a size of the arguments is wrong.
+            ValueError: the number of arguments or a size is wrong.
         """
         with self._lock:
             for memory, argument in zip(self._inputs, arguments, strict=True):
@@ -101,21 +100,21 @@ class ArgumentDerivatives(NamedTuple):
 
 
 class RobotNumbers(NamedTuple):
-    """The numbers of a :class:`~screwsynth.models.RobotInstance` at one pose.
+    """Values of a :class:`~screwsynth.models.RobotInstance` at one pose.
 
     Attributes:
         parameters: (k, 1) components of all parameters, radians for angles.
         rotation: (3, 3) ``R``, platform to world coordinates.
-        position: (3, 1) ``p``, length.
+        position: (3, 1) ``p``, origin of the platform frame, length.
         jacobian: (m, 6) unit wrenches, force, then moment about the world origin.
         rates: (m, tasks) work rates.
         F: (tasks, 1) objective of each task.
         squares: (m, 1) squared length of each row's direction.
-        magnitude: (tasks, 1) F without cancellation.
-        loops: (k, 1) left sides of all the model's loop equations.
-        driven: (m, a) work rate of each row for a unit rate of each of the model's actuators.
-        relations: (r, a) factors of the actuators' rates in the equations that loops demand of these alone.
-        quantities: (n, 1) values of each of the model's quantities, radians for angles.
+        magnitude: (tasks, 1) upper bound on F without cancellation.
+        loops: (k, 1) left sides of all loop equations of the model.
+        driven: (m, a) work rate of each row for a unit rate of each actuator.
+        relations: (r, a) coefficients of the equations of the actuator rates only, which loops impose.
+        quantities: (n, 1) values of each quantity of the model, radians for angles.
     """
 
     parameters: FloatArray
@@ -133,7 +132,7 @@ class RobotNumbers(NamedTuple):
 
     @classmethod
     def from_outputs(cls, *outputs: FloatArray) -> RobotNumbers:
-        """Return the numbers from the outputs of :meth:`Program.robot_state`."""
+        """Return the values from the outputs of :meth:`Program.robot_state`."""
         numbers, quantities = outputs[:11], outputs[11:]
         return cls._make((*numbers, quantities))
 
@@ -145,19 +144,19 @@ class RobotNumbers(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Program(Whole):
-    """A nonlinear program without its numbers.
+    """Nonlinear program without values.
 
     Attributes:
-        variables: the free numbers, in the order of ``x``.
-        arguments: the fixed numbers, in the order of ``p``.
-        x: (n, 1) symbols of the free variables.
+        variables: free variables, in the order of ``x``.
+        arguments: fixed arguments, in the order of ``p``.
+        x: (n, 1) symbols of the variables.
         p: (k, 1) symbols of the arguments.
         objective: (1, 1) expression that is maximised or minimised.
         constraints: constraints in addition to the variables' bounds.
         robots: the robot's expressions at each pose.
-        model: the robot itself.
-        places: places of the case's numbers, rotations, unknowns, twists, directions and epigraph.
-        objective_call: the call whose value the objective is, where it combines F of several poses.
+        model: symbolic model of the robot.
+        places: places of the case's parameters, rotations, unknowns, twists, directions and epigraph.
+        objective_call: call that returns the objective, if it combines F of several poses; else None.
     """
 
     variables: tuple[Scalar, ...]
@@ -179,7 +178,7 @@ class Program(Whole):
 
     @property
     def robot(self) -> RobotInstance:
-        """The robot's expressions, at the first pose where there are several."""
+        """Expressions of the robot, at the first pose if there are several."""
         return self.robots[0]
 
     @cached_property
@@ -221,14 +220,14 @@ class Program(Whole):
 
     @cached_property
     def kernels(self) -> Kernels:
-        """The functions as kernels, with NumPy arrays as arguments and results."""
+        """Functions as kernels, with NumPy arrays as arguments and results."""
         return Kernels(self)
 
 
 class Kernels:
-    """A program's functions as kernels on NumPy arrays, each made at its first use.
+    """Functions of a program as kernels on NumPy arrays, each made at first use.
 
-    Arguments and results are those of the properties of the same names of :class:`Program`.
+    Arguments and results are those of the :class:`Program` properties of the same names.
     """
 
     def __init__(self, program: Program) -> None:
@@ -256,24 +255,24 @@ class Kernels:
 
     @cached_property
     def robot_state(self) -> Kernel[RobotNumbers]:
-        """``(x, p)`` to the robot's numbers at the first pose."""
+        """``(x, p)`` to the robot's values at the first pose."""
         return self.robot_states[0]
 
     @cached_property
     def robot_states(self) -> tuple[Kernel[RobotNumbers], ...]:
-        """``(x, p)`` to the robot's numbers, one kernel for each pose."""
+        """``(x, p)`` to the robot's values, one kernel for each pose."""
         poses = range(len(self._program.robots))
         return tuple(Kernel(self._program.robot_state(pose), RobotNumbers.from_outputs) for pose in poses)
 
     @cached_property
     def joint_screws(self) -> ca.Function:
-        """Parameters, unknowns, rotation and position to the values of the paths of the model."""
+        """Function from parameters, unknowns, rotation and position to the expressions of the model's paths."""
         model = self._program.model
         return ca.Function("joint_screws", Substitution.identity(model).all, expressions_of_paths(model.joint_screws))
 
 
 def design_indices(program: Program) -> tuple[int, ...]:
-    """Return the indices in ``x`` of dimensions and poses: of all variables but joints, and an epigraph's level."""
+    """Return the indices in ``x`` of dimensions and poses: all variables but joints and the epigraph level."""
     places = program.places
     others = set(places.inner)
     if places.epigraph is not None:
@@ -282,7 +281,7 @@ def design_indices(program: Program) -> tuple[int, ...]:
 
 
 def design_names(program: Program) -> frozenset[str]:
-    """Return the names of the variables of a design, with those of its limits: all but joints and closed loops."""
+    """Return the names of a design's variables and limits: all but those of joints and closed loops."""
     model = program.model
     inner = {program.variables[index].name for index in program.places.inner}
     names = {each.name for each in program.variables} | {each.name for each in program.constraints}

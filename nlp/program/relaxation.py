@@ -1,9 +1,8 @@
-"""The smallest relaxation that makes an infeasible case feasible, as a program.
+"""Smallest relaxation that makes an infeasible case feasible, as a program.
 
-The number of every limit gets a variable ``t >= 0``, by which it is relaxed at every leg, joint and pose at once: ``t``
-is a part of the number itself, or of one unit where the number is 0. The program minimises the sum of all t. A sum,
-unlike a sum of squares, relaxes few numbers and leaves the others unchanged, so that its optimum shows which limits
-contradict each other.
+Every limit gets a variable ``t >= 0`` by which it is relaxed, at every leg, joint and pose at once. The unit of ``t``
+is the limit's value, or 1 for a value of 0. The program minimises the sum of all t. A sum, unlike a sum of squares,
+relaxes few limits, so that its optimum shows which limits contradict each other.
 """
 
 from collections.abc import Sequence
@@ -23,27 +22,28 @@ from .pairs import violated_pairs, with_pairs
 from .places import Scalar
 from .sampling import starting_points
 
-#: Relaxation above which a limit counts as relaxed, as a part of the limit's number.
+#: Relative relaxation above which a limit counts as relaxed.
 RELAXED = 1e-6
-#: Difference of two relaxations that is rounding error of their limits.
+#: Difference of two relaxations that counts as rounding of their limits.
 _ROUNDING = 1e-9
 #: Number of points at which the necessary relaxation of each limit is evaluated for the upper bound of t.
 _BOUND_POINTS = 32
 #: Upper bound of t, as a multiple of the largest of these necessary relaxations.
 _BOUND_FACTOR = 2.0
-#: Largest relaxation of a limit, as a multiple of the limit's number.
+#: Largest relaxation of a limit, as a multiple of its value.
 _LARGEST_RELAXATION = 1e3
 
 
 class RelaxedLimit(JsonObject):
-    """A number of an infeasible case that must be moved, with all the others of its list, for the case to be feasible.
+    """Limit of an infeasible case that must be relaxed, together with all others of its list.
 
     Attributes:
-        key: dotted key, below limits, of the number.
-        limit: as it is.
-        needed: as it would have to be; where limits hold over a workspace or along a path, at least so far from it.
-        unit: of both.
-        dimension: of both, which are in radians for angles.
+        key: dotted key of the limit's value, below ``limits``.
+        limit: value in the case.
+        needed: value with which the case would be feasible; for limits over a workspace or along a path, at least so
+            far from ``limit``.
+        unit: unit of both values.
+        dimension: dimension of both values; radians for angles.
     """
 
     key: str
@@ -55,13 +55,13 @@ class RelaxedLimit(JsonObject):
 
 @dataclass(frozen=True)
 class _RelaxableSide:
-    """One side of a constraint that belongs to a limit.
+    """Side of a constraint that belongs to a limit.
 
     Attributes:
-        key: dotted key, below ``limits``, of the limit's number.
+        key: dotted key of the limit's value, below ``limits``.
         constraint: the constraint.
         place: index of the constraint in the program.
-        limit: the side, in units of the constraint's expression.
+        limit: bound of the side, in units of the constraint's expression.
         direction: sign of a relaxation: -1 for a lower side, +1 for an upper one.
     """
 
@@ -73,16 +73,16 @@ class _RelaxableSide:
 
     @property
     def number(self) -> float:
-        """The limit's number, radians for angles."""
+        """Value of the limit, radians for angles."""
         return self.constraint.reading.from_value(self.limit)
 
     @property
     def unit(self) -> float:
-        """Change of the number by a relaxation of 1: its size, or one unit where it is 0."""
+        """Change of the limit's value by a relaxation of 1: its size, or one unit if it is 0."""
         return abs(self.number) or 1.0
 
     def necessary_relaxation(self, value: float) -> float:
-        """Return the smallest relaxation t >= 0 with which a value of the expression is feasible."""
+        """Return the smallest relaxation t >= 0 for which a value of the expression is feasible."""
         return max(0.0, self.direction * (self.constraint.reading.from_value(value) - self.number) / self.unit)
 
 
@@ -100,9 +100,9 @@ def _relaxable_sides(nlp: Nlp) -> list[_RelaxableSide]:
 
 
 def formulate_relaxation(nlp: Nlp) -> Nlp:
-    """Return the program whose optimum is the smallest relaxation of a program's limits.
+    """Return the program of the smallest relaxation of a program's limits.
 
-    Its last variables are the t of the limits' numbers, in the order of the program's constraints.
+    Its last variables are the t of the limits, in the order of the program's constraints.
 
     Args:
         nlp: a program with limits.
@@ -147,21 +147,21 @@ def formulate_relaxation(nlp: Nlp) -> Nlp:
 
 
 def relaxation_point(nlp: Nlp, x: FloatArray) -> FloatArray:
-    """Return a point of :func:`formulate_relaxation`'s program: a point of the original with the t that it requires.
+    """Return a point of the relaxation's program: a point of the original one with the required t.
 
     Args:
         nlp: the original program.
         x: (n,) a point of the original program.
 
     Returns:
-        (n + k,) array with a t for each of the k numbers.
+        (n + k,) array, with a t for each of the k limits.
     """
     sides = _relaxable_sides(nlp)
     return np.append(x, _necessary_relaxations(nlp, sides, _keys(sides), x))
 
 
 def unrelaxed_pairs(nlp: Nlp, x: FloatArray) -> list[PairPlace]:
-    """Return the pairs that a program lacks, where a point of its relaxation relaxes their limits too little.
+    """Return the missing pairs of a program that are violated at a point of its relaxation.
 
     Args:
         nlp: the original program.
@@ -179,7 +179,7 @@ def unrelaxed_pairs(nlp: Nlp, x: FloatArray) -> list[PairPlace]:
 
 
 def relaxed_limits(nlp: Nlp, x: FloatArray) -> tuple[RelaxedLimit, ...]:
-    """Return the limits that are relaxed at a point of :func:`formulate_relaxation`'s program.
+    """Return the limits that are relaxed at a point of the relaxation's program.
 
     Args:
         nlp: the original program.
@@ -201,12 +201,12 @@ def relaxed_limits(nlp: Nlp, x: FloatArray) -> tuple[RelaxedLimit, ...]:
 
 
 def _keys(sides: Sequence[_RelaxableSide]) -> list[str]:
-    """Return the key of each limit's number once, in the order of the sides."""
+    """Return the key of each limit's value once, in the order of the sides."""
     return list(dict.fromkeys(side.key for side in sides))
 
 
 def _necessary_relaxations(nlp: Nlp, sides: Sequence[_RelaxableSide], keys: Sequence[str], x: FloatArray) -> FloatArray:
-    """Return the smallest t (k,) with which a point (n,) is feasible, at most :data:`_LARGEST_RELAXATION`."""
+    """Return the smallest t (k,) for which a point (n,) is feasible, at most :data:`_LARGEST_RELAXATION`."""
     g = nlp.evaluate(x)[1]
     needed = np.zeros(len(keys))
     for side in sides:
@@ -223,7 +223,7 @@ def _upper_bounds(nlp: Nlp, sides: Sequence[_RelaxableSide], keys: Sequence[str]
     for k, key in enumerate(keys):
         side = next(each for each in sides if each.key == key)
         reading = side.constraint.reading
-        # A number whose square is the limit in the program, for example, cannot be relaxed below zero.
+        # For example, a limit that enters the program squared cannot be relaxed below zero.
         one_sided = reading.from_value(float(reading.to_value(SX(-1.0)))) >= 0
         if side.direction < 0 and one_sided:
             largest[k] = min(largest[k], 1.0)

@@ -1,10 +1,9 @@
-"""Constraints that only repeat another: polynomial normal forms decide whether two expressions are one function.
+"""Removal of repeated constraints: polynomial normal forms decide if two expressions are one function.
 
-Symmetric robots have limits that are the same function of the variables and the arguments, such as the spacing of each
-pair of joints on a circle. They would share one multiplier. Two expressions are the same where they have one normal
-form: a polynomial in symbols and in values of other operations, whose operands are normal forms again. So they agree
-for all values of the variables and the arguments, up to the rounding of their constants. Expressions that only agree at
-some points, as distances between segments may on a part of the box, stay apart.
+Symmetric robots have limits that are the same function of variables and arguments, such as the spacing of each pair of
+joints on a circle; they would share one multiplier. Equal normal forms prove equality for all values, up to the
+rounding of constants: polynomials in symbols and in values of other operations, whose operands are normal forms again.
+Expressions that agree only at some points, such as distances between segments, stay separate.
 """
 
 from __future__ import annotations
@@ -20,40 +19,40 @@ from casadi import SX
 
 from ..case.limits.constraint import BoundedConstraint, Constraint
 
-#: Largest difference of two equal coefficients, in parts of the sizes of the numbers that they are sums of: rounding.
+#: Largest difference of equal coefficients, relative to the sizes of their summands: rounding.
 _ROUNDING = 64 * float(np.finfo(float).eps)
-#: Largest product of numbers of terms that is expanded: a larger one is an operation like any other.
+#: Largest product of the numbers of terms that is expanded; a larger product stays an operation.
 _MOST_TERMS = 64
-#: Values at random symbols that differ by more than this part of their size belong to different functions, and the
-#: number of such points: segments have the same distance on a part of the space.
+#: Relative difference of values at random symbols above which two functions differ, and the number of such points:
+#: distances of segments may agree on a part of the space.
 _DIFFERENT, _POINTS = 1e-9, 8
 _SEED = 0
 
-#: Powers of atoms: their numbers in order, each as often as its power.
+#: Monomial: atom numbers in order, each repeated by its power.
 _Monomial: TypeAlias = tuple[int, ...]
 
 
 class _Coefficient(NamedTuple):
-    """A coefficient, and the sum of the sizes of the numbers that it is a sum of."""
+    """Coefficient, and the sum of the absolute values of its summands."""
 
     value: float
     size: float
 
 
-#: A sum of monomials with coefficients.
+#: Polynomial: monomials with their coefficients.
 _Polynomial: TypeAlias = dict[_Monomial, _Coefficient]
 
 
 def without_repeated(
     added: Sequence[BoundedConstraint], x: SX, p: SX, known: Sequence[Constraint] = ()
 ) -> list[BoundedConstraint]:
-    """Return new constraints without those that are the same function as an earlier one with the same limit.
+    """Return new constraints without repetitions of an earlier function with the same limit.
 
     Args:
         added: the new constraints.
         x: (n, 1) symbols of the variables.
         p: (k, 1) symbols of the arguments.
-        known: constraints that a program has already.
+        known: existing constraints of a program.
     """
     constraints = [*known, *(item.constraint for item in added)]
     if len(constraints) < 2:
@@ -63,7 +62,7 @@ def without_repeated(
     rng = np.random.default_rng(_SEED)
     points = [(rng.uniform(-1, 1, x.numel()), rng.uniform(-1, 1, p.numel())) for _ in range(_POINTS)]
     values = np.column_stack([function(*each).full().ravel() for each in points])
-    # Most are told apart by their values at random points: that they differ there proves that they are not the same.
+    # Different values at random points prove that two constraints differ; this separates most of them.
     alike: dict[tuple[str, str], list[list[int]]] = {}
     for i, row in enumerate(values):
         groups = alike.setdefault(constraints[i].keys, [])
@@ -86,14 +85,14 @@ def without_repeated(
 
 
 class _NormalForms:
-    """Normal forms of expressions that share their atoms: symbols, and operations that are not expanded."""
+    """Normal forms of expressions with common atoms: symbols, and operations that are not expanded."""
 
     def __init__(self) -> None:
         self._count = 0
         self._symbols: dict[tuple[int, int], int] = {}
-        #: Operands and number of the atoms of each operation.
+        #: Operands and numbers of the atoms of each operation.
         self._operations: dict[int, list[tuple[list[_Polynomial], int]]] = {}
-        #: Squares of sines and roots in other atoms.
+        #: Squares of sines and roots in terms of other atoms.
         self._squares: dict[int, _Polynomial] = {}
 
     def of(self, expressions: SX, x: SX, p: SX) -> list[_Polynomial]:
@@ -138,7 +137,7 @@ class _NormalForms:
         return {(atom,): _Coefficient(1.0, 1.0)}
 
     def _wave(self, op: int, angle: _Polynomial) -> _Polynomial:
-        """Return the sine or cosine of an angle by those of the angle without its constant and with a first sign."""
+        """Return the sine or cosine of an angle by those of the angle without constant and with a positive sign."""
         constant = angle.get((), _Coefficient(0.0, 0.0)).value
         rest = {monomial: each for monomial, each in angle.items() if monomial}
         if not rest:
@@ -155,7 +154,7 @@ class _NormalForms:
         return _sum(_sum({}, *parts[0]), *parts[1])
 
     def _atom(self, op: int, given: list[_Polynomial]) -> int:
-        """Return the number of the atom that is an operation on normal forms."""
+        """Return the number of the atom of an operation on normal forms."""
         known = self._operations.setdefault(op, [])
         for operands, place in known:
             if all(_are_same(one, other) for one, other in zip(operands, given, strict=True)):
@@ -188,7 +187,7 @@ def _constant(value: float) -> _Polynomial:
 
 
 def _sum(one: _Polynomial, other: _Polynomial, factor: float) -> _Polynomial:
-    """Return the first polynomial plus a number times the second."""
+    """Return the first polynomial plus a factor times the second."""
     found = dict(one)
     for monomial, each in other.items():
         have = found.get(monomial, _Coefficient(0.0, 0.0))
@@ -197,7 +196,7 @@ def _sum(one: _Polynomial, other: _Polynomial, factor: float) -> _Polynomial:
 
 
 def _are_same(one: _Polynomial, other: _Polynomial) -> bool:
-    """Return whether two polynomials have the same coefficients, up to rounding."""
+    """Return True if two polynomials have the same coefficients, up to rounding."""
     none = _Coefficient(0.0, 0.0)
     for monomial in one.keys() | other.keys():
         a, b = one.get(monomial, none), other.get(monomial, none)

@@ -1,4 +1,4 @@
-"""Starting points: the case's own, then a Latin hypercube; uniform on unit spheres and in the balls of rotations."""
+"""Starting points: that of the case, then a Latin hypercube, uniform on unit spheres and in balls of rotations."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .places import FreeRotation
 def starting_points(nlp: Nlp, count: int, seed: int) -> FloatArray:
     """Return starting points inside the bounds of the variables and inside the balls of the rotations.
 
-    The generator is Python's own: the import of NumPy's takes longer than the sampling of a solve.
+    Python's generator is used, because importing NumPy's takes longer than the sampling.
 
     Args:
         nlp: the program.
@@ -22,7 +22,7 @@ def starting_points(nlp: Nlp, count: int, seed: int) -> FloatArray:
         seed: seed of the generator; the same seed gives the same points.
 
     Returns:
-        (count, n) array; the first row is the case's own start.
+        (count, n) array; the first row is the start of the case.
     """
     generator = random.Random(seed)  # noqa: S311 - starting points, not secrets
     unit = np.empty((count - 1, nlp.n))
@@ -37,17 +37,15 @@ def starting_points(nlp: Nlp, count: int, seed: int) -> FloatArray:
             continue
         ball = nlp.program.constraints.index(rotation.ball)
         inner, outer = max(nlp.g_lower[ball], 0.0) ** 1.5, nlp.g_upper[ball] ** 1.5
-        # The points are uniform in volume, so the cube of the radius is uniform; the hypercube's first column of q
-        # spreads it.
+        # Uniform points in volume have a uniform cube of the radius, which the hypercube's first column of q spreads.
         radii = np.cbrt(inner + unit[:, rotation.q[0]] * (outer - inner))
         points[:, rotation.q] = radii[:, None] * _sphere_points(generator, count - 1)
-    # Joints start at home, from which the loops close: other values belong to other ways to assemble the robot.
+    # Joints start at home, from which the loops close: other values belong to other assembly modes.
     inner = list(nlp.program.places.inner)
     points[:, inner] = nlp.start[inner]
     return np.vstack([nlp.start, np.clip(points, nlp.lower, nlp.upper)])
 
 
 def _sphere_points(generator: random.Random, count: int) -> FloatArray:
-    """Return unit vectors (count, 3), uniform on the unit sphere."""
     vectors = np.array([[generator.gauss() for _ in range(3)] for _ in range(count)]).reshape(-1, 3)
     return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True), dtype=np.float64)

@@ -1,12 +1,12 @@
-"""Proofs for every point of a box, and their checker. Nothing here imports a solver.
+"""Proofs for every point of a box, and the checker of proof files. Nothing here imports a solver.
 
 The rooms import each other in this order:
 
-* ``statement``: the claims, for search and checker alike;
+* ``statement``: claims, shared by searches and checker;
 * ``enclosure``: ranges of expressions over boxes, in C and in NumPy;
 * ``boxes``: branch and bound;
-* ``certificate``: the global optimum of a program;
-* ``workspace``: a robot at every pose of a box.
+* ``certificate``: bounds of the global optimum of a nonlinear program;
+* ``workspace``: a robot at every pose of a box, or of a tool path.
 
-``checker`` reads proofs and checks them with its own arithmetic and rules. It imports ``statement`` alone.
+``checker`` reads proof files and checks them with independent arithmetic and rules. It imports only ``statement``.
 """

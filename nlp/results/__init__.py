@@ -1,1 +1,1 @@
-"""Results as data."""
+"""Results as typed values and as JSON."""

@@ -1,4 +1,4 @@
-"""How far a platform can move from a pose, as a result."""
+"""Free travel of a platform from a pose as a result."""
 
 from typing import TYPE_CHECKING
 
@@ -13,19 +13,19 @@ if TYPE_CHECKING:
 
 
 class AxisRangesResult(JsonObject):
-    """Result of asking how far a platform can move from a pose.
+    """Free travel from a pose along each coordinate, and along each pair of coordinates, up to the first limit.
 
     Attributes:
         head: the case.
-        proved: whether everything is proved at the pose, and a range about it of a coordinate.
+        proved: If true, all claims are proved at the pose, and a coordinate has a proved range.
         pose: position, and roll, pitch and yaw.
-        largest: length and angle by which coordinates were moved at most.
+        largest: largest travel in the search, length and angle.
         faults: claims that are not proved at the pose itself.
-        axes: the independent coordinates alone.
-        pairs: each two of them.
-        not_alone: coordinates that the robot cannot choose: they follow from the others, and move with them.
-        reason: why the work ended before all axes and pairs were judged; absent otherwise.
-        versions: versions of the programs.
+        axes: ranges of the independent coordinates, with the others held.
+        pairs: ranges of the pairs of independent coordinates.
+        not_alone: dependent coordinates, which move with the independent ones.
+        reason: reason for the end of the search before all axes and pairs were examined; absent otherwise.
+        versions: versions of the software.
     """
 
     head: Inline[HeadData]

@@ -1,15 +1,13 @@
 """Checks of cases against expected and published values.
 
-Three kinds of value are kept apart: those that this program **computes**, those that the case **expects**, with a
-tolerance of its own, and those that the literature prints (**published**). A published number is *reproduced* by one of
-two rules, and no other:
+A case **expects** values of its result, with tolerances, and states values that the literature prints (**published**).
+A published value is *reproduced* by one of two rules:
 
-* ``digits``: the computed number is within half a unit of the last printed digit, in every component;
+* ``digits``: the computed value is within half a unit of the last printed digit, in every component;
 * ``flat``: for an argument of the optimum, F at the printed point is within 1e-5 of the best F with this argument free
-  and the other printed arguments held fixed. Where F is flat, or best on a whole set, fewer digits of an argument are
-  significant than are printed.
+  and the other printed arguments fixed. Where F is flat, fewer digits of an argument are significant than are printed.
 
-A number that a case marks reproduced and that is not, or the other way round, is *newly changed*, and fails the check.
+A value is *newly changed*, and fails the check, where the case states the opposite about its reproduction.
 """
 
 import math
@@ -42,14 +40,14 @@ _STARTS = 8
 
 
 class ExpectedCheck(JsonObject):
-    """A computed number beside the one that the case expects.
+    """Comparison of a computed value with the value that the case expects.
 
     Attributes:
         quantity: dotted path in the case's result.
-        expected: by the case.
-        computed: as the result has it; null where it has none.
+        expected: expected value.
+        computed: value in the result; null where the result has none.
         tolerance: allowed difference.
-        passed: whether the expectation holds.
+        passed: If true, the values agree.
     """
 
     quantity: str
@@ -60,20 +58,20 @@ class ExpectedCheck(JsonObject):
 
 
 class PublishedCheck(JsonObject):
-    """A published number beside the computed one.
+    """Comparison of a published value with the computed value.
 
     Attributes:
         quantity: dotted path in the case's result, or gain.
-        value: as printed.
+        value: printed value.
         source: place in the literature.
-        reproduced: whether the case says that the number is reproduced.
-        because: the reason, where it is not.
-        decimals: printed digits behind the point, where the value does not show them.
-        over: name of the case that a gain is over.
-        computed: the computed number; empty where there is none.
-        verdict: of the check.
-        rule: that decided, with its figures.
-        passed: whether the check confirms the case.
+        reproduced: If true, the case states that the value is reproduced.
+        because: reason, where the value is not reproduced.
+        decimals: number of printed decimals, where the value does not show them.
+        over: name of the reference case of a gain.
+        computed: computed value; empty where there is none.
+        verdict: verdict of the check.
+        rule: rule that decided, with its figures.
+        passed: If true, the check confirms the statement of the case.
     """
 
     quantity: str
@@ -90,7 +88,7 @@ class PublishedCheck(JsonObject):
 
     @property
     def is_reproduced(self) -> bool:
-        """Whether a rule finds the number reproduced."""
+        """True if a rule finds the value reproduced."""
         return self.passed == self.reproduced
 
 
@@ -100,10 +98,10 @@ class CaseCheck(JsonObject):
     Attributes:
         name: name of the case.
         title: title of the case.
-        passed: whether everything holds.
+        passed: If true, all values are as expected.
         seconds: wall time.
-        expected: numbers that the case expects.
-        published: numbers that the literature prints.
+        expected: comparisons with expected values.
+        published: comparisons with published values.
     """
 
     name: Annotated[str, Key("case")]
@@ -119,7 +117,7 @@ class ChecksResult(JsonObject):
 
     Attributes:
         schema: version of the result's keys.
-        passed: whether everything holds.
+        passed: If true, all values are as expected.
         cases: checks of each case.
     """
 
@@ -136,13 +134,13 @@ def checks_of(checks: Sequence[CaseCheck]) -> ChecksResult:
 def check(names: Sequence[str] | None = None) -> list[CaseCheck]:
     """Solve cases and check their expected and published values; a case that others refer to is solved once.
 
-    Where the work is requested to stop, the cases that are checked by then are returned.
+    After a request to stop, the cases that are checked so far are returned.
 
     Args:
-        names: paths of case files, or bare names of shipped cases; left out, all shipped cases.
+        names: paths of case files, or names of shipped cases; None for all shipped cases.
 
     Raises:
-        InputError: a case, or one that it refers to, cannot be read.
+        InputError: a case, or a case to which it refers, cannot be read.
     """
     solved: dict[str, CaseResult] = {}
     checks: list[CaseCheck] = []
@@ -159,11 +157,11 @@ def check_case(name: str, solved: dict[str, CaseResult] | None = None) -> CaseCh
     """Solve a case and check it.
 
     Args:
-        name: path of a case file, or the bare name of a shipped case.
+        name: path of a case file, or name of a shipped case.
         solved: results of cases by name, for cases that refer to each other; new results are added.
 
     Raises:
-        InputError: the case, or one that it refers to, cannot be read.
+        InputError: the case, or a case to which it refers, cannot be read.
     """
     began = time.perf_counter()
     solved = {} if solved is None else solved
@@ -186,9 +184,9 @@ def _result_for(name: str, solved: dict[str, CaseResult], case: Case | None = No
     """Return the result of a case by name; each case is solved once.
 
     Args:
-        name: of the case.
+        name: name of the case.
         solved: results by name; a new result is added.
-        case: the case, where it is read already.
+        case: the case; None where it is not read yet.
     """
     if name not in solved:
         case = case or load_case(name)
@@ -197,7 +195,7 @@ def _result_for(name: str, solved: dict[str, CaseResult], case: Case | None = No
 
 
 def _check_expected(case: Case, result: CaseResult, data: JsonData) -> list[ExpectedCheck]:
-    """Return the expected numbers of a case beside the computed ones, its status first."""
+    """Return the comparisons with the expected values of a case, its status first."""
     expect, rows = case.expect, list[ExpectedCheck]()
 
     def add(quantity: str, expected: float | bool | str, computed: object, tolerance: float, *, passed: bool) -> None:
@@ -250,10 +248,10 @@ def _numbers(data: JsonValue, path: str) -> tuple[float, ...]:
 def _check_published(
     name: str, case: Case, row: Published, result: CaseResult, data: JsonData, solved: dict[str, CaseResult]
 ) -> PublishedCheck:
-    """Return a published number beside the computed one, with the rule that decided.
+    """Return the comparison with a published value, and the rule that decided.
 
     Raises:
-        CaseError: the quantity is no number of the result, or has another number of components.
+        CaseError: the quantity is no value of the result, or has another number of components.
     """
     if row.over is None:
         computed = _numbers(data, row.quantity)
@@ -277,14 +275,14 @@ def _check_published(
 
 
 def _published(row: Published, computed: tuple[float, ...], rule: str, *, found: bool) -> PublishedCheck:
-    """Return the check of a published number, which a rule finds reproduced or not."""
+    """Return the check of a published value that a rule finds reproduced or not."""
     passed = found == row.reproduced
     verdict = "newly changed" if not passed else "reproduced" if found else "not reproduced"
     return PublishedCheck.of(row, computed=computed, verdict=verdict, rule=rule, passed=passed)
 
 
 def decimals_of(value: float) -> int:
-    """Return the number of digits behind the point of the shortest text of a number."""
+    """Return the number of decimals of the shortest text of a number."""
     text = f"{value:.15g}"
     if "e" in text:
         return 15
@@ -292,9 +290,9 @@ def decimals_of(value: float) -> int:
 
 
 def _flat_difference(name: str, case: Case, row: Published, result: CaseResult) -> float | None:
-    """Return the relative difference of F between the printed point and the best with this argument free.
+    """Return the relative difference of F between the printed point and the optimum with this argument free.
 
-    None when the number is no argument of F, or the printed point is no robot.
+    None where the value is no argument of F, or the robot has no value at the printed point.
     """
     printed: dict[str, float | list[float]] = {}
     for each in case.published:
@@ -341,7 +339,7 @@ def _computed_settings(case: Case, robot: RobotData) -> Settings:
 
 
 def _best_objectives(case: Case) -> list[tuple[float, float]]:
-    """Return the best F of each task over the numbers that are still free, and its size without cancellation."""
+    """Return the best F of each task over the remaining variables, and its size without cancellation."""
     values = []
     for nlp in formulate_each(case):
         solution = solve_program(nlp, Search(starts=_STARTS))

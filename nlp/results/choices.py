@@ -1,9 +1,9 @@
-"""Values that were chosen: of listed numbers, and of rounded dimensions; what their search found, in words."""
+"""Choice among listed values and rounding of dimensions, with the outcomes of these searches in words."""
 
 from typing import TYPE_CHECKING
 
 from ...models import Dimension
-from ..case.choices import ChosenNumber, chosen_settings, listed_numbers
+from ..case.choices import ChosenDimension, catalogue_dimensions, chosen_settings
 from ..solver.status import Status
 from ..system.jsonvalues import JsonObject
 
@@ -11,22 +11,22 @@ if TYPE_CHECKING:
     from ..solver.solution import Choice, Rounding, Solution
 
 
-#: Part of itself by which a number may differ from its rounded one that was round before.
+#: Relative difference up to which a dimension counts as round already.
 _SAME = 1e-9
 
 
 class ChoiceData(JsonObject):
-    """The choice among listed values.
+    """Choice among listed values.
 
     Attributes:
-        numbers: that have listed values.
+        numbers: dimensions with listed values.
         combinations: number of all combinations.
-        solved: number of those that were solved.
-        complete: whether the others are left out as no better design was found between the ends of their values.
-        statement: the same in words.
+        solved: number of solved combinations.
+        complete: If true, all combinations are solved, or excluded: no better design was found within their ranges.
+        statement: outcome in words.
     """
 
-    numbers: tuple[ChosenNumber, ...]
+    numbers: tuple[ChosenDimension, ...]
     combinations: int
     solved: int
     complete: bool
@@ -34,22 +34,22 @@ class ChoiceData(JsonObject):
 
 
 class RoundingData(JsonObject):
-    """The rounding of the dimensions.
+    """Rounding of the dimensions.
 
     Attributes:
-        step: whose multiples the numbers are, in the unit of length, and degrees for angles.
-        numbers: that were rounded.
-        before: objective before.
-        loss: how much worse it is now; null without an answer.
-        relative_loss: loss as a part of the objective before; null where that is 0, and without an answer.
-        combinations: number of combinations of the multiples that were searched.
-        solved: number of those that were solved.
-        complete: as of a choice.
-        statement: in words.
+        step: step of the multiples, in the unit of length, and degrees for angles.
+        numbers: rounded dimensions.
+        before: objective before the rounding.
+        loss: loss of the objective by the rounding; null without an answer.
+        relative_loss: loss as a part of the objective before the rounding; null where that is 0, and without an answer.
+        combinations: number of searched combinations of multiples.
+        solved: number of solved combinations.
+        complete: If true, all combinations are solved, or excluded: no better design was found within their ranges.
+        statement: outcome in words.
     """
 
     step: float
-    numbers: tuple[ChosenNumber, ...]
+    numbers: tuple[ChosenDimension, ...]
     before: float
     loss: float | None
     relative_loss: float | None
@@ -60,14 +60,16 @@ class RoundingData(JsonObject):
 
 
 def choice_data(solution: "Solution") -> ChoiceData | None:
-    """Return the choice among the listed values of a solution's case; None without any."""
+    """Return the choice among the listed values of a solution's case; None without listed values."""
     case, choice = solution.case, solution.choice
     if choice is None:
         return None
     chosen = chosen_settings(case, solution.outcomes[0].own.nlp.case)
     numbers = tuple(
-        ChosenNumber.of(each, case.units, value=chosen[each.name], unit=case.units.label(each.dimension), before=None)
-        for each in listed_numbers(case)
+        ChosenDimension.of(
+            each, case.units, value=chosen[each.name], unit=case.units.label(each.dimension), before=None
+        )
+        for each in catalogue_dimensions(case)
     )
     return ChoiceData.of(
         choice,
@@ -78,12 +80,12 @@ def choice_data(solution: "Solution") -> ChoiceData | None:
 
 
 def _starts(solution: "Solution") -> int:
-    """Return the number of starts of each solve; 0 where nothing else was free."""
+    """Return the number of starts of each solve; 0 where a case has no other variables."""
     return len(solution.outcomes[0].own.starts)
 
 
 def _statement(choice: "Choice", starts: int, status: Status) -> str:
-    """Return what a search over combinations found."""
+    """Return the outcome of a search over combinations, in words."""
     is_answer = status.is_answer
     count = f"{choice.combinations:,} combinations of values"
     how = f"solved from {starts} starts" if starts else "solved"
@@ -95,15 +97,15 @@ def _statement(choice: "Choice", starts: int, status: Status) -> str:
         if status is Status.INTERRUPTED:
             if not choice.solved:
                 return f"stopped in the first of {count}"
-            return f"stopped after {some}; the others are not all searched"
-        return f"the best of {some}; the others are not all searched" if is_answer else f"no answer in {some}"
+            return f"stopped after {some}; not all others are searched"
+        return f"the best of {some}; not all others are searched" if is_answer else f"no answer in {some}"
     # The solves of ranges began from as many starts.
-    ranges = f"{choice.solved:,} {how}, and the others left out by solves of {choice.relaxed:,} ranges of values"
+    ranges = f"{choice.solved:,} {how}, and the others excluded by solves of {choice.relaxed:,} ranges of values"
     return f"the best of {count}: {ranges}" if is_answer else f"no answer in {count}: {ranges}"
 
 
 def rounding_data(solution: "Solution") -> RoundingData | None:
-    """Return the rounding of a solution's dimensions; None without one."""
+    """Return the rounding of a solution's dimensions; None where they are not rounded."""
     case, rounding = solution.case, solution.rounding
     if rounding is None:
         return None
@@ -115,7 +117,7 @@ def rounding_data(solution: "Solution") -> RoundingData | None:
     choice = rounding.choice
     return RoundingData(
         step=rounding.step,
-        numbers=ChosenNumber.of_each(rounding.numbers, case.units),
+        numbers=ChosenDimension.of_each(rounding.numbers, case.units),
         before=before,
         loss=loss,
         relative_loss=None if loss is None or not before else loss / abs(before),
@@ -127,7 +129,7 @@ def rounding_data(solution: "Solution") -> RoundingData | None:
 
 
 def _rounding_statement(solution: "Solution", rounding: "Rounding") -> str:
-    """Return what rounding found, in words."""
+    """Return the outcome of rounding, in words."""
     case, starts, status = solution.case, _starts(solution), solution.status
     kinds = {each.dimension for each in rounding.numbers}
     names = [f"{rounding.step:g} {case.units.length}"] if Dimension.LENGTH in kinds else []
@@ -137,9 +139,9 @@ def _rounding_statement(solution: "Solution", rounding: "Rounding") -> str:
         stopped = "" if rounding.choice is None else _statement(rounding.choice, starts, status)
         return f"{what}: {stopped or 'stopped before the end'}"
     if not status.is_answer:
-        return f"{what}: no multiples within {rounding.farther + 1} steps were found that keep all limits"
+        return f"{what}: no multiples within {rounding.farther + 1} steps were found that satisfy all limits"
     if all(abs(each.value - (each.before or 0.0)) <= _SAME * abs(each.value) for each in rounding.numbers):
-        return f"{what}: the numbers were round already"
+        return f"{what}: the dimensions were round already"
     if rounding.choice is None:
-        return f"{what}: each number has one of them near it within its bounds"
+        return f"{what}: every dimension has only one multiple near it within its bounds"
     return f"{what}: {_statement(rounding.choice, starts, status)}"

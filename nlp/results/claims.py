@@ -1,4 +1,4 @@
-"""Poses that a judged workspace names: those that refute a claim, and the worst one."""
+"""Poses of a workspace result: the poses that refute claims, and the worst pose."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ if TYPE_CHECKING:
     from .verdicts import VerdictData
     from .workspace import WorkspaceResult
 
-#: Beginning of the keys of limits that no single pose refutes, but two: the shortest and the longest length of a leg.
+#: Start of the keys of limits that two poses refute: those of the shortest and of the longest leg length.
 _OVER_POSES = "actuator."
-#: Beginning of the names of the lengths of legs.
+#: Start of the names of leg lengths.
 _LENGTH = "leg_length limb "
 
 
 class PosedClaim(NamedTuple):
-    """A claim at a pose.
+    """Claim at a pose.
 
     Attributes:
         name: name of the claim, up to a colon.
         outcome: outcome of the claim over the workspace.
         pose: the pose.
-        verdict: on the claim, where it is about a number.
-        length: verdict on the length of a leg that is extreme at the pose, for a claim that needs two poses.
+        verdict: verdict on the claim; None for a rank.
+        length: verdict on the leg length that is extreme at the pose, for a claim with two poses; else None.
     """
 
     name: str
@@ -40,17 +40,17 @@ class PosedClaim(NamedTuple):
 
     @property
     def key(self) -> str:
-        """Dotted key, below ``limits``, of the limit in the case; empty for regular poses and without a limit."""
+        """Dotted key, below ``limits``, of the limit in the case; empty for a rank and without a limit."""
         return "" if self.verdict is None else self.verdict.key or ""
 
     @property
     def beyond(self) -> float:
-        """Part of the limit by which it is passed; negative where it is kept."""
+        """Excess over the limit, as a part of the limit; negative where the limit is satisfied."""
         return 0.0 if self.verdict is None else _beyond(self.verdict)
 
 
 def refuted_claims(result: WorkspaceResult) -> Iterator[PosedClaim]:
-    """Yield the claims that are refuted, each with its pose; a limit on a stroke has two poses."""
+    """Yield the refuted claims with their poses; a limit on a stroke has two poses."""
     for name, rank in ((REGULAR, result.regular), (CONSTRAINTS, result.constraints)):
         if rank is not None and rank.outcome is Outcome.REFUTED and rank.pose is not None:
             yield PosedClaim(name, rank.outcome, rank.pose)
@@ -60,12 +60,12 @@ def refuted_claims(result: WorkspaceResult) -> Iterator[PosedClaim]:
 
 
 def worst_claim(result: WorkspaceResult, sense: Sense) -> PosedClaim | None:
-    """Return the claim that is farthest beyond its limit, or, where all are kept, nearest to it; with its pose.
+    """Return the claim with the largest excess over its limit, or with the smallest margin, and its pose.
 
     A singular pose is worse than any limit. Without limits it is the worst F. None where no pose is known.
 
     Args:
-        result: judgement over the workspace.
+        result: verdicts over the workspace.
         sense: sense of the first task.
     """
     singular = next((each for each in refuted_claims(result) if each.name == REGULAR and each.verdict is None), None)
@@ -84,7 +84,7 @@ def worst_claim(result: WorkspaceResult, sense: Sense) -> PosedClaim | None:
 
 
 def _at_poses(result: WorkspaceResult, each: VerdictData) -> Iterator[PosedClaim]:
-    """Yield an extreme with the poses at which it is reached."""
+    """Yield an extreme value with the poses that have it."""
     name = each.name.partition(":")[0]
     if each.key is not None and each.key.startswith(_OVER_POSES):
         for length in _lengths(result.extremes, each.name.partition(" limb ")[2]):
@@ -95,12 +95,12 @@ def _at_poses(result: WorkspaceResult, each: VerdictData) -> Iterator[PosedClaim
 
 
 def _lengths(extremes: Sequence[VerdictData], limb: str) -> list[VerdictData]:
-    """Return the smallest and the largest length of a leg."""
+    """Return the verdicts on the smallest and the largest length of a leg."""
     return [each for each in extremes if each.name == f"{_LENGTH}{limb}"]
 
 
 def _beyond(each: VerdictData) -> float:
-    """Return how far a number is beyond its limit, as a part of the limit; negative where it is kept."""
+    """Return the excess of a value over its limit, as a part of the limit; negative where the limit is satisfied."""
     if each.limit is None or each.reached is None or each.sense is None:
         return float("-inf")
     sign = each.sense.sign

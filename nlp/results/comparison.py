@@ -1,4 +1,4 @@
-"""Robots compared on one case as data."""
+"""Result of a comparison of robots on one case."""
 
 from collections.abc import Mapping
 from typing import Annotated, Literal
@@ -13,13 +13,13 @@ from .parts import SchemaVersion, UnitsData, VersionsData
 
 
 class ComparedRateData(JsonObject):
-    """The rate of an actuator for a task.
+    """Rate of an actuator for a task.
 
     Attributes:
-        actuator: its name.
-        unit: of the rate, per unit of the task's motion.
-        rate: for the task's motion; null where the motion does not determine it, because the actuator can move while
-            the platform stands still.
+        actuator: name of the actuator.
+        unit: unit of the rate, per unit of the task's motion.
+        rate: rate for the task's motion; null where the motion does not determine the rate, because the actuator can
+            move while the platform stands still.
     """
 
     actuator: str
@@ -28,15 +28,15 @@ class ComparedRateData(JsonObject):
 
 
 class ComparedTaskData(JsonObject):
-    """A task at a robot's design.
+    """Task at a robot's design.
 
     Attributes:
-        name: of the task.
+        name: name of the task.
         F: objective; null without an answer.
-        unit: of F.
-        can_move: whether the platform can make the motion at the first pose; null where it is not known.
-        constraint: part of F that constraints carry, 0 to 1; null where it is not known.
-        rates: of the actuators.
+        unit: unit of F.
+        can_move: If true, the platform can make the motion at the first pose; null where this is not known.
+        constraint: part of F from constraint wrenches, 0 to 1; null where it is not known.
+        rates: rates of the actuators.
     """
 
     name: str
@@ -48,13 +48,13 @@ class ComparedTaskData(JsonObject):
 
 
 class ComparedDimensionData(JsonObject):
-    """A dimension of a robot's design.
+    """Dimension of a robot's design.
 
     Attributes:
-        name: of the number.
-        value: in the design.
-        unit: of the value.
-        range: smallest and largest value that was allowed; absent for a fixed number.
+        name: name of the dimension.
+        value: value in the design.
+        unit: unit of the value.
+        range: lower and upper bound; absent for a fixed dimension.
     """
 
     name: str
@@ -64,11 +64,11 @@ class ComparedDimensionData(JsonObject):
 
 
 class ComparedLimitData(JsonObject):
-    """A limit of the case that a robot cannot have.
+    """Limit of the case that does not apply to a robot.
 
     Attributes:
         key: dotted key in the case file.
-        reason: a clause.
+        reason: reason, as a clause.
     """
 
     key: str
@@ -76,11 +76,11 @@ class ComparedLimitData(JsonObject):
 
 
 class ComparedStrokeData(JsonObject):
-    """The largest stroke of a measure over the workspace, or over the poses of a case with several.
+    """Largest stroke of an actuator quantity over the workspace, or over the poses of a case with several poses.
 
     Attributes:
-        stroke: of the limb that needs the largest; over a workspace from proven bounds.
-        unit: of the stroke.
+        stroke: largest stroke of a limb; over a workspace from proved bounds.
+        unit: unit of the stroke.
     """
 
     stroke: float
@@ -88,33 +88,33 @@ class ComparedStrokeData(JsonObject):
 
 
 class ComparedRobotData(JsonObject):
-    """A robot of a comparison.
+    """Robot of a comparison.
 
     Attributes:
-        name: in tables.
+        name: name in tables.
         model: name of the robot.
-        description: of the robot.
-        part: of the table: ``ranked``, ``limits not kept`` where the robot does not keep every limit of the case,
+        description: description of the robot.
+        part: part of the table: ``ranked``, ``limits not kept`` where the robot violates a limit of the case,
             ``no freedom`` where the platform cannot make a task's motion, or ``no answer``.
-        factor: by which typical lengths are multiplied.
-        size: largest distance between two points at home, typical dimensions times the factor.
+        factor: scale factor of the typical lengths.
+        size: largest distance between two points at home, with typical dimensions times the factor.
         final_size: largest distance between two points of the design; null without an answer.
-        freedoms: of the platform; null where they are not known.
-        status: of the solve; null where the case contradicts itself with this robot.
-        value: F of one task, or the value of the combination of several; null without an answer.
-        sense: whether the value is maximised or minimised.
-        tasks: each task at the design; empty without an answer.
-        dimensions: of the design; empty without an answer.
-        active: bounds and limits that the design lies on.
-        singularities: clauses about the design.
-        limits_kept: number of the case's limits that hold for this robot.
-        limits_left_out: limits that this robot cannot have.
-        certificate: the proven bound; null without one.
-        certificate_fault: reason why there is no certificate; absent where none was asked for, or there is one.
-        workspace: verdict on the design over the workspace; null where it is not judged.
-        strokes: largest strokes, by measure: over the workspace, else over the poses of a case with several.
-        sentences: about what is missing or cannot be compared.
-        case: the case with this robot as the text of a case file; null where no file can state it.
+        freedoms: degrees of freedom of the platform; null where they are not known.
+        status: status of the solve; null where the case contradicts itself with this robot.
+        value: F of one task, or value of the combination of several tasks; null without an answer.
+        sense: sense of the optimisation: the value is maximised or minimised.
+        tasks: tasks at the design; empty without an answer.
+        dimensions: dimensions of the design; empty without an answer.
+        active: active bounds and limits.
+        singularities: clauses about singularities of the design.
+        limits_kept: number of the case's limits that the robot satisfies.
+        limits_left_out: limits that do not apply to the robot.
+        certificate: proved bound; null without a proof.
+        certificate_fault: reason why there is no certificate; absent with a certificate, or where none was requested.
+        workspace: verdict on the design over the workspace; null without a verdict.
+        strokes: largest strokes by quantity: over the workspace, else over the poses of a case with several poses.
+        sentences: sentences about missing or incomparable values.
+        case: case with this robot, as the text of a case file; null where no file can state it.
         seconds: wall time.
     """
 
@@ -150,15 +150,15 @@ class ComparisonResult(JsonObject):
     Attributes:
         schema: version of the result's keys.
         case: name of the case.
-        title: of the case.
-        units: of every number.
+        title: title of the case.
+        units: units of all values.
         limits: number of limits of the case.
-        size: to which the robots are scaled; null where they are not scaled.
-        range: part of a typical dimension by which a design may differ from it.
-        characteristic_length: by which couples count beside forces.
-        robots: ranked ones first, the best first.
-        sentences: about the whole comparison.
-        versions: of the programs.
+        size: common size of the robots; null where they are not scaled.
+        range: largest relative difference between a dimension of a design and its typical value.
+        characteristic_length: factor between couples and forces.
+        robots: robots, ranked robots first, best first.
+        sentences: sentences about the whole comparison.
+        versions: versions of the software.
         seconds: wall time.
     """
 

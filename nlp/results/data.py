@@ -1,6 +1,6 @@
-"""Results of a solve: of one task, and of several tasks combined.
+"""Results of a solve of one task, and of a combined solve of several tasks.
 
-A solve that failed has no ``F``: the point reached is under ``reached``, so that nobody takes it for an answer.
+A failed solve has no ``F``: its last point is under ``reached``, so that it is not mistaken for an answer.
 """
 
 from collections.abc import Mapping
@@ -26,11 +26,11 @@ if TYPE_CHECKING:
 
 
 class ReachedData(JsonObject):
-    """The best point of a solve that failed.
+    """Best point of a failed solve.
 
     Attributes:
-        F: objective there; null where it has no value.
-        violated: bounds and constraints that the point lies outside of.
+        F: objective at the point; null where it has no value.
+        violated: violated bounds and constraints.
     """
 
     F: float | None
@@ -38,13 +38,13 @@ class ReachedData(JsonObject):
 
 
 class OptimumData(JsonObject):
-    """A distinct optimum.
+    """Distinct optimum.
 
     Attributes:
         F: objective.
-        count: number of starts that ended there.
-        spread: of the points along one variable, as a part of its range; 0 for an isolated optimum.
-        assembly: a few words about joints that are assembled in another way than at home, or perhaps; empty for home's,
+        count: number of starts that ended at the optimum.
+        spread: largest distance of these points along a variable, as a part of its range; 0 for an isolated optimum.
+        assembly: assembly mode in a few words, if it is not, or may not be, that of home; empty for the home mode,
             absent for a robot without loops.
     """
 
@@ -55,14 +55,14 @@ class OptimumData(JsonObject):
 
 
 class StartsData(JsonObject):
-    """Outcome of the starts.
+    """Outcomes of the starts.
 
     Attributes:
         run: number of starts.
-        converged: number of those that converged.
-        failed: number of the others, by reason.
+        converged: number of converged starts.
+        failed: number of failed starts, by reason.
         optima: distinct optima, best first.
-        better: F within the limits that a search reached without converging, better than every optimum; else absent.
+        better: F of a feasible point of an unconverged search that is better than every optimum; else absent.
     """
 
     run: int
@@ -73,20 +73,20 @@ class StartsData(JsonObject):
 
 
 class CertificateData(JsonObject):
-    """A proven bound of the global optimum.
+    """Proved bound of the global optimum.
 
     Attributes:
-        status: of the proof.
-        bound: no feasible point of the box has a better objective; null where nothing is known.
-        incumbent: objective of the best point known.
+        status: status of the proof.
+        bound: proved bound: no feasible point has a better objective; null where nothing is proved.
+        incumbent: objective of the best known feasible point; null where no such point is known.
         gap: distance of the bound from the incumbent.
         relative_gap: gap as a part of the incumbent; null near 0.
-        engine: that examined the boxes.
+        engine: engine of the search.
         boxes: number of boxes examined.
-        open: number of boxes left.
+        open: number of undecided boxes.
         seconds: wall time.
-        statement: the proved statement in words.
-        history: seconds, bound and incumbent on the way.
+        statement: proved statement in words.
+        history: seconds, bound and incumbent during the search.
     """
 
     status: CertificateStatus
@@ -107,26 +107,26 @@ class SolveResult(JsonObject):
 
     Attributes:
         head: the case.
-        sense: whether F is maximised or minimised.
-        status: of the solve.
-        F: objective; null unless the solve gave an answer.
-        objective: what is optimised instead of F; absent for F.
-        reached: the best point of a solve that failed; else absent.
-        relaxation: for an infeasible case, the limits that would have to move; else absent.
-        robot: at the point; absent where its equations have no value.
-        optimality: evidence; null when nothing was free.
-        margins: every limit at every leg, joint and pose.
-        limits: one row for each limiting number of the case.
-        sensitivity: of the optimal F to every fixed number; absent without an answer.
-        tolerance: loss by inexact joint centres; absent without an answer or where the case has no tolerance.
-        starts: outcome of the starts.
-        certificate: the proven bound; null where none was asked for.
-        workspace: proof over the workspace; absent where no limit holds there.
-        path: proof along the path; absent where no limit holds there.
-        choice: among listed values of dimensions; absent where the case has none.
-        rounding: of the dimensions; absent where they are not rounded.
-        seed: of the starting points.
-        versions: of the programs.
+        sense: sense of the optimisation: F is maximised or minimised.
+        status: status of the solve.
+        F: objective; null without an answer.
+        objective: objective, where it is not F at the stated poses; else absent.
+        reached: best point of a failed solve; else absent.
+        relaxation: for an infeasible case, the limits that would have to change; else absent.
+        robot: robot at the point; absent where its equations have no value.
+        optimality: evidence of optimality; null for a case without variables.
+        margins: margin of every limit at every leg, joint and pose.
+        limits: limits of the case, a row for each.
+        sensitivity: derivatives of the optimal F by every fixed value; absent without an answer.
+        tolerance: loss by joint-centre errors; absent without an answer or a tolerance.
+        starts: outcomes of the starts.
+        certificate: proved bound; null where no proof was requested.
+        workspace: proof over the workspace; absent where no limit covers the workspace.
+        path: proof along the path; absent where no limit covers the path.
+        choice: choice among listed values; absent without listed values.
+        rounding: rounding of the dimensions; absent where they are not rounded.
+        seed: random seed of the starting points.
+        versions: versions of the software.
         seconds: wall time.
     """
 
@@ -155,18 +155,18 @@ class SolveResult(JsonObject):
 
 
 class OutcomeData(JsonObject):
-    """A task at the combined point.
+    """Task at the combined point.
 
     Attributes:
-        name: of the task.
-        sense: whether F is maximised or minimised.
-        weight: as it was used.
+        name: name of the task.
+        sense: sense of the optimisation: F is maximised or minimised.
+        weight: weight of the task in the combination.
         F: objective at the combined point; null without an answer.
-        best: optimum of the task alone; null where there is none.
-        loss: how much worse F is than the optimum of the task alone.
-        relative_loss: loss as a part of that optimum.
-        unique: whether the task's own optimum is the only one.
-        verdict: kind of point that the combined point is for this task alone; null where nothing is free.
+        best: separate optimum of the task; null where there is none.
+        loss: loss of F against the separate optimum.
+        relative_loss: loss as a part of the separate optimum.
+        unique: If true, the separate optimum is unique.
+        verdict: kind of the combined point as a point of this task; null for a case without variables.
         rates: work rate of each row in the task's motion; null without an answer.
     """
 
@@ -183,12 +183,12 @@ class OutcomeData(JsonObject):
 
 
 class CombinedPointData(JsonObject):
-    """The robot that several tasks were combined to.
+    """Combined point of several tasks.
 
     Attributes:
-        robot: at the point; absent where its equations have no value.
-        margins: every limit at every leg, joint and pose.
-        limits: one row for each limiting number of the case.
+        robot: robot at the point; absent where its equations have no value.
+        margins: margin of every limit at every leg, joint and pose.
+        limits: limits of the case, a row for each.
     """
 
     robot: Inline[RobotData | None]
@@ -197,19 +197,19 @@ class CombinedPointData(JsonObject):
 
 
 class CombinedData(JsonObject):
-    """Several tasks brought together.
+    """Combination of several tasks.
 
     Attributes:
-        method: how they were brought together.
-        value: of the combined objective; null for an average, and without an answer.
-        method_point: the point that the method yields; absent where it yields none.
-        reached: the point reached where the method yields none; else absent.
+        method: method of combination.
+        value: value of the combined objective; null for an average, and without an answer.
+        method_point: point of the method; absent without an answer.
+        reached: last point of a method without an answer; else absent.
         tasks: each task at the combined point.
-        violated: names of the bounds and constraints that the combined point lies outside of.
-        notices: for the reader.
-        optimality: evidence about the combined program; null where there is none.
-        starts: of the combined program; null where there is none.
-        certificate: the proven bound of the combined program; null where there is none.
+        violated: names of the violated bounds and constraints.
+        notices: notices for the reader.
+        optimality: evidence of optimality for the combined program; null without such a program.
+        starts: outcomes of the starts of the combined program; null without such a program.
+        certificate: proved bound of the combined program; null where no proof was requested.
     """
 
     method: Method
@@ -225,7 +225,7 @@ class CombinedData(JsonObject):
 
     @property
     def point(self) -> CombinedPointData | None:
-        """The combined point, whether an answer or merely reached."""
+        """Combined point, whether it is an answer or not."""
         return self.reached if self.method_point is None else self.method_point
 
 
@@ -234,14 +234,14 @@ class CombinedResult(JsonObject):
 
     Attributes:
         head: the case.
-        status: of the whole.
-        tasks: each task solved by itself.
-        combined: the tasks brought together.
-        choice: among listed values of dimensions; absent where the case has none.
-        rounding: of the dimensions; absent where they are not rounded.
-        workspace: proof of the combined design over the workspace; absent where no limit holds there.
-        path: its proof along the path; absent where no limit holds there.
-        versions: of the programs.
+        status: status of the whole solve.
+        tasks: results of the separate solves.
+        combined: combination of the tasks.
+        choice: choice among listed values; absent without listed values.
+        rounding: rounding of the dimensions; absent where they are not rounded.
+        workspace: proof of the combined design over the workspace; absent where no limit covers the workspace.
+        path: proof of the combined design along the path; absent where no limit covers the path.
+        versions: versions of the software.
         seconds: wall time.
     """
 
@@ -263,17 +263,17 @@ class CombinedResult(JsonObject):
 
     @property
     def robot(self) -> RobotData | None:
-        """The robot at the combined point, an answer or merely reached; None where it does not exist."""
+        """Robot at the combined point, whether it is an answer or not; None where its equations have no value."""
         return None if self.combined.point is None else self.combined.point.robot
 
     @property
     def margins(self) -> tuple[Margin, ...]:
-        """Every limit at every leg, joint and pose of the combined point."""
+        """Margin of every limit at every leg, joint and pose of the combined point."""
         return () if self.combined.point is None else self.combined.point.margins or ()
 
     @property
     def limits(self) -> tuple[LimitData, ...]:
-        """One row for each limiting number of the case at the combined point."""
+        """Limits of the case at the combined point, a row for each."""
         return () if self.combined.point is None else self.combined.point.limits or ()
 
 

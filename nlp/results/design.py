@@ -1,4 +1,4 @@
-"""Margins and costs of a design's limits in the case's units, and its loss by inexact joint centres."""
+"""Margins of a design's limits with derivatives of F, in the case's units, and its loss by joint-centre errors."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from .rounding import NOISE
 
 
 def margins_data(nlp: Nlp, x: FloatArray, *, optimal: bool) -> tuple[Margin, ...]:
-    """Return the margins of a point (n,) in the case's units; their costs too where the point is an optimum."""
+    """Return the margins of a point (n,) in the case's units, with derivatives of F where the point is an optimum."""
     return Margin.of_each(margins_of(nlp, x, optimal=optimal), nlp.case.units)
 
 
 def limits_data(margins: Sequence[Margin]) -> tuple[LimitData, ...]:
-    """Return one row for each limiting number of the case: its least margin, where it is active, and its whole cost."""
+    """Return a row for each limit: its smallest margin, the places where it is active, and the derivative of F."""
     keys = dict.fromkeys(row.key for row in margins)
     return tuple(_limit([row for row in margins if row.key == key]) for key in keys)
 
 
 def _limit(margins: Sequence[Margin]) -> LimitData:
-    """Return one limiting number from all its margins."""
+    """Return the row of a limit from all its margins."""
     sizes = [row.margin if math.isfinite(row.margin) else -math.inf for row in margins]
-    # The first of equally near ones: rounding must not choose among legs that are images of each other.
+    # The first of equal margins: rounding must not choose among symmetric legs.
     beside = [abs(each) for each in (margins[0].limit, margins[0].value) if math.isfinite(each)]
     near = min(sizes) + NOISE * max(beside)
     least = next(row for row, size in zip(margins, sizes, strict=True) if size <= near)
@@ -42,7 +42,7 @@ def _limit(margins: Sequence[Margin]) -> LimitData:
 
 
 def tolerance_loss_of(nlp: Nlp, x: FloatArray) -> ToleranceLoss | None:
-    """Return the loss at an optimum (n,) by inexact joint centres; None without a tolerance, or without rows of it."""
+    """Return the loss at an optimum (n,) by joint-centre errors; None without a tolerance, or where it has no rule."""
     tolerance = nlp.case.joint_centre_tolerance
     if tolerance is None or not nlp.case.model.built or nlp.case.tasks[0].measure or nlp.case.worst_everywhere:
         return None

@@ -1,4 +1,4 @@
-"""The robot at one given point as a result: the types and their construction. Nothing is optimised."""
+"""Result of an evaluation at one point: types and construction. Nothing is optimised."""
 
 from collections.abc import Sequence
 
@@ -15,13 +15,13 @@ from .point import head_data, objective, robot_data, task_data, versions, violat
 
 
 class EvaluatedTaskData(JsonObject):
-    """A task at the point.
+    """Task at the point.
 
     Attributes:
         task: the task.
-        F: its objective.
-        rates: work rate of each row in the task's motion.
-        task_is_free: whether F is zero, so that nothing resists the task's motion.
+        F: objective of the task.
+        rates: work rate of each row of J in the task's motion.
+        task_is_free: If true, F is zero: nothing resists the task's motion.
     """
 
     task: Inline[TaskData]
@@ -36,14 +36,14 @@ class EvaluationResult(JsonObject):
     Attributes:
         head: the case.
         F: objective of the first task.
-        objective: what a solve optimises instead of F; absent for F.
-        robot: at the point, with the first task.
+        objective: objective of a solve, where it is not F at the stated poses; else absent.
+        robot: robot at the point, with the first task.
         tasks: every task at the point.
-        violated: bounds and constraints that the point lies outside of.
-        margins: every limit at every leg, joint and pose.
-        limits: one row for each limiting number of the case.
+        violated: violated bounds and constraints.
+        margins: margin of every limit at every leg, joint and pose.
+        limits: limits of the case, a row for each.
         principal_motions: motions that the robot resists least and most.
-        versions: of the programs.
+        versions: versions of the software.
     """
 
     head: Inline[HeadData]
@@ -59,12 +59,12 @@ class EvaluationResult(JsonObject):
 
 
 def evaluation_of(nlps: Sequence[Nlp], x: FloatArray, states: Sequence[RobotState]) -> EvaluationResult:
-    """Return the robot at one point: with its first task, then every task, and the motions at which F is stationary.
+    """Return the result of an evaluation: the robot at a point, every task, and the motions at which F is stationary.
 
     Args:
-        nlps: the program of each task.
-        x: (n,) the point.
-        states: the robot there with each task's rates, in order.
+        nlps: nonlinear program of each task.
+        x: (n,) point.
+        states: robot at the point, with the rates of each task, in order.
     """
     nlp, case = nlps[0], nlps[0].case
     margins = margins_data(nlp, x, optimal=False)

@@ -1,4 +1,4 @@
-"""Evidence of optimality and proven bounds as data, and the certificates of a case as a result."""
+"""Evidence of optimality and proved bounds as data; the result of ``certify``."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -23,14 +23,14 @@ if TYPE_CHECKING:
 
 
 def optimality_of(nlp: Nlp, evidence: Evidence | None) -> Evidence | None:
-    """Return the evidence about a point of a program in the case's units; None without any."""
+    """Return the evidence about a point of a program in the case's units; None without evidence."""
     if evidence is None:
         return None
     return Evidence.of(evidence, nlp.case.units, flat=tuple(_flat(nlp, direction) for direction in evidence.flat))
 
 
 def _flat(nlp: Nlp, direction: Mapping[str, float]) -> Mapping[str, float]:
-    """Return a flat direction in the case's units, the rate of the variable that moves most in its range 1."""
+    """Return a flat direction in the case's units; the variable that moves most within its range has the rate 1."""
     moved = [(k, each) for k, each in enumerate(nlp.program.variables) if each.name in direction]
     rates = {each.name: nlp.case.units.shown(direction[each.name], each.dimension) for _, each in moved}
     parts = np.array([abs(direction[each.name]) / nlp.scale[k] for k, each in moved])
@@ -39,12 +39,12 @@ def _flat(nlp: Nlp, direction: Mapping[str, float]) -> Mapping[str, float]:
 
 
 def certificate_data(certificate: Certificate | None) -> CertificateData | None:
-    """Return a proven bound; None without a certificate."""
+    """Return a proved bound; None without a certificate."""
     return None if certificate is None else CertificateData.of(certificate)
 
 
 def incumbent_data(certificate: Certificate | None) -> Mapping[str, float] | None:
-    """Return the best point known by the names of the program's variables, in the case's units."""
+    """Return the incumbent by the names of the program's variables, in the case's units."""
     if certificate is None or certificate.x is None:
         return None
     nlp = certificate.nlp
@@ -55,13 +55,13 @@ def incumbent_data(certificate: Certificate | None) -> Mapping[str, float] | Non
 
 
 class CertifiedTaskData(JsonObject):
-    """A task by itself and its certificate.
+    """Certificate of a task.
 
     Attributes:
-        name: of the task.
-        sense: whether F is maximised or minimised.
-        certificate: the proven bound.
-        point: the best point known, by the names of the program's variables; null where there is none.
+        name: name of the task.
+        sense: sense of the optimisation: F is maximised or minimised.
+        certificate: proved bound of the task's F.
+        point: incumbent, by the names of the program's variables; null where no feasible point is known.
     """
 
     name: str
@@ -75,14 +75,13 @@ class CertifiedResult(JsonObject):
 
     Attributes:
         head: the case.
-        certificate: of the one task, or of the program that combines several; null where there is no such program.
-        objective: what is optimised instead of F; absent for F.
-        point: the best point known, by the names of the program's variables; null where there is none.
-        tasks: each task by itself.
-        choice: among listed values of dimensions, at the best combination known; absent where the case has none.
-        notice: that the limits are taken at the stated pose alone, where the case has them over its workspace; else
-            absent.
-        versions: of the programs.
+        certificate: proved bound of the task, or of the program that combines tasks; null without such a program.
+        objective: objective, where it is not F at the stated poses; else absent.
+        point: incumbent, by the names of the program's variables; null where no feasible point is known.
+        tasks: certificates of the separate tasks.
+        choice: choice among listed values, at the best known combination; absent without listed values.
+        notice: notice that limits over a workspace or path are taken at the stated pose only; else absent.
+        versions: versions of the software.
     """
 
     head: Inline[HeadData]
@@ -96,7 +95,7 @@ class CertifiedResult(JsonObject):
 
 
 def certified_of(certified: "Certified") -> CertifiedResult:
-    """Return the proven bounds of a case: of every task, and of the combined program where there is one."""
+    """Return the proved bounds of a case: of every task, and of the combined program where there is one."""
     case = certified.tasks[0].nlp.case
     return CertifiedResult(
         head=head_data(case),

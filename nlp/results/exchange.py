@@ -1,4 +1,4 @@
-"""Proofs of solved designs by exchange of poses as a result: what those over a workspace and along a path share."""
+"""Proof of a solved design by exchange of poses as a result, over a workspace or along a path."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -11,10 +11,10 @@ if TYPE_CHECKING:
 
 
 class BindingData(JsonObject):
-    """A pose at which a claim is a constraint of the program.
+    """Pose at which a claim was added as a constraint of the nonlinear program.
 
     Attributes:
-        claim: claim that the pose refuted.
+        claim: name of the claim that the pose refuted.
         pose: the pose.
     """
 
@@ -23,11 +23,11 @@ class BindingData(JsonObject):
 
 
 class DesignData(JsonObject):
-    """A design on the way to the proven one.
+    """Design of an iteration.
 
     Attributes:
         F: F of the design.
-        unproved: number of claims about the workspace that it does not keep, or that stay open.
+        unproved: number of claims that are refuted or undecided for the design.
     """
 
     F: float
@@ -38,13 +38,11 @@ class ExchangeData(JsonObject):
     """Proof of a design, by exchange of poses.
 
     Attributes:
-        proved: whether all ranks and limits are proved at every pose.
-        joint_centre: the proof is about every robot whose joint centres are off by at most this; absent where it is
-            about the exact robot.
-        tighter: part of themselves by which the program's limits at the poses are tighter than the case's; absent in
-            results of earlier versions.
-        designs: each design that was judged; the last is the answer.
-        poses: poses of the constraints.
+        proved: If true, all ranks and limits are proved at every pose.
+        joint_centre: tolerance of joint centres: the proof covers every robot within it; absent for the exact robot.
+        tighter: safety margin of the added constraints, as a part of the limits; absent in results of earlier versions.
+        designs: designs of the iterations; the last one is the answer.
+        poses: poses of the added constraints.
     """
 
     proved: bool

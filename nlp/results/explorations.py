@@ -1,4 +1,4 @@
-"""Fronts of several goals and sweeps, column by column, as data."""
+"""Results of a Pareto front and of a sweep; a sweep is stored by columns."""
 
 from collections.abc import Mapping
 from typing import TypeAlias
@@ -12,12 +12,12 @@ from .parts import HeadData, VersionsData
 
 
 class FrontGoalData(JsonObject):
-    """A goal of a front.
+    """Goal of a front.
 
     Attributes:
         name: ``F:TASK`` or ``limits.KEY``.
-        sense: whether it is maximised or minimised.
-        unit: of its numbers; empty for a plain number.
+        sense: sense of the goal: maximised or minimised.
+        unit: unit of its values; empty for a plain number.
     """
 
     name: str
@@ -26,20 +26,20 @@ class FrontGoalData(JsonObject):
 
 
 class FrontPointData(JsonObject):
-    """A point of a front: the optimum of one goal within bounds of the others.
+    """Point of a front: the optimum of one goal, with bounds on the other goals.
 
     Attributes:
-        goals: number of each goal, by name.
-        optimised: name of the goal whose optimum the point is.
-        bounds: that the other goals keep, by name; empty for the optimum of one goal alone.
-        status: of the solve.
-        design: the free numbers of the case, by name.
-        active: sides of bounds and limits that the design lies on.
-        multipliers: of the active sides, in the optimised goal per unit.
-        kind: of point, by the evidence; null where nothing is free.
+        goals: value of each goal, by name.
+        optimised: name of the optimised goal.
+        bounds: bounds on the other goals, by name; empty for the optimum of one goal without such bounds.
+        status: status of the solve.
+        design: variables of the case, by name.
+        active: active bounds and limits.
+        multipliers: multipliers of the active bounds and limits, in the optimised goal per unit.
+        kind: kind of the point, by its evidence; null for a case without variables.
         stationarity: largest scaled derivative of the Lagrangian; null without evidence.
         feasibility: largest distance outside a limit, in half ranges; null without evidence.
-        certificate: the proven bound; null where none was asked for.
+        certificate: proved bound; null where no proof was requested.
     """
 
     goals: Mapping[str, float]
@@ -60,13 +60,12 @@ class FrontResult(JsonObject):
 
     Attributes:
         head: the case.
-        notice: that the limits are taken at the stated pose alone, where the case has them over its workspace; else
-            absent.
+        notice: notice that limits over a workspace or path are taken at the stated pose only; else absent.
         front: the goals.
-        points: none of which is better than another in all goals, in the order of the first goal, its best value last.
-        gaps: of two goals, indices of the points that no point was found between it and the next.
-        failed: number of searches that found no optimum.
-        versions: of the programs.
+        points: nondominated points, in the order of the first goal, its best value last.
+        gaps: for two goals, indices of points with a gap in the front between them and the next point.
+        failed: number of searches without an optimum.
+        versions: versions of the software.
         seconds: wall time.
     """
 
@@ -80,37 +79,37 @@ class FrontResult(JsonObject):
     seconds: float
 
 
-#: A number for each point; null where there is none.
+#: Values of the points; null where a point has no value.
 Numbers: TypeAlias = tuple[float | None, ...]
 
 
 class SweepResult(JsonObject):
-    """Result of a sweep: one entry for each point in each column.
+    """Result of a sweep, by columns: each column has one entry for each point.
 
     Attributes:
-        head: the case at the first point.
-        notice: that limits are taken at the stated pose alone, where the case has them over its workspace and the
-            compiled engine solved points; else absent.
-        unit: of F; empty where tasks do not agree in it.
-        numbers: values of each number that changes, by name.
-        statuses: of each solve; "refused" where the case contradicts itself.
-        F: objective, or the value of the combination of several tasks.
-        design: values of each free number, by name.
-        actives: sides of bounds and limits that each design lies on.
-        multipliers: of the active sides.
+        head: case at the first point.
+        notice: notice that limits over a workspace are taken at the stated pose only, for points of the compiled
+            engine; else absent.
+        unit: unit of F; empty where tasks have different units.
+        numbers: values of each varied parameter, by name.
+        statuses: status of each solve; "refused" where the case contradicts itself.
+        F: objective, or value of the combination of several tasks.
+        design: values of each variable, by name.
+        actives: active bounds and limits of each design.
+        multipliers: multipliers of the active bounds and limits.
         verdicts: kind of each point.
         stationarity: largest scaled derivative of the Lagrangian.
-        feasibility: largest distance outside a side, in half ranges.
+        feasibility: largest distance outside a bound or limit, in half ranges.
         curvature: smallest eigenvalue of the reduced Hessian.
         starts: number of searches.
-        converged: number of searches that converged.
-        engines: whose point it is.
+        converged: number of converged searches.
+        engines: engine that solved the point.
         times: wall time, seconds.
-        notes: reasons of refusals.
-        certificates: status of each proof; absent where none was asked for.
-        bounds: proven bounds of F; absent likewise.
-        gaps: distances of the bounds from F; absent likewise.
-        versions: of the programs.
+        notes: reasons for refusals.
+        certificates: status of each proof; absent where no proof was requested.
+        bounds: proved bounds of F; absent where no proof was requested.
+        gaps: distances of the bounds from F; absent where no proof was requested.
+        versions: versions of the software.
     """
 
     head: Inline[HeadData]

@@ -18,13 +18,13 @@ _WRENCH = ("f_x", "f_y", "f_z", "m_x", "m_y", "m_z")
 
 
 def inverse_csv(case: Case, found: InversePoses, rows: Sequence[int], *, derivatives: bool) -> str:
-    """Return a row for each pose: whether it is closed and singular, then numbers, which are empty where not closed.
+    """Return a row for each pose: closed or not, singular or not, and coordinates, which are empty where not closed.
 
     Args:
         case: the case.
-        found: the joints at its poses.
-        rows: number of each pose's row in its file.
-        derivatives: whether the rates of the actuators and J follow, in radians and the case's unit of length.
+        found: joint coordinates at the poses.
+        rows: row number of each pose in its file.
+        derivatives: If true, actuator rates and J follow, in radians and the case's unit of length.
     """
     head = ["row", "closed", "singular", *found.dependent]
     head += [f"{measure} {name}" for measure, name in zip(found.measures, found.actuators, strict=True)]
@@ -52,7 +52,7 @@ def inverse_csv(case: Case, found: InversePoses, rows: Sequence[int], *, derivat
 
 
 def _coordinate(found: InversePoses, name: str) -> FloatArray:
-    """Return a coordinate (N,) of the poses: of the position, or roll, pitch or yaw, radians."""
+    """Return a coordinate (N,) of the poses: x, y or z, or roll, pitch or yaw in radians."""
     if name in POSITION:
         return found.positions[:, POSITION.index(name)]
     R = found.rotations
@@ -61,5 +61,5 @@ def _coordinate(found: InversePoses, name: str) -> FloatArray:
 
 
 def _in_units(case: Case, values: FloatArray, dimensions: Sequence[Dimension]) -> FloatArray:
-    """Return numbers (N, k) in the case's units."""
+    """Return values (N, k) in the case's units."""
     return values / [case.units.to_internal(1.0, each) for each in dimensions]

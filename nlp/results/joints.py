@@ -1,4 +1,4 @@
-"""Joints of a robot given joint by joint at one point: freedoms, rates, singularities and assembly."""
+"""Joints of a robot at one point: degrees of freedom, rates, singularities and assembly mode."""
 
 import math
 from typing import Literal
@@ -14,13 +14,13 @@ from ..system.jsonvalues import Absent, JsonObject, finite_or_none
 
 
 class ActuatorData(JsonObject):
-    """An actuated joint of a robot given joint by joint.
+    """Actuated joint of a robot defined by joints.
 
     Attributes:
-        name: of the actuator: its limb, with a number where the limb has several.
+        name: name of the actuator: its limb, with a number where the limb has several actuators.
         kind: ``angle`` or ``length``.
-        rate: for the task's motion, radians or length per unit of time; null where the motion does not determine it,
-            because the actuator can move while the platform stands still.
+        rate: rate for the task's motion, radians or length per unit of time; null where the motion does not determine
+            the rate, because the actuator can move while the platform stands still.
     """
 
     name: str
@@ -29,19 +29,19 @@ class ActuatorData(JsonObject):
 
 
 class JointsData(JsonObject):
-    """Joints of a robot given joint by joint, at its first pose.
+    """Joints of a robot defined by joints, at its first pose.
 
     Attributes:
-        freedoms: of the platform with free actuators.
-        feasible: whether the platform can make the task's motion with free actuators; absent with several tasks.
-        actuators: with their rates for the task's motion; absent where there are several tasks.
-        constrained: part of F that constraints carry, which no actuator can move with; 0 for a motion that is possible.
-        limb_parts: actuation and constraints in F, limb by limb; absent where there are several tasks.
-        centre_dependence: largest change of F, as a part of it, where the centre of a limb's wrenches moves by the
-            characteristic length along the axis of its last passive joint; absent where no limb's wrenches have such a
-            centre, and with several tasks.
-        singularities: that were found.
-        assembly: sentences about joints that are assembled in another way than at home, or perhaps; empty for home's.
+        freedoms: degrees of freedom of the platform with free actuators.
+        feasible: If true, the platform can make the task's motion with free actuators; absent with several tasks.
+        actuators: actuators with their rates for the task's motion; absent with several tasks.
+        constrained: part of F from constraint wrenches, which no actuator motion can follow; 0 for a possible motion.
+        limb_parts: parts of actuation and constraints in F, by limb; absent with several tasks.
+        centre_dependence: largest relative change of F where the centre of a limb's wrenches moves by the
+            characteristic length along the axis of its last passive joint; absent with several tasks, and without such
+            a centre.
+        singularities: singularities at the pose.
+        assembly: sentences about an assembly mode that is not, or may not be, that of home; empty for the home mode.
     """
 
     freedoms: int
@@ -57,14 +57,14 @@ class JointsData(JsonObject):
 def joints_data(
     nlp: Nlp, x: FloatArray, state: RobotState, dependence: Dependence | None, *, with_task: bool
 ) -> JointsData | None:
-    """Return the joints of a robot given joint by joint; None for others.
+    """Return the joints of a robot defined by joints; None for a robot defined by its rows.
 
     Args:
-        nlp: the program.
-        x: (n,) the point.
-        state: the robot there, at the first pose.
-        dependence: of F on conventions; None where it is not known.
-        with_task: whether the state's rates belong to a task.
+        nlp: nonlinear program.
+        x: (n,) point.
+        state: robot at the point and the first pose.
+        dependence: dependence of F on conventions; None where it is not known.
+        with_task: If true, the rates of the state belong to a task.
     """
     found = mobility_of(nlp, x, state)
     if found is None:

@@ -1,4 +1,4 @@
-"""What is optimised: F of a task, or the largest force, speed or power of the actuators; its unit."""
+"""Objective of a case and its unit: F of a task, or the largest force, speed or power of the actuators."""
 
 import math
 from typing import TYPE_CHECKING
@@ -19,15 +19,15 @@ if TYPE_CHECKING:
 
 
 class ObjectiveData(JsonObject):
-    """A number of the actuators that is optimised instead of F, or F's worst value over a workspace or along a path.
+    """Objective other than F at the stated poses: an actuator quantity, or the worst F over a workspace or path.
 
     Attributes:
-        minimise: name of the number of the actuators; absent for F.
-        over: poses of which F is the worst, ``workspace`` or ``path``; absent for a number of the actuators.
-        value: the largest over loads, actuators and poses, or the worst F; proved where limits hold beside the stated
-            poses. Null without an answer, or where nothing is proved.
-        unit: of these numbers.
-        bound: that no design within the limits is beyond; absent where none was asked for.
+        minimise: name of the actuator quantity; absent for F.
+        over: domain of the worst F, ``workspace`` or ``path``; absent for an actuator quantity.
+        value: largest value over loads, actuators and poses, or worst F; a proved bound where limits cover a workspace
+            or path. Null without an answer, or where nothing is proved.
+        unit: unit of value and bound.
+        bound: proved bound of the value for all designs within the limits; absent where no proof was requested.
         gap: distance of the bound from the value.
     """
 
@@ -40,12 +40,12 @@ class ObjectiveData(JsonObject):
 
 
 def objective_data(case: Case, value: float | None, certificate: Certificate | None = None) -> ObjectiveData | None:
-    """Return what a case optimises instead of F of its stated poses; None for that.
+    """Return the objective of a case, where it is not F at the stated poses; else None.
 
     Args:
         case: the case.
-        value: of the number; None without an answer.
-        certificate: proven bound of it.
+        value: value of the objective; None without an answer.
+        certificate: proved bound of the objective; None without a proof.
     """
     measure = case.tasks[0].measure
     if not (measure or case.worst_everywhere):
@@ -63,7 +63,7 @@ def objective_data(case: Case, value: float | None, certificate: Certificate | N
 
 
 def certified_objective(certified: "Certified") -> ObjectiveData | None:
-    """Return the number of the actuators that a certificate bounds, proved over the workspace where there is one."""
+    """Return the objective that a certificate bounds, with its proved value over the workspace where there is one."""
     certificate, solution = certified.certificate, certified.solution
     if certificate is None:
         return None
@@ -75,7 +75,7 @@ def certified_objective(certified: "Certified") -> ObjectiveData | None:
 
 
 def over_workspace(case: Case, judged: "Judgement") -> float:
-    """Return a proven bound of what a case optimises over every pose of a workspace or path; NaN without one."""
+    """Return a proved bound of the objective over every pose of a workspace or path; NaN without a proof."""
     measure = case.tasks[0].measure
     bounds = [each.bound for each in judged.extremes if each.key.startswith(f"{measure or ObjectiveLimit.key}.")]
     if measure:
@@ -84,26 +84,26 @@ def over_workspace(case: Case, judged: "Judgement") -> float:
 
 
 def pose_objective(case: Case, found: PoseLoads) -> float:
-    """Return the number of the actuators that a case optimises, at one pose."""
+    """Return the actuator quantity that a case optimises, at one pose."""
     return _in_unit(case, largest_of(found, case.tasks[0].measure))
 
 
 def _in_unit(case: Case, value: float) -> float:
-    """Return a number of the actuators from evidence or a proof in the case's unit, as the program has it."""
+    """Return an actuator quantity from evidence or a proof, in the case's unit."""
     return case.units.shown(value, _dimension(case))
 
 
 def _dimension(case: Case) -> Dimension:
-    """Return the dimension of the number of the actuators that a case optimises."""
+    """Return the dimension of the actuator quantity that a case optimises."""
     return dimension_of_measure(case.tasks[0].measure, driven_joints(case.model)[0])
 
 
 def unit_of_objective(case: Case, task: int | None = None) -> str:
-    """Return the unit of F, or of what is optimised instead.
+    """Return the unit of the objective.
 
     Args:
         case: the case.
-        task: index of the task whose F it is; all tasks together for None, which have a unit where they agree in it.
+        task: index of the task; None for all tasks, which have a unit only where it is the same for all.
     """
     tasks = case.tasks if task is None else [case.tasks[task]]
     if tasks[0].measure:
@@ -112,12 +112,12 @@ def unit_of_objective(case: Case, task: int | None = None) -> str:
 
 
 def unit_of_claim(case: Case, name: str, dimension: Dimension) -> str:
-    """Return the unit of a claim's number over a workspace or along a path: that of F for F of a task.
+    """Return the unit of a claim's quantity over a workspace or along a path: the unit of F for F of a task.
 
     Args:
         case: the case.
-        name: of the claim.
-        dimension: of its number.
+        name: name of the claim.
+        dimension: dimension of its quantity.
     """
     tasks = [k for k, task in enumerate(case.tasks) if name in ("F", f"F of {task.name}")]
     is_of_F = dimension is Dimension.NUMBER and tasks and not case.tasks[0].measure

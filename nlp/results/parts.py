@@ -1,6 +1,6 @@
-"""Parts that several kinds of result share: the case, poses, motions, the robot at a point, limits and their margins.
+"""Parts of several kinds of result: the case, poses, motions, the robot at a point, limits and their margins.
 
-Numbers are in the case's units. Nothing is ever NaN or infinite, but an infinite pitch, which is the string ``"inf"``.
+Values are in the case's units. None is NaN or infinite; an infinite pitch is the string ``"inf"``.
 """
 
 import math
@@ -22,15 +22,15 @@ from .joints import JointsData
 SchemaVersion: TypeAlias = Literal[1]
 SCHEMA: Final = 1
 
-#: Values of a quantity by the limb or joint that has it.
+#: Values of a quantity by limb or joint.
 ByOwner: TypeAlias = Mapping[str, float]
-#: Numbers that replace those of a case file, by the names of ``--set``; an infinite one is a text.
+#: Values that replace those of a case file, by the names of ``--set``; an infinite value is a text.
 SettingsData: TypeAlias = Mapping[str, float | Vector | Literal["inf", "-inf"]]
 Jacobian: TypeAlias = tuple[Vector6, ...]
 
 
 def settings_data(settings: Settings) -> SettingsData | None:
-    """Return numbers that replace those of a case file as JSON has them; None without any."""
+    """Return the values that replace those of a case file, in the form of JSON; None without any."""
     return {name: _setting_data(value) for name, value in settings.items()} or None
 
 
@@ -43,7 +43,7 @@ def _setting_data(value: float | list[float]) -> float | Vector | Literal["inf",
 
 
 def settings_from_data(data: SettingsData) -> Settings:
-    """Return the numbers that replace those of a case file from their JSON."""
+    """Return the values that replace those of a case file, from their JSON."""
     return {name: list(value) if isinstance(value, tuple) else float(value) for name, value in data.items()}
 
 
@@ -60,14 +60,14 @@ class UnitsData(JsonObject):
 
 
 class HeadData(JsonObject):
-    """The case that a result is about.
+    """Case of a result.
 
     Attributes:
         schema: version of the result's keys.
-        case: name of the case, its file's.
+        case: name of the case, which is that of its file.
         title: title of the case.
         model: name of the robot.
-        units: of every number.
+        units: units of all values.
     """
 
     schema: SchemaVersion
@@ -78,7 +78,7 @@ class HeadData(JsonObject):
 
 
 class VersionsData(JsonObject):
-    """Versions of the programs that the numbers depend on."""
+    """Versions of the software on which the values depend."""
 
     screwsynth: str
     casadi: str
@@ -87,13 +87,13 @@ class VersionsData(JsonObject):
 
 
 class TaskData(JsonObject):
-    """A task of the case.
+    """Task of the case.
 
     Attributes:
-        name: of the task.
-        sense: whether F is maximised or minimised.
-        motion: of the platform.
-        stated_point: the axis's point that the case states; absent where it states none.
+        name: name of the task.
+        sense: sense of the optimisation: F is maximised or minimised.
+        motion: motion of the platform.
+        stated_point: point of the axis as the case states it; absent where the case states none.
     """
 
     name: str
@@ -103,20 +103,20 @@ class TaskData(JsonObject):
 
 
 class PoseStateData(JsonObject):
-    """The robot at one of several poses.
+    """Robot at one of several poses.
 
     Attributes:
-        F: objective at this pose alone.
-        pose: of the platform.
+        F: objective at this pose only.
+        pose: pose of the platform.
         jacobian: unit wrenches as rows, force then moment about the world origin.
-        rates: one for each row.
-        rank: of the Jacobian.
-        singular: whether the rank is below six.
-        singular_values: of the Jacobian with moments about the platform's origin, divided by their longest arm, largest
-            first.
-        quantities: leg lengths, joint angles and the like, by limb.
-        limited_quantities: what the case's limits speak of beside the quantities, by limb: angles from the mounting
-            axes that they state, and lengths of legs of a robot given joint by joint; absent without any.
+        rates: work rate of each row.
+        rank: rank of the Jacobian.
+        singular: If true, the rank is below six.
+        singular_values: singular values of the Jacobian, largest first, with moments about the platform's origin,
+            divided by their longest arm.
+        quantities: quantities such as leg lengths and joint angles, by name and limb.
+        limited_quantities: further quantities that the case limits, by name and limb: joint angles from stated mounting
+            axes, and leg lengths of a robot defined by joints; absent without any.
     """
 
     F: float
@@ -131,12 +131,12 @@ class PoseStateData(JsonObject):
 
 
 class PosesData(JsonObject):
-    """The robot at every pose of a case with several.
+    """Robot at every pose of a case with several poses.
 
     Attributes:
         stated_poses: poses that the case states, before their displacements.
-        over_poses: how F is combined over the poses.
-        poses: the robot at every pose.
+        over_poses: combination of F over the poses: sum, mean or worst.
+        poses: robot at every pose.
     """
 
     stated_poses: tuple[PlatformPose, ...]
@@ -145,32 +145,32 @@ class PosesData(JsonObject):
 
 
 class RobotData(JsonObject):
-    """The robot at a point; with several poses, at the first.
+    """Robot at a point; with several poses, at the first pose.
 
     Attributes:
         parameters: dimensions by name; three numbers for a point or direction.
-        pose: of the platform; with several poses, the first that the case states.
-        task: the task that the rates belong to; absent where there are several.
+        pose: pose of the platform; with several poses, the first stated pose.
+        task: task to which the rates belong; absent with several tasks.
         limbs: limb of each row of the Jacobian.
-        members: member of its limb that applies each row: the limb, with a number where the limb has several.
+        members: member of each row of the Jacobian: the limb, with a number where the limb has several members.
         jacobian: unit wrenches as rows, force then moment about the world origin.
         rates: work rate of each row in the task's motion.
-        rank: of the Jacobian.
-        singular: whether the rank is below six.
-        singular_values: of the Jacobian with moments about the platform's origin, divided by their longest arm, largest
-            first.
+        rank: rank of the Jacobian.
+        singular: If true, the rank is below six.
+        singular_values: singular values of the Jacobian, largest first, with moments about the platform's origin,
+            divided by their longest arm.
         free_motions: basis of the motions that no row resists.
-        task_is_free: whether F is zero, so that nothing resists the task's motion.
-        quantities: leg lengths, joint angles and the like, by limb.
-        limited_quantities: what the case's limits speak of beside the quantities, by limb: angles from the mounting
-            axes that they state, and lengths of legs of a robot given joint by joint; absent without any.
-        characteristic_length: that relates couples to forces; absent for robots without constraint couples.
-        length_dependence: relative derivative of F by it, ``(l / F) dF/dl``, over all poses; absent for such robots,
-            where F is 0, and with several tasks.
-        joints: freedoms, actuator rates and singularities of a robot given joint by joint; absent for others.
-        free_joints: positions, at every pose, of driven joints that the pose does not determine; absent without any.
-        loading: forces and speeds of its actuators; absent without loads and motions.
-        several: the robot at every pose; absent where there is one.
+        task_is_free: If true, F is zero: nothing resists the task's motion.
+        quantities: quantities such as leg lengths and joint angles, by name and limb.
+        limited_quantities: further quantities that the case limits, by name and limb: joint angles from stated mounting
+            axes, and leg lengths of a robot defined by joints; absent without any.
+        characteristic_length: factor between couples and forces; absent for robots without constraint couples.
+        length_dependence: relative derivative of F by the characteristic length, ``(l / F) dF/dl``, over all poses;
+            absent without that length, where F is 0, and with several tasks.
+        joints: degrees of freedom, actuator rates and singularities of a robot defined by joints; absent for others.
+        free_joints: free actuator coordinates, which the pose does not determine, at every pose; absent without any.
+        loading: forces and speeds of the actuators; absent without loads and motions.
+        several: robot at every pose; absent where there is one pose.
     """
 
     parameters: Mapping[str, float | Vector]
@@ -196,14 +196,14 @@ class RobotData(JsonObject):
 
 
 class ViolationData(JsonObject):
-    """A bound or constraint that a point lies outside of.
+    """Violated bound or constraint.
 
     Attributes:
-        name: variable or constraint.
-        bound: side of it.
-        value: at the point.
-        limit: that it must keep.
-        unit: of both; absent for a plain number.
+        name: name of the variable or constraint.
+        bound: side: smallest, largest or required value.
+        value: value at the point.
+        limit: allowed value.
+        unit: unit of both values; absent for a plain number.
     """
 
     name: str
@@ -214,18 +214,18 @@ class ViolationData(JsonObject):
 
 
 class LimitData(JsonObject):
-    """A limiting number of the case, over all legs, joints and poses.
+    """Limit of the case, over all legs, joints and poses.
 
     Attributes:
-        key: dotted key, below limits, of the number.
-        limit: the number.
-        unit: of limit, value and margin.
-        nearest: where the margin is least.
-        value: measured there.
-        margin: least margin, positive inside.
-        active: everywhere that the point lies on the limit.
-        violated: everywhere that the point lies outside of the limit.
-        cost: derivative of the optimal F by the number; null where the point is no optimum.
+        key: dotted key of the limit, below ``limits``.
+        limit: allowed value.
+        unit: unit of limit, value and margin.
+        nearest: place with the smallest margin.
+        value: value at this place.
+        margin: smallest margin, positive inside the limit.
+        active: places at which the limit is active.
+        violated: places at which the limit is violated.
+        cost: derivative of the optimal F by the allowed value; null where the point is no optimum.
     """
 
     key: str

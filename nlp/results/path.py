@@ -1,4 +1,4 @@
-"""Verdicts on a programmed path as a result: the types and their construction."""
+"""Verdicts along a tool path as a result: types and construction."""
 
 import math
 from collections.abc import Iterator
@@ -30,13 +30,13 @@ if TYPE_CHECKING:
 
 
 class PathFaultData(JsonObject):
-    """A point of a path that refutes a claim.
+    """Point of a path that refutes a claim.
 
     Attributes:
-        value: value of the number at this point; null of a rank.
+        value: value of the quantity at this point; null for a rank.
         line: line of the file, or row of a table, of the segment.
-        segment: its index, from 0.
-        parameter: along the segment, from 0 to 1.
+        segment: index of the segment, from 0.
+        parameter: parameter along the segment, from 0 to 1.
         pose: pose of the platform at this point.
     """
 
@@ -51,10 +51,10 @@ class PathVerdictData(VerdictData):
     """Verdict on a claim about every point of a path.
 
     Attributes:
-        line: line of the file, or row of a table, of the segment with the pose; null where none is known.
-        segment: index of this segment, from 0.
-        parameter: parameter along it, from 0 to 1.
-        fault: first known point, in the order of the path, that refutes the claim; absent of other outcomes.
+        line: line of the file, or row of a table, of the segment with the pose; null where no pose is known.
+        segment: index of this segment, from 0; null likewise.
+        parameter: parameter along this segment, from 0 to 1; null likewise.
+        fault: first known point of the path that refutes the claim; absent for another outcome.
     """
 
     line: int | None
@@ -64,17 +64,15 @@ class PathVerdictData(VerdictData):
 
 
 class PathActuatorData(JsonObject):
-    """Numbers of an actuator along a path.
+    """Range, speed and acceleration of an actuator along a path.
 
     Attributes:
-        actuator: its name.
+        actuator: name of the actuator.
         unit: unit of its coordinate.
-        smallest: proven smallest coordinate; null where nothing is proved.
-        largest: proven largest coordinate.
-        speed: proven largest speed, in this unit by seconds, in the path's motion where it states times; absent without
-            such.
-        acceleration: largest size of the change of its speed between knots, by the square of seconds; absent without
-            knots or times.
+        smallest: proved smallest coordinate; null where nothing is proved.
+        largest: proved largest coordinate; null where nothing is proved.
+        speed: proved largest speed in the motion of the path, unit per second; absent without times.
+        acceleration: largest acceleration between knots, unit per second squared; absent without knots or times.
     """
 
     actuator: str
@@ -86,15 +84,15 @@ class PathActuatorData(JsonObject):
 
 
 class PathKnotsData(JsonObject):
-    """Knots of a path, of which a table has the coordinates of the actuators.
+    """Knots of a path: points at which a table has the actuator coordinates.
 
     Attributes:
         number: number of knots.
         closed: number of knots that the robot reaches.
-        within: largest distance asked for between the path and the platform's origin, as actuators move linearly from
-            knot to knot; absent where steps were asked for.
-        deviation: the proven largest distance; absent where none was asked for, and null where none is proved.
-        reason: for which none is proved; absent otherwise.
+        within: requested largest deviation of the platform's origin from the path, with linear actuator motion from
+            knot to knot; absent where a step was requested.
+        deviation: proved largest deviation; null where nothing is proved, or where a step was requested.
+        reason: reason why no deviation is proved; absent otherwise.
     """
 
     number: int
@@ -105,18 +103,18 @@ class PathKnotsData(JsonObject):
 
 
 class PathData(JsonObject):
-    """A path and the claims about it.
+    """Path and the claims about it.
 
     Attributes:
-        file: its name.
-        segments: their number.
-        time: seconds of the segments whose time is stated; absent where none is.
-        untimed: number of the others, of which speeds are not known; absent where no time is stated.
-        idle: words of the program without a motion, in the order of the lines.
-        dependent: names of the coordinates of the pose that follow from the others; absent without any.
-        claims: ranks first.
+        file: name of the path's file.
+        segments: number of segments.
+        time: total time of the segments with a stated time, seconds; absent where no time is stated.
+        untimed: number of segments without a time, along which speeds are not known; absent where no time is stated.
+        idle: words of the G-code without a motion, in the order of the lines.
+        dependent: names of the dependent coordinates of the pose; absent without any.
+        claims: verdicts, ranks first.
         actuators: ranges of the actuators.
-        knots: knots of the table of actuators; absent where none is requested.
+        knots: knots of the table of actuators; absent where no table is requested.
     """
 
     file: str
@@ -131,15 +129,15 @@ class PathData(JsonObject):
 
 
 class PathResult(JsonObject):
-    """Result of judging a machine along a path.
+    """Result of verifying a robot along a tool path.
 
     Attributes:
         head: the case.
-        settings: numbers that replaced those of the case file, such as a limit, by the names of ``--set``; absent
+        settings: values that replaced those of the case file, such as a limit, by the names of ``--set``; absent
             without any, and in results of earlier versions.
-        proved: whether all ranks and limits are proved at every point.
-        path: the path.
-        versions: versions of the programs.
+        proved: If true, all ranks and limits are proved at every point.
+        path: the path and its claims.
+        versions: versions of the software.
     """
 
     head: Inline[HeadData]
@@ -150,15 +148,15 @@ class PathResult(JsonObject):
 
 
 class PlaceData(JsonObject):
-    """Place of a path's frame in the world.
+    """Placement of a path's frame in the world.
 
     Attributes:
-        x: first coordinate of its origin.
-        y: second coordinate.
-        z: third coordinate.
-        roll: first turn, about the world's x.
-        pitch: second turn, about the world's y.
-        yaw: third turn, about the world's z.
+        x: x coordinate of its origin.
+        y: y coordinate of its origin.
+        z: z coordinate of its origin.
+        roll: first rotation, about the world's x.
+        pitch: second rotation, about the world's y.
+        yaw: third rotation, about the world's z.
     """
 
     x: float
@@ -175,7 +173,7 @@ class PathProofData(ExchangeData):
     Attributes:
         file: name of the path's file.
         segments: number of its segments.
-        place: place of the path's frame.
+        place: placement of the path's frame.
         claims: verdicts, ranks first.
     """
 
@@ -190,7 +188,7 @@ def path_result(judged: "Judgement", settings: "Settings | None" = None) -> Path
 
     Args:
         judged: the verdicts.
-        settings: numbers that replaced those of the case file; None without any.
+        settings: values that replaced those of the case file; None without any.
     """
     return PathResult(
         head=head_data(judged.case),

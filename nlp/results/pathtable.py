@@ -1,6 +1,6 @@
-"""Coordinates of actuators along a path as a table, for controllers: knots with times, poses, speeds and accelerations.
+"""Table of actuator coordinates along a path, for controllers: knots with times, poses, speeds and accelerations.
 
-Speeds and accelerations are differences between knots: what actuators do that move linearly from one to the next.
+Speeds and accelerations are differences between knots, for actuators that move linearly from knot to knot.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ..path.path import ProgrammedPath
     from ..proof.workspace.path_knots import Knots
 
-#: Number of rows that are made at once.
+#: Number of rows that are computed at once.
 _BLOCK = 2**14
 #: Columns of the pose.
 _POSE = ("x", "y", "z", "roll", "pitch", "yaw")
@@ -33,9 +33,9 @@ class KnotMotion(NamedTuple):
     """Motion of the actuators between K knots of a path, in radians; NaN where no time is stated.
 
     Attributes:
-        times: (K,) seconds from the start; segments without a time take none.
-        speeds: (K, a) of the motion that ends at each knot.
-        accelerations: (K, a) at each knot: change of the speed there by the mean time of the motions about it.
+        times: (K,) seconds from the start; a segment without a time counts 0.
+        speeds: (K, a) speeds of the motion that ends at each knot.
+        accelerations: (K, a) accelerations: change of the speed at each knot by the mean time of both motions there.
     """
 
     times: FloatArray
@@ -58,7 +58,7 @@ def knot_motion(path: ProgrammedPath, knots: Knots) -> KnotMotion:
 
 
 def _angles(path: ProgrammedPath, k: NDArray[np.intp], s: FloatArray, rotations: FloatArray) -> FloatArray:
-    """Return roll, pitch and yaw (K, 3) at places: those of the path where it is stated by them."""
+    """Return roll, pitch and yaw (K, 3) at places of a path: its own angles where the path states these."""
     if path.between is Between.ANGLES and path.order == ORDERS["rpy"] and path.frame is None:
         start = path.knots[k, 3:]
         return np.asarray(start + s[:, None] * (path.knots[k + 1, 3:] - start))
@@ -69,9 +69,9 @@ def _angles(path: ProgrammedPath, k: NDArray[np.intp], s: FloatArray, rotations:
 
 
 def knots_csv(case: Case, path: ProgrammedPath, knots: Knots) -> str:
-    """Return a row for each knot: its line, segment and parameter, time, pose, coordinates, speeds and accelerations.
+    """Return a row for each knot: line, segment and parameter, time, pose, coordinates, speeds and accelerations.
 
-    Numbers are in the units of the case. Cells are empty where the machine does not reach the pose, or without a time.
+    Values are in the units of the case. Cells are empty where the robot does not reach the pose, or without a time.
     """
     units = case.units
     head = ["line", "segment", "parameter", *(["t"] * path.is_timed), *_POSE]
@@ -83,7 +83,7 @@ def knots_csv(case: Case, path: ProgrammedPath, knots: Knots) -> str:
 
 
 def _rows(case: Case, path: ProgrammedPath, knots: Knots, scales: FloatArray) -> Iterator[list[float | None]]:
-    """Yield the rows, in which numbers that are not known are None."""
+    """Yield the rows; unknown values are None."""
     motion = knot_motion(path, knots)
     for begin in range(0, len(knots.segments), _BLOCK):
         rows = slice(begin, begin + _BLOCK)

@@ -1,4 +1,4 @@
-"""The robot at a point as data: its case, poses, motions and numbers, and the constraints that the point violates."""
+"""Robot at a point as data: case, poses, motions and quantities; violated bounds and constraints of a point."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..evidence.conventions import dependence_of
 from ..evidence.evaluation import shown_parameters
 from ..evidence.kkt import FEASIBLE, linearise
 from ..evidence.loads import loading_of, loads_at
-from ..evidence.margins import measured_numbers, measured_slack, unit_of_side
+from ..evidence.margins import measured_slack, measured_values, unit_of_side
 from ..evidence.screwvalues import motion_of
 from ..evidence.state import PlatformPose, RobotState, evaluate, stated_poses
 from ..program.free_joints import FreeJoint, free_joints
@@ -42,25 +42,25 @@ from .parts import (
 )
 from .rounding import TURNED
 
-#: Violations of less than this part of the worst are left out: a failed solve leaves them beside the worst.
+#: Size of violations, as a part of the worst one, below which they are left out: a failed solve leaves small ones.
 _SMALL = 1e-3
 
 
 def head_data(case: Case) -> HeadData:
-    """Return the case that a result is about."""
+    """Return the case of a result."""
     return HeadData.of(case, schema=SCHEMA, case=case.name, model=case.model.name, units=UnitsData.of(case.units))
 
 
 def stated_pose_notice(case: Case) -> str | None:
-    """Return the notice that limits elsewhere are taken at the stated pose alone; None for other cases."""
-    if case.tasks[0].measure:  # which is bounded from poses of the workspace or the path
+    """Return the notice that limits over a workspace or path are taken at the stated pose only; else None."""
+    if case.tasks[0].measure:  # its bound covers poses of the workspace or path
         return None
     return case.stated_pose_notice or None
 
 
 @cache
 def versions() -> VersionsData:
-    """Return the versions of the programs that the numbers depend on."""
+    """Return the versions of the software on which the values depend."""
     return VersionsData(
         screwsynth=__version__,
         casadi=ca.CasadiMeta.version(),
@@ -73,16 +73,16 @@ def robot_data(nlp: Nlp, x: FloatArray, state: RobotState, task: int | None) -> 
     """Return the robot at a point.
 
     Args:
-        nlp: the program.
-        x: (n,) the point.
-        state: the robot there, at the first pose where there are several.
-        task: index in the case of the task that the state's rates belong to; None leaves task and rates out.
+        nlp: nonlinear program.
+        x: (n,) point.
+        state: robot at the point and the first pose.
+        task: index of the task to which the rates of the state belong; None for a result without task and rates.
 
     Raises:
-        EvaluationError: a number is not finite at another pose.
+        EvaluationError: a value is not finite at another pose.
     """
     case = nlp.case
-    task = None if case.tasks[0].measure else task  # its motion is none that is asked for
+    task = None if case.tasks[0].measure else task  # an actuator quantity has no task of the user
     limited = _limited_quantities(nlp, x)
     several = _poses_data(nlp, x, limited)
     dependence = None if task is None else dependence_of(nlp, x)
@@ -109,7 +109,7 @@ def robot_data(nlp: Nlp, x: FloatArray, state: RobotState, task: int | None) -> 
 
 
 def _limited_quantities(nlp: Nlp, x: FloatArray) -> list[Mapping[str, ByOwner]]:
-    """Return what limits of a case speak of beside quantities at a point (n,), for each pose; empty without any."""
+    """Return the limited quantities that are not quantities of the model, at a point (n,), for each pose."""
     case, program = nlp.case, nlp.program
     rows = [
         {limit.key: found for limit in case.limits if (found := limit.measures(robot)) is not None}
@@ -134,9 +134,9 @@ def _limited_quantities(nlp: Nlp, x: FloatArray) -> list[Mapping[str, ByOwner]]:
 
 
 def _poses_data(nlp: Nlp, x: FloatArray, limited: Sequence[Mapping[str, ByOwner]]) -> PosesData | None:
-    """Return the robot at every pose, or None where there is one pose only.
+    """Return the robot at every pose; None for one pose.
 
-    F and rates are those of the program's task; of the first task, where the program combines several.
+    F and rates are those of the program's task, or of the first task, where the program combines several.
     """
     case = nlp.case
     if len(nlp.program.robots) == 1:
@@ -161,7 +161,7 @@ def _pose_state(nlp: Nlp, x: FloatArray, k: int, limited: Mapping[str, ByOwner] 
 
 
 def pose_data(case: Case, pose: RobotState | PlatformPose) -> PlatformPose:
-    """Return a pose in the case's units; without rotation its axis is z, unless the case holds another one."""
+    """Return a pose in the case's units; without rotation its axis is z, unless the case states another axis."""
     is_held = any(each.rotation.axis is not None for each in case.poses)
     unturned = {} if is_held or abs(pose.angle) > TURNED else {"axis": (0.0, 0.0, 1.0)}
     return PlatformPose.of(pose, case.units, **unturned)
@@ -178,7 +178,7 @@ def task_data(case: Case, task: int) -> TaskData:
 
 
 def _quantities(case: Case, state: RobotState) -> Mapping[str, ByOwner]:
-    """Return the model's measures that are finite, by name and owner, in the case's units."""
+    """Return the finite quantities of the model, by name and owner, in the case's units."""
     return MappingProxyType(
         {
             item.name: _by_owner(case, item, state.quantities[item.name])
@@ -189,21 +189,21 @@ def _quantities(case: Case, state: RobotState) -> Mapping[str, ByOwner]:
 
 
 def _by_owner(case: Case, quantity: Quantity, values: FloatArray) -> ByOwner:
-    """Return the values of one measure by their limbs or joints, in the case's units."""
+    """Return the values of a quantity by limb or joint, in the case's units."""
     pairs = zip(quantity.owners, values, strict=True)
     return MappingProxyType({owner: case.units.shown(float(value), quantity.dimension) for owner, value in pairs})
 
 
 def objective(nlp: Nlp, x: FloatArray, state: RobotState | None) -> float:
-    """Return F at a point (n,): the state's F, or the sum, mean or worst over several poses."""
+    """Return F at a point (n,): F of the state, or the sum, mean or worst F over several poses."""
     is_other = bool(nlp.case.tasks[0].measure) or nlp.program.places.epigraph is not None
     return nlp.evaluate(x)[0] if state is None or is_other or len(nlp.program.robots) > 1 else state.F
 
 
 def violations(nlp: Nlp, x: FloatArray) -> tuple[ViolationData, ...]:
-    """Return the bounds and constraints that a point (n,) lies outside of, in the case's words and units.
+    """Return the violated bounds and constraints of a point (n,), in the case's words and units.
 
-    Violations a thousand times smaller than the worst are left out: a failed solve leaves them beside the worst.
+    Violations a thousand times smaller than the worst one are left out, as they come from the failed solve.
     """
     nlp = with_pairs_at(nlp, [x])
     at, g = linearise(nlp, x), nlp.evaluate(x)[1]
@@ -211,7 +211,7 @@ def violations(nlp: Nlp, x: FloatArray) -> tuple[ViolationData, ...]:
     worst = -float(np.min(slack, initial=0.0)) if np.isfinite(slack).all() else math.inf
     least = -max(FEASIBLE, _SMALL * worst)
     outside = [j for j in range(len(slack)) if not slack[j] >= least]
-    measured = measured_numbers(nlp, x) if outside else []
+    measured = measured_values(nlp, x) if outside else []
     rows: list[ViolationData] = []
     for j in outside:
         side, limit = nlp.sides.sides[j], float(nlp.sides.limit[j])
@@ -220,7 +220,7 @@ def violations(nlp: Nlp, x: FloatArray) -> tuple[ViolationData, ...]:
         else:
             reading = nlp.program.constraints[side.constraint].reading
             dimension, limit, value = reading.dimension, reading.from_value(limit), measured[side.constraint]
-            # Equations are no limits, and are not measured otherwise.
+            # Equations are no limits: only the program measures them.
             value = reading.from_value(float(g[side.constraint])) if math.isnan(value) else value
         shown, allowed = units.shown(value, dimension), units.shown(limit, dimension)
         unit = unit_of_side(nlp.case, side.name, dimension) or None

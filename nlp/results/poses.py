@@ -1,4 +1,4 @@
-"""Rotations as numbers, in the form in which their case states them."""
+"""Rotations as numbers, in the form of their case."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def rotation_form(case: Case) -> RotationForm:
-    """Return the form in which the poses of a case are shown: that of its workspace or its path, else of its pose."""
+    """Return the form of rotations for the poses of a case: that of its workspace or path, else that of its pose."""
     if case.workspace is not None:
         is_rpy = case.workspace.turns.kind is TurnKind.ROLL_PITCH_YAW
         return RotationForm.RPY if is_rpy else RotationForm.AXIS_ANGLE
@@ -25,17 +25,17 @@ def rotation_form(case: Case) -> RotationForm:
 
 
 def rotation_numbers(case: Case, axis: Sequence[float], angle: float, form: RotationForm) -> dict[str, list[float]]:
-    """Return a rotation in a form: its numbers, by the names that ``--set`` has for them.
+    """Return the numbers of a rotation in a form, by the names of ``--set``.
 
     Args:
         case: the case.
         axis: (3,) unit axis.
-        angle: about it, in the case's unit.
-        form: of the numbers.
+        angle: angle about the axis, in the case's unit.
+        form: form of the numbers.
     """
     if form is RotationForm.AXIS_ANGLE:
         turns = None if case.workspace is None else case.workspace.turns
-        # About an axis that the case states, an angle has a sign.
+        # About an axis that the case states, the angle has a sign.
         is_back = turns is not None and turns.kind is TurnKind.AXIS and np.dot(axis, turns.axis) < 0
         sign = -1.0 if is_back else 1.0
         return {"axis": [sign * each for each in axis], "angle": [sign * angle]}

@@ -1,4 +1,4 @@
-"""A solution as a result: of the program of one task, or of several tasks combined."""
+"""Construction of the result of a solve, from a solution of one task or of several."""
 
 from __future__ import annotations
 
@@ -48,16 +48,16 @@ def task_result(
     choice: ChoiceData | None = None,
     rounding: RoundingData | None = None,
 ) -> SolveResult:
-    """Return the whole result of the program of one task.
+    """Return the result of the program of one task.
 
     Args:
-        solution: of the program.
-        task: index of that task in the case.
-        certificate: of the same program.
-        workspace: proof over the workspace.
-        path: proof along the path.
-        choice: among listed values of dimensions.
-        rounding: of the dimensions.
+        solution: solution of the program.
+        task: index of the task in the case.
+        certificate: proved bound of the program; None without a proof.
+        workspace: proof over the workspace; None without a proof.
+        path: proof along the path; None without a proof.
+        choice: choice among listed values; None without listed values.
+        rounding: rounding of the dimensions; None where they are not rounded.
     """
     nlp, x, state = solution.nlp, solution.x, solution.state
     answer = solution.status.is_answer
@@ -106,7 +106,7 @@ def _path_data(path: ExchangeProof) -> PathProofData:
 
 
 def starts_data(solution: ProgramSolution) -> StartsData:
-    """Return how the starts of a solve ended, and the distinct optima."""
+    """Return the outcomes of the starts of a solve, and the distinct optima."""
     ended = Counter(start.status for start in solution.starts)
     reasons = [status for status in StartStatus if status is not StartStatus.CONVERGED and ended[status]]
     return StartsData(
@@ -129,13 +129,13 @@ def combined_result(
     certificates: Sequence[Certificate] = (),
     combined_certificate: Certificate | None = None,
 ) -> CombinedResult:
-    """Return the whole result of several tasks.
+    """Return the result of several tasks.
 
     Args:
-        solution: of the case.
-        combination: the combination of the tasks.
-        certificates: of each task by itself; empty without certification.
-        combined_certificate: of the combined program.
+        solution: solution of the case.
+        combination: combination of the tasks.
+        certificates: proved bounds of the separate tasks; empty without certification.
+        combined_certificate: proved bound of the combined program; None without a proof.
     """
     combined, point = combination.combined, _point(solution, combination)
     return CombinedResult(
@@ -165,11 +165,11 @@ def combined_result(
 
 
 def _point(solution: Solution, combination: Combination) -> CombinedPointData:
-    """Return the combined point; without the robot, where its equations have no value there."""
+    """Return the combined point; without the robot where its equations have no value."""
     own, combined = solution.outcomes[0], combination.combined
     if own.state is None:
         return CombinedPointData(robot=None, margins=None, limits=None)
-    # Only a combined program gives a limit a cost, which is that of the program's value.
+    # Only a combined program has derivatives of its value by the limits.
     nlp, x = (own.own.nlp, solution.x) if combined is None else (combined.nlp, combined.x)
     margins = margins_data(nlp, x, optimal=combined is not None and solution.all_solved)
     robot = robot_data(own.own.nlp, solution.x, own.state, None)
@@ -177,7 +177,7 @@ def _point(solution: Solution, combination: Combination) -> CombinedPointData:
 
 
 def _outcome(outcome: TaskOutcome, *, is_answer: bool) -> OutcomeData:
-    """Return a task at the combined point; ``F`` is absent without an answer, ``best`` without an own optimum."""
+    """Return a task at the combined point; ``F`` is null without an answer, ``best`` without a separate optimum."""
     best = outcome.own.F if outcome.own.status.is_answer else None
     state = outcome.state if is_answer else None
     loss = outcome.loss if state is not None and best is not None else math.nan
@@ -194,7 +194,7 @@ def _outcome(outcome: TaskOutcome, *, is_answer: bool) -> OutcomeData:
 
 
 def result_of(found: Solution | Certified) -> CaseResult:
-    """Return the whole result of a solve, with its certificates where there are any."""
+    """Return the result of a solve, with its certificates where a proof was requested."""
     solution = found if isinstance(found, Solution) else found.solution
     certificates = () if isinstance(found, Solution) else found.tasks
     if solution.combination is None:

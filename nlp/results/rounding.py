@@ -1,7 +1,6 @@
-"""Error bounds of numbers, and numbers that are 0 where they are below them.
+"""Rounding errors of numbers: numbers below their error bound are shown as 0.
 
-A number that is the sum of larger terms, or that a search has found within a range, has an error in proportion to
-these. For people it is 0 where it is smaller than that; in JSON every number stands as it is.
+The error of a sum is proportional to its terms, and the error of a search to the range. JSON has all digits.
 """
 
 from __future__ import annotations
@@ -17,13 +16,13 @@ from ..units import Units
 if TYPE_CHECKING:
     from .parts import Jacobian, RobotData, TaskData
 
-#: Error bound of a number, as a part of its terms, its neighbours or its range: a thousand times what a search leaves.
+#: Error bound of a number, as a part of its terms, its neighbours or its range: a thousand times a search's error.
 NOISE = 1e-9
-#: Error bound of a number that a case states, as a part of the largest beside it: the rounding of a sine, some times.
+#: Error bound of a stated number, as a part of the largest stated with it: a few times the rounding of a sine.
 STATED = 1e-14
-#: Significant digits by which numbers are put in an order: rounding decides on no order.
+#: Significant digits by which numbers are sorted, so that rounding errors do not decide on the order.
 _ORDERED = 6
-#: A rotation by less than this, radians, has no axis that means anything.
+#: Smallest rotation with a significant axis, radians.
 TURNED = 1e-9
 
 
@@ -33,12 +32,12 @@ def settled(value: float, size: float, part: float = NOISE) -> float:
 
 
 def ordered(value: float) -> float:
-    """Return a number as the key of an order, in which numbers that differ by rounding are equal."""
+    """Return the sorting key of a number: numbers that differ by rounding errors have the same key."""
     return float(f"{value:.{_ORDERED}g}")
 
 
 def size_of(dimension: Dimension, values: Iterable[float], units: Units) -> float:
-    """Return the size beside which numbers of one dimension have rounding error: half a turn for angles."""
+    """Return the size to which rounding errors of values are relative: half a turn for angles."""
     return units.shown(math.pi, dimension) if dimension is Dimension.ANGLE else max(map(abs, values), default=0.0)
 
 
@@ -47,8 +46,8 @@ def rate_sizes(jacobian: Jacobian, twist: Sequence[float], position: Sequence[fl
 
     Args:
         jacobian: the rows, force, then moment about the world origin.
-        twist: (6,) of the motion.
-        position: (3,) the platform's origin, as in the objective without cancellation.
+        twist: (6,) twist of the motion.
+        position: (3,) origin of the platform; moments about it avoid cancellation, as in the objective.
     """
     omega, v = twist[:3], twist[3:]
     turn = math.hypot(*omega)
@@ -61,18 +60,18 @@ def rate_sizes(jacobian: Jacobian, twist: Sequence[float], position: Sequence[fl
 
 
 def settled_rates(rates: Sequence[float], sizes: Sequence[float], *, is_free: bool = False) -> list[float]:
-    """Return rates, 0 where they are rounding error of the terms that they sum.
+    """Return rates, 0 where they are rounding errors of their terms.
 
     Args:
-        rates: one for each row.
-        sizes: of their terms.
-        is_free: whether F counts as zero.
+        rates: work rates of the rows.
+        sizes: sizes of their terms.
+        is_free: If true, F counts as zero.
     """
     return [0.0 if is_free else settled(rate, size) for rate, size in zip(rates, sizes, strict=True)]
 
 
 def settled_F(F: float, sizes: Sequence[float]) -> float:  # noqa: N802 - the objective's name
-    """Return F, or 0 where rounding leaves as much of the terms of its rates."""
+    """Return F, or 0 where it is rounding error of the terms of its rates."""
     return settled(F, math.fsum(size**2 for size in sizes), ZERO_F)
 
 
@@ -84,9 +83,9 @@ def size_of_F(robot: RobotData, F: float = 0.0, task: TaskData | None = None) ->
     """Return the size of the terms of F, over all poses; F itself where the task is not known.
 
     Args:
-        robot: at the point.
-        F: the objective.
-        task: whose F is meant; the robot's own where left out.
+        robot: robot at the point.
+        F: objective.
+        task: task of F; None for the task of the robot.
     """
     task = task or robot.task
     if task is None:
@@ -98,11 +97,11 @@ def size_of_F(robot: RobotData, F: float = 0.0, task: TaskData | None = None) ->
 
 
 def task_F(robot: RobotData | None, F: float) -> float:  # noqa: N802 - the objective's name
-    """Return a value of F of a robot's task, over its poses, or 0 where it is rounding error there."""
+    """Return a value of F of a robot's task over its poses, or 0 where it is rounding error."""
     return F + 0.0 if robot is None or robot.task is None else settled(F, size_of_F(robot), ZERO_F)
 
 
 def robot_size(robot: RobotData) -> float:
-    """Return a length beside which positions of a robot have rounding error: its longest arm of a moment."""
+    """Return the length to which rounding errors of a robot's positions are relative: its longest arm of a moment."""
     lengths = [abs(part) for row in robot.jacobian for part in row[3:] if any(row[:3])]
     return max([*lengths, *map(abs, robot.pose.position)]) or 1.0

@@ -1,4 +1,4 @@
-"""The JSON of results: its schema, made from their types, and its reader, which makes a typed value of it again."""
+"""JSON of results: the schema, derived from the types of results, and the reader."""
 
 from __future__ import annotations
 
@@ -49,23 +49,23 @@ Schema: TypeAlias = dict[str, JsonValue]
 
 
 def result_schema() -> Schema:
-    """Return the JSON Schema of everything that ``--json`` writes: one of the kinds of result."""
+    """Return the JSON Schema of the files of ``--json``: one of the kinds of result."""
     definitions: Schema = {}
     kinds: list[JsonValue] = [_schema(kind, definitions) for kind in RESULTS]
     return {
         "$schema": _DIALECT,
         "title": "Result of screwsynth",
-        "description": "What --json writes of a solve or another command with this option.",
+        "description": "Result of a command, as --json writes it.",
         "anyOf": kinds,
         "$defs": definitions,
     }
 
 
 def _schema(kind: object, definitions: Schema) -> Schema:
-    """Return the schema of an annotation; objects are added to the definitions, and referred to.
+    """Return the schema of an annotation; objects are added to the definitions, and referenced.
 
     Raises:
-        TypeError: JSON has no type for it.
+        TypeError: JSON has no type for the annotation.
     """
     if kind in _SCALARS:
         return {"type": _SCALARS[kind]}
@@ -97,7 +97,7 @@ def _compound(kind: object, definitions: Schema) -> Schema:
 
 
 def _reference(kind: type[JsonObject], definitions: Schema) -> Schema:
-    """Return a reference to the schema of an object type, which is added to the definitions."""
+    """Return a reference to the schema of an object type, and add this schema to the definitions."""
     name = kind.__name__
     if name not in definitions:
         fields = _fields(kind, definitions)
@@ -117,12 +117,12 @@ def _reference(kind: type[JsonObject], definitions: Schema) -> Schema:
 
 
 class _Fields(NamedTuple):
-    """Fields of a JSON object, those of inline parts among them.
+    """Fields of a JSON object, with the fields of inline parts.
 
     Attributes:
-        properties: schema of each, by name.
-        required: names of those that are never absent.
-        together: names of the fields that must be there beside a field of an inline part that may be absent.
+        properties: schema of each field, by name.
+        required: names of the fields that are never absent.
+        together: for a field of an inline part that may be absent, names of the fields that must be present with it.
     """
 
     properties: Schema
@@ -131,7 +131,7 @@ class _Fields(NamedTuple):
 
 
 def _fields(kind: type[JsonObject], definitions: Schema) -> _Fields:
-    """Return the fields of an object type, those of its inline parts among them."""
+    """Return the fields of an object type, with the fields of its inline parts."""
     fields, descriptions = _Fields({}, [], {}), _descriptions(kind)
     for each in entries_of(kind):
         if each.inline is not None:
@@ -197,7 +197,7 @@ def load_result(file: str | Path) -> Result:
         The typed value; :func:`~screwsynth.nlp.json_data` makes the same JSON of it again.
 
     Raises:
-        InputError: the file cannot be read, holds no result, or one of a version that is not read.
+        InputError: the file cannot be read, is no result, or has a version that is not supported.
     """
     try:
         tables = json_tree(read_limited(file, _LARGEST))
@@ -214,7 +214,7 @@ def result_from_json(tables: object, source: str) -> Result:
         source: name of the document, for messages.
 
     Raises:
-        InputError: it is no result, or one of a version that is not read.
+        InputError: the document is no result, or has a version that is not supported.
     """
     if isinstance(tables, dict):
         check_version(RESULT_FILES, tables, source)
@@ -235,7 +235,7 @@ def _result(tables: object) -> Result:
     if VERSION_KEY not in tables:
         raise WrongValueError(VERSION_KEY, "is missing")
     required = {kind: set(keys_of(kind, required=True)) for kind in RESULTS}
-    # The kinds have different keys; the one that misses least is the one that was meant.
+    # The kinds have different keys: the document is taken as the kind with the fewest missing keys.
     kind = min(RESULTS, key=lambda each: (len(required[each] - tables.keys()), -len(required[each])))
     found: Any = object_of(kind, tables)
     return found  # type: ignore[no-any-return]

@@ -1,4 +1,4 @@
-"""The numbers of a result as settings of its case, as ``--set`` has them."""
+"""Values of a result as settings of its case, by the names of ``--set``."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .schema import load_result
 from .workspace import WorkspaceResult
 
 Answer: TypeAlias = SolveResult | CombinedResult | EvaluationResult
-#: Names of the numbers of a pose, behind its prefix.
+#: Names of the values of a pose, after its prefix.
 _OF_POSE = ("p_x", "p_y", "p_z", "axis", "angle", RotationForm.RPY.value, RotationForm.QUATERNION.value)
 
 
@@ -30,7 +30,7 @@ def load_answer(file: str) -> Answer:
     """Read a result of ``solve`` or ``evaluate``.
 
     Raises:
-        InputError: the file cannot be read, or holds no such result.
+        InputError: the file cannot be read, or is no such result.
     """
     result = load_result(file)
     if not isinstance(result, Answer):
@@ -45,10 +45,10 @@ def robot_of(result: Answer, source: str, case: Case, *, of_any_case: bool = Fal
         result: the result.
         source: name of its file, for messages.
         case: the case.
-        of_any_case: whether the result may be of another case with the same robot and units.
+        of_any_case: If true, the result may belong to another case with the same robot and units.
 
     Raises:
-        InputError: the result is of another case, in other units, or no answer.
+        InputError: the result belongs to another case, has other units, or is no answer.
     """
     name, model = result.head.case, result.head.model
     if model != case.model.name or (name != case.name and not of_any_case):
@@ -57,7 +57,7 @@ def robot_of(result: Answer, source: str, case: Case, *, of_any_case: bool = Fal
     units = result.head.units
     if (units.length, units.angle) != (case.units.length, case.units.angle):
         own = f"{case.units.length!r} and {case.units.angle!r}"
-        raise InputError(f"{source}: has the units {units.length!r} and {units.angle!r}, and the case {own}")
+        raise InputError(f"{source}: has the units {units.length!r} and {units.angle!r}, but the case has {own}")
     robot = result.robot
     if robot is None or (not isinstance(result, EvaluationResult) and not result.status.is_answer):
         raise InputError(f"{source}: holds no answer: its solve gave none")
@@ -65,11 +65,11 @@ def robot_of(result: Answer, source: str, case: Case, *, of_any_case: bool = Fal
 
 
 def claim_settings(given: str, case: Case) -> Settings:
-    """Return the numbers with which a refuted claim was judged, limits too, and its pose, by their names in its case.
+    """Return the settings of a refuted claim, with limits, and its pose, by their names in its case.
 
     Args:
-        given: a file that ``workspace --json`` or ``path --json`` wrote, ``#``, and the number of the claim from 1, in
-            the order of the file: claims of a workspace with a pose, or those of a path with a fault.
+        given: file of ``workspace --json`` or ``path --json``, ``#``, and the number of the claim from 1, in the order
+            of the file: refuted claims with a pose, or claims of a path with a fault.
         case: the case.
 
     Raises:
@@ -81,7 +81,7 @@ def claim_settings(given: str, case: Case) -> Settings:
     result = load_result(file)
     form, numbers = rotation_form(case), dict[str, float | list[float]]()
     if isinstance(result, WorkspaceResult | PathResult):
-        # The pose of the claim takes the place of the case's first one.
+        # The pose of the claim replaces the first pose of the case.
         replaced = {f"{case.pose_prefixes[0]}{name}" for name in _OF_POSE}
         of_command = settings_from_data(result.settings or {})
         numbers |= {name: each for name, each in of_command.items() if _without_end(name) not in replaced}
@@ -105,7 +105,7 @@ def claim_settings(given: str, case: Case) -> Settings:
 
 
 def settings_of(robot: RobotData, case: Case) -> Settings:
-    """Return the numbers of a robot by the names that they have in its case, in the case's units."""
+    """Return the values of a robot by their names in its case, in the case's units."""
     found = dict(dimensions_of(robot, case))
     stated = (robot.pose,) if robot.several is None else robot.several.stated_poses
     for prefix, pose, data in zip(case.pose_prefixes, case.poses, stated, strict=True):
@@ -114,12 +114,12 @@ def settings_of(robot: RobotData, case: Case) -> Settings:
 
 
 def dimensions_of(robot: RobotData, case: Case) -> Settings:
-    """Return the dimensions of a robot by the names that they have in its case, in the case's units."""
+    """Return the dimensions of a robot by their names in its case, in the case's units."""
     return {case.parameter_name(name): _setting(value) for name, value in robot.parameters.items()}
 
 
 def _without_end(name: str) -> str:
-    """Return the name of a number without that of an end of its range."""
+    """Return the name of a value without the name of an end of its range."""
     whole, _, end = name.rpartition(".")
     return whole if end in ENDS else name
 
@@ -129,12 +129,12 @@ def _setting(value: float | Vector) -> float | list[float]:
 
 
 def joints_of(robot: RobotData, case: Case) -> Mapping[str, float]:
-    """Return the free positions of driven joints by the names of their variables, length or radians."""
+    """Return the free actuator coordinates by the names of their variables, length or radians."""
     return {each.name: case.units.to_internal(each.value, Dimension(each.kind)) for each in robot.free_joints or ()}
 
 
 def place_of(result: Answer, case: Case) -> Settings:
-    """Return the free numbers of a path's place in a result by the names that they have in its case; none without."""
+    """Return the free values of a path's placement in a result, by their names in the case; empty without any."""
     path = result.path if isinstance(result, SolveResult) else None
     if path is None or case.path is None:
         return {}
@@ -142,7 +142,7 @@ def place_of(result: Answer, case: Case) -> Settings:
 
 
 def _pose_settings(prefix: str, pose: Pose, data: PlatformPose) -> Settings:
-    """Return the numbers of a pose; those of a rotation only where it is free."""
+    """Return the values of a pose; those of its rotation only where it is free."""
     found: dict[str, float | list[float]] = {
         f"{prefix}p_{axis}": value for axis, value in zip("xyz", data.position, strict=True)
     }

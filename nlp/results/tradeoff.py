@@ -1,4 +1,4 @@
-"""Trade-off curves as a result, over the active limits of a solution."""
+"""Result of a trade-off; trade-off curves over the active limits of a solution."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -21,23 +21,23 @@ from .point import head_data, stated_pose_notice, versions
 from .result import result_of
 from .rounding import ordered
 
-#: Stands before the dotted key of a limit.
+#: Start of the dotted key of a limit.
 LIMITS = "limits."
 
 
 class TradeoffPointData(JsonObject):
-    """The optimum at one value of the number.
+    """Optimum at a value of the varied limit or parameter.
 
     Attributes:
-        value: of the number.
-        status: of the solve.
-        F: objective; with several tasks the value of their combination, null for an average; null without an answer.
-        slope: derivative of F by the number; null where it is not known.
+        value: value of the limit or parameter.
+        status: status of the solve.
+        F: objective, or value of the combination of several tasks; null for an average, and without an answer.
+        slope: derivative of F by the value; null where it is not known.
         tasks: F of each task at the point; null without an answer.
-        active: bounds and limits that the point lies on.
+        active: active bounds and limits.
         parameters: dimensions by name; null without an answer.
-        pose: of the platform, the first that the case states; null without an answer.
-        certificate: the proven bound; absent where none was asked for.
+        pose: first stated pose of the platform; null without an answer.
+        certificate: proved bound; absent where no proof was requested.
     """
 
     value: float
@@ -52,20 +52,19 @@ class TradeoffPointData(JsonObject):
 
 
 class TradeoffResult(JsonObject):
-    """Result of a trade-off: the optimum of a case over values of one of its numbers.
+    """Result of a trade-off: the optimum of a case over values of a limit or parameter.
 
     Attributes:
         head: the case.
-        over: name of the number.
-        unit: of the number; empty for a plain number.
-        senses: of each task.
+        over: name of the limit or parameter.
+        unit: unit of its values; empty for a plain number.
+        senses: sense of each task.
         tasks: name of each task.
-        points: one for each value; the status is "interrupted" for those that an interrupted command has not solved.
-        seed: of the starting points.
-        versions: of the programs.
+        points: optima, one for each value; the status is "interrupted" for values that an interrupted command left.
+        seed: random seed of the starting points.
+        versions: versions of the software.
         seconds: wall time.
-        notice: that the limits are taken at the stated pose alone, where the case has them over its workspace; else
-            absent.
+        notice: notice that limits over a workspace or path are taken at the stated pose only; else absent.
     """
 
     head: Inline[HeadData]
@@ -102,12 +101,12 @@ def tradeoff_result(found: Tradeoff) -> TradeoffResult:
 
 
 def unit_of_number(name: str, case: Case, limits: Sequence[LimitData] = ()) -> str:
-    """Return the unit of a case's number by its name; empty for a plain number, or where it is not known.
+    """Return the unit of a value of a case by its name; empty for a plain number, or where it is not known.
 
     Args:
-        name: as ``--set`` takes it.
+        name: name of the value, as in ``--set``.
         case: the case.
-        limits: rows of its limits, which have their units.
+        limits: rows of the limits, with their units.
     """
     if name.startswith(LIMITS):
         return next((row.unit for row in limits if _is_key(name, row.key)), "")
@@ -152,13 +151,13 @@ def _unsolved(value: float, tasks: int) -> TradeoffPointData:
 
 
 def _is_key(name: str, key: str) -> bool:
-    """Return whether a setting's name is that of a limit's number, whose key may leave out ``max``."""
+    """Return whether a setting names a limit, which may leave out ``max``."""
     dotted = name.removeprefix(LIMITS)
     return dotted in (key, f"{key}.max") or f"{dotted}.max" == key
 
 
 def _slope(name: str, result: CaseResult) -> float | None:
-    """Return the derivative of F by the number: a limit's cost, or the sensitivity to a fixed number."""
+    """Return the derivative of F by the varied value: a limit, a bound, or a fixed parameter."""
     if name.startswith(LIMITS):
         return next((row.cost for row in result.limits if _is_key(name, row.key)), None)
     if not isinstance(result, SolveResult):
@@ -183,25 +182,25 @@ def _active(solution: Solution, result: CaseResult) -> tuple[str, ...]:
     return (*(f"{name}.{bound}" if bound in ("min", "max") else name for name, bound in sides), *keys)
 
 
-#: Range of a curve to each side of the limit, as a part of it; number of values, odd so that the limit is among them.
+#: Range of a curve to each side of the limit, as a part of it; number of values, odd to include the limit itself.
 _REACH, _VALUES = 0.1, 7
-#: Curves of one solution at most, those of the costliest limits; starting points of each solve beside its neighbours'.
+#: Largest number of curves of a solution; number of starting points of each solve, besides the neighbouring optima.
 _CURVES, _STARTS = 3, 4
 
 
 def limit_curves(
     solution: Solution, result: CaseResult, case_at: Callable[[str, float], Case], jobs: int | None = None
 ) -> tuple[TradeoffResult, ...]:
-    """Solve again along the costliest active limits of an answer to a case with one task.
+    """Return trade-off curves over the active limits with the largest relative effect on F.
 
     Args:
-        solution: the answer.
-        result: of the same solve.
-        case_at: returns the case with a number by name, such as ``limits.leg_length.max``, and its value.
+        solution: solution of a case.
+        result: result of the same solve.
+        case_at: returns the case with a changed value, by its name, such as ``limits.leg_length.max``.
         jobs: number of threads; the result does not depend on it.
 
     Returns:
-        A curve for each of these limits; none where there is no answer, or where there are several tasks.
+        A curve for each of these limits; empty without an answer, or with several tasks.
     """
     if not isinstance(result, SolveResult) or not solution.status.is_answer:
         return ()
@@ -218,20 +217,20 @@ def limit_curves(
         if len(values) > 1:
             starts = min(_STARTS, solution.case.search.starts)
             found = solve_along(at, values, name=name, starts=starts, jobs=jobs, first=[solution.x])
-            if is_requested():  # only whole curves are shown
+            if is_requested():  # incomplete curves are not shown
                 break
             curves.append(tradeoff_result(found))
     return tuple(curves)
 
 
 def _values_about(limit: float) -> list[float]:
-    """Return values about a limit, the limit itself among them and without its rounding."""
+    """Return values around a limit, with the limit itself, exactly."""
     steps = np.linspace(-_REACH, _REACH, _VALUES)
     return [limit if k == _VALUES // 2 else float(limit * (1 + step)) for k, step in enumerate(steps)]
 
 
 def _is_allowed(case_at: Callable[[float], Case], value: float) -> bool:
-    """Return whether there is a case with a value: some limits cannot be this large, or cross others."""
+    """Return whether the case with a value is valid: some limits cannot be this large, or contradict others."""
     try:
         case_at(value)
     except CaseError:

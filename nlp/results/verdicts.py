@@ -1,11 +1,11 @@
-"""Verdicts of a judgement as a result: on ranks and numbers, over a workspace or along a path."""
+"""Verdicts on ranks and quantities, over a workspace or along a path, as a result."""
 
 from typing import TYPE_CHECKING, Annotated, Any
 
 from ..case.task import Sense
 from ..evidence.state import WorkspacePose
 from ..proof.enclosure.engine import ENGINE
-from ..proof.statement.machine import has_straight_legs
+from ..proof.statement.fixed_robot import has_straight_legs
 from ..proof.workspace.robot.pose_box import pose_box
 from ..proof.workspace.verdict import Outcome
 from ..system.jsonvalues import Absent, JsonObject, Mark, Measure, Vector3, vector
@@ -14,7 +14,7 @@ from .objective import unit_of_claim
 
 if TYPE_CHECKING:
     from ..case.case import Case
-    from ..proof.statement.machine import JointErrors
+    from ..proof.statement.fixed_robot import JointErrors
     from ..proof.workspace.judgement import Judgement
     from ..proof.workspace.robot.pose_box import PoseNumbers
     from ..proof.workspace.verdict import Verdict
@@ -25,15 +25,15 @@ class CentreData(JsonObject):
 
     Attributes:
         joint: label of the joint, limb and place, or leg and plate.
-        error: in the world frame at home, or in that of the leg's plate, length.
+        error: error in the world frame at home, or in the frame of the leg's plate, length.
     """
 
     joint: str
     error: Vector3
 
 
-class MachineData(JsonObject):
-    """Errors of the joint centres of a machine.
+class JointErrorsData(JsonObject):
+    """Joint-centre errors of a robot within the tolerance.
 
     Attributes:
         base: errors of the base joints of six straight legs, in the world frame, length; absent for another robot.
@@ -50,17 +50,17 @@ class RegularData(JsonObject):
     """Verdict on the claim that J has full rank at every pose.
 
     Attributes:
-        outcome: ``proved``; ``refuted``, with a singular pose; ``open``, with the middle of the widest box that is
-            left.
-        pose: the singular pose, or that middle; absent where the claim is proved.
+        outcome: ``proved``; ``refuted``, with a singular pose; ``open`` (undecided), with the centre of the widest
+            undecided box.
+        pose: singular pose, or centre of the widest undecided box; absent where the claim is proved.
         between: two poses at which the determinant of the rows is proved to have opposite signs; absent where the
-            claim is not refuted so.
+            claim is not refuted in this way.
         boxes: number of boxes examined.
-        open: number of boxes left.
-        share: part of the box of poses in boxes that are left.
+        open: number of undecided boxes.
+        share: volume of the undecided boxes, as a part of the box of poses.
         seconds: wall time.
         engine: ``c``, or ``none`` where no search was made.
-        reason: for stopping early, or how a singular pose was found that is not between two; absent without one.
+        reason: reason for an early end, or method of a singular pose that is not between two poses; absent without one.
         machine: joint-centre errors of the singular robot; absent where the claim is not refuted, or the exact robot is
             singular.
     """
@@ -74,22 +74,22 @@ class RegularData(JsonObject):
     seconds: float
     engine: str
     reason: Absent[str]
-    machine: Absent[MachineData]
+    machine: Absent[JointErrorsData]
 
 
 class VerdictData(JsonObject):
-    """Verdict on a claim about every pose of a workspace or path: a rank, or the smallest or largest value of a number.
+    """Verdict on a claim about every pose of a workspace or path: a rank, or an extreme value of a quantity.
 
     Attributes:
         name: name of the claim.
-        unit: unit of the values; empty for a plain number, absent of a rank.
-        sense: smallest or largest value; absent of a rank.
-        bound: proven bound: no pose has a smaller, or larger, value; null where nothing is proved, and of a rank.
-        reached: smallest or largest known value; null without one, and of a rank.
+        unit: unit of the values; empty for a plain number, absent for a rank.
+        sense: smallest or largest value; absent for a rank.
+        bound: proved bound: no pose has a smaller, or larger, value; null where nothing is proved, and for a rank.
+        reached: smallest or largest known value; null without one, and for a rank.
         key: dotted key, below ``limits``, of the limit in the case; absent without one.
         limit: the limit; absent without one.
-        outcome: outcome of the limit or rank; of a number without a limit, whether the requested gap was reached.
-        pose: pose with the value, or of a singular or open rank; null without one.
+        outcome: outcome of the limit or rank; for a quantity without a limit, ``proved`` if the gap was reached.
+        pose: pose with the value, singular pose, or centre of the widest undecided box of a rank; null without one.
         boxes: number of examined boxes; absent in results of earlier versions along a path.
         seconds: wall time; absent in results of earlier versions along a path.
         reason: reason for an open outcome, or how a singular pose was computed; absent without one.
@@ -108,7 +108,7 @@ class VerdictData(JsonObject):
     boxes: Absent[int]
     seconds: Absent[float]
     reason: Absent[str]
-    machine: Absent[MachineData]
+    machine: Absent[JointErrorsData]
 
 
 def pose_data(pose: "PoseNumbers", units: Units) -> WorkspacePose:
@@ -127,19 +127,19 @@ def rank_data(found: "Verdict", judged: "Judgement") -> RegularData:
         pose=None if found.pose is None else pose_data(found.pose, case.units),
         between=sides,
         engine=ENGINE if found.boxes else "none",
-        machine=machine_data(found.errors, case),
+        machine=joint_errors_data(found.errors, case),
     )
 
 
-def machine_data(errors: "JointErrors | None", case: "Case") -> MachineData | None:
-    """Return the errors of a machine; None for the exact one. Lengths are in the case's unit already."""
+def joint_errors_data(errors: "JointErrors | None", case: "Case") -> JointErrorsData | None:
+    """Return the joint-centre errors of a robot; None for the exact robot. Lengths are in the case's unit already."""
     if errors is None:
         return None
     each = tuple(map(vector, errors.vectors))
     if has_straight_legs(case.model):
-        return MachineData(base=each[::2], platform=each[1::2], centres=None)
+        return JointErrorsData(base=each[::2], platform=each[1::2], centres=None)
     centres = tuple(CentreData(joint=name, error=error) for name, error in zip(errors.names, each, strict=True))
-    return MachineData(base=None, platform=None, centres=centres)
+    return JointErrorsData(base=None, platform=None, centres=centres)
 
 
 def verdict_data(each: "Verdict", case: "Case") -> VerdictData:
@@ -153,5 +153,5 @@ def posed_fields(each: "Verdict", case: "Case") -> dict[str, Any]:
         "unit": None if each.is_rank else unit_of_claim(case, each.name, each.dimension),
         "sense": None if each.is_rank else each.sense,
         "pose": None if each.pose is None else pose_data(each.pose, case.units),
-        "machine": machine_data(each.errors, case),
+        "machine": joint_errors_data(each.errors, case),
     }

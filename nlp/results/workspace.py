@@ -1,4 +1,4 @@
-"""Verdicts on a workspace as a result: the types and their construction."""
+"""Verdicts over a workspace as a result: types and construction."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from ...models.statics import driven_joints
 from ..case.loads import NO_LOADING
-from ..case.motors import MotorNumber
+from ..case.motors import ActuatorQuantity
 from ..case.task import Sense
 from ..evidence.state import WorkspacePose
 from ..proof.statement.claims import ACTUATED
@@ -30,14 +30,14 @@ _WORSE = (Outcome.PROVED, Outcome.OPEN, Outcome.REFUTED)
 
 
 class MotorEndData(JsonObject):
-    """The smallest or the largest value of a number of an actuator.
+    """Smallest or largest value of an actuator quantity.
 
     Attributes:
-        bound: proven: no pose has a smaller, or larger, value; null where nothing is proved.
-        reached: the smallest or largest value known; null without one.
-        outcome: of the limit, or, without one, of the gap.
+        bound: proved bound: no pose has a smaller, or larger, value; null where nothing is proved.
+        reached: smallest or largest known value; null where no value is known.
+        outcome: outcome of the limit; without a limit, ``proved`` if the requested gap was reached.
         limit: the limit; absent without one.
-        pose: at which the value is reached; null without one.
+        pose: pose with the known value; null where no value is known.
     """
 
     bound: float | None
@@ -48,20 +48,20 @@ class MotorEndData(JsonObject):
 
 
 class MotorData(JsonObject):
-    """A number of an actuator over the workspace.
+    """Actuator quantity over the workspace.
 
     Attributes:
-        actuator: its name.
-        number: its coordinate, the length of a leg for one; its force, or torque, positive in the sense of its rate;
-            its speed, or its power, the larger one of both senses of the force.
-        unit: of the values.
-        load: name of the loads; absent for a number that depends on none.
-        smallest: smallest value; absent of speeds and powers.
+        actuator: name of the actuator.
+        number: quantity: coordinate, or length of a leg; force or torque, positive in the sense of the rate; speed; or
+            power, the larger value of both senses of the force.
+        unit: unit of the values.
+        load: name of the loads; absent for a quantity that depends on no load.
+        smallest: smallest value; absent for speeds and powers.
         largest: largest value.
     """
 
     actuator: str
-    number: MotorNumber
+    number: ActuatorQuantity
     unit: str
     load: Absent[str]
     smallest: Absent[MotorEndData]
@@ -69,14 +69,14 @@ class MotorData(JsonObject):
 
 
 class ScaleData(JsonObject):
-    """The largest factor by which the box of poses can grow about its centre with everything proved.
+    """Largest factor by which the box of poses can grow about its centre with everything proved.
 
     Attributes:
-        factor: everything is proved for the box that is larger by this factor; null where no such factor was found.
-        refuted: the smallest factor known at which something is refuted; null where there is none.
-        claim: the claim that is refuted there, or that stays open; empty without one.
-        pose: at which it is refuted; null without one.
-        reason: why the search ended before the factor was known to 1 %; absent where it is.
+        factor: factor of the largest proved box; null where no box is proved.
+        refuted: smallest known factor at which a claim is refuted; null where none is known.
+        claim: claim that is refuted or undecided for the next larger box; empty without one.
+        pose: pose at which the claim is refuted; null without one.
+        reason: reason for the end of the search before the factor was known to 1 %; absent otherwise.
     """
 
     factor: float | None
@@ -87,24 +87,24 @@ class ScaleData(JsonObject):
 
 
 class WorkspaceResult(JsonObject):
-    """Result of judging a machine over its workspace.
+    """Result of verifying a robot over its workspace.
 
     Attributes:
         head: the case.
         parameters: dimensions by name; three numbers for a point or direction.
-        settings: numbers that replaced those of the case file, such as a limit, by the names of ``--set``; absent
+        settings: values that replaced those of the case file, such as a limit, by the names of ``--set``; absent
             without any, and in results of earlier versions.
-        joint_centre: every claim is about all machines whose joint centres are off by at most this; absent where it is
-            about the exact machine alone.
-        proved: whether J is regular at every pose, and every limit holds; numbers without a limit are information.
-        poses: the set of poses that the verdicts are about, in words; absent without dependent coordinates.
-        dependent: names of the coordinates of the pose that follow from the others; absent without any.
-        regular: whether J has full rank at every pose.
-        constraints: whether the constraint wrenches alone keep their rank at every pose; absent for a robot without.
-        extremes: smallest and largest values; those of actuators under loads where they have a limit.
-        motors: numbers of actuators; absent for a case without loads and motions.
-        scale: the largest box; absent where it was not asked for.
-        versions: of the programs.
+        joint_centre: tolerance of joint centres: every claim covers all robots within it; absent for the exact robot.
+        proved: If true, J has full rank at every pose, and every limit is satisfied. Quantities without a limit do not
+            count.
+        poses: set of poses that the verdicts cover, in words; absent without dependent coordinates.
+        dependent: names of the dependent coordinates of the pose; absent without any.
+        regular: verdict on the full rank of J at every pose.
+        constraints: verdict on the rank of the constraint wrenches at every pose; absent without constraint wrenches.
+        extremes: smallest and largest values; of actuators under loads, only values with a limit.
+        motors: actuator quantities; absent for a case without loads and motions.
+        scale: largest proved box; absent where it was not requested.
+        versions: versions of the software.
     """
 
     head: Inline[HeadData]
@@ -126,7 +126,7 @@ class WorkspaceProofData(ExchangeData):
     """Proof of a design over its workspace, by exchange of poses.
 
     Attributes:
-        regular: whether J has full rank at every pose.
+        regular: verdict on the full rank of J at every pose.
         extremes: smallest and largest values.
     """
 
@@ -154,7 +154,7 @@ def workspace_of(
     Args:
         judged: the verdicts.
         scale: the largest proved box; None where no search for it was made.
-        settings: numbers that replaced those of the case file; None without any.
+        settings: values that replaced those of the case file; None without any.
     """
     case = judged.case
     parameters: dict[str, float | Vector] = {}
@@ -179,17 +179,17 @@ def workspace_of(
 
 
 def poses_of(judged: "Judgement") -> str | None:
-    """Return the set of poses that a judgement is about, in words; None without dependent coordinates."""
+    """Return the set of poses that the verdicts cover, in words; None without dependent coordinates."""
     workspace = judged.workspace
     return f"every {workspace.set_words(judged.case.units)}" if workspace.dependent else None
 
 
 def _motors(judged: "Judgement") -> Iterator[MotorData]:
-    """Yield the numbers of each actuator, for a case with loads or motions."""
+    """Yield the quantities of each actuator, for a case with loads or motions."""
     case = judged.case
     if case.loading == NO_LOADING:
         return
-    found: dict[tuple[MotorNumber, str, str], list[Verdict]] = {}
+    found: dict[tuple[ActuatorQuantity, str, str], list[Verdict]] = {}
     for each in judged.extremes:
         if each.motor is not None:
             found.setdefault((each.motor.number, each.motor.actuator, each.motor.load), []).append(each)
@@ -197,8 +197,8 @@ def _motors(judged: "Judgement") -> Iterator[MotorData]:
         names = [f"{measure} limb {joint.name}" for measure in ("leg_length", *ACTUATED)]
         own = {each.sense: each for each in judged.extremes if each.name in names}
         if len(own) == len(Sense):
-            found[MotorNumber.COORDINATE, joint.name, ""] = list(own.values())
-    order, names = list(MotorNumber), [joint.name for joint in driven_joints(case.model)]
+            found[ActuatorQuantity.COORDINATE, joint.name, ""] = list(own.values())
+    order, names = list(ActuatorQuantity), [joint.name for joint in driven_joints(case.model)]
     for key in sorted(found, key=lambda key: (names.index(key[1]), order.index(key[0]))):
         (what, actuator, load), every = key, found[key]
         ends = {sense: [each for each in every if each.sense is sense] for sense in Sense}
@@ -213,7 +213,7 @@ def _motors(judged: "Judgement") -> Iterator[MotorData]:
 
 
 def _motor_end(parts: "Sequence[Verdict]", case: "Case") -> MotorEndData:
-    """Return an end of a number of an actuator: the farthest of its parts, and the worst of their outcomes."""
+    """Return an extreme value of an actuator quantity: the most extreme of its parts, with their worst outcome."""
     every = [verdict_data(each, case) for each in parts]
     farthest = max(parts, key=lambda each: each.sense.sign * each.reached if math.isfinite(each.reached) else -math.inf)
     shown = every[list(parts).index(farthest)]
@@ -229,7 +229,7 @@ def _motor_end(parts: "Sequence[Verdict]", case: "Case") -> MotorEndData:
 
 
 def scale_data(found: "Scale", units: Units) -> ScaleData:
-    """Return the largest proven workspace in a case's units."""
+    """Return the largest proved box in a case's units."""
     return ScaleData.of(
         found,
         refuted=found.failed if found.refuted else None,
@@ -241,5 +241,5 @@ def scale_data(found: "Scale", units: Units) -> ScaleData:
 def _fixed(value: object) -> float:
     """Return a fixed number."""
     if not isinstance(value, float):
-        raise TypeError("a judged machine has fixed dimensions")
+        raise TypeError("a verified robot has fixed dimensions")
     return value

@@ -1,4 +1,4 @@
-"""Searches from many points by the solver of generated C, in this process and without a compiler.
+"""Fast searches from many points by the solver of generated C, in this process and without a compiler.
 
-They find optima quickly; a point is no answer before a solver and the evidence confirm it.
+A point is an answer only after a solver and the evidence confirm it.
 """

@@ -1,7 +1,7 @@
 /* Searches of a program from many points by the solver of generated C, in this process.
  *
- * The search is that of nlp/embedding/c: the same source. CasADi evaluates the functions: its buffers are called through a C
- * pointer, so that no line of Python runs and other threads may. Each thread has buffers and a workspace of its own.
+* The search has the source of nlp/embedding/c. CasADi evaluates the functions: its buffers are called through a C pointer
+ * without Python, so that other threads can run. Each thread has its own buffers and workspace.
  */
 #define Py_LIMITED_API 0x030B0000
 #define PY_SSIZE_T_CLEAN
@@ -12,15 +12,15 @@
 
 #include "screwsynth-search.h"
 
-#define FEASIBLE 1e-9    /* violation in half ranges of a feasible point, as the evidence has it */
-#define STATIONARY 1e-7  /* residual of a stationary point, likewise */
-#define RESTORES 2       /* number of times that a search looks for a feasible point first, as in generated C */
-#define SHARE 4          /* evaluations that a search may have for each iteration so far, likewise */
-#define RESERVE 30       /* evaluations that it may have beside those */
+#define FEASIBLE 1e-9    /* largest violation of a feasible point, in half ranges, as in the evidence */
+#define STATIONARY 1e-7  /* largest residual of a stationary point, as in the evidence */
+#define RESTORES 2       /* largest number of searches for a feasible point in a search, as in generated C */
+#define SHARE 4          /* allowed evaluations of a search for each iteration so far, as in generated C */
+#define RESERVE 30       /* further allowed evaluations */
 
 typedef void (*evaluator)(void *buffer);
 
-/* The program, over scaled variables (x - centre) / scale; weight: of F, which is minimised; sizes: of the constraints. */
+/* Program in scaled variables (x - centre) / scale; weight: factor of F, which is minimised; sizes: divisors of constraints. */
 typedef struct {
     int n, c, iterations;
     double weight;
@@ -28,7 +28,7 @@ typedef struct {
     void *derivatives, *curvature; /* CasADi's buffers; they read and write the arrays below */
     const double *centre, *scale, *sizes, *lower, *upper;
     double *x, *F, *gradient, *g, *jacobian, *factor, *multipliers, *hessian;
-    const volatile int *stop; /* whether the search is to end */
+    const volatile int *stop; /* nonzero to end the search */
     int evaluations, visits;
 } program;
 
@@ -46,7 +46,7 @@ static void move_to(program *of, const double *s)
         of->x[i] = fmin(fmax(of->centre[i] + of->scale[i] * s[i], of->lower[i]), of->upper[i]);
 }
 
-/* CasADi's matrices are column after column, those of the search row after row. */
+/* CasADi stores matrices by columns, the search by rows. */
 static int values(void *self, const double *s, double *f, double *gradient, double *g, double *rows)
 {
     program *of = self;
@@ -82,7 +82,7 @@ static int hessian(void *self, const double *s, double weight, const double *mul
     return !is_finite(H, n * n);
 }
 
-/* The search's own program, for the bounds of the constraints. */
+/* Task of a search: program, and problem with the bounds of the constraints. */
 typedef struct {
     program of;
     screwsynth_SQP_problem problem;
@@ -97,8 +97,8 @@ static int visit(void *self, const double *s, double f, const double *g, const d
     return *of->of.stop;
 }
 
-/* Searches from s, and again after a search for a feasible point where it ends infeasible. Returns whether it ends at an
- * optimum; u: n + c multipliers, positive at an upper bound and negative at a lower one. */
+/* Searches from s, and again after a search for a feasible point if it ends infeasible. Returns 1 if it ends at an optimum;
+ * u: n + c multipliers, positive at an upper bound and negative at a lower one. */
 static int search_from(task *of, double *s, double *u, int *iterations, double *work, int *iwork)
 {
     screwsynth_SQP_problem *p = &of->problem;
@@ -134,7 +134,7 @@ typedef struct {
     int count;
 } borrowed;
 
-/* Memory of a contiguous array, which must hold so many items of a size. NULL with an exception otherwise. */
+/* Memory of a contiguous array of given item count and size. NULL with an exception otherwise. */
 static void *borrow(borrowed *all, PyObject *object, Py_ssize_t items, Py_ssize_t size, int writable)
 {
     Py_buffer *view = &all->views[all->count];
@@ -164,7 +164,7 @@ static PyObject *search_each(PyObject *module, PyObject *args)
                           &written[6], &written[7], &points, &multipliers, &found, &counts, &stop, &count, &first, &last))
         return NULL;
     if (p->n < 1 || p->c < 0 || p->n > 10000 || p->c > 100000 || first < 0 || first > last || last > count) {
-        PyErr_SetString(PyExc_ValueError, "the search got numbers that do not belong together");
+        PyErr_SetString(PyExc_ValueError, "the search got inconsistent sizes or indices");
         return NULL;
     }
     const Py_ssize_t n = p->n, c = p->c, D = sizeof(double), I = sizeof(int);
@@ -226,7 +226,7 @@ static PyObject *search_each(PyObject *module, PyObject *args)
 static PyMethodDef methods[] = {
     {"search_each", search_each, METH_VARARGS,
      "search_each(program, (points, multipliers, converged, iterations), stop, count, first, last)\n\n"
-     "Search from the points first <= k < last of count, and set them to where the searches end. A program is (address of\n"
+     "Search from the points first <= k < last of count, and set them to the ends of the searches. A program is (address of\n"
      "CasADi's function that evaluates a buffer, buffer of the derivatives, buffer of the Hessian, n, c, iterations, weight,\n"
      "(centre, scale, lower, upper, sizes, g_lower, g_upper),\n"
      "(x, F, gradient, g, jacobian, factor, multipliers, hessian)); the last arrays are those of the buffers."},

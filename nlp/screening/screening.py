@@ -1,14 +1,14 @@
-"""Quick searches from many starting points, by sequential quadratic programming in C on several threads.
+"""Fast searches from many starting points, by sequential quadratic programming in C on several threads.
 
-The search is that of generated C (``nlp/embedding/c``), compiled as an extension of this package; the functions are the
-program's own, which CasADi evaluates. Each start is searched by itself, so the results do not depend on the threads.
+The search is that of generated C (``nlp/embedding/c``), compiled as an extension of this package; CasADi evaluates the
+program's functions. Each start is searched separately, so results do not depend on the threads.
 
 CasADi exports ``void casadi::_function_buffer_eval(void *)`` for calls without overhead; its Python interface calls the
-same function. Its name in the library is that of the C++ ABI of GCC and Clang. Where it is not found, as with another
-compiler's library, there is no pointer, and nothing else is tried.
+same function. Its symbol is that of the C++ ABI of GCC and Clang. If the symbol is missing, as in a library of another
+compiler, there is no screening.
 
-An interpreter of our own in C was measured beside it: an evaluation took as long (2.2 and 14 microseconds for the
-derivatives and the Hessian of Section 4.1), and writing down the instructions first took 44 ms.
+An alternative interpreter in C took as long for an evaluation (2.2 and 14 microseconds for the derivatives and the
+Hessian of Section 4.1), and 44 ms to write down the instructions.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ _SYMBOL = "_ZN6casadi21_function_buffer_evalEPv"
 
 
 class Buffer(NamedTuple):
-    """A function's buffer.
+    """Buffer of a CasADi function.
 
     Attributes:
-        capsule: the buffer for C.
+        capsule: buffer for C.
         outputs: memory of each result, column after column.
-        kept: what must live as long as the capsule.
+        kept: objects that must live as long as the capsule.
     """
 
     capsule: object
@@ -50,10 +50,10 @@ class Buffer(NamedTuple):
 
 @cache
 def evaluator() -> int | None:
-    """Return the address of the C function that evaluates a buffer; None where CasADi's library does not export it."""
+    """Return the address of the C function that evaluates a buffer; None if CasADi's library does not export it."""
     interface: Any = ca
     try:
-        # The library of the Python interface is loaded already; a symbol is also looked for in those that it needs.
+        # The library of the Python interface is loaded already; symbols are also searched in its dependencies.
         found: Any = getattr(ctypes.CDLL(interface._casadi.__file__), _SYMBOL)
     except (OSError, AttributeError):
         return None
@@ -65,32 +65,33 @@ def buffer_of(function: ca.Function, *inputs: FloatArray) -> Buffer:
 
     Args:
         function: the function, made of ``SX``.
-        inputs: memory of each input, which the function reads when it is evaluated.
+        inputs: memory of each input, read at evaluation.
     """
     outputs = tuple(np.zeros(function.numel_out(i)) for i in range(function.n_out()))
     buffer, _ = buffer_on(function, inputs, outputs)
     return Buffer(buffer._self(), outputs, (function, buffer, inputs))
 
 
-#: Largest numbers of variables and constraints. The search's matrices are dense: with more, Ipopt's sparse ones win.
+#: Largest numbers of variables and constraints: the search has dense matrices, and beyond these Ipopt's sparse ones
+#: win.
 _MOST_VARIABLES = 60
 _MOST_CONSTRAINTS = 600
-#: Iterations of a search: generated C has as many. Those of the shipped cases need 5 to 40.
+#: Largest number of iterations of a search, as in generated C. The shipped cases need 5 to 40.
 _ITERATIONS = 100
-#: Starts of one call: more threads than calls would wait.
+#: Largest number of starts of one call: with more, threads would wait for each other.
 _CHUNK = 8
-#: Seconds between two looks at whether the work is requested to stop.
+#: Seconds between two checks for a request to stop.
 _LOOK = 0.05
 
 
 class Screened(NamedTuple):
-    """Ends of searches from k points.
+    """Results of searches from k points.
 
     Attributes:
-        x: (k, n) where they ended, in the program's units.
-        multipliers: (k, n + c) of the variables' bounds, per half range, and of the constraints, per unit of their
-            expressions, of the scaled objective: positive at an upper bound and negative at a lower one.
-        converged: (k,) whether the search ended at a strict or weak local optimum by its own conditions.
+        x: (k, n) end points, in the program's units.
+        multipliers: (k, n + c) multipliers of the scaled objective: of the variables' bounds, per half range, then of
+            the constraints, per unit of their expressions; positive at an upper bound and negative at a lower one.
+        converged: (k,) True if the search ended at a strict or weak local optimum by its own conditions.
         iterations: (k,) number of iterations.
     """
 
@@ -102,7 +103,7 @@ class Screened(NamedTuple):
 
 @cache
 def extension() -> ModuleType | None:
-    """Return the search in C, or None where it was not built."""
+    """Return the search in C; None if it was not built."""
     try:
         return import_module("screwsynth.nlp.screening._screen")
     except ImportError:
@@ -110,7 +111,7 @@ def extension() -> ModuleType | None:
 
 
 def can_screen(nlp: Nlp) -> bool:
-    """Return whether a program can be screened here: it is small, the search was built, and CasADi can be called."""
+    """Return True if a program can be screened: it is small, the extension was built, and CasADi can be called."""
     small = 0 < nlp.n <= _MOST_VARIABLES and len(nlp.program.constraints) <= _MOST_CONSTRAINTS
     return small and extension() is not None and evaluator() is not None
 
@@ -118,18 +119,18 @@ def can_screen(nlp: Nlp) -> bool:
 def screen(nlp: Nlp, points: FloatArray, sizes: FloatArray, max_iterations: int, jobs: int | None = None) -> Screened:
     """Search a program from each of several points.
 
-    A search that is requested to stop ends at once, and counts as not converged.
+    A request to stop ends a search at once, as not converged.
 
     Args:
-        nlp: the program, for which :func:`can_screen` holds.
+        nlp: program for which :func:`can_screen` returns True.
         points: (k, n) starting points, in the program's units.
-        sizes: (c,) typical lengths of the constraints' gradients in scaled variables, by which they are divided.
+        sizes: (c,) typical lengths of the constraints' gradients in scaled variables, used as divisors.
         max_iterations: largest number of iterations of each search.
-        jobs: number of threads; left out, as many as there are processors and work.
+        jobs: number of threads; None for as many as there are processors and work.
     """
     module, address = extension(), evaluator()
     if module is None or address is None:
-        raise RuntimeError("the search in C was not built: ask can_screen first")
+        raise RuntimeError("the search in C was not built: call can_screen first")
     count, n, c = len(points), nlp.n, len(nlp.program.constraints)
     ends, multipliers = np.array(points, dtype=np.float64, order="C"), np.zeros((count, n + c))
     converged, iterations = np.zeros(count, dtype=np.intc), np.zeros(count, dtype=np.intc)
@@ -137,7 +138,7 @@ def screen(nlp: Nlp, points: FloatArray, sizes: FloatArray, max_iterations: int,
     chunks = [(first, min(first + _CHUNK, count)) for first in range(0, count, _CHUNK)]
     threads = max(1, min(jobs if jobs is not None else os.cpu_count() or 1, len(chunks)))
     programs = [_Program(nlp, sizes, address, min(max_iterations, _ITERATIONS)) for _ in range(threads)]
-    # Also a single thread leaves this one free to see a request to stop.
+    # Even a single thread leaves this thread free to see a request to stop.
     pool = ThreadPoolExecutor(threads)
 
     def search(thread: int) -> None:
@@ -162,12 +163,12 @@ def screen(nlp: Nlp, points: FloatArray, sizes: FloatArray, max_iterations: int,
 
 
 class _Program:
-    """A program as one thread of the extension reads it.
+    """Program for one thread of the extension.
 
     Args:
         nlp: the program.
-        sizes: (c,) those of the constraints.
-        address: that of the function that evaluates CasADi's buffers.
+        sizes: (c,) typical lengths of the constraints' gradients.
+        address: address of the function that evaluates CasADi's buffers.
         max_iterations: largest number of iterations of each search.
     """
 

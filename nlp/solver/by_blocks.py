@@ -1,8 +1,8 @@
-"""Searches of a program block by block, such as pose by pose: starting points of the whole, and its best blocks.
+"""Block-by-block search of a program, for example pose by pose: combined starting points, and the best blocks.
 
-Each block is searched from its part of every starting point, by the quick search in C. The best ends of all blocks
-together are the first start of the whole program, the second best the second one, and so on. They are corrected and
-judged by the whole program's own conditions, as the ends of any other search.
+The fast search in C starts each block from its part of every starting point. The best results of all blocks together
+are the first start of the whole program, the second best are the second start, and so on. They are corrected and
+judged by the conditions of the whole program, like the results of any other search.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class SearchedStarts(NamedTuple):
 
     Attributes:
         points: (k, n) starting points of the whole program.
-        starts: by their places, those of which nothing is left to be searched.
+        starts: converged starts by their index; these need no further search.
     """
 
     points: FloatArray
@@ -41,19 +41,19 @@ class SearchedStarts(NamedTuple):
 def searched_starts(
     nlp: Nlp, blocks: Blocks, points: FloatArray, search: Search, solver: Solver, jobs: int | None
 ) -> SearchedStarts:
-    """Return the starts of a program whose blocks are searched one by one; the points themselves without blocks.
+    """Return the starts of a program whose blocks are searched separately; without blocks, the given points.
 
     Args:
-        nlp: the program.
-        blocks: of the program.
+        nlp: the nonlinear program.
+        blocks: blocks of the program.
         points: (k, n) starting points.
-        search: the solver's settings, and whether starts are screened.
-        solver: the local solver of the whole; blocks are only searched where it is Ipopt.
-        jobs: number of threads; left out, as many as there are processors and work.
+        search: settings of the search.
+        solver: local solver of the whole program; blocks are searched only if it is Ipopt.
+        jobs: number of threads; if left out, as many as processors and starts allow.
     """
     if not blocks.blocks:
         return SearchedStarts(points, {})
-    found = _Found(nlp, points)
+    found = _BlockResults(nlp, points)
     for block in blocks.blocks if solver is ipopt and search.screen else ():
         program, columns = blocks.program(block), blocks.columns(block)
         if is_requested() or not can_screen(program):
@@ -65,11 +65,11 @@ def searched_starts(
     return SearchedStarts(found.x, starts)
 
 
-class _Found:
-    """Ends of searches of blocks, put together in the order of the starting points.
+class _BlockResults:
+    """Results of the searches of all blocks, combined in the order of the starting points.
 
     Args:
-        nlp: the program.
+        nlp: the nonlinear program.
         points: (k, n) starting points.
     """
 
@@ -82,7 +82,7 @@ class _Found:
         self._is_whole = False
 
     def take(self, block: Block, found: Screened) -> None:
-        """Take the ends of the searches of a block; where a search did not converge, its starting point stays."""
+        """Store the results of the searches of a block; where a search did not converge, its starting point stays."""
         count, kept, of_block = len(block.variables), found.converged[:, None], list(block.variables)
         x = np.clip(found.x[:, :count], self._nlp.lower[of_block], self._nlp.upper[of_block])
         self.x[:, of_block] = np.where(kept, x, self.x[:, of_block])
@@ -92,9 +92,9 @@ class _Found:
         self._converged = np.vstack([self._converged, found.converged])
 
     def sort(self, blocks: Blocks) -> None:
-        """Put the best ends of all blocks together, the second best, and so on; those of failed searches are left out.
+        """Combine the best results of all blocks, then the second best, and so on; failed searches are left out.
 
-        A block with fewer good ends than there are starting points begins with its best one again.
+        A block with fewer good results than starting points repeats them from the best one on.
         """
         is_known = len(self._converged) == len(blocks.blocks)
         orders = list(blocks.orders(self.x))
@@ -111,7 +111,7 @@ class _Found:
         self.x = np.array([with_exact_level(self._nlp, x) for x in self.x])
 
     def judged(self) -> dict[int, Start]:
-        """Return the starts that converged, by their places: none where a block has no good end."""
+        """Return the converged starts by their index; none where a block has no good result."""
         starts: dict[int, Start] = {}
         for k in range(len(self.x)) if self._is_whole else ():
             if is_requested():
@@ -132,14 +132,14 @@ class _Found:
 def from_best_blocks(
     nlp: Nlp, blocks: Blocks, ends: Sequence[FloatArray], best: float | None, better: float
 ) -> FloatArray | None:
-    """Return the point (n,) of the best blocks of all ends, where it is better than the best one; else None.
+    """Return the point (n,) of the best blocks over all results, if it is better than the best optimum; else None.
 
     Args:
-        nlp: the program.
-        blocks: of the program.
+        nlp: the nonlinear program.
+        blocks: blocks of the program.
         ends: points (n,) at which searches ended.
         best: objective of the best optimum; None for none.
-        better: difference of the scaled objective that is more than rounding.
+        better: smallest difference of the scaled objective that is more than rounding.
     """
     if not blocks.blocks or not ends:
         return None

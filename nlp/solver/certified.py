@@ -1,4 +1,4 @@
-"""Certificates of a case: an incumbent from a solve, a search of the whole box, and the proof from that search."""
+"""Certificates of a case: incumbent from a solve, branch and bound over the whole search box, and the proof record."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ...models import FloatArray
 from ...models.shown import Shown
 from ...models.whole import Whole
 from ..case.case import Case
-from ..case.choices import listed_numbers
+from ..case.choices import catalogue_dimensions
 from ..case.task import Method, Sense
 from ..errors import InputError, check_seconds
 from ..interruption import is_requested, one_call, reason_of, seconds_left, within
@@ -35,15 +35,15 @@ from .solution import Answer, Solution, interrupted
 from .solve import solve, solve_programs
 from .status import Status
 
-#: Words of a bound for a design that was rounded: only its pose, and what was not rounded, is free.
+#: Scope of a bound for a rounded design: only the pose, and parameters that were not rounded, are free.
 _ROUNDED = "with the rounded dimensions"
-#: Part of the time of a certificate that its solve takes at most.
+#: Largest part of the time limit of a certificate for its solve.
 _SHARE = 0.5
 _Solved = TypeVar("_Solved")
 
 
 class OptionError(InputError):
-    """An option of a certificate that has no meaning for the case, or whose value is out of range."""
+    """Invalid option of a certificate: out of range, or without meaning for the case."""
 
 
 @dataclass(frozen=True)
@@ -51,13 +51,13 @@ class CertifyOptions:
     """Options of a certificate.
 
     Attributes:
-        gap: allowed distance of the bound from the incumbent, as a part of the incumbent.
-        above: prove that F is above this value instead.
+        gap: allowed relative difference between bound and incumbent.
+        above: value of F to prove as a lower bound, in place of a gap.
         time_limit: seconds for the whole call.
-        jobs: threads.
+        jobs: number of threads.
 
     Raises:
-        OptionError: a number is outside of its range.
+        OptionError: a value is outside of its range.
     """
 
     gap: float = GAP
@@ -67,10 +67,10 @@ class CertifyOptions:
 
     def __post_init__(self) -> None:
         if not 1e-10 <= self.gap < 1:
-            raise OptionError(f"gap {self.gap:g}: must be at least 1e-10 and below 1")
+            raise OptionError(f"gap: expected a value from 1e-10 to below 1, got {self.gap:g}")
         check_seconds(self.time_limit)
         if self.above is not None and not abs(self.above) < float("inf"):
-            raise OptionError(f"above {self.above:g}: must be finite")
+            raise OptionError(f"above: expected a finite value, got {self.above:g}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,10 +79,10 @@ class Certified(Whole, Shown, Answer):
 
     Attributes:
         solution: the solution.
-        tasks: a certificate for each task by itself.
-        combined: for the combined program of several tasks, where the method has one.
-        statement: names the program that ``tree`` is about.
-        tree: the proof's nodes; None without ``with_proof``, and where nothing is proved.
+        tasks: certificate of each task by itself.
+        combined: certificate of the combined program of several tasks; None where the method has none.
+        statement: description of the program that ``tree`` proves.
+        tree: nodes of the proof; None without ``with_proof``, and where nothing is proved.
     """
 
     solution: Solution
@@ -97,7 +97,7 @@ class Certified(Whole, Shown, Answer):
 
     @property
     def certificate(self) -> Certificate | None:
-        """Certificate of the program that decides: of the only task, or of the combined program."""
+        """Certificate of the deciding program: the only task, or the combined program."""
         return self.tasks[0] if self.solution.combination is None else self.combined
 
     @property
@@ -125,25 +125,25 @@ def certify(
     with_proof: bool = False,
     progress: Callable[[str], CertifyProgress] | None = None,
 ) -> Certified:
-    """Prove bounds of a case's global optima over the whole box: of every task, and of their combined program.
+    """Prove bounds on the global optima of a case over its whole search box, for every task and for their combination.
 
     Args:
-        found: a case, which is solved first, or its solution.
-        gap: allowed distance of the bound from the incumbent, as a part of the incumbent.
-        above: prove, instead, that F of a case's only task is above this value on the whole box.
-        time_limit: seconds for the whole call, the solve included, which takes half of them at most; searches then stop
-            with the bounds reached. Of the time left, each of several programs takes an equal part at most.
+        found: case to solve and certify, or its solution.
+        gap: allowed relative difference between bound and incumbent.
+        above: value of F to prove as a lower bound on the whole box, for the only task of a case.
+        time_limit: seconds for the whole call. A solve takes at most half of them, and several programs share the rest
+            equally; searches then stop with the bounds that they have reached.
         jobs: number of threads; the result does not depend on it.
-        starts: number of starting points instead of the case's.
-        seed: seed instead of the case's.
-        all_assemblies: cover all working modes of a robot given joint by joint, in the place of home's, where a solve
-            begins. All are covered too where the solution is in another mode.
-        with_proof: keep the proof of the case's one task, or of its combined program, for :func:`proof_of`.
-        progress: returns, for the name of a program, the function that is called from time to time during its search.
+        starts: number of starting points; the case's number if left out.
+        seed: seed of the starting points; the case's seed if left out.
+        all_assemblies: If true, cover all working modes of a robot with given joints; otherwise only the home working
+            mode, in which a solve begins. All are also covered if the solution is in another mode.
+        with_proof: If true, keep the proof of the only task, or of the combined program, for :func:`proof_of`.
+        progress: function that returns, for the name of a program, a function to call repeatedly during its search.
 
     Raises:
         OptionError: an option is outside of its range, or has no meaning for the case.
-        UncoveredError: the case's expressions hold an operation without a rule.
+        UncoveredError: an expression of the case has an operation without an interval rule.
         InputError: the C kernel was not built.
     """
     options = CertifyOptions(gap, above, time_limit, jobs)
@@ -156,37 +156,35 @@ def certify(
     )
     with within(time_limit):
         if isinstance(found, Solution) and is_rounded:
-            # The rounded numbers are proved as they are, and not what rounding lost.
+            # The rounded design is proved as it is; bounds do not cover what rounding lost.
             own = prove(replace(found, case=found.outcomes[0].own.nlp.case, choice=None, rounding=None), options)
             solution = replace(own.solution, case=case, choice=found.choice, rounding=found.rounding)
             tasks = tuple(replace(each, scope=_ROUNDED) for each in own.tasks)
             combined = None if own.combined is None else replace(own.combined, scope=_ROUNDED)
             return replace(own, solution=solution, tasks=tasks, combined=combined)
-        if listed_numbers(case):
+        if catalogue_dimensions(case):
             return _certify_choices(found, options, starts, seed, prove)
         return prove(found, options)
 
 
 def _check_writable(case: Case, *, is_rounded: bool) -> None:
-    """Refuse the proof of a program that no case file states.
+    """Refuse a proof record of a program that no case file states.
 
     Raises:
-        OptionError: there is none.
+        OptionError: the program is not stated by a case file.
     """
     if is_rounded:
-        raise OptionError("proof: the rounded numbers are in no case file; give them with --set")
-    if listed_numbers(case):
-        raise OptionError(
-            "proof: each combination of listed values is a program of its own; give the values with --set"
-        )
+        raise OptionError("proof: no case file contains the rounded dimensions; give them with --set")
+    if catalogue_dimensions(case):
+        raise OptionError("proof: each combination of listed values is a separate program; give the values with --set")
     if case.is_optimised_everywhere:
         raise OptionError(
-            f"proof: the poses of the {case.limits_over} from which the bound follows are in no case file"
+            f"proof: no case file contains the poses of the {case.limits_over} from which the bound follows"
         )
 
 
 def _in_half(solve: Callable[[], _Solved]) -> _Solved:
-    """Return what a solve returns in half of the time left at most: the other half is that of the proof."""
+    """Return the result of a solve that may use half of the remaining time; the other half is for the proof."""
     left = seconds_left()
     with within(None if math.isinf(left) else _SHARE * left):
         return solve()
@@ -202,7 +200,7 @@ def _certify(
     all_assemblies: bool,
     with_proof: bool,
 ) -> Certified:
-    """Return what is proved of a case without listed numbers in the time left; the rest is as for :func:`certify`."""
+    """Return the certificates of a case without listed values, in the remaining time; see :func:`certify`."""
     above, jobs = options.above, options.jobs
     given = found if isinstance(found, Solution) else None
     case = found.case if isinstance(found, Solution) else found
@@ -216,18 +214,18 @@ def _certify(
         except InputError as error:
             raise OptionError(str(error)) from None
     if several and with_proof and case.method is Method.AVERAGE:
-        raise OptionError("proof: averaged tasks have no single program whose optimum could be proved")
+        raise OptionError("proof: averaged tasks have no common program whose optimum could be proved")
     nlps = formulate_each(case) if given is None else [outcome.own.nlp for outcome in given.outcomes]
     with_mode = not all_assemblies and has_modes(case.model)
     if given is None and nlps[0].n:
-        # A missing kernel, or an operation without a rule, is refused before a solve.
+        # Refuse a missing kernel, or an operation without a rule, before a solve.
         kernel()
         form = standard_form(replace(nlps[0], in_home_mode=with_mode))
         reason_of(lambda: "" if search_tape(form, is_short=False).op.size else "empty")
     search = case.search.but(starts, seed)
 
     def certify_one(own: ProgramSolution, name: str, recorder: TreeRecord | None, programs: int = 1) -> Certificate:
-        """Certify a program with an equal part of the time left, which so many programs share."""
+        """Certify one of several programs, with an equal share of the remaining time."""
         x, claimed = _incumbent(own)
         in_home_mode = with_mode and (x is None or is_in_home_mode(own.nlp, x) is True)
         program = replace(own.nlp, in_home_mode=True) if in_home_mode else own.nlp
@@ -242,7 +240,7 @@ def _certify(
             progress=None if progress is None else progress(name),
             recorder=recorder,
         )
-        # A journal has no trees, and asks within this block whether the search is cut short.
+        # A journal keeps no trees, and checks within this block whether the search was cut short.
         is_kept = recorder is None
         with within(seconds_left() / programs):
             found = kept_certificate(program, x, certified, gap=options.gap, above=above) if is_kept else certified()
@@ -257,7 +255,7 @@ def _certify(
         certificate = certify_one(own, case.tasks[0].name, writer)
         if certificate.was_beaten and certificate.x is not None:
             own = (
-                replace(own, status=Status.INTERRUPTED)  # its best point is beaten, and no time is left
+                replace(own, status=Status.INTERRUPTED)  # a better point is known, and there is no time to correct it
                 if is_requested()
                 else solve_program(nlp, search, first=[certificate.x], jobs=jobs)
             )
@@ -265,31 +263,31 @@ def _certify(
         statement = replace(statement, in_home_mode=certificate.nlp.in_home_mode)
         return Certified(solution, (certificate,), None, statement, _complete_tree(writer, certificate))
     solution = given or _in_half(lambda: solve_programs(case, nlps, search, jobs=jobs))
-    count = len(solution.outcomes) + 1  # and the combined program
-    alone = tuple(
+    count = len(solution.outcomes) + 1  # tasks and the combined program
+    separate = tuple(
         certify_one(outcome.own, outcome.task.name, None, count - k) for k, outcome in enumerate(solution.outcomes)
     )
     if solution.combination is None or solution.combination.combined is None:
-        return Certified(solution, alone, None, Statement(), None)
+        return Certified(solution, separate, None, Statement(), None)
     combined = solution.combination.combined
     writer = TreeRecord() if with_proof and combined.nlp.n else None
     certificate = certify_one(combined, case.method.value, writer)
     statement = replace(_combined_statement(case, combined), in_home_mode=certificate.nlp.in_home_mode)
-    return Certified(solution, alone, certificate, statement, _complete_tree(writer, certificate))
+    return Certified(solution, separate, certificate, statement, _complete_tree(writer, certificate))
 
 
 def _incumbent(own: ProgramSolution) -> tuple[FloatArray | None, float | None]:
-    """Return the best point (n,) of a solve, and the objective that it claims there; of one cut short an optimum."""
+    """Return the best point (n,) of a solve and its objective; only an optimum if the solve was interrupted."""
     if own.status.is_answer:
         return own.x, own.F
     return (own.optima[0].x if own.status is Status.INTERRUPTED and own.optima else None), None
 
 
 def _after_solve(certificate: Certificate, own: ProgramSolution, starts: int) -> Certificate:
-    """Return a certificate that says, where it is not proved, that the solve before it was cut short."""
+    """Return a certificate with a reason that the solve before it was cut short, unless it is proved."""
     if own.status is not Status.INTERRUPTED or certificate.status is CertificateStatus.PROVED:
         return certificate
-    done = f"the solve before had half of the time, for {len(own.starts)} of {starts} starts"
+    done = f"the time for the solve was used up after {len(own.starts)} of {starts} starts"
     return replace(certificate, reason=f"{certificate.reason}; {done}" if certificate.reason else done)
 
 
@@ -300,7 +298,7 @@ def _certify_choices(
     seed: int | None,
     prove: Callable[[Case, CertifyOptions], Certified],
 ) -> Certified:
-    """Return the best combination of a case's listed numbers, and what is proved over all of them."""
+    """Return the best combination of a case's listed values, and the bound over all combinations."""
     case = found.case if isinstance(found, Solution) else found
     search = case.search.but(starts, seed)
 
@@ -312,7 +310,7 @@ def _certify_choices(
     choice = found.choice if isinstance(found, Solution) else None
     choice = choice or _in_half(lambda: solve_choices(case, solve_fixed).choice)
     if choice is None:
-        raise OptionError("values: the case has none to choose from")
+        raise OptionError("values: the case has no parameter with listed values")
     best, values, together = prove_choices(
         case,
         choice,
@@ -323,7 +321,7 @@ def _certify_choices(
     chosen = replace(best.solution, case=case, choice=replace(choice, chosen=values))
     closed = (CertificateStatus.PROVED, CertificateStatus.INFEASIBLE)
     if not choice.is_complete and (together is None or together.status not in closed):
-        chosen = interrupted(chosen)  # neither a solve nor a proof has seen all combinations
+        chosen = interrupted(chosen)  # neither the solve nor the proof covers all combinations
     if len(case.tasks) > 1:
         return replace(best, solution=chosen, combined=together)
     return replace(best, solution=chosen, tasks=best.tasks if together is None else (together,))
@@ -332,9 +330,10 @@ def _certify_choices(
 def _certify_from_poses(
     solution: Solution, options: CertifyOptions, progress: Callable[[str], CertifyProgress] | None
 ) -> Certified:
-    """Return a bound of what is optimised over a workspace or along a path: it is that at the poses of the exchange.
+    """Return a bound of the optimum with limits over a workspace or along a path, from the poses of the exchange.
 
-    Limits at these poses are those of the case, which the exchange has tightened.
+    A design that satisfies the limits everywhere satisfies them at these poses: the limits there are those of the case,
+    without the margin of the exchange.
     """
     own = solution.outcomes[0].own
     x, claimed = (own.x, own.F) if own.status.is_answer else (None, None)
@@ -351,30 +350,30 @@ def _certify_from_poses(
     )
     certificate = kept_certificate(nlp, x, certified, gap=options.gap, above=options.above)
     if x is None and options.above is None and certificate.status is CertificateStatus.PROVED:
-        # The incumbent keeps the limits at these poses only, so the bound has no design to be compared with.
+        # The incumbent satisfies the limits at these poses only, so no design can be compared with the bound.
         certificate = replace(
             certificate,
             status=CertificateStatus.INCOMPLETE,
             x=None,
             incumbent=math.nan,
-            reason=f"the solve found no design that keeps the limits over the {solution.case.limits_over}",
+            reason=f"no design that keeps the limits over the {solution.case.limits_over} is known",
         )
     return Certified(solution, (certificate,), None, Statement(), None)
 
 
 def proof_of(certified: Certified, text: str) -> Proof:
-    """Return the proof that belongs to a certificate.
+    """Return the proof record of a certificate.
 
     Args:
-        certified: the certificates, from :func:`certify` with ``with_proof``.
-        text: the case file's text.
+        certified: certificates from :func:`certify` with ``with_proof``.
+        text: text of the case file.
 
     Raises:
-        OptionError: nothing was proved.
+        OptionError: no bound was proved.
     """
     certificate = certified.certificate
     if certificate is None or certified.tree is None:
-        raise OptionError("proof: nothing was proved, so nothing is written")
+        raise OptionError("proof: no bound was proved, so no file was written")
     nlp = certificate.nlp
     is_empty = certificate.status is CertificateStatus.INFEASIBLE
     bound = None if is_empty else certificate.bound_of_tree
@@ -386,12 +385,12 @@ def proof_of(certified: Certified, text: str) -> Proof:
 def _complete_tree(writer: TreeRecord | None, certificate: Certificate) -> bytes | None:
     """Return the nodes of a complete proof; None where nothing is proved or recorded."""
     complete = certificate.status in (CertificateStatus.PROVED, CertificateStatus.INFEASIBLE)
-    # A program whose value follows from the one point there is has no search, and no tree.
+    # A program with a single point needs no search, and has no tree.
     return writer.tree() if writer is not None and complete and certificate.engine == ENGINE else None
 
 
 def _combined_statement(case: Case, combined: ProgramSolution) -> Statement:
-    """Return the statement that names the combined program of several tasks."""
+    """Return the proof statement about the combined program of several tasks."""
     epigraph = combined.nlp.program.places.epigraph
     if epigraph is None or not has_both_senses(case):
         return Statement()

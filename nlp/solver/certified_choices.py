@@ -1,8 +1,7 @@
-"""Proof of the best combination of values of listed numbers: bounds of parts that hold all combinations together.
+"""Proof of the best combination of listed values, from bounds of parts that together cover all combinations.
 
-A part that the solve left out is proved with its numbers free between the ends of their values, and divided into its
-combinations where that bound is too wide. A part far from the best combination needs no narrow bound: its gap is as
-wide as the best one allows.
+A part that the solve skipped is bounded with its parameters free between their smallest and largest values. It is
+split into its combinations where that bound is too wide. The gap of a part far from the best combination may be wide.
 """
 
 from __future__ import annotations
@@ -14,21 +13,21 @@ from dataclasses import replace
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
 from ..case.case import Case
-from ..case.choices import Ranges, listed_numbers, within_ranges
+from ..case.choices import Ranges, catalogue_dimensions, within_ranges
 from ..interruption import is_requested, seconds_left, why_stopped, within
 from ..proof.certificate.certificate import Certificate, CertificateStatus
 from .choices import combinations_of, exists
 from .solution import Choice, ChoicePart
 
-#: Gaps of parts: as a part of the one asked for, so that a part as good as the best combination is not divided; and the
-#: widest one.
+#: Gaps of parts: smallest one relative to the requested gap, so that a part as good as the best combination is not
+#: split; and largest one.
 _NARROWEST, _WIDEST = 0.5, 0.5
-#: Part of a gap by which a bound may exceed it and still count as met: rounding.
+#: Part of a gap by which a bound may exceed the gap and still meets it: rounding.
 _ROUNDING = 1e-6
 
 
 class _Proved(Protocol):
-    """A case with certificates: of each task, and of the program that decides."""
+    """A case with certificates of each task, and of the deciding program."""
 
     @property
     def tasks(self) -> tuple[Certificate, ...]: ...
@@ -41,12 +40,12 @@ Proved = TypeVar("Proved", bound=_Proved)
 
 
 class ChoiceProof(NamedTuple, Generic[Proved]):
-    """Proof over all combinations of values.
+    """Proof over all combinations of listed values.
 
     Attributes:
-        best: the best combination, proved by itself.
+        best: certificates of the best combination.
         chosen: ranges of this combination.
-        certificate: of all combinations together; None where no program combines the tasks of the best one.
+        certificate: certificate over all combinations; None where no program combines the tasks of the best one.
     """
 
     best: Proved
@@ -57,17 +56,17 @@ class ChoiceProof(NamedTuple, Generic[Proved]):
 def prove_choices(
     case: Case, choice: Choice, prove: Callable[[Case, float], Proved], gap: float, *, is_each: bool
 ) -> ChoiceProof[Proved]:
-    """Prove a bound over all combinations of values of a case's listed numbers.
+    """Prove a bound over all combinations of listed values of a case.
 
     Args:
         case: the case.
-        choice: from its solve.
-        prove: certifies a case without listed numbers to a gap.
-        gap: allowed distance of the bound from the incumbent, as a part of the incumbent.
-        is_each: whether every combination is proved by itself, as for a value that F is to be above.
+        choice: search over the combinations from the solve of the case.
+        prove: function that certifies a case without listed values to a gap.
+        gap: allowed relative difference between bound and incumbent.
+        is_each: If true, certify every combination separately, as for a lower bound on F.
     """
     began = time.perf_counter()
-    numbers, chosen = listed_numbers(case), choice.chosen
+    numbers, chosen = catalogue_dimensions(case), choice.chosen
     parts = [part for part in choice.parts if part.ranges != choice.chosen]
     if is_each:
         parts = [each for part in parts for each in _combinations_in(part, choice.chosen)]
@@ -86,7 +85,7 @@ def prove_choices(
         if _is_one(part) and not exists(case, numbers, part.ranges):
             continue
         is_better = part.cost is not None and part.cost < _cost(known, known.incumbent) - known.allowed
-        if is_better and not _is_one(part):  # as an earlier end of the solve may leave one
+        if is_better and not _is_one(part):  # a solve that ended early may leave such a part
             parts += _combinations_in(part, choice.chosen)
             continue
         with within(_share(parts)):
@@ -102,7 +101,7 @@ def prove_choices(
         if is_final or _is_met(certificate.bound, certificate, known):
             found.append(certificate)
             continue
-        # Its gap was too wide: a better point than that of the solve was found.
+        # The gap was too wide: the solve missed a better point.
         boxes += certificate.boxes
         parts += [ChoicePart(part.ranges, None)] if _is_one(part) else _combinations_in(part, choice.chosen)
     together = _together(known, first, found, choice.combinations, boxes, unknown)
@@ -110,7 +109,7 @@ def prove_choices(
 
 
 def _deciding(answer: _Proved) -> Certificate | None:
-    """Return the certificate that decides; that of a task which has no point within the limits stands for all."""
+    """Return the deciding certificate; a task without any feasible point decides for all tasks."""
     none = (each for each in answer.tasks if each.status is CertificateStatus.INFEASIBLE)
     return next(none, answer.certificate)
 
@@ -118,15 +117,15 @@ def _deciding(answer: _Proved) -> Certificate | None:
 def _together(
     known: Certificate, first: Certificate, found: Sequence[Certificate], count: int, boxes: int, unknown: str
 ) -> Certificate:
-    """Return the certificate of all combinations.
+    """Return the certificate over all combinations.
 
     Args:
-        known: of the best combination.
-        first: of the combination that the solve found best.
-        found: of the parts that hold all combinations.
+        known: certificate of the best combination.
+        first: certificate of the best combination of the solve.
+        found: certificates of the parts that cover all combinations.
         count: number of combinations.
-        boxes: number of boxes examined beside those of these certificates.
-        unknown: why some combinations are in none of these; empty where all are.
+        boxes: number of boxes examined in addition to those of these certificates.
+        unknown: reason why these certificates do not cover some combinations; empty where they cover all.
     """
     possible = [each for each in found if each.status is not CertificateStatus.INFEASIBLE]
     bounds = [known.nlp.sign * each.bound for each in possible]
@@ -140,7 +139,7 @@ def _together(
     elif reason or any(each.status is not CertificateStatus.PROVED for each in possible):
         status = CertificateStatus.INCOMPLETE
     elif known.above is None and not all(_is_met(each.bound, each, known) for each in possible):
-        status, reason = CertificateStatus.INCOMPLETE, "the bounds of some combinations are wider than asked for"
+        status, reason = CertificateStatus.INCOMPLETE, "the gaps of some combinations are wider than requested"
     return replace(
         known,
         status=status,
@@ -154,40 +153,40 @@ def _together(
 
 
 def _at_end(certificate: Certificate, seconds: float) -> Certificate:
-    """Return a certificate with the time of the whole search, of which only the end is known."""
+    """Return a certificate with the time of the whole search, and only the final entry in its history."""
     is_known = math.isfinite(certificate.bound) and math.isfinite(certificate.incumbent)
     history = ((seconds, certificate.bound, certificate.incumbent),) if is_known else ()
     return replace(certificate, seconds=seconds, history=history)
 
 
 def _share(parts: Sequence[ChoicePart]) -> float | None:
-    """Return the seconds for one part beside so many others; None without a limit."""
+    """Return the seconds for one of several parts; None without a time limit."""
     return None if math.isinf(seconds_left()) else seconds_left() / (1 + len(parts))
 
 
 def _is_met(bound: float, certificate: Certificate, known: Certificate) -> bool:
-    """Return whether a bound is no better than the best combination known by more than the gap asked for."""
+    """Return whether a bound is within the requested gap of the best known combination."""
     return _cost(certificate, bound) >= _cost(known, known.incumbent) - (1 + _ROUNDING) * known.allowed
 
 
 def _combinations_in(part: ChoicePart, chosen: Ranges) -> list[ChoicePart]:
-    """Return the combinations in a part but for the chosen one, which is proved already."""
+    """Return the combinations of a part without the chosen one, which is certified already."""
     return [ChoicePart(each, None) for each in combinations_of(part.ranges) if each != chosen]
 
 
 def _is_one(part: ChoicePart) -> bool:
-    """Return whether a part is one combination."""
+    """Return whether a part has only one combination."""
     return all(behind - first == 1 for first, behind in part.ranges)
 
 
 def _cost(certificate: Certificate, value: float) -> float:
-    """Return a number of an objective, the smaller the better; infinite for an infeasible program, or without one."""
+    """Return the objective as a cost to be minimised; infinite for an infeasible program, or without a value."""
     is_none = certificate.status is CertificateStatus.INFEASIBLE or math.isnan(value)
     return math.inf if is_none else certificate.nlp.sign * value
 
 
 def _gap_of(part: ChoicePart, known: Certificate, gap: float) -> float:
-    """Return the gap to which a part is proved: its bound is to be no better than the best combination allows."""
+    """Return the gap to which a part must be proved to show that it has no better combination."""
     best = _cost(known, known.incumbent)
     if not part.cost or math.isinf(best):
         return gap

@@ -1,8 +1,8 @@
-"""Dimensions that have one of a few values: a search over their combinations, each of which is solved as a case.
+"""Search over combinations of listed parameter values, each of which is solved as a case.
 
-A few combinations are solved one by one. More are searched by branch and bound: a part of them is solved with the
-numbers free between the ends of their values, and is left out where that is no better than the best combination. Every
-solve is local, from the case's starting points, so that this is no proof: :mod:`.certified_choices` proves.
+A few combinations are solved one by one. More are searched by branch and bound: a part is solved with the parameters
+free between their smallest and largest values, and skipped where that is no better than the best combination. Every
+solve is local, from the case's starting points; the proof is in :mod:`.certified_choices`.
 """
 
 from __future__ import annotations
@@ -14,36 +14,36 @@ from dataclasses import replace
 import numpy as np
 
 from ..case.case import Case
-from ..case.choices import ListedNumber, Ranges, all_values, listed_numbers, within_ranges
+from ..case.choices import CatalogueDimension, Ranges, all_values, catalogue_dimensions, within_ranges
 from ..errors import EvaluationError, NoRobotError
 from ..interruption import is_requested, one_call
 from .solution import Choice, ChoicePart, Solution, interrupted
 from .status import Status
 
-#: So many combinations are all solved: bounds of parts would need about as many solves.
+#: Largest number of combinations that are all solved: bounds of parts would need about as many solves.
 _FEW = 16
-#: Part of the objective by which a part of the combinations must be better than the best one to be searched: two solves
-#: of one program differ by less.
+#: Smallest relative improvement over the best combination for which a part is searched: two solves of one program
+#: differ by less.
 _BETTER = 1e-9
 
 
 @one_call
 def solve_choices(case: Case, solve_fixed: Callable[[Case], Solution], most: float = math.inf) -> Solution:
-    """Solve a case for the best combination of values of its listed numbers.
+    """Solve a case for the best combination of its listed parameter values.
 
     Args:
         case: the case.
-        solve_fixed: solves a case without listed numbers.
-        most: number of solves after which the search ends, with the best combination found.
+        solve_fixed: function that solves a case without listed values.
+        most: largest number of solves; the search then ends with the best known combination.
 
     Returns:
-        The solution of the best combination, with the case given; without an answer where no combination has one.
+        The solution of the best combination, with the given case; without an answer where no combination has one.
     """
     return _Search(case, solve_fixed, most).run()
 
 
 def cost_of(solution: Solution) -> float:
-    """Return the objective of a solution, the smaller the better; infinite without an answer."""
+    """Return the objective of a solution as a cost to be minimised; infinite without an answer."""
     if not solution.status.is_answer:
         return math.inf
     combination, decided = solution.combination, solution.decided_by
@@ -52,21 +52,21 @@ def cost_of(solution: Solution) -> float:
 
 
 class _Part:
-    """A part of the combinations that is open: ranges of values, and its solve with the numbers free between them.
+    """An open part of the combinations: index ranges of values, and the solve with parameters free between their ends.
 
-    There is no solve where the robot does not exist at any starting point of it.
+    The solve is None where the robot's loops cannot be closed at any of its starting points.
     """
 
     def __init__(self, ranges: Ranges, relaxed: Solution | None) -> None:
         self.ranges, self.relaxed = ranges, relaxed
-        # Without an answer, or where a better point is known, nothing is known.
+        # Without an answer, or where a better point is known, the solve gives no bound.
         self.bound = -math.inf
         if relaxed is not None and relaxed.status.is_answer and relaxed.status is not Status.LOCAL:
             self.bound = cost_of(relaxed)
 
     @property
     def open_numbers(self) -> int:
-        """Number of the numbers that have several values."""
+        """Number of parameters with several values."""
         return sum(behind - first > 1 for first, behind in self.ranges)
 
 
@@ -75,7 +75,7 @@ class _Search:
 
     def __init__(self, case: Case, solve_fixed: Callable[[Case], Solution], most: float) -> None:
         self._case, self._solve, self._most = case, solve_fixed, most
-        self._numbers = listed_numbers(case)
+        self._numbers = catalogue_dimensions(case)
         self._solved: dict[Ranges, Solution] = {}
         self._cut: dict[Ranges, Solution] = {}
         self._relaxed = 0
@@ -91,7 +91,7 @@ class _Search:
         open_parts = self._solve_all(everything) if count <= _FEW else self._bisect(everything)
         best = self._best
         if best is None:
-            # No combination has an answer; one of those solved says why, with the limits that would have to move.
+            # No combination has an answer: return a solved one, with the limits that would have to be relaxed.
             known = {**self._solved, **self._cut}
             self._chosen = next(iter(known), next(combinations_of(everything)))
             best = known[self._chosen] if known else self._solve_combination(self._chosen)
@@ -102,7 +102,7 @@ class _Search:
         return replace(best, case=self._case, choice=choice)
 
     def _solve_all(self, everything: Ranges) -> list[Ranges]:
-        """Solve every combination; return those that are not solved."""
+        """Solve every combination; return the combinations that were not solved."""
         left = [each for each in combinations_of(everything) if self._exists(each)]
         while left and not is_requested():
             self._solve_combination(left[0])
@@ -112,14 +112,14 @@ class _Search:
         return left
 
     def _bisect(self, everything: Ranges) -> list[Ranges]:
-        """Divide the combinations until all are solved or left out; return the parts that are neither."""
+        """Split the combinations until all are solved or skipped; return the parts that are neither."""
         root = self._relax(everything)
-        # Rounding is a first answer, which leaves out much.
+        # Rounding gives a first answer, by which many parts can be skipped.
         if self._exists(nearest := self._nearest(root)):
             self._solve_combination(nearest)
         parts, cut = [root], list[Ranges]()
         while parts and not is_requested() and len(self._solved) + self._relaxed < self._most:
-            # Without an answer, those parts first that are nearest to a combination.
+            # Without an answer, begin with the parts that are nearest to a combination.
             is_first = self._best is None
             part = min(parts, key=lambda each: (each.open_numbers if is_first else 0, each.bound))
             parts.remove(part)
@@ -141,16 +141,16 @@ class _Search:
         return [*cut, *(each.ranges for each in parts)]
 
     def _exists(self, ranges: Ranges) -> bool:
-        """Return whether there is a robot with the values of a combination."""
+        """Return whether the robot's loops can be closed with the values of a combination."""
         return exists(self._case, self._numbers, ranges)
 
     def _is_no_better(self, part: _Part) -> bool:
-        """Return whether a part holds no combination that is known to be better than the best one."""
+        """Return whether no combination of a part is known to be better than the best one."""
         best = math.inf if self._best is None else cost_of(self._best)
         return math.isfinite(best) and part.bound >= best - _BETTER * abs(best)
 
     def _relax(self, ranges: Ranges) -> _Part:
-        """Solve a case with the listed numbers free between the ends of their values."""
+        """Solve a case with the listed parameters free between their smallest and largest values."""
         self._relaxed += 1
         try:
             return _Part(ranges, self._solve_within(ranges))
@@ -158,9 +158,9 @@ class _Search:
             return _Part(ranges, None)
 
     def _solve_combination(self, ranges: Ranges) -> Solution:
-        """Solve a combination once, and keep it where it is the best so far.
+        """Solve a combination once, and store it if it is the best so far.
 
-        An interrupted solve is not complete: it may be the best one, and its combination stays open.
+        An interrupted solve is incomplete: it may still be the best one, and its combination stays open.
         """
         if ranges in self._solved:
             return self._solved[ranges]
@@ -174,14 +174,14 @@ class _Search:
         return found
 
     def _solve_within(self, ranges: Ranges) -> Solution:
-        """Solve a case with the listed numbers within ranges, and note its objective."""
+        """Solve a case with the listed parameters within ranges, and store its objective."""
         found = self._solve(within_ranges(self._case, self._numbers, ranges))
         if math.isfinite(cost_of(found)):
             self._costs[ranges] = cost_of(found)
         return found
 
     def _nearest(self, part: _Part) -> Ranges:
-        """Return the combination nearest to the numbers of a part's solve."""
+        """Return the combination nearest to the solved values of a part."""
         ranges = []
         for number, (first, behind) in zip(self._numbers, part.ranges, strict=True):
             at = _value_of(part.relaxed, number)
@@ -191,7 +191,7 @@ class _Search:
         return tuple(ranges)
 
     def _divided(self, part: _Part) -> tuple[Ranges, Ranges]:
-        """Return the two halves of a part: cut where the solve is farthest from a value beside those values' width."""
+        """Return two halves of a part, split where a solved value is relatively farthest from any listed one."""
         farthest, cut = -1.0, (0, 1)
         for k, (number, (first, behind)) in enumerate(zip(self._numbers, part.ranges, strict=True)):
             if behind - first > 1:
@@ -206,8 +206,8 @@ class _Search:
         return low, high
 
 
-def exists(case: Case, numbers: Sequence[ListedNumber], ranges: Ranges) -> bool:
-    """Return whether a case has a robot with the values of a combination of its listed numbers."""
+def exists(case: Case, numbers: Sequence[CatalogueDimension], ranges: Ranges) -> bool:
+    """Return whether the robot's loops can be closed with the values of a combination."""
     try:
         within_ranges(case, numbers, ranges)
     except NoRobotError:
@@ -216,14 +216,14 @@ def exists(case: Case, numbers: Sequence[ListedNumber], ranges: Ranges) -> bool:
 
 
 def combinations_of(ranges: Ranges) -> Iterator[Ranges]:
-    """Yield every combination within ranges, the last number's values first."""
+    """Yield every combination within ranges; the values of the last parameter change first."""
     counts = [behind - first for first, behind in ranges]
     for index in np.ndindex(*counts):
         yield tuple((first + k, first + k + 1) for (first, _), k in zip(ranges, index, strict=True))
 
 
-def _value_of(solution: Solution | None, number: ListedNumber) -> float:
-    """Return the value of a listed number at a solution's point: the middle of its values where the robot has none."""
+def _value_of(solution: Solution | None, number: CatalogueDimension) -> float:
+    """Return the value of a listed parameter at a solution; the middle of its values where the robot has none."""
     state = None if solution is None else solution.outcomes[0].state
     if state is None:
         return (number.values[0] + number.values[-1]) / 2

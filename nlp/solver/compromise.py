@@ -1,19 +1,19 @@
-"""Combination of several tasks for one robot: equation 15, the best weighted sum, and the best worst task.
+"""Combination of several tasks for one robot: average (equation 15), best weighted sum, or best worst case.
 
 Every task is first solved by itself. Then the tasks are combined:
 
-* ``average`` (equation 15): ``Q = (1/n) sum_j w_j q_j`` of the tasks' own optima ``q_j``. As printed this is a mean
-  only when the weights sum to ``n``: the weights are scaled to that sum, with a notice. Lengths and angles average
-  linearly, a rotation whose axis is free on SO(3), a free direction on the sphere. Nothing is optimised at ``Q``, and
-  only the bounds of the variables are sure to hold there, because a box is convex.
+* ``average`` (equation 15): ``Q = (1/n) sum_j w_j q_j`` over the optima ``q_j`` of the tasks. As printed this is a mean
+  only if the weights sum to ``n``: the weights are scaled to that sum, with a notice. Lengths and angles are averaged
+  linearly, a rotation with a free axis on SO(3), a free direction on the sphere. Nothing is optimised at ``Q``, and
+  only the bounds of the variables are guaranteed there, because a box is convex.
 * ``weighted-sum`` and ``worst-case``: one program each; see :mod:`screwsynth.nlp.program.formulation`.
 
-Each method states its cost: every task's F, rates and verdict at the combined point, its loss against its own optimum,
-and every limit that is violated.
+Each method reports its cost: F, rates and verdict of every task at the combined point, the loss against the optimum of
+the task, and every violated limit.
 
-Where a task's optimum is not unique, its ``q_j`` is arbitrary. The rule is then *nearest to the others*: the member of
-the optimal set nearest (in half ranges) to the mean of the other tasks' points, for all tasks at once, repeated until
-no point moves, so that the result does not depend on the order of the tasks.
+If the optimum of a task is not unique, its ``q_j`` is arbitrary. It is then the point of the optimal set nearest (in
+half ranges) to the mean of the other tasks' points. This is repeated for all tasks at once until no point moves, so
+that the result does not depend on the order of the tasks.
 """
 
 from __future__ import annotations
@@ -43,31 +43,31 @@ from .starts import StartStatus, same_value
 from .status import Status
 
 #: Weights of the distance to the other tasks' points, in parts of F's scale, in descending order, for the search of the
-#: nearest member of an optimal set: the point tends to that member, and the correction that follows removes the rest.
+#: nearest optimum of a set: smaller weights approach it, and a final correction removes the rest.
 _DISTANCE_WEIGHTS = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
-#: Largest number of rounds of choosing members, and the movement in half ranges below which the rounds end.
+#: Largest number of rounds of this choice, and the movement in half ranges below which the rounds end.
 _ROUNDS = 20
 _STILL = 1e-9
 
 
 class SolveOne(Protocol):
-    """A solve of one program, with the settings of the whole solve."""
+    """A function that solves one program with the settings of the whole solve."""
 
     def __call__(self, name: str, nlp: Nlp, first: Sequence[FloatArray] = ()) -> ProgramSolution:
-        """Solve a program, shown by a name, from points (n,) and from sampled ones."""
+        """Solve a program with a name for progress messages, from points (n,) and from sampled starting points."""
         ...
 
 
 class Polish(Protocol):
-    """A search of one program from points close to its solution."""
+    """A function that searches one program from points close to its solution."""
 
     def __call__(self, nlp: Nlp, *, first: Sequence[FloatArray]) -> ProgramSolution:
-        """Solve a program from points (n,) and a few sampled ones."""
+        """Solve a program from points (n,) and a few sampled starting points."""
         ...
 
 
 def solution_of_one_task(case: Case, own: ProgramSolution) -> Solution:
-    """Return the solution of a case whose only task is solved."""
+    """Return the solution of a case with only one task, from the solution of its program."""
     F = own.nlp.evaluate(own.x)[0]
     outcome = TaskOutcome(case.tasks[0], own, _is_unique(own), own.x, own.state, F, own.evidence, 0.0)
     return Solution(case, own.status, own.x, (outcome,), None, own.seconds)
@@ -76,17 +76,17 @@ def solution_of_one_task(case: Case, own: ProgramSolution) -> Solution:
 def combine(
     case: Case, nlps: Sequence[Nlp], own: Sequence[ProgramSolution], solve_one: SolveOne, polish: Polish
 ) -> Solution:
-    """Combine several tasks, each solved by itself, by the method that the case names.
+    """Combine several separately solved tasks by the method of the case.
 
     Args:
-        case: a case with at least two tasks and something free.
-        nlps: the program of each task.
-        own: the solution of each task's program.
-        solve_one: solves the combined program.
-        polish: searches for the nearest member of an optimal set.
+        case: case with at least two tasks and a free variable.
+        nlps: nonlinear program of each task.
+        own: solution of each task's program.
+        solve_one: function that solves the combined program.
+        polish: function that searches the nearest optimum of a set.
 
     Returns:
-        The solution, with no seconds yet.
+        The solution; its time is not set.
     """
     weights = scaled_weights(case)
     points, unique, notices = _choose_members(nlps, own, polish)
@@ -94,7 +94,7 @@ def combine(
     combined: ProgramSolution | None = None
     if not all(solution.status.is_answer for solution in own):
         x, status, value = own[0].x, next(s.status for s in own if not s.status.is_answer), None
-        notices.append("a task has no optimum by itself, so that the tasks cannot be combined")
+        notices.append("the tasks cannot be combined: a task has no optimum by itself")
     elif case.method is Method.AVERAGE:
         x, status, value = _average(nlps[0], points, weights), Status.AVERAGED, None
     else:
@@ -111,8 +111,8 @@ def combine(
         status=status,
         x=frozen_array(x, (nlps[0].n,)),
         outcomes=tuple(
-            _outcome(nlp, replace(task, weight=weight), solution, alone, point, x)
-            for nlp, task, weight, solution, alone, point in zip(
+            _outcome(nlp, replace(task, weight=weight), solution, is_unique, point, x)
+            for nlp, task, weight, solution, is_unique, point in zip(
                 nlps, case.tasks, weights, own, unique, points, strict=True
             )
         ),
@@ -122,7 +122,7 @@ def combine(
 
 
 def _scaling_notices(case: Case, scaled: Sequence[float]) -> list[str]:
-    """Return a notice where the weights that a case states were scaled."""
+    """Return a notice if the stated weights of a case were scaled."""
     given = [task.weight for task in case.tasks]
     if given == scaled:
         return []
@@ -147,13 +147,13 @@ def _solve_combined(
     weights: Sequence[float],
     solve_one: SolveOne,
 ) -> ProgramSolution:
-    """Solve the combined program from the tasks' own optima, their average, and the search's starts."""
+    """Solve the combined program from the optima of the tasks, their average, and sampled starting points."""
     first = [*points, _average(nlps[0], points, weights)]
     if case.method is Method.WEIGHTED_SUM:
         return solve_one(case.method.value, formulate_weighted(case, weights), first)
     best = [nlp.evaluate(solution.x)[0] for nlp, solution in zip(nlps, own, strict=True)]
     levels = [level_of_tasks(case, [nlp.evaluate(x)[0] for nlp in nlps], weights, best) for x in first]
-    # No level can exceed the least of the tasks' own maxima, nor be worse than that of the best of the first points.
+    # The level cannot exceed the smallest maximum of a task, nor be worse than at the best of the first points.
     senses = {task.sense for task in case.tasks}
     ceiling = min(b / w for b, w in zip(best, weights, strict=True)) if senses == {Sense.MAX} else min(levels)
     floor = 1e-3 * max(nlp.objective_size for nlp in nlps)
@@ -169,7 +169,7 @@ def _choose_members(
     """Choose the point of each task's optimal set that is nearest to the other tasks' points.
 
     Returns:
-        The points, whether each set has no other, and notices about sets of several points.
+        The points, whether each optimum is unique, and notices about optima that are not.
     """
     points = [np.array(solution.x) for solution in own]
     members = [_known_members(solution) for solution in own]
@@ -180,7 +180,7 @@ def _choose_members(
         for j, solution in enumerate(own)
         if not unique[j] and solution.status.is_answer
     ]
-    extended = proximity_program(nlps[0].program)  # one program serves all tasks: only their arguments differ
+    extended = proximity_program(nlps[0].program)  # one program for all tasks: only their arguments differ
     for _ in range(_ROUNDS if notices else 0):
         following = list(points)
         for j in range(len(own)):
@@ -205,7 +205,7 @@ def _is_unique(solution: ProgramSolution) -> bool:
 
 
 def _known_members(solution: ProgramSolution) -> list[FloatArray]:
-    """Return known members of an optimal set: one of each isolated optimum, every start's point on a connected set."""
+    """Return known points of an optimal set: one for each isolated optimum, all starts' points on a connected set."""
     if not solution.optima:
         return [np.array(solution.x)]
     tolerance = same_value(solution.nlp)
@@ -224,7 +224,7 @@ def _nearest_member(
     extended: Program,
     polish: Polish,
 ) -> FloatArray:
-    """Return the member of a task's optimal set nearest to a point (n,), searched from the known members."""
+    """Return the point of a task's optimal set nearest to a point (n,), searched from the known optima."""
 
     def distance(x: FloatArray) -> float:
         return float(np.linalg.norm((x - target) / nlp.scale))
@@ -257,7 +257,7 @@ def _average(nlp: Nlp, points: Sequence[FloatArray], weights: Sequence[float]) -
         if isinstance(rotation, FreeRotation):
             q = list(rotation.q)
             Q[q] = _mean_rotation([point[q] for point in points], shares)
-    # The unknowns of joints are no design: at the averaged dimensions and pose they follow from closed loops.
+    # Joint unknowns are not averaged: at the averaged dimensions and pose they follow from the loop equations.
     return close_equations(nlp, Q) if nlp.program.model.unknowns else np.asarray(Q, dtype=np.float64)
 
 

@@ -1,7 +1,7 @@
-"""Frames of the poses of an exchange in the variables of its program: the place of a path, and the pose of a case.
+"""Frames in which the poses of an exchange are given, in the variables of its program: path frame, or stated pose.
 
-A path's frame turns positions too. A workspace about a pose has excursions in the axes of the world, which turn the
-platform of that pose: see :mod:`screwsynth.nlp.case.excursions`.
+The frame of a path also rotates positions. A workspace about a pose has excursions along the axes of the world, which
+rotate the platform of that pose: see :mod:`screwsynth.nlp.case.excursions`.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ def pose_of(position: FloatArray, rotation: FloatArray) -> PoseNumbers:
 def excursion_to(
     stated: tuple[FloatArray, FloatArray], position: FloatArray, rotation: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return position and rotation in the world of an excursion about a stated pose."""
+    """Return the position and rotation in the world of an excursion from a stated pose."""
     return stated[0] + position, rotation @ stated[1]
 
 
 def excursion_from(
     stated: tuple[FloatArray, FloatArray], position: FloatArray, rotation: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return position and rotation of the excursion from a stated pose to a pose in the world."""
+    """Return the position and rotation of the excursion from a stated pose to a given pose in the world."""
     return position - stated[0], rotation @ stated[1].T
 
 
@@ -41,8 +41,8 @@ class Frame:
     """A frame in which poses are given.
 
     Attributes:
-        place: of the frame in the world, as expressions of a program.
-        is_path: whether it is that of a path, and not the pose about which a workspace is.
+        place: pose of the frame in the world, as expressions of a program.
+        is_path: whether this is the frame of a path; else it is the pose about which a workspace lies.
     """
 
     place: SymbolicPose
@@ -60,18 +60,18 @@ class Frame:
         return self.in_world(SX(pose.position.tolist()), SX(pose.rotation.tolist()))
 
     def carried(self, at: SymbolicPose, nlp: Nlp, x: FloatArray) -> SymbolicPose:
-        """Return an expression of a pose in the world at a point (n,) of a program, carried along by a frame about it.
+        """Return an expression of a world pose that is fixed in this frame, from its value at a point of a program.
 
         Args:
-            at: the pose, of whose expressions none is a variable of the frame.
-            nlp: the program.
-            x: the point.
+            at: pose in the world; none of its expressions is a variable of the frame.
+            nlp: the nonlinear program.
+            x: (n,) the point at which the pose has its value.
         """
         position, rotation = self.at(self.place, nlp, x)
         return self.in_world(at.position - SX(position.tolist()), at.rotation @ SX(rotation.T.tolist()))
 
     def returned(self, at: SymbolicPose, nlp: Nlp, x: FloatArray) -> SymbolicPose:
-        """Return a pose as it would be if a frame about it had stayed where it is at a point (n,) of a program."""
+        """Return the world pose as if this frame had stayed at its place at a point (n,) of a program."""
         position, rotation = self.at(self.place, nlp, x)
         turned = at.rotation @ self.place.rotation.T @ SX(rotation.tolist())
         return SymbolicPose(at.position - self.place.position + SX(position.tolist()), turned)

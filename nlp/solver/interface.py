@@ -1,7 +1,7 @@
-"""Interface of a local solver: any function of the type :class:`Solver` can search a program.
+"""Interface of local solvers: any function of the type :class:`Solver` can search a program.
 
-A solver reports the point at which it stopped, the multipliers, the reason, and the number of iterations. The report is
-never trusted: :mod:`screwsynth.nlp.solver.starts` corrects the point and judges it by the program's own conditions.
+A solver reports its last point, the multipliers, the stop reason, and the number of iterations. The report is never
+trusted: :mod:`screwsynth.nlp.solver.starts` corrects the point and judges it by the conditions of the program.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ class StopReason(enum.Enum):
 
 @dataclass(frozen=True, eq=False)
 class SolverResult:
-    """The point at which a local solver stopped.
+    """Report of a local solver about the point at which it stopped.
 
-    Multipliers belong to the scaled problem of :mod:`screwsynth.nlp.evidence.kkt`: variables in half ranges, and the
-    objective in parts of its scale, minimised. They are positive at an upper limit and negative at a lower one.
+    Multipliers belong to the scaled problem of :mod:`screwsynth.nlp.evidence.kkt`, with variables in half ranges and a
+    scaled objective to be minimised. They are positive at an upper limit and negative at a lower one.
 
     Attributes:
         x: (n,) the point, in the program's units.
-        bound_multipliers: (n,) of the variables' bounds, per half range.
-        constraint_multipliers: (c,) of the constraints, per unit of their expressions.
-        reason: why the solver stopped there.
+        bound_multipliers: (n,) multipliers of the variables' bounds, per half range.
+        constraint_multipliers: (c,) multipliers of the constraints, per unit of their expressions.
+        reason: reason why the solver stopped.
         iterations: number of iterations.
     """
 
@@ -59,12 +59,12 @@ class Solver(Protocol):
         """Return ``count`` searches that may run at the same time, each in one thread only.
 
         Args:
-            nlp: the program, with at least one variable.
-            search: the limit of iterations, and whether functions are to be compiled.
-            points: (k, n) the starting points to come, for a solver that scales the problem by them.
+            nlp: nonlinear program with at least one variable.
+            search: limit of iterations, and whether functions are compiled.
+            points: (k, n) later starting points, for a solver that scales the problem by them.
             count: number of searches.
 
         Raises:
-            InputError: the program is to be compiled, and cannot be.
+            InputError: the program cannot be compiled, although the search asks for it.
         """
         ...

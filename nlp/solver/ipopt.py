@@ -1,4 +1,4 @@
-"""The call of Ipopt through CasADi, over scaled variables and a scaled objective.
+"""Call of Ipopt through CasADi, with scaled variables and a scaled objective.
 
 No other module knows Ipopt's strings.
 """
@@ -18,14 +18,14 @@ from ..program.nlp import Nlp
 from ..system.programs import shared_library
 from .interface import LocalSearch, SolverResult, StopReason
 
-#: Ipopt's tolerance. The Newton correction that follows converges quadratically: tighter would only cost iterations.
+#: Ipopt's tolerance. The Newton correction afterwards converges quadratically: a tighter one would only cost time.
 TOLERANCE = 1e-8
 #: Number of starting points at which the size of each constraint is measured.
 _SAMPLED = 4
-#: Length of a gradient in scaled variables below which ranges are narrow: an ordinary rotation of 3 degrees has 1e-3.
+#: Length of a gradient in scaled variables that indicates narrow ranges: an ordinary rotation of 3 degrees has 1e-3.
 _SHORT = 1e-4
-#: Distance from bounds, barrier and multipliers that Ipopt keeps at a point that is optimal already: below its
-#: tolerance, so that it need not leave the point.
+#: Distance from bounds, barrier and multipliers for Ipopt at a point that is optimal already: below its tolerance, so
+#: that Ipopt can stay at the point.
 _MARGIN = 1e-9
 _WARM = (
     "mu_init",
@@ -49,7 +49,7 @@ def ipopt(nlp: Nlp, search: Search, points: FloatArray, count: int) -> list[Loca
     CasADi's symbols are not safe to share between threads: every function is built here, and only called later.
 
     Raises:
-        InputError: the objective is to be compiled, and cannot be.
+        InputError: the objective cannot be compiled, although the search asks for it.
     """
     problem = _Problem(nlp, search, constraint_sizes(nlp, points))
     options = _options(search.max_iterations)
@@ -57,18 +57,18 @@ def ipopt(nlp: Nlp, search: Search, points: FloatArray, count: int) -> list[Loca
 
 
 class Confirmation:
-    """Ipopt from points that are optimal already, with their multipliers: where it agrees, it stays there.
+    """Ipopt from points that are optimal already, with their multipliers: if it confirms a point, it stays there.
 
-    Its derivatives are the program's own functions, which exist by then; differentiating once more takes longer than a
-    search. Like every search it must be built, and used, in one thread.
+    Its derivatives are existing functions of the program; another differentiation would take longer than a search.
+    Like every search it must be built and used in the same thread.
 
     Args:
-        nlp: the program.
-        search: the limit of iterations, and whether functions are to be compiled.
-        sizes: (c,) those of the constraints, by :func:`constraint_sizes`.
+        nlp: the nonlinear program.
+        search: limit of iterations, and whether functions are compiled.
+        sizes: (c,) sizes of the constraints, from :func:`constraint_sizes`.
 
     Raises:
-        InputError: the objective is to be compiled, and cannot be.
+        InputError: the objective cannot be compiled, although the search asks for it.
     """
 
     def __init__(self, nlp: Nlp, search: Search, sizes: FloatArray) -> None:
@@ -88,13 +88,13 @@ class Confirmation:
 
 
 class _Problem:
-    """A program over scaled variables as Ipopt gets it, and the numbers with which it is scaled.
+    """A program in scaled variables for Ipopt, with its scales.
 
     Args:
-        nlp: the program.
-        search: whether functions are to be compiled.
-        sizes: (c,) those of the constraints.
-        symbols: the problem by CasADi's keys; that of :func:`_scaled_problem` where left out.
+        nlp: the nonlinear program.
+        search: limit of iterations, and whether functions are compiled.
+        sizes: (c,) sizes of the constraints.
+        symbols: problem by CasADi's keys; :func:`_scaled_problem` if left out.
     """
 
     def __init__(self, nlp: Nlp, search: Search, sizes: FloatArray, symbols: dict[str, MX] | None = None) -> None:
@@ -110,11 +110,11 @@ class _Problem:
         self._lower, self._upper = nlp.g_lower / self._sizes, nlp.g_upper / self._sizes
 
     def function(self, options: dict[str, Any]) -> ca.Function:
-        """Return a new solver, for one thread."""
+        """Return a new solver for one thread."""
         return ca.nlpsol("solver", "ipopt", self._problem, options)
 
     def search(self, function: ca.Function, point: FloatArray, optimum: SolverResult | None = None) -> SolverResult:
-        """Search from a point (n,), with the multipliers of an optimum where one is given."""
+        """Search from a point (n,), with the multipliers of an optimum if there is one."""
         nlp, sizes = self._nlp, self._sizes
         scaled = (point - nlp.centre) / nlp.scale
         given: dict[str, Any] = {"x0": scaled, "p": self._parameters, "lbg": self._lower, "ubg": self._upper}
@@ -134,7 +134,7 @@ class _Problem:
 def _given_derivatives(nlp: Nlp) -> tuple[dict[str, MX], dict[str, Any]]:
     """Return the problem of :func:`_scaled_problem` as calls of the program's functions, and options with derivatives.
 
-    The problem is by CasADi's keys.
+    Both have CasADi's keys.
     """
     program, n, c = nlp.program, nlp.n, len(nlp.program.constraints)
     counts = [len(program.arguments), n, n, 1, c]
@@ -157,7 +157,7 @@ def _given_derivatives(nlp: Nlp) -> tuple[dict[str, MX], dict[str, Any]]:
         ),
     }
     rows = jacobian * ca.repmat(scale.T, c, 1) / ca.repmat(sizes, 1, n)
-    # CasADi would differentiate once more, for multipliers that are not asked for.
+    # CasADi would differentiate once more, for multipliers that nobody needs.
     options["no_nlp_grad"] = True
     options["jac_g"] = ca.Function("nlp_jac_g", [s, parameters], [g / sizes, rows], names, ["g", "jac_g_x"])
     values = program.values(x, p)
@@ -165,9 +165,9 @@ def _given_derivatives(nlp: Nlp) -> tuple[dict[str, MX], dict[str, Any]]:
 
 
 def constraint_sizes(nlp: Nlp, points: FloatArray) -> FloatArray:
-    """Return (c,) typical lengths of each limit's gradient in scaled variables; divided by them, rows are of order 1.
+    """Return typical gradient lengths (c,) of the limits in scaled variables; divided by them, rows are of order 1.
 
-    The program's other constraints are of order 1 already, and have 1, except where narrow ranges make them small.
+    The other constraints of the program are of order 1 already and have 1, unless narrow ranges make them small.
     """
     jacobians = [nlp.program.kernels.derivatives(x, nlp.arguments).jacobian for x in points[:_SAMPLED]]
     rows = np.array(jacobians) * nlp.scale
@@ -179,7 +179,7 @@ def constraint_sizes(nlp: Nlp, points: FloatArray) -> FloatArray:
 
 
 def _scaled_problem(nlp: Nlp) -> dict[str, SX]:
-    """Return the program's structure over scaled variables, with a scaled objective to be minimised."""
+    """Return the program by CasADi's keys, in scaled variables, with a scaled objective to be minimised."""
     program = nlp.program
     s, centre, scale, weight = SX.sym("s", nlp.n), SX.sym("centre", nlp.n), SX.sym("scale", nlp.n), SX.sym("weight")
     sizes = SX.sym("sizes", len(program.constraints))
@@ -188,7 +188,7 @@ def _scaled_problem(nlp: Nlp) -> dict[str, SX]:
 
 
 def _compiled_problem(problem: dict[str, SX]) -> str:
-    """Return the path of a library with every function that Ipopt calls, for CasADi to load as external functions."""
+    """Return the path of a library with all functions that Ipopt calls, for CasADi to load as external functions."""
     solver = ca.nlpsol("solver", "ipopt", problem, _options(1))
     generator = ca.CodeGenerator("problem.c")
     for function in (solver.oracle(), *(solver.get_function(name) for name in solver.get_function())):
@@ -197,7 +197,7 @@ def _compiled_problem(problem: dict[str, SX]) -> str:
 
 
 def _options(max_iterations: int) -> dict[str, Any]:
-    """Return CasADi's and Ipopt's options, by their own names."""
+    """Return the options of CasADi and Ipopt, by their names there."""
     return {
         "print_time": False,
         "show_eval_warnings": False,
@@ -209,7 +209,7 @@ def _options(max_iterations: int) -> dict[str, Any]:
             "sb": "yes",
             "tol": TOLERANCE,
             "max_iter": max_iterations,
-            # Ipopt would otherwise widen every bound by 1e-8 and return values that no feasible point has.
+            # Otherwise Ipopt widens every bound by 1e-8 and returns infeasible points.
             "bound_relax_factor": 0.0,
             # The objective and variables are scaled already, by the same numbers for every start.
             "nlp_scaling_method": "none",

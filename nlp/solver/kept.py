@@ -1,4 +1,4 @@
-"""Journal in force, from which searches are taken and in which new ones are kept; none in most commands."""
+"""Active journal, from which kept searches are read and to which new ones are added; most commands have none."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ class Keeper(Protocol):
 
     def search(
         self, nlp: Nlp, search: Search, first: Sequence[FloatArray], solve: Callable[[], Any], make: Callable[..., Any]
-    ) -> Any:  # noqa: ANN401 - the solution's type stands above this module
-        """Return the solution of a search that is kept, or the one of a function, which is then kept.
+    ) -> Any:  # noqa: ANN401 - the type of a solution is defined in a module that imports this one
+        """Return the kept solution of a search, or solve and keep it.
 
         Args:
-            nlp: the program.
+            nlp: the nonlinear program.
             search: settings of the search.
             first: points (n,) to start from.
-            solve: searches the program.
-            make: returns a solution from its fields.
+            solve: function that searches the program.
+            make: function that returns a solution from its fields.
         """
         ...
 
@@ -35,7 +35,7 @@ _journal: ContextVar[Keeper | None] = ContextVar("journal", default=None)
 
 @contextmanager
 def kept_in(journal: Keeper | None) -> Iterator[None]:
-    """Take searches of a block from a journal, and keep those that are new in it; None for no journal."""
+    """Use a journal inside a block: read kept searches from it, and add new ones to it; None for no journal."""
     token = _journal.set(journal)
     try:
         yield
@@ -44,5 +44,5 @@ def kept_in(journal: Keeper | None) -> Iterator[None]:
 
 
 def journal_in_force() -> Keeper | None:
-    """Return the journal of the block; None without one."""
+    """Return the journal of the enclosing block, or None."""
     return _journal.get()

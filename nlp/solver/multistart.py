@@ -1,9 +1,8 @@
-"""Search of one program from many starting points, and the distinct optima found.
+"""Search of one program from many starting points, with the distinct optima.
 
-A case that fixes all dimensions and the pose leaves the robot's internal unknowns alone as variables, as many as its
-loops have independent equations: such a program is closed by Newton's method, without a local solver. Where the loops
-cannot be closed, dependent equations cannot be told and all remain: an interior-point method refuses a program with
-more equations than variables.
+A case without free dimensions and with a fixed pose has only the robot's internal unknowns as variables, as many as the
+loops have independent equations: Newton's method closes the loops, without a local solver. Where it fails, dependent
+equations cannot be recognised: an interior-point method refuses a program with more equations than variables.
 """
 
 from __future__ import annotations
@@ -45,9 +44,9 @@ from .screened import search_each
 from .starts import Optimum, Start, StartStatus, distinct_optima
 from .status import Phase, PhaseProgress, Status, no_phase
 
-#: A point better than the best optimum by more than this part of F's scale is better by more than rounding.
+#: Smallest improvement over the best optimum, in parts of F's scale, that is more than rounding.
 _BETTER = 1e-6
-#: Starting points of the search for the smallest relaxation.
+#: Number of starting points of the search for the smallest relaxation.
 _ELASTIC_STARTS = 8
 
 
@@ -56,19 +55,19 @@ class ProgramSolution(Whole):
     """Outcome of a search of one program.
 
     Attributes:
-        status: how it ended; only :attr:`Status.OPTIMAL` is the best point found.
-        nlp: the program.
-        x: (n,) the best point: optimal, or merely reached when the status says so.
-        state: the robot there, or None where its equations have no value.
-        evidence: the evidence there; None when nothing is free.
+        status: outcome of the search; only :attr:`Status.OPTIMAL` stands for the best known point.
+        nlp: the nonlinear program.
+        x: (n,) the best point: optimal, or only reached, as the status says.
+        state: state of the robot at ``x``; None where its equations have no value.
+        evidence: evidence of optimality at ``x``; None when nothing is free.
         starts: every start, in order.
-        optima: distinct optima that converged starts found, best first.
-        seed: of the starting points.
+        optima: distinct optima of converged starts, best first.
+        seed: seed of the starting points.
         seconds: wall time.
-        relaxation: for an infeasible program, the smallest movement of its limits found that makes it feasible; empty
-            where none was found.
-        better: objective of a point within the limits that is better than every optimum found, and at which a search
-            did not converge; None for none.
+        relaxation: smallest known relaxation of the limits that makes an infeasible program feasible; empty where none
+            is known.
+        better: objective of a feasible point that is better than every optimum, but at which no search converged; None
+            for none.
     """
 
     status: Status
@@ -92,14 +91,14 @@ class ProgramSolution(Whole):
         """Objective at the optimum.
 
         Raises:
-            EvaluationError: there is none, because the search failed.
+            EvaluationError: the search failed, so there is no optimum.
         """
         if not self.status.is_answer:
-            raise EvaluationError(f"the solve gave no optimum: it is {self.status.value}")
+            raise EvaluationError(f"no optimum: the solve ended with status {self.status.value!r}")
         return self.nlp.evaluate(self.x)[0]
 
 
-#: Called after each start with the number of starts done, the number of all, and the best objective so far.
+#: Function to call after each start, with the number of starts done, the number of all, and the best objective so far.
 Progress = Callable[[int, int, float | None], None]
 
 
@@ -113,16 +112,16 @@ def solve_program(
     solver: Solver = ipopt,
     phase: PhaseProgress = no_phase,
 ) -> ProgramSolution:
-    """Solve a program; where its limits seem to contradict each other, find the smallest relaxation.
+    """Solve a program; where its limits seem to contradict each other, search for the smallest relaxation.
 
     Args:
-        nlp: the program.
-        search: number of starts, seed and the solver's settings.
-        first: points (n,) to start from before those that the search samples.
-        jobs: number of threads; the result does not depend on it. Left out, as many as there are processors and work.
-        progress: called after each start.
-        solver: the local solver that searches from each starting point.
-        phase: called with the phase of the solve, and how far it is.
+        nlp: the nonlinear program.
+        search: number of starts, seed and settings of the solver.
+        first: points (n,) to start from before the sampled ones.
+        jobs: number of threads; the result does not depend on it. If left out, as many as processors and starts allow.
+        progress: function to call after each start.
+        solver: local solver that searches from each starting point.
+        phase: function to call with the phase of the solve and its progress.
 
     Raises:
         InputError: the objective is to be compiled, and there is no C compiler or it fails.
@@ -145,7 +144,7 @@ def _solved(
     solver: Solver,
     phase: PhaseProgress,
 ) -> ProgramSolution:
-    """Solve a program; arguments as for :func:`solve_program`."""
+    """Solve a program; for arguments see :func:`solve_program`."""
     began = time.perf_counter()
     solution = _search(nlp, search, first, jobs, progress, solver, phase)
     nlp = solution.nlp
@@ -175,7 +174,7 @@ def _solved(
             break
     moved = relaxed_limits(nlp, least.x)
     if not moved:
-        # All limits can hold at once: the first search only missed the feasible set, which this point lies in.
+        # All limits can hold at once: the first search missed the feasible set, in which this point lies.
         solution = _search(nlp, search, [*first, least.x[: nlp.n]], jobs, None, solver, phase)
     return replace(solution, relaxation=moved, seconds=time.perf_counter() - began)
 
@@ -189,11 +188,11 @@ def _search(
     solver: Solver,
     phase: PhaseProgress,
 ) -> ProgramSolution:
-    """Search a program from the first points and from sampled ones, again while bounds of its level hold it back."""
+    """Search a program from the first points and from sampled ones; repeat while the bounds of its level are active."""
     solution = _search_within(nlp, search, first, jobs, progress, solver, phase)
     while (wider := with_wider_level(solution.nlp, solution.x)) is not None and not is_requested():
         solution = _search_within(wider, search, [*first, solution.x], jobs, progress, solver, phase)
-    # A level on its bound is no answer.
+    # A level on its bound is not an answer.
     return solution if wider is None else replace(solution, status=Status.INTERRUPTED)
 
 
@@ -208,8 +207,8 @@ def _search_within(
 ) -> ProgramSolution:
     """Search a program from the first points and from sampled ones.
 
-    Of limits on many pairs, the program has those that the starting points violate, and gets those that the starts'
-    ends violate; such starts are repeated until none is left.
+    Of limits on many pairs, the program has those that the starting points violate. Limits that the results violate
+    are added, and the affected starts are repeated until no limit is violated.
     """
     began = time.perf_counter()
     if nlp.is_fixed:
@@ -219,7 +218,7 @@ def _search_within(
     blocks = Blocks(nlp)
     points = np.vstack([*first, starting_points(nlp, search.starts, search.seed)])
     if nlp.program.model.unknowns:
-        # From open loops, many searches end far from every closed one, or at one in which the robot is folded over.
+        # From open loops, many searches end far from every closed point, or where the robot is folded over.
         points = closed_starts(nlp, points)
     points, found = searched_starts(nlp, blocks, points, search, solver, jobs)
     nlp = with_pairs_at(nlp, points)
@@ -258,9 +257,9 @@ def _searched(
     solver: Solver,
     phase: PhaseProgress,
 ) -> tuple[Nlp, dict[int, Start]]:
-    """Return a program with the pairs that bind, and the searches from points (k, n) but for those that are known.
+    """Return a program with the pairs that bind, and the searches from points (k, n) whose results are not yet known.
 
-    Interrupted searches end before the last point.
+    If interrupted, the searches end before the last point.
     """
     found, left = dict(known), [k for k in range(len(points)) if k not in known]
     if found:
@@ -269,7 +268,7 @@ def _searched(
         phase(Phase.STARTS, len(found), len(points))
         for k, start in zip(left, search_each(nlp, points[left], search, jobs, solver), strict=False):
             if not found and start.status is StartStatus.CONVERGED:
-                _ = nlp.program.kernels.hessian  # the evidence needs it: at hand when the search is interrupted
+                _ = nlp.program.kernels.hessian  # the evidence needs it, also when the search is interrupted
             found[k] = start
             reached(Milestone.START)
             if progress is not None:
@@ -290,13 +289,13 @@ def _outcome(
 
 
 def _best_value(nlp: Nlp, starts: Iterable[Start]) -> float | None:
-    """Return the best objective of converged starts, or None where there is none."""
+    """Return the best objective of converged starts, or None without one."""
     values = [nlp.sign * start.F for start in starts if start.status is StartStatus.CONVERGED]
     return nlp.sign * min(values) if values else None
 
 
 def _evaluate_fixed(nlp: Nlp, search: Search, began: float) -> ProgramSolution:
-    """Evaluate a program of a case that leaves nothing free, once: only the robot's loops are closed."""
+    """Evaluate a program without free variables: only the robot's loops are closed."""
     x = closed_point(nlp, search)
     status = Status.EVALUATED if measured_violation(nlp, x) <= FEASIBLE else Status.INFEASIBLE
     evidence = None if status is Status.EVALUATED else examine(nlp, x)
@@ -304,11 +303,11 @@ def _evaluate_fixed(nlp: Nlp, search: Search, began: float) -> ProgramSolution:
 
 
 def _find_better_start(nlp: Nlp, starts: Sequence[Start], optima: Sequence[Optimum]) -> Start | None:
-    """Return a feasible start that did not converge and is better than every optimum found, or None.
+    """Return a feasible start that did not converge and is better than every optimum, or None.
 
-    With such a start, the best optimum found is not the global one, and must not be reported as such.
+    With such a start, the best optimum is not the global one, and must not be reported as such.
     """
-    others = (StartStatus.CONVERGED, StartStatus.OPEN)  # a robot with open loops is no point of the case
+    others = (StartStatus.CONVERGED, StartStatus.OPEN)  # open loops are no point of the case
     feasible = [start for start in starts if start.status not in others and start.violation <= FEASIBLE]
     if not (feasible and optima):
         return None
@@ -318,11 +317,11 @@ def _find_better_start(nlp: Nlp, starts: Sequence[Start], optima: Sequence[Optim
 
 
 def _status(nlp: Nlp, x: FloatArray, evidence: Evidence, converged: bool, better: Start | None) -> Status:
-    """Return the status of a search from the evidence at its best point (n,), and a better start, not converged."""
+    """Return the status of a search from the evidence at its best point (n,), and a better unconverged start."""
     if converged and evidence.kind.is_optimum:
         return Status.OPTIMAL if better is None else Status.LOCAL
     if evidence.kind is PointKind.INFEASIBLE:
-        # A point that only an estimate on the safe side refuses shows that there is one.
+        # A point that only a conservative estimate refuses shows that the program is feasible.
         return Status.INFEASIBLE if measured_violation(nlp, x) > FEASIBLE else Status.NOT_CONVERGED
     if evidence.kind is PointKind.LIMB_SINGULAR:
         return Status.LIMB_SINGULAR
@@ -330,13 +329,13 @@ def _status(nlp: Nlp, x: FloatArray, evidence: Evidence, converged: bool, better
 
 
 def closed_point(nlp: Nlp, search: Search) -> FloatArray:
-    """Return the point (n,) of a case that leaves nothing free, with its loops closed.
+    """Return the point (n,) of a case without free variables, with closed loops.
 
-    The assembly is that of home. Where the path from home does not reach the pose, loops are closed from sampled
-    unknowns; where this fails too, the point is where Newton's method ended from home.
+    The assembly mode is the home assembly mode. Where the path from home does not reach the pose, loops are closed from
+    sampled unknowns. Where this fails too, the result is the last iterate of Newton's method from home.
 
     Args:
-        nlp: the program.
+        nlp: the nonlinear program.
         search: number of starts and seed.
     """
     first = with_exact_level(nlp, closed_start(nlp))

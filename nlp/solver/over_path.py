@@ -1,4 +1,4 @@
-"""A design that is regular and keeps its limits at every point of a programmed path, by the exchange of poses."""
+"""Optimisation with regular poses and satisfied limits everywhere along a tool path, by exchange of poses."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ def over_path(case: Case, nlp: Nlp) -> SemiInfinite:
 
     Args:
         case: the case.
-        nlp: its program with limits at the stated poses.
+        nlp: nonlinear program of the case with limits at the stated poses.
 
     Raises:
-        InputError: the file of the path cannot be read, or holds what is not read.
+        InputError: the path's file cannot be read, or has a word that is not supported.
     """
     nlp, numbers, frame = with_place(nlp, case)
     path = path_of_case(case) if frame is None else stated_path(case)
@@ -38,7 +38,7 @@ def over_path(case: Case, nlp: Nlp) -> SemiInfinite:
         along = path if frame is None else placed(path, place.tolist())
         found = judge_path(with_objective(design_of(case, solved.nlp, solved.x), solved.F), along, gap=gap)
         faults = list(faults_of(found))
-        found = replace(found, case=replace(found.case, limits=case.limits))  # the level is no limit of the case
+        found = replace(found, case=replace(found.case, limits=case.limits))  # the level is not a limit of the case
         if frame is not None:
             faults = [None if each is None else each.moved(partial(in_frame, place)) for each in faults]
         return JudgedDesign(found.case, found, faults)

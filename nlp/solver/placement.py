@@ -1,4 +1,4 @@
-"""The place of a path as variables of a program."""
+"""Pose of a path's frame as variables of a program."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from ..program.places import Scalar
 
 
 class Placement(NamedTuple):
-    """A program with the free numbers of a path's place.
+    """A program with the free coordinates of a path's frame as variables.
 
     Attributes:
-        nlp: the program.
-        numbers: returns the place (6,) at a point of the program, or of one with further variables.
-        frame: the place as expressions; None where nothing of it is free.
+        nlp: the nonlinear program.
+        numbers: function that returns the pose (6,) of the frame at a point of the program, or of an extended one.
+        frame: frame as expressions; None where the frame is fixed.
     """
 
     nlp: Nlp
@@ -35,11 +35,11 @@ class Placement(NamedTuple):
 
 
 def with_place(nlp: Nlp, case: Case) -> Placement:
-    """Return a program with the free numbers of the place of its case's path as variables."""
+    """Return a program with the free coordinates of the frame of its case's path as variables."""
     place = () if case.path is None else case.path.place
     free = [k for k, value in enumerate(place) if isinstance(value, Free)]
     fixed = np.array([0.0 if isinstance(value, Free) else value for value in place])
-    # The level of an epigraph stays the last variable.
+    # The level of an epigraph remains the last variable.
     epigraph = nlp.program.places.epigraph
     first = nlp.n if epigraph is None else epigraph.level
 
@@ -52,7 +52,7 @@ def with_place(nlp: Nlp, case: Case) -> Placement:
         return Placement(nlp, numbers, None)
     symbols, every = SX.sym("place", len(free)), SX(fixed.tolist())
     every[free] = symbols
-    # With both indices below a column stays one where it is empty.
+    # Two indices keep the column shape of an empty result.
     ranges = [value for value in place if isinstance(value, Free)]
     names, program = list(PLACE.items()), nlp.program
     added = [Scalar(f"path.place.{names[k][0]}", names[k][1]) for k in free]

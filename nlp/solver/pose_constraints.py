@@ -1,10 +1,10 @@
-"""Claims at poses of a workspace as constraints of a program, for any robot and any machine within a tolerance.
+"""Claims at poses of a workspace as constraints of a program, for the exact robot and within a joint-centre tolerance.
 
-At such a pose the independent coordinates are fixed, and unknowns in closed form are put in. The other dependent
-coordinates are further variables of the program, with the loop equations at this pose as constraints.
+At such a pose the independent coordinates are fixed, and unknowns with a closed form are replaced by it. The other
+dependent coordinates become further variables of the program, with the loop equations at this pose as constraints.
 
-Out of a limb's reach the closed forms are continued, so that a search may pass through such points: reach is a separate
-claim, and so a separate constraint.
+Beyond the reach of a limb the closed forms are continued, so that a search may pass through such points: reach is a
+separate claim, and so a separate constraint.
 """
 
 from __future__ import annotations
@@ -45,45 +45,45 @@ from ..program.epigraph import level_constraint
 from ..program.nlp import Nlp
 from ..program.places import Scalar
 from ..proof.statement.claims import Claim, dependent_claims
-from ..proof.statement.machine import workspace_of_case
+from ..proof.statement.fixed_robot import workspace_of_case
 from ..proof.statement.tolerance import BuiltModel, built_model
 from ..proof.workspace.robot.pose_box import PoseNumbers, pose_box, rotation_of
 from ..proof.workspace.robot.posed_robot import NotJudgedError, Problem, build_problem
 from .frames import Frame, pose_of
 
-#: Part of a limit by which it is tighter in the constraints: several gaps of the proofs fit between.
+#: Relative amount by which constraints are tighter than limits: several gaps of the proofs fit between.
 TIGHTER = 1e-3
-#: Start of the name of a claim that a limb reaches every pose; smallest squared sine or cosine of a limb's reach: of a
-#: number between 0 and 1 the limit 0 is tighter by as much.
+#: First words of the name of a claim about the reach of a limb; and smallest squared sine or cosine of the limb's reach
+#: in a constraint: for a quantity between 0 and 1, the limit 0 is tighter by this amount.
 REACH, _REACH = "reach limb ", TIGHTER
-#: Part of the determinant of J in the middle of the workspace that is demanded at a singular pose.
+#: Smallest determinant of J at a singular pose, as a part of that in the middle of the workspace.
 _DETERMINANT = 1e-2
-#: The same of J'J, from the stated pose: J'J has no sign that tells the far side of a singular pose, so that the
-#: singular pose moves by little: of each further one more is demanded, up to a largest part.
+#: Smallest determinant of J'J, as a part of that at the stated pose; the factor for each further singular pose; and the
+#: largest part. J'J has no sign, so the singular pose moves only a little: each further one must be farther away.
 _SQUARED, _MORE, _MOST = 1e-4, 4.0, 1e-2
-#: What every design with a proof keeps of reaches and determinants.
+#: Bounds of reaches and determinants that hold for every proved design.
 _ABOVE = (0.0, math.inf)
 #: Steps from the middle of the workspace to a pose, along which closed loops are followed.
 _WAY = 16
-#: Working ranges by which a dependent coordinate of the pose may leave its own in a search: that of another design
-#: is another.
+#: Number of working ranges by which a dependent coordinate may leave its range in a search: another design has other
+#: ranges.
 _BEYOND = 2.0
 #: Steps of Newton's method for the further variables, and largest residual of closed loops.
 _STEPS, _CLOSED = 11, 1e-9
-#: Part of its size by which two constraints may differ that count as the same; and the distance of designs, in half
-#: ranges, at which they are compared.
+#: Relative difference below which two constraints count as equal; and the distance of designs, in half ranges, at which
+#: they are compared.
 _ALIKE, _NEARBY = 3e-4, 0.05
 _SEED = 0
 
 
 class BindingPose(NamedTuple):
-    """A pose at which a claim, by its name, is a constraint.
+    """A pose at which a claim becomes a constraint.
 
     Attributes:
-        name: of the claim.
-        pose: the pose; of a stroke that of the shortest length.
-        longest: pose of the longest length of a stroke; else None.
-        errors: (m, 3) of the joint centres of the machine that is meant; None for the exact one.
+        name: name of the claim.
+        pose: pose in question; for a stroke, the pose of the shortest length.
+        longest: pose of the longest length, for a stroke; else None.
+        errors: (m, 3) joint-centre errors of the robot within the tolerance; None for the exact robot.
     """
 
     name: str
@@ -97,12 +97,12 @@ class BindingPose(NamedTuple):
         return (self.pose,) if self.longest is None else (self.pose, self.longest)
 
     def moved(self, move: Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]) -> BindingPose:
-        """Return the claim at poses that are moved from one frame to another, from position and rotation."""
+        """Return the claim with poses moved to another frame by a function of position and rotation."""
         poses = [pose_of(*move(each.position, each.rotation)) for each in self.poses]
         return self._replace(pose=poses[0], longest=None if self.longest is None else poses[1])
 
     def is_same(self, other: BindingPose) -> bool:
-        """Return whether another one has the same claim, poses and machine, to the last bit."""
+        """Return whether another claim has exactly the same name, poses and joint-centre errors."""
         one, two = (
             [*(part for pose in each.poses for part in (pose.position, pose.rotation)), each.errors]
             for each in (self, other)
@@ -118,11 +118,11 @@ class _ClosedPose:
     """A robot at a pose, with m further variables of a program that close its loops.
 
     Attributes:
-        model: the robot; its unknowns have no closed form.
-        robot: at the pose.
-        reaches: edges of the reach of its limbs at the pose.
-        variables, symbols: the further variables, (m, 1).
-        lower, upper, start: (m,) their bounds, and values at which the loops of the design are closed.
+        model: model of the robot; its unknowns have no closed form.
+        robot: expressions of the robot at the pose.
+        reaches: reach margins of its limbs at the pose.
+        variables, symbols: further variables and their symbols, (m, 1).
+        lower, upper, start: (m,) bounds of the variables, and values that close the loops of the design.
         equations: m loop equations.
     """
 
@@ -138,7 +138,7 @@ class _ClosedPose:
 
 
 class _PosedClaim(NamedTuple):
-    """A claim as constraints of a program, and of its level where that is minimised, with the robot at its poses."""
+    """A claim as constraints of a program, and of its level if that is minimised, with the robot at its poses."""
 
     poses: tuple[_ClosedPose, ...]
     constraints: tuple[BoundedConstraint, ...]
@@ -149,16 +149,16 @@ class PoseConstraints:
     """Claims at poses, as constraints of the program of a case.
 
     Args:
-        nlp: the program without them.
+        nlp: nonlinear program without these constraints.
         case: the case.
-        middle: pose by whose determinant of J others are measured; that in the middle of the workspace if left out.
-        frame: in which poses are given; the world if left out.
+        middle: pose whose determinant of J is the reference; the middle of the workspace if left out.
+        frame: frame in which poses are given; the world if left out.
     """
 
     def __init__(self, nlp: Nlp, case: Case, middle: PoseNumbers | None = None, frame: Frame | None = None) -> None:
         if middle is None:
             if case.workspace is None:
-                raise TypeError("a case with limits over its workspace has a workspace")
+                raise TypeError("case.workspace: expected a workspace where limits hold over it, got None")
             box = pose_box(case.workspace)
             middle = box.pose(0.5 * (box.lower + box.upper))
         self._nlp, self._case, self._middle, self._frame = nlp, case, middle, frame
@@ -172,7 +172,7 @@ class PoseConstraints:
 
     @property
     def program(self) -> Nlp:
-        """The program with the claims as constraints, with limits that are tighter by :data:`TIGHTER`."""
+        """The program with the claims as constraints, tighter than the limits by :data:`TIGHTER`."""
         nlp, program = self._nlp, self._nlp.program
         poses = [pose for claim in self._claims for pose in claim.poses]
         count = sum(len(each.variables) for each in poses)
@@ -199,19 +199,19 @@ class PoseConstraints:
         return wide.with_constraints([*equations, *limits, *of_level])
 
     def added(self, design: Case, fresh: Sequence[BindingPose], x: FloatArray, part: float = 1.0) -> list[BindingPose]:
-        """Add further claims as constraints, and return those that are added.
+        """Add further claims as constraints, and return the added ones.
 
-        Constraints that only repeat another, at the images of a pose in a symmetric robot, are left out: with both a
-        program would have no unique multipliers. Two are the same where they differ by less than they are tighter than
+        Constraints that repeat another one, such as at mirrored poses of a symmetric robot, are left out: with both, a
+        program has no unique multipliers. Two constraints count as equal if they differ by less than the margin to
         their limits, at a design and at designs around it.
 
         Args:
-            design: that refutes the claims.
-            fresh: the claims.
-            x: (n,) the design, and more that does not count.
-            part: of :data:`TIGHTER` by which the limits are tighter.
+            design: design that refutes the claims.
+            fresh: new claims.
+            x: (n,) the design; further components are not read.
+            part: part of :data:`TIGHTER` by which the limits are tighter.
         """
-        # Where a limb does not reach a pose, J and the limits are not defined nearby: the reach comes first.
+        # Where a limb does not reach a pose, J and the limits are not defined nearby: add the reach first.
         first = [each for each in fresh if each.name.startswith(REACH)]
         if not fresh:
             return []
@@ -226,7 +226,7 @@ class PoseConstraints:
             if claim is None:
                 continue
             values = self._values(claim, points)
-            # Limits of one size on joints of different limbs repeat each other too.
+            # Equal limits on joints of different limbs may also repeat each other.
             key = repr([(item.lower, item.upper) for item in (*claim.constraints, *claim.of_level)])
             if not any(key == one and _are_alike(values, other, part) for one, other in known):
                 known.append((key, values))
@@ -241,7 +241,7 @@ class PoseConstraints:
         return [x, *(np.clip(x + step, nlp.lower, nlp.upper) for step in steps)]
 
     def _values(self, claim: _PosedClaim, points: Sequence[FloatArray]) -> FloatArray:
-        """Return the numbers of a claim's constraints, with loops closed, at designs (n,)."""
+        """Return the values of a claim's constraints, with closed loops, at designs (n,)."""
         program = self._nlp.program
         symbols = ca.vertcat(SX(0, 1), *[each.symbols for each in claim.poses])
         equations, values = (
@@ -264,7 +264,7 @@ class PoseConstraints:
         return np.array([at_design(x) for x in points])
 
     def _claim(self, binding: BindingPose, problem: Problem, x: FloatArray) -> _PosedClaim | None:
-        """Return a claim as constraints; None where it has none, or the loops of the design (n,) do not close there."""
+        """Return a claim as constraints; None without any, or where the loops of the design (n,) cannot be closed."""
         where = f" workspace pose {len(self._claims) + 1}"
         poses = []
         for pose in binding.poses:
@@ -286,7 +286,7 @@ class PoseConstraints:
     def _closed_pose(
         self, pose: PoseNumbers, errors: FloatArray | None, problem: Problem, x: FloatArray, where: str
     ) -> _ClosedPose | None:
-        """Return a machine at a pose; None where the loops of the design (n,) do not close there."""
+        """Return a robot at a pose; None where the loops of the design (n,) cannot be closed."""
         nlp, count, box = self._nlp, len(problem.free), problem.box
         y = box.coordinates(self._numbers(pose, x))
         start = _closed_at(problem, y)
@@ -300,7 +300,7 @@ class PoseConstraints:
             model, reaches = self._built.model, self._built.reaches
             parameters = ca.vertcat(parameters, SX(errors.ravel().tolist()))
             reference = None if reference is None else (*reference, *np.zeros(errors.size).tolist())
-        names = [*(f"number {j + 1} of the pose" for j in places), *(item.name for item in model.unknowns)]
+        names = [*(f"pose coordinate {j + 1}" for j in places), *(item.name for item in model.unknowns)]
         symbols, coordinates = SX.sym("w", len(names)), SX(y)
         for j, place in enumerate(places):
             coordinates[place] = symbols[j]
@@ -327,13 +327,13 @@ class PoseConstraints:
         return replace(closed, equations=equations) if len(equations) == len(names) else None
 
     def _placed(self, pose: PoseNumbers) -> SymbolicPose:
-        """Return a pose in the world."""
+        """Return the symbolic world pose for a pose given in the frame."""
         if self._frame is None:
             return SymbolicPose(SX(pose.position.tolist()), SX(pose.rotation.tolist()))
         return self._frame.placed(pose)
 
     def _numbers(self, pose: PoseNumbers, x: FloatArray) -> PoseNumbers:
-        """Return a pose in the world at a point (n,)."""
+        """Return the world pose at a point (n,) for a pose given in the frame."""
         return pose if self._frame is None else pose_of(*Frame.at(self._frame.placed(pose), self._nlp, x))
 
     @cached_property
@@ -341,12 +341,12 @@ class PoseConstraints:
         return built_model(self._case.model, extended=True)
 
     def _robot(self, model: Model, given: Substitution) -> RobotInstance:
-        """Return a robot with the tasks of the case."""
+        """Return the expressions of a robot with the tasks of the case."""
         twists = [SX(np.asarray(task.twist, dtype=np.float64).tolist()) for task in self._case.tasks]
         return instantiate(model, given, SX(self._case.characteristic_length), twists)
 
     def _equations(self, closed: _ClosedPose, x: FloatArray, where: str) -> tuple[BoundedConstraint, ...]:
-        """Return the loop equations that determine the further variables: those that follow from them are left out."""
+        """Return independent loop equations that determine the further variables."""
         if not closed.variables:
             return ()
         program, closure = self._nlp.program, closed.robot.closure
@@ -360,7 +360,7 @@ class PoseConstraints:
     def _constraints(
         self, binding: BindingPose, poses: Sequence[_ClosedPose], x: FloatArray, where: str
     ) -> Iterator[BoundedConstraint]:
-        """Yield the constraints of a claim, with limits that are a little tighter."""
+        """Yield the constraints of a claim, tighter than its limits."""
         closed, name = poses[0], f"{binding.name}{where}"
         if binding.name == "regular":
             yield self._regular(closed.robot, name)
@@ -369,7 +369,7 @@ class PoseConstraints:
         if reaches:
             program = self._nlp.program
             numbers = ca.Function("reach", [program.x, program.p], [ca.vertcat(*reaches)])
-            # Both rods of a parallelogram reach equally far: one of two equal constraints is enough.
+            # The two rods of a parallelogram have equal reach: one of two equal constraints is enough.
             farthest = int(np.argmin(numbers(x, self._nlp.arguments).full()))
             yield BoundedConstraint(Constraint(name, reaches[farthest], NUMBER, stated=_ABOVE), _REACH, math.inf)
             return
@@ -386,17 +386,17 @@ class PoseConstraints:
         yield from (_tightened(item, name) for item in items if item.constraint.name in (binding.name, name))
 
     def _of_dependent(self, robot: RobotInstance, x: FloatArray) -> list[Claim]:
-        """Return the claims about stated ranges of dependent coordinates of a pose, in the workspace of a design."""
+        """Return the claims about stated ranges of dependent coordinates, in the workspace of a design."""
         if self._workspace is None:
             return []
         if self._frame is not None and not self._frame.is_path:
-            # The range moves with the pose, and is that of the design.
+            # The range moves with the pose of the design.
             at = self._frame.returned(SymbolicPose(robot.position, robot.rotation), self._nlp, x[: self._nlp.n])
             robot = replace(robot, position=at.position, rotation=at.rotation)
         return [each for each in dependent_claims(robot, self._workspace) if each.limit is not None]
 
     def _regular(self, robot: RobotInstance, name: str) -> BoundedConstraint:
-        """Return the constraint that J keeps its rank: a determinant of its six rows also keeps its sign."""
+        """Return the constraint that J keeps its rank; a determinant of six rows must also keep its sign."""
         length = self._case.characteristic_length
         model = self._closed.model
         if robot.jacobian.shape[0] == robot.jacobian.shape[1] and not (model.unknowns or model.members):
@@ -411,13 +411,13 @@ class PoseConstraints:
         return BoundedConstraint(Constraint(name, ratio, NUMBER, stated=_ABOVE), least, math.inf)
 
     def _at_pose(self, closed: _ClosedPose, where: str) -> Iterator[BoundedConstraint]:
-        """Yield the constraints of the case's limits on a machine at a pose, and on its joint centres."""
+        """Yield the constraints of the case's limits on a robot at a pose, and on its joint centres."""
         robot, design, names = closed.robot, self._nlp.program.robot.legs, tuple(task.name for task in self._case.tasks)
         plates = [
             Plate(plate, tuple(PlateJoint(leg.name, getattr(leg, plate)) for leg in robot.legs))
             for plate in ("base", "platform")
         ]
-        # Joints are mounted as in the design.
+        # The joints are mounted as in the design.
         legs = tuple(replace(one, span=other.span) for one, other in zip(design, robot.legs, strict=True))
         for limit in self._case.limits:
             posed = replace(robot, legs=legs) if isinstance(limit, JointAngle) else robot
@@ -428,7 +428,7 @@ class PoseConstraints:
                 yield from limit.of_design(Design(self._case.as_limited, (robot,), {}))
 
     def _of_stroke(self, name: str, poses: Sequence[_ClosedPose]) -> Iterator[BoundedConstraint]:
-        """Yield the constraints of a claim about a leg at the poses of its shortest and of its longest length."""
+        """Yield the constraints of a claim about a leg's stroke, at the poses of shortest and longest length."""
         both = Design(self._case.as_limited, tuple(each.robot for each in poses), {})
         for limit in self._case.limits:
             for leg, family in zip(poses[0].robot.legs, limit.on_pairs(both), strict=False):
@@ -438,9 +438,9 @@ class PoseConstraints:
 
 
 def with_margin(nlp: Nlp, part: float) -> Nlp:
-    """Return a program whose limits at poses are tighter than those of the case by a part of what they are in it.
+    """Return a program with limits at poses that are tighter than in the case by a part of their present margin.
 
-    With 0 they are those of the case: the program holds for every design of the case, whatever its poses are.
+    With ``part`` 0 they are the limits of the case, and any poses give constraints that a valid design satisfies.
     """
     stated = [each.stated for each in nlp.program.constraints]
 
@@ -460,13 +460,13 @@ def _rows(robot: RobotInstance, length: float) -> SX:
 
 
 def _are_alike(one: FloatArray, other: FloatArray, part: float) -> bool:
-    """Return whether numbers (designs, constraints) are the same but for a small part of their size."""
+    """Return whether values (designs, constraints) are equal up to a small part of their size."""
     most = part * _ALIKE * np.abs(other).max(initial=0.0)
     return one.shape == other.shape and bool(np.abs(one - other).max() <= most)
 
 
 def _problem(design: Case, workspace: Workspace) -> Problem | None:
-    """Return a design over its workspace; None where its loops are not closed in the middle."""
+    """Return the problem of a design over its workspace; None where its loops cannot be closed in the middle."""
     try:
         return build_problem(design, closed_form(design.model).model, pose_box(workspace))
     except NotJudgedError:
@@ -474,7 +474,7 @@ def _problem(design: Case, workspace: Workspace) -> Problem | None:
 
 
 def _closed_at(problem: Problem, y: FloatArray) -> FloatArray | None:
-    """Return closed loops (n,) at a pose with coordinates (6,), followed from the middle; None where they end."""
+    """Return closed loops (n,) at a pose with coordinates (6,), followed from the middle; None if that fails."""
     independent, dependent = list(problem.independent), list(problem.dependent)
     z = problem.start.copy()
     target = z.copy()
@@ -492,7 +492,7 @@ def _closed_at(problem: Problem, y: FloatArray) -> FloatArray | None:
 
 
 def _tightened(item: BoundedConstraint, name: str) -> BoundedConstraint:
-    """Return a constraint with tighter bounds and a name."""
+    """Return a named constraint with tighter bounds."""
     lower = item.lower + TIGHTER * abs(item.lower) if math.isfinite(item.lower) else item.lower
     upper = item.upper - TIGHTER * abs(item.upper) if math.isfinite(item.upper) else item.upper
     stated = (item.lower, item.upper)

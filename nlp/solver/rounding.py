@@ -1,9 +1,9 @@
-"""A design in round numbers: of the multiples of a step near each free dimension, those with the best objective.
+"""Rounding of a design to multiples of a step, with the best objective among the multiples near each free dimension.
 
-Free lengths and angles of the robot are rounded, lengths to multiples in the case's unit and angles in degrees. Plain
-numbers, such as ratios, and directions stay free, as does the pose: they are solved again, with the rounded dimensions
-fixed. The multiples below and above each number are a search over listed values (:mod:`.choices`); where none of their
-combinations keeps the limits, the next ones on both sides join them.
+Free lengths and angles of the robot are rounded: lengths in the case's unit, angles in degrees. Plain numbers such as
+ratios, directions and the pose stay free, and are solved again with the rounded dimensions. The multiples below and
+above each value form a search over listed values (:mod:`.choices`). Where no combination satisfies the limits, the next
+multiples on both sides are added.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 
 from ...models import Dimension
 from ..case.case import Case
-from ..case.choices import ChosenNumber, listed_numbers, within_ranges
+from ..case.choices import ChosenDimension, catalogue_dimensions, within_ranges
 from ..case.pose import Free, Value
 from ..case.task import Method
 from ..errors import InputError
@@ -28,18 +28,18 @@ from .solution import Rounding, Solution
 from .solve import solve
 from .status import Status
 
-#: So many multiples farther on each side than the nearest ones are tried.
+#: Numbers of additional multiples on each side of the nearest ones, in the order in which they are tried.
 _FARTHEST = 3
-#: So many solves are made for each distance: with many dimensions not every combination can be searched.
+#: Largest number of solves for each of these: with many dimensions not every combination can be searched.
 _MOST = 200
-#: Distance from a multiple, in steps, that is rounding error.
+#: Distance from a multiple, in steps, below which it is rounding error.
 _EXACT = 1e-9
-#: Largest number of steps in a number: beyond it, multiples are not exact.
+#: Largest number of steps in a value: beyond it, multiples are not exact.
 _STEPS = 1e12
 
 
 class _Place(NamedTuple):
-    """A dimension that is rounded: parameter, component, name, dimension, its bounds, and its value at the solution."""
+    """A dimension to round: parameter, component, name, dimension, bounds, and value at the solution."""
 
     parameter: str
     component: int
@@ -58,29 +58,31 @@ def round_design(
     jobs: int | None = None,
     compiled: bool = False,
 ) -> Solution:
-    """Return a solution with the free lengths and angles of its robot rounded, and everything else solved again.
+    """Return a solution with rounded lengths and angles of its robot; everything else is solved again.
 
     Args:
-        solution: the answer to a case; one without an answer is returned as it is.
-        step: whose multiples the numbers become: in the case's unit of length, and degrees for angles.
-        starts: number of starting points of each solve instead of the case's.
-        seed: seed instead of the case's.
+        solution: answer to a case; a solution without an answer is returned unchanged.
+        step: step of the multiples, in the case's unit of length, and in degrees for angles.
+        starts: number of starting points of each solve; the case's number if left out.
+        seed: seed of the starting points; the case's seed if left out.
         jobs: number of threads; the result does not depend on it.
-        compiled: whether Ipopt calls the objective as compiled C.
+        compiled: If true, Ipopt calls the objective as compiled C.
 
     Returns:
-        The best combination of round numbers found, judged like any solution; without an answer where none of those
-        tried keeps the limits.
+        The best known combination of rounded values, judged like any solution; without an answer where no combination
+        that was tried satisfies the limits.
 
     Raises:
-        InputError: the step is not positive and finite, nothing is to be rounded, a range holds no multiple, or tasks
+        InputError: the step is not positive and finite, there is nothing to round, a range has no multiple, or tasks
             are combined by their average.
     """
     case, option = solution.case, f"--round {step:g}"
     check_rounding(case, step)
     if not solution.status.is_answer:
         return solution
-    chosen = case if solution.choice is None else within_ranges(case, listed_numbers(case), solution.choice.chosen)
+    chosen = (
+        case if solution.choice is None else within_ranges(case, catalogue_dimensions(case), solution.choice.chosen)
+    )
     places = list(_places(chosen, solution))
     solve_fixed = partial(solve, starts=starts, seed=seed, jobs=jobs, compiled=compiled)
     found, farther = solution, 0
@@ -91,12 +93,12 @@ def round_design(
             for item in case.model.parameters
         }
         near = replace(chosen, parameters=parameters)
-        found = solve_choices(near, solve_fixed, _MOST) if listed_numbers(near) else solve_fixed(near)
+        found = solve_choices(near, solve_fixed, _MOST) if catalogue_dimensions(near) else solve_fixed(near)
         if found.status.is_answer or found.status is Status.INTERRUPTED:
             break
     state = found.outcomes[0].state
     numbers = tuple(
-        ChosenNumber(
+        ChosenDimension(
             name=each.name,
             value=math.nan if state is None else float(np.ravel(state.parameters[each.parameter])[each.component]),
             unit=case.units.label(each.dimension),
@@ -111,7 +113,7 @@ def round_design(
 
 
 def check_rounding(case: Case, step: float) -> None:
-    """Refuse a step, or a case, with which rounding has no meaning; errors are those of :func:`round_design`."""
+    """Refuse a step, or a case, for which rounding has no meaning; for errors see :func:`round_design`."""
     option = f"--round {step:g}"
     if not 0 < step < math.inf:
         raise InputError(f"{option}: must be positive and finite")
@@ -130,12 +132,12 @@ def check_rounding(case: Case, step: float) -> None:
 
 
 def _is_rounded(dimension: Dimension, value: Value) -> bool:
-    """Return whether a number is rounded: a free length or angle that has no listed values."""
+    """Return whether a value is rounded: a free length or angle without listed values."""
     return isinstance(value, Free) and not value.values and dimension in (Dimension.LENGTH, Dimension.ANGLE)
 
 
 def _places(case: Case, solution: Solution) -> Iterator[_Place]:
-    """Yield the dimensions that are rounded, with their values at a solution."""
+    """Yield the dimensions to round, with their values at a solution."""
     state = solution.outcomes[0].state
     for item in case.model.parameters:
         for k, value in enumerate(case.components(item.name)):
@@ -145,26 +147,26 @@ def _places(case: Case, solution: Solution) -> Iterator[_Place]:
 
 
 def _multiples(place: _Place, step: float, farther: int, case: Case, option: str) -> Value:
-    """Return the multiples of a step about a number: the nearest ones, and so many farther on each side.
+    """Return the multiples of a step near a value: the nearest ones, and ``farther`` more on each side.
 
     Raises:
-        InputError: there is none within the number's bounds.
+        InputError: there is no multiple within the bounds of the value.
     """
     is_angle = place.dimension is Dimension.ANGLE
     ends = (place.bounds.lower, place.bounds.upper, place.value)
     lower, upper, at = (math.degrees(each) if is_angle else each for each in ends)
     if max(abs(lower), abs(upper)) > _STEPS * step:
-        raise InputError(f"{option}: is too small beside robot.parameters.{place.name}")
+        raise InputError(f"{option}: is too small compared with robot.parameters.{place.name}")
     low, high = math.ceil(lower / step - _EXACT), math.floor(upper / step + _EXACT)
     if low > high:
         unit = "deg" if is_angle else case.units.label(place.dimension)
-        fault = f"robot.parameters.{place.name} has no multiple of it between {lower:g} and {upper:g} {unit}"
+        fault = f"robot.parameters.{place.name} has no multiple of the step between {lower:g} and {upper:g} {unit}"
         raise InputError(f"{option}: {fault}")
     first = min(max(math.floor(at / step + _EXACT), low), high)
     last = min(max(math.ceil(at / step - _EXACT), low), high)
-    # Decimals of a multiple are those of the step: 3 times 0.1 is 0.3.
+    # A multiple has the decimals of the step: 3 times 0.1 is 0.3.
     shown = [float(k * Decimal(repr(step))) for k in range(max(first - farther, low), min(last + farther, high) + 1)]
-    # A bound in degrees differs from the same multiple by rounding.
+    # A bound in degrees may differ from the same multiple by rounding.
     inside = [
         min(max(math.radians(each) if is_angle else each, place.bounds.lower), place.bounds.upper) for each in shown
     ]

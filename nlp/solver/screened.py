@@ -1,9 +1,8 @@
-"""Screened starts: each is searched by sequential quadratic programming in C, and Ipopt confirms the optima.
+"""Screened starts: sequential quadratic programming in C searches each start, and Ipopt confirms the optima.
 
-The search in C (:mod:`screwsynth.nlp.screening`) takes a fraction of Ipopt's time. Every distinct optimum that it finds
-is given to Ipopt, with its multipliers: the point at which Ipopt ends is the answer. A start from which the search in C
-does not converge, or whose end the program's own conditions refuse, is searched by Ipopt from the beginning, so that no
-start is lost.
+The search in C (:mod:`screwsynth.nlp.screening`) takes a fraction of Ipopt's time. Ipopt starts from each distinct
+optimum of it, with the multipliers, and its last point is the answer. Ipopt also searches, from the beginning, the
+starts from which the search in C does not converge, or whose result violates the program's conditions.
 """
 
 from __future__ import annotations
@@ -20,30 +19,30 @@ from .interface import Solver, SolverResult, StopReason
 from .ipopt import Confirmation, constraint_sizes, ipopt
 from .starts import SAME_F, Start, StartStatus, judge, known_optimum, same_value, search_from
 
-#: Name of the search in C as the solver that ended a start.
+#: Name of the search in C, for starts that it ended.
 SCREEN = "sqp"
-#: Starts that are screened before the first of them is confirmed: few, so that long searches show progress and answer
-#: a request to stop with what they have.
+#: Number of starts that are screened before the first is confirmed: few, so that long searches show progress and can be
+#: stopped with what they have.
 _BLOCK = 32
 
 
 def search_each(
     nlp: Nlp, points: FloatArray, search: Search, jobs: int | None = None, solver: Solver = ipopt
 ) -> Iterator[Start]:
-    """Search a program from each of several points, with screening where the solver is Ipopt and it applies.
+    """Search a program from each of several points, with screening if the solver is Ipopt and the program allows it.
 
     Args:
-        nlp: the program.
+        nlp: the nonlinear program.
         points: (k, n) starting points.
-        search: the solver's settings, and whether starts are screened.
-        jobs: as for :func:`~screwsynth.nlp.solver.starts.search_from`.
-        solver: the local solver.
+        search: settings of the solver, and whether starts are screened.
+        jobs: number of threads; see :func:`~screwsynth.nlp.solver.starts.search_from`.
+        solver: local solver.
 
     Yields:
-        One start for each point, in their order; those that are done, where the work is requested to stop.
+        One start for each point, in order; if a stop is requested, only those that are done.
 
     Raises:
-        InputError: the objective is to be compiled, and cannot be.
+        InputError: the objective cannot be compiled, although the search asks for it.
     """
     if solver is not ipopt or not search.screen or not can_screen(nlp):
         yield from search_from(nlp, points, search, jobs, solver)
@@ -58,7 +57,7 @@ def search_each(
 def _search_block(
     nlp: Nlp, points: FloatArray, search: Search, jobs: int | None, confirmed: _Confirmed
 ) -> Iterator[Start]:
-    """Screen points, and yield their starts in order; those that are done, where the work is requested to stop."""
+    """Screen points, and yield their starts in order; if a stop is requested, only those that are done."""
     found = screen(nlp, points, confirmed.sizes, search.max_iterations, jobs)
     starts: list[Start | None] = []
     for k in range(len(points)):
@@ -80,15 +79,15 @@ def _search_block(
 
 
 class _Confirmed:
-    """Starts that the search in C brought to an optimum, and that Ipopt confirms.
+    """Confirmation by Ipopt of optima from the search in C.
 
-    Of points of one F, as on a connected set of optima, Ipopt confirms the first, and each that is better even by
-    rounding, so that a best one is always Ipopt's.
+    Of points with equal F, as on a connected set of optima, Ipopt confirms the first, and each that is better even by
+    rounding, so that the best point always comes from Ipopt.
 
     Args:
-        nlp: the program.
-        search: the solver's settings.
-        sizes: (c,) those of the constraints; see :func:`~screwsynth.nlp.solver.ipopt.constraint_sizes`.
+        nlp: the nonlinear program.
+        search: settings of the solver.
+        sizes: (c,) sizes of the constraints; see :func:`~screwsynth.nlp.solver.ipopt.constraint_sizes`.
     """
 
     def __init__(self, nlp: Nlp, search: Search, sizes: FloatArray) -> None:
@@ -97,7 +96,7 @@ class _Confirmed:
         self._known: list[Start] = []
 
     def start(self, found: Screened, k: int) -> Start | None:
-        """Return the k-th start, or None where Ipopt must search from its beginning."""
+        """Return the k-th start, or None where Ipopt must search from its starting point."""
         if not found.converged[k]:
             return None
         n, iterations = self._nlp.n, int(found.iterations[k])
@@ -117,9 +116,9 @@ class _Confirmed:
         return start
 
     def _confirm(self, screened: SolverResult) -> Start | None:
-        """Return the start whose search in C ended at a point; None where the program's conditions refuse it.
+        """Return the start for an optimum of the search in C; None where it violates the program's conditions.
 
-        Ipopt's point counts unless Ipopt fails from there, or leaves for a worse one.
+        Ipopt's point counts unless Ipopt fails from there, or moves to a worse point.
         """
         nlp = self._nlp
         own = replace(judge(nlp, screened), solver=SCREEN)
@@ -139,7 +138,7 @@ class _Confirmed:
         return own if is_good and loss > SAME_F * nlp.objective_scale else confirmed
 
     def _is_of_known_value(self, start: Start) -> bool:
-        """Return whether Ipopt has confirmed a point of the same F that is at least as good."""
+        """Return whether Ipopt has confirmed a point with the same F that is at least as good."""
         tolerance, sign = same_value(self._nlp), self._nlp.sign
         known = (sign * (start.F - each.F) for each in self._known if each.solver != SCREEN)
         return any(0 <= worse <= tolerance for worse in known)

@@ -1,7 +1,7 @@
-"""Searches and certificates that are kept in a journal, from which a stopped command goes on.
+"""Journal of searches and certificates, from which an interrupted command resumes.
 
-An entry is found by what was searched: names, bounds and arguments of the program, its values at a few points, settings
-and first points of the search. So a command that repeats a search takes its outcome from the journal, in any order.
+The key of an entry is the search: names, bounds and arguments of the program, its values at a few points, settings and
+first points. A command that repeats a search reads its outcome from the journal, in any order.
 """
 
 from __future__ import annotations
@@ -31,25 +31,25 @@ from .kept import journal_in_force
 from .starts import Optimum, Start, StartStatus
 from .status import Status
 
-#: Points of the box at which values of a program tell it from others.
+#: Number of points of the box at which values of programs are compared.
 _POINTS = 3
-#: Significant digits of the numbers that tell two searches apart, and part of the largest number of an array below
-#: which another one is rounding.
+#: Significant digits of the values that distinguish two searches, and part of the largest value of an array below which
+#: another value is rounding.
 _DIGITS, _ROUNDING = 12, 1e-14
 
 
 class KeptSearch(NamedTuple):
-    """Outcome of a search of a program. Numbers are texts, which keep every digit, and those that are not finite.
+    """Outcome of a search of a program. Numbers are texts, which keep every digit and also values that are not finite.
 
     Attributes:
-        key: text that tells the search from others.
+        key: text that identifies the search.
         status: value of the status.
-        x, lower, upper: the best point, and the bounds of the program that was searched last.
-        pairs: constraints of limits on pairs that the program got.
+        x, lower, upper: best point, and bounds of the last searched program.
+        pairs: constraints of limits on pairs that were added to the program.
         has_evidence: whether there is evidence at ``x``.
         starts: status, objective, stationarity, violation, iterations, solver and point of each start.
         optima: objective, count, spread and point of each distinct optimum.
-        relaxation: key, unit, dimension, limit and needed number of each limit that would have to move.
+        relaxation: key, unit, dimension, limit and needed value of each limit to relax.
         seed, seconds, better: fields of the solution.
     """
 
@@ -72,11 +72,11 @@ class KeptCertificate(NamedTuple):
     """A certificate of a program.
 
     Attributes:
-        key: text that tells the search from others.
-        x: the incumbent; None without one.
-        numbers: fields by name as texts.
-        words: fields by name.
-        counts: fields by name, whole numbers and truth values.
+        key: text that identifies the search.
+        x: incumbent; None without one.
+        numbers: fields with real values, by name, as texts.
+        words: fields with texts, by name.
+        counts: fields with whole numbers and truth values, by name.
         history: history of the certificate.
     """
 
@@ -93,13 +93,13 @@ _COUNTS = ("boxes", "open", "is_relative", "was_beaten", "in_other_mode")
 
 
 class SearchJournal(JournalFile):
-    """Searches and certificates that are done, in a file.
+    """Completed searches and certificates, in a file.
 
     Args:
-        path: name of the file, which is made when missing.
+        path: name of the file; a missing file is created.
 
     Raises:
-        InputError: the file cannot be written, is no journal of this version, or is held by another process.
+        InputError: the file cannot be written, is no journal of this version, or is locked by another process.
     """
 
     def __init__(self, path: Path) -> None:
@@ -108,8 +108,8 @@ class SearchJournal(JournalFile):
             path, {"screwsynth": "searches", "version": __version__}, "command", "choose another --resume, or remove it"
         )
 
-    def found(self, place: int, line: bytes) -> None:
-        """Take note of an entry that is in the file."""
+    def load_entry(self, place: int, line: bytes) -> None:
+        """Store an entry that is in the file."""
         del place
         with suppress(ValueError):
             try:
@@ -122,7 +122,7 @@ class SearchJournal(JournalFile):
         return len(self._kept)
 
     def __getitem__(self, key: str) -> KeptSearch | KeptCertificate | None:
-        """Return the entry of a key; None where there is none."""
+        """Return the entry of a key, or None."""
         return self._kept.get(key)
 
     def add(self, entry: KeptSearch | KeptCertificate) -> None:
@@ -137,32 +137,32 @@ class SearchJournal(JournalFile):
     def search(
         self, nlp: Nlp, search: Search, first: Sequence[FloatArray], solve: Callable[[], Any], make: Callable[..., Any]
     ) -> Any:  # noqa: ANN401 - as in Keeper
-        """Return the solution of a search that is kept, or the one of a function; see :class:`.Keeper`."""
+        """Return the kept solution of a search, or solve and keep it; see :class:`.Keeper`."""
         key = _key_of(nlp, repr(search), *first)
         known = self[key]
         if isinstance(known, KeptSearch):
-            with suppress(ValueError, LookupError):  # a journal that was written by others
+            with suppress(ValueError, LookupError):  # the file may be damaged or written by another program
                 return make(**_fields_of(known, nlp))
         found = solve()
-        if not is_requested():  # a search that was stopped is no outcome
+        if not is_requested():  # a stopped search has no outcome
             self.add(_entry_of(key, found))
         return found
 
     @property
     def words(self) -> str:
-        """How many entries it has, and what goes on from there."""
+        """Number of entries, and how to resume from them."""
         return f"{self.count}: the same command goes on from there" if self._kept else "no search is done"
 
     @property
     def count(self) -> str:
-        """How many entries it has."""
+        """Number of entries, with the name of the file."""
         return f"{len(self):,} search{'es are' if len(self) != 1 else ' is'} in {self.path}"
 
 
 def _key_of(nlp: Nlp, settings: str, *points: FloatArray) -> str:
-    """Return a text that tells a search from others, in any unit.
+    """Return a text that identifies a search, in any unit.
 
-    The last digits of numbers have no part in it: a repeated command may compute a program's constants with others.
+    The last digits of values are left out: a repeated command may compute a program's constants with other rounding.
     """
     program = nlp.program
     names = [[each.name for each in group] for group in (program.variables, program.constraints, program.arguments)]
@@ -170,7 +170,7 @@ def _key_of(nlp: Nlp, settings: str, *points: FloatArray) -> str:
     for share in np.random.default_rng(0).random((_POINTS, nlp.n)):
         at = nlp.evaluate(nlp.lower + share * (nlp.upper - nlp.lower))
         values.append(np.append(at.g, at.F))
-    # A number that is rounding beside the largest of its array is 0.
+    # A value that is rounding compared with the largest of its array is 0.
     shown = [
         f"{0.0 if abs(each) <= _ROUNDING * size else each:.{_DIGITS}g}"
         for group in values
@@ -185,19 +185,19 @@ def _text(values: FloatArray) -> str:
 
 
 def _vector(text: str, count: int) -> FloatArray:
-    """Return an array (n,) of a text.
+    """Return an array (n,) from a text.
 
     Raises:
-        ValueError: the text has another count of numbers.
+        ValueError: the text has another number of values.
     """
     values = [float(part) for part in text.split()]
     if len(values) != count:
-        raise ValueError("the entry is of another program")
+        raise ValueError(f"the entry belongs to another program: expected {count} values")
     return frozen_array(values, (count,))
 
 
 def _entry_of(key: str, found: Any) -> KeptSearch:  # noqa: ANN401 - as above
-    """Return a solution as an entry of a journal."""
+    """Return the journal entry of a solution."""
     nlp: Nlp = found.nlp
     return KeptSearch(
         key,
@@ -226,10 +226,10 @@ def _entry_of(key: str, found: Any) -> KeptSearch:  # noqa: ANN401 - as above
 
 
 def _fields_of(kept: KeptSearch, nlp: Nlp) -> Mapping[str, Any]:
-    """Return the fields of the solution of a program from an entry; state and evidence are computed anew.
+    """Return the fields of a solution from an entry; state and evidence are computed again.
 
     Raises:
-        ValueError: the entry is none of this program; a LookupError likewise.
+        ValueError, LookupError: the entry belongs to another program.
     """
     nlp = with_pairs(nlp, [PairPlace(*place) for place in kept.pairs])
     nlp = replace(nlp, lower=_vector(kept.lower, nlp.n), upper=_vector(kept.upper, nlp.n))
@@ -266,16 +266,16 @@ def kept_certificate(
     gap: float = GAP,
     above: float | None = None,
 ) -> Certificate:
-    """Return the certificate of a program from the journal in force, or that of a function, which is then kept.
+    """Return the certificate of a program from the active journal, or certify and keep it.
 
-    A certificate that an interrupt or the end of this block's time cuts short is no outcome, and is not kept.
+    A certificate that an interrupt or the time limit cuts short is not kept.
 
     Args:
-        nlp: the program.
-        x: (n,) best known point; None without one.
-        certified: certifies the program from this point.
-        gap: gap of its search, as for :func:`.certify_program`.
-        above: value of which it proves that F is above, likewise.
+        nlp: the nonlinear program.
+        x: (n,) incumbent; None without one.
+        certified: function that certifies the program from this point.
+        gap: requested gap, as for :func:`.certify_program`.
+        above: value of F to prove as a lower bound, as for :func:`.certify_program`.
     """
     journal = journal_in_force()
     if not isinstance(journal, SearchJournal):

@@ -1,13 +1,13 @@
-"""Semi-infinite programming by exchange of poses: a design that is regular and keeps its limits over a workspace.
+"""Semi-infinite programming by exchange of poses: a design that is regular and satisfies its limits over a workspace.
 
-A limit over a workspace is one constraint for each of its poses. A program with a few of them is solved, its design is
-judged over the whole workspace (:mod:`screwsynth.nlp.proof.workspace`), and the poses that refute a claim become
-constraints, each of the one claim that it refutes, until the proof holds.
+A limit over a workspace is one constraint at each of its poses. A program with a few of them is solved, and its design
+is judged over the whole workspace (:mod:`screwsynth.nlp.proof.workspace`). Poses that refute a claim become constraints
+of this claim, until the proof succeeds.
 
-In these constraints every limit is a little tighter than in the case: a design that lies exactly on a limit at the
-worst of the poses known is beyond it at some pose nearby, and the exchange would never end. Where no design keeps so
-much, the margin becomes smaller, with closer proofs. A case is infeasible only where no design keeps its limits as they
-are stated at the poses known, which is a program without any margin.
+The constraints are a little tighter than the limits of the case: a design exactly on a limit at the worst known poses
+would violate it at a nearby pose, and the exchange would never end. Where no design satisfies this margin, the margin
+shrinks, with tighter proofs. A case is infeasible only if no design satisfies its limits, without any margin, at the
+known poses.
 
 Source: J. W. Blankenship, J. E. Falk, *Infinitely constrained optimization problems*, J. Optim. Theory Appl. 19 (1976).
 """
@@ -38,7 +38,7 @@ from ..path.path import SymbolicPose
 from ..program.nlp import Nlp
 from ..proof.enclosure.engine import kernel
 from ..proof.statement.claims import REGULAR
-from ..proof.statement.machine import JointErrors, workspace_of_case
+from ..proof.statement.fixed_robot import JointErrors, workspace_of_case
 from ..proof.statement.posed_layout import reach_claims
 from ..proof.workspace.judge import judge_workspace
 from ..proof.workspace.judgement import Judgement
@@ -49,18 +49,18 @@ from .multistart import ProgramSolution
 from .pose_constraints import TIGHTER, BindingPose, PoseConstraints, with_margin
 from .status import Status
 
-#: Gap of the proofs: several of them fit between a limit of the constraints and that of the case.
+#: Gap of the proofs: several of them fit between a constraint's bound and the limit of the case.
 GAP = 2e-4
-#: Parts of the margin and of the gap, the next one where no design keeps the margin; the last two have the same gap.
+#: Parts of the margin and of the gap, in the order in which they are tried; the last two have the same gap.
 _PARTS = (1.0, 1e-1, 1e-2, 1e-3, 0.0)
-#: Part of a minimised level by which the same number over the workspace may be larger.
+#: Relative amount by which a minimised level may be larger over the workspace.
 LEVEL_ROOM = 1e-3
-#: Reason for ranks that are not judged.
+#: Reason why ranks are not judged.
 _UNREACHED = "a limb does not reach every pose, so that J is not judged"
 #: Largest number of exchanges.
 MOST_EXCHANGES = 40
 
-#: Solves a program, from points that come before those that the search samples.
+#: Function that solves a program from given points, followed by sampled ones.
 SolveOne = Callable[[Nlp, Sequence[FloatArray]], ProgramSolution]
 
 
@@ -69,12 +69,12 @@ class ExchangeProof:
     """The proof of a design over a workspace or along a path, by exchange of poses.
 
     Attributes:
-        judgement: judgement of the design.
-        poses: poses of the constraints, in the order in which they were found.
+        judgement: verdicts on the design.
+        poses: poses of the constraints, in the order in which they were added.
         history: F, and the number of claims that were not proved, of each design in turn.
-        first: judgement of the first design, which keeps the limits at the stated poses alone.
-        tighter: part of themselves by which the limits of the constraints are tighter than those of the case.
-        place: (6,) place of a path's frame: position, then roll, pitch and yaw, radians; empty for a workspace.
+        first: verdicts on the first design, with limits at the stated poses only.
+        tighter: relative amount by which the constraints are tighter than the limits of the case.
+        place: (6,) pose of a path's frame: position, then roll, pitch and yaw, radians; empty for a workspace.
     """
 
     judgement: Judgement
@@ -86,7 +86,7 @@ class ExchangeProof:
 
     @property
     def is_proved(self) -> bool:
-        """Whether the design is regular and keeps its limits at every pose."""
+        """Whether the design is proved to be regular and to satisfy its limits at every pose."""
         return self.judgement.is_proved
 
 
@@ -94,9 +94,9 @@ class JudgedDesign(NamedTuple):
     """A design judged at every pose of a set.
 
     Attributes:
-        design: the design, with the poses for which it is judged as its workspace.
-        judgement: its judgement.
-        faults: a pose for each claim that is not proved, None for one that is open without a pose.
+        design: design, with the set of poses as its workspace.
+        judgement: verdicts on the design.
+        faults: pose for each claim that is not proved; None for a claim that is undecided and has no pose.
     """
 
     design: Case
@@ -108,10 +108,10 @@ class SemiInfinite(NamedTuple):
     """A program whose limits hold at every pose of a set.
 
     Attributes:
-        nlp: the program without constraints from poses.
-        constraints: such constraints, none yet.
-        judge: judges the design of a solution, with a gap.
-        in_world: returns a proof at a point (n,) of the program with its poses in the world frame.
+        nlp: nonlinear program without constraints at poses.
+        constraints: constraints at poses, none yet.
+        judge: function that judges the design of a solution, with a gap.
+        in_world: function that returns a proof at a point (n,) of the program with its poses in the world frame.
     """
 
     nlp: Nlp
@@ -125,11 +125,11 @@ def over_workspace(case: Case, nlp: Nlp) -> SemiInfinite:
 
     Args:
         case: the case.
-        nlp: its program with limits at the stated poses.
+        nlp: nonlinear program of the case with limits at the stated poses.
     """
     frame = None
     if case.workspace is not None and case.workspace.about_pose:
-        # The workspace moves with the pose, and constraints with it.
+        # The workspace and its constraints move with the pose.
         robot = nlp.program.robot
         frame = Frame(SymbolicPose(robot.position, robot.rotation))
 
@@ -140,7 +140,7 @@ def over_workspace(case: Case, nlp: Nlp) -> SemiInfinite:
         if frame is not None:
             move = partial(excursion_from, Frame.at(frame.place, nlp, solved.x[: nlp.n]))
             faults = [None if each is None else each.moved(move) for each in faults]
-        # The level is no limit of the case.
+        # The level is not a limit of the case.
         return JudgedDesign(design, replace(found, case=design), faults)
 
     def in_world(proof: ExchangeProof, x: FloatArray) -> ExchangeProof:
@@ -153,10 +153,10 @@ def over_workspace(case: Case, nlp: Nlp) -> SemiInfinite:
 
 
 def check_exchange(case: Case) -> None:
-    """Refuse a case whose limits hold beside its poses and that no exchange can solve, and a missing C kernel.
+    """Refuse a case that the exchange of poses cannot solve, and a missing C kernel.
 
     Raises:
-        CaseError: the case averages its tasks, or combines them along a path with a free place.
+        CaseError: the case averages its tasks, or combines tasks along a path with a free place.
         InputError: the C kernel was not built.
     """
     if len(case.tasks) > 1 and case.method is Method.AVERAGE:
@@ -164,7 +164,7 @@ def check_exchange(case: Case) -> None:
         raise CaseError("combine.method", fault, case.method.value, case.source)
     if len(case.tasks) > 1 and case.path is not None and any(isinstance(each, Free) for each in case.path.place):
         raise CaseError("path.place", "must be fixed where several tasks are combined", source=case.source)
-    kernel()  # before any solve where it is missing
+    kernel()  # a missing kernel is reported before any solve
 
 
 @one_call
@@ -173,12 +173,12 @@ def exchanged(
 ) -> tuple[ProgramSolution, ExchangeProof | None]:
     """Return the solution of a program whose limits hold at every pose of a set, and the proof; None without an answer.
 
-    A design that is not proved at the end of the exchange is no answer. Where the work is to stop, it is the last one
-    that was judged.
+    A design that is not proved at the end of the exchange is no answer. If a stop is requested, the result is the last
+    judged design.
 
     Args:
-        problem: the program.
-        solve_one: solves a program.
+        problem: program with limits at every pose of a set.
+        solve_one: function that solves a program.
         first: points (n,) of the program to start from.
     """
     nlp, constraints = problem.nlp, problem.constraints
@@ -209,17 +209,17 @@ def exchanged(
 def _solve_within(
     nlp: Nlp, solve_one: SolveOne, start: FloatArray, parts: Sequence[float]
 ) -> tuple[ProgramSolution, list[float]]:
-    """Return the solution of a program with the largest margin that a design keeps, and the margins from it on.
+    """Return the solution of a program with the largest margin that a design satisfies, and the remaining margins.
 
     Args:
-        nlp: the program, with the whole margin.
-        solve_one: solves a program.
+        nlp: nonlinear program with the whole margin.
+        solve_one: function that solves a program.
         start: (n,) point to start from.
-        parts: of the margin, in turn.
+        parts: parts of the margin, in the order in which they are tried.
 
     Returns:
-        The solution; one without an answer where the limits as the case states them have none either. Then the first
-        of the parts that are left.
+        The solution, and the parts from its margin on. If the limits of the case cannot be satisfied either, the
+        solution has no answer, and the only part is 0.
     """
     found = solve_one(with_margin(nlp, parts[0]), [start])
     if found.status.is_answer or found.status is Status.INTERRUPTED or not parts[0]:
@@ -235,7 +235,7 @@ def _solve_within(
 
 
 def with_objective(design: Case, level: float) -> Case:
-    """Return a design with a limit on what is optimised over all poses: the level and a little more."""
+    """Return a design with a limit on the objective over all poses: slightly above the level."""
     measure, sense = design.tasks[0].measure, design.tasks[0].sense
     if design.worst_everywhere:
         allowed = level - sense.sign * LEVEL_ROOM * abs(level)
@@ -253,9 +253,9 @@ def with_objective(design: Case, level: float) -> Case:
 
 
 def _judged(case: Case, gap: float) -> Judgement:
-    """Return the verdicts on a design over its workspace; where its limbs do not reach every pose, on these alone."""
+    """Return the verdicts on a design over its workspace; if a limb does not reach every pose, on the reaches only."""
     closed, workspace = closed_form(case.model), workspace_of_case(case)
-    # Poses that the robot cannot take say nothing of the reach of its limbs.
+    # Poses that the robot cannot take are no evidence about the reach of its limbs.
     if closed.reaches and not workspace.dependent:
         layout, claims = reach_claims(case, closed, workspace)
         found = tuple(prove_extreme(layout, claim, NumberSearch(gap, 1)) for claim in claims)
@@ -267,7 +267,7 @@ def _judged(case: Case, gap: float) -> Judgement:
 def design_of(case: Case, nlp: Nlp, x: FloatArray) -> Case:
     """Return a case with the dimensions of a point (n,) of its program, all fixed.
 
-    Where the workspace is about the pose, it has the pose of the point too.
+    If the workspace lies about the stated pose, the case also has the pose of the point.
     """
     values = nlp.program.kernels.robot_state(x, nlp.arguments).parameters.ravel().tolist()
     parameters, begin = {}, 0
@@ -284,9 +284,9 @@ def design_of(case: Case, nlp: Nlp, x: FloatArray) -> Case:
 
 
 def faults_of(judged: Judgement) -> Iterator[BindingPose | None]:
-    """Yield a pose for each claim that is not proved; None for one that is open without a pose.
+    """Yield a pose for each claim that is not proved; None for a claim that is undecided and has no pose.
 
-    A constraint for the rank of the constraint wrenches does not exist.
+    There is no constraint for the rank of the constraint wrenches.
     """
     for each in (rank for rank in judged.ranks if rank.fails):
         is_known = each.name == REGULAR and each.pose is not None
@@ -295,7 +295,7 @@ def faults_of(judged: Judgement) -> Iterator[BindingPose | None]:
 
 
 def _faults_of_numbers(extremes: Sequence[Verdict]) -> Iterator[BindingPose | None]:
-    """Yield a pose for each number whose limit is not proved; None for one that is open without a pose."""
+    """Yield a pose for each limited quantity that is not proved; None where it is undecided and has no pose."""
     by_name = {(each.name, each.sense): each for each in extremes}
     for each in extremes:
         if not each.fails:
@@ -311,5 +311,5 @@ def _faults_of_numbers(extremes: Sequence[Verdict]) -> Iterator[BindingPose | No
 
 
 def _errors(found: JointErrors | None) -> FloatArray | None:
-    """Return the errors (m, 3) of the joint centres of a machine; None for the exact one."""
+    """Return the joint-centre errors (m, 3) of a robot within the tolerance; None for the exact robot."""
     return None if found is None else found.vectors

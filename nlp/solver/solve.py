@@ -1,4 +1,4 @@
-"""The solve of a case, with one task or several."""
+"""Solve of a case with one task or several."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from ...models import FloatArray
 from ..case.case import Case
-from ..case.choices import listed_numbers
+from ..case.choices import catalogue_dimensions
 from ..case.settings import Search
 from ..errors import CaseError
 from ..program.formulation import formulate_each, formulate_everywhere
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     Everywhere: TypeAlias = Callable[[Case, Nlp], SemiInfinite]
 
-#: Called after each start with the task or method that is being solved, the number of starts done, the number of all,
+#: Function to call after each start, with the name of the task or method, the number of starts done, the number of all,
 #: and the best objective so far.
 SolveProgress = Callable[[str, int, int, float | None], None]
 
@@ -44,28 +44,28 @@ def solve(
     solver: Solver = ipopt,
     phase: PhaseProgress = no_phase,
 ) -> Solution:
-    """Solve a case: its task, or each of several and then all of them by the method that the case names.
+    """Solve a case: its task, or each of several tasks and then their combination by the method of the case.
 
-    Of dimensions that have a few values, the best combination is taken: see :mod:`.choices`.
+    Of listed parameter values, the best combination is chosen: see :mod:`.choices`.
 
     Args:
         case: the case.
-        starts: number of starting points instead of the case's.
-        seed: seed instead of the case's.
-        jobs: number of threads; the result does not depend on it. Left out, as many as there are processors and work.
-        compiled: whether Ipopt calls the objective as compiled C.
-        progress: called after each start.
-        solver: the local solver that searches from each starting point.
-        phase: called with the phase of the solve, and how far it is.
+        starts: number of starting points; the case's number if left out.
+        seed: seed of the starting points; the case's seed if left out.
+        jobs: number of threads; the result does not depend on it. If left out, as many as processors and starts allow.
+        compiled: If true, Ipopt calls the objective as compiled C.
+        progress: function to call after each start.
+        solver: local solver that searches from each starting point.
+        phase: function to call with the phase of the solve and its progress.
 
     Raises:
         CaseError: the case contradicts itself, or has several tasks and nothing free.
-        InputError: the objective is to be compiled, and there is no C compiler or it fails; or limits hold over a
-            workspace or along a path, which needs a proof, and the C kernel was not built; or the path cannot be read.
+        InputError: the objective is to be compiled, and there is no C compiler or it fails; limits hold over a
+            workspace or along a path, and the C kernel for their proof was not built; or the path cannot be read.
     """
     began = time.perf_counter()
-    if listed_numbers(case):
-        from .choices import solve_choices  # noqa: PLC0415 - few cases have listed numbers
+    if catalogue_dimensions(case):
+        from .choices import solve_choices  # noqa: PLC0415 - few cases have listed values
 
         solve_fixed = partial(
             solve, starts=starts, seed=seed, jobs=jobs, compiled=compiled, progress=progress, solver=solver, phase=phase
@@ -105,22 +105,22 @@ def solve_programs(
     phase: PhaseProgress = no_phase,
     everywhere: Everywhere | None = None,
 ) -> Solution:
-    """Solve a case whose programs, one for each task, are formulated already.
+    """Solve a case from the formulated program of each of its tasks.
 
     Args:
         case: the case.
-        nlps: the program of each task, in order.
-        search: number of starts, seed and the solver's settings.
-        jobs: as for :func:`solve`.
-        progress: as for :func:`solve`.
-        solver: as for :func:`solve`.
-        phase: as for :func:`solve`.
-        everywhere: returns a program whose limits hold over a workspace or along a path, from one of the case with
-            limits at the stated poses; None for none.
+        nlps: nonlinear program of each task, in order.
+        search: number of starts, seed and settings of the solver.
+        jobs: number of threads; see :func:`solve`.
+        progress: function to call after each start.
+        solver: local solver that searches from each starting point.
+        phase: function to call with the phase of the solve and its progress.
+        everywhere: function that returns a program with limits over a workspace or along a path, from one with limits
+            at the stated poses; None for none.
 
     Raises:
         CaseError: the case has several tasks and nothing free.
-        InputError: as for :func:`solve`.
+        InputError: same reasons as for :func:`solve`.
     """
     began = time.perf_counter()
 
@@ -149,7 +149,7 @@ def solve_programs(
         own.append(solve_everywhere(replace(case, tasks=(task,)), task.name, nlp))
         if any(each is not None and not each.is_proved for each in proof.values()):
             notices.append(f"the optimum of {task.name!r} by itself is not proved {case.limits_where}")
-    proof.clear()  # only that of the combined design counts
+    proof.clear()  # only the proof of the combined design counts
     nlps = with_shared_pairs(nlps, [place for solution in own for place in solution.nlp.pairs])
     polish = partial(solve_program, search=replace(search, starts=1), jobs=1, solver=solver)
     solve_combined = partial(solve_everywhere, case)
@@ -162,18 +162,18 @@ def solve_programs(
 
 
 def _at_stated_poses(found: ProgramSolution, nlp: Nlp) -> ProgramSolution:
-    """Return a solution with poses of an exchange as constraints as one of the program without them."""
+    """Return the solution of an exchange as a solution of the program without constraints at its poses."""
     starts = tuple(replace(each, x=each.x[: nlp.n]) for each in found.starts)
     optima = tuple(replace(each, x=each.x[: nlp.n], nlp=nlp) for each in found.optima)
-    # A proof is of the combined design: an optimum that is not proved is combined too, and a notice says so.
+    # Only the combined design needs a proof: a separate optimum without proof is combined too, with a notice.
     status = Status.OPTIMAL if found.status is Status.NOT_PROVED else found.status
     return replace(found, status=status, nlp=nlp, x=found.x[: nlp.n], starts=starts, optima=optima)
 
 
 def _with_exchanged(solution: Solution, own: Sequence[ProgramSolution], notices: Sequence[str]) -> Solution:
-    """Return a solution of several tasks with each task's own program as the exchange left it, and further notices.
+    """Return a solution of several tasks with each task's program after the exchange, and with further notices.
 
-    Evidence about the combined point for one task alone is left out: it would be that of a program without the poses.
+    Evidence for one task at the combined point is left out: its program would lack the poses of the exchange.
     """
     combination = solution.combination
     return replace(

@@ -1,7 +1,7 @@
-"""Searches from many starting points, each corrected and judged by the program's own conditions; their distinct optima.
+"""Searches from many starting points, each corrected and judged by the program's conditions, and their distinct optima.
 
-The sides that the solver reports as active are held, and a few Newton steps bring the solver's point to rounding error.
-Convergence is then judged by the program's own first-order conditions, and never by the solver's report.
+The sides that the solver reports as active are fixed, and a few Newton steps bring the solver's point to rounding
+error. The first-order conditions of the program then decide on convergence, never the report of the solver.
 """
 
 from __future__ import annotations
@@ -34,34 +34,33 @@ from .status import Phase, PhaseProgress
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: A side farther than this, in half ranges, from the solver's point does not belong to the active set.
+#: A side farther than this from the solver's point, in half ranges, does not belong to the active set.
 _NEAR = 1e-2
-#: A side is held where its multiplier exceeds this part of its slack. The smallest part, which holds most sides, is
-#: tried first. Where it holds inactive sides, and so does not lead to a point as stationary as ``_POLISHED``, larger
-#: parts follow.
+#: A side is taken as active if its multiplier exceeds this part of its slack. The smallest part, with the most sides,
+#: is tried first; larger parts follow unless the corrected point is as stationary as ``_POLISHED``.
 _SHARES = (1e-4, 1.0, 1e2)
 _POLISHED = 1e-10
-#: Distance of a unit normal from the space of others below which it depends on them.
+#: Distance of a unit normal from the span of others below which it depends on them.
 _DEPENDENT = 1e-6
-#: Stationarity, violation and distance from active sides that are rounding error: a correction would change nothing.
+#: Stationarity, violation and distance from active sides below which a correction would change nothing.
 _EXACT = 1e-13
-#: A correction may make the scaled objective worse by this much: the tolerance that Ipopt stops at.
+#: Largest loss of the scaled objective by a correction: the stopping tolerance of Ipopt.
 _WORSE = 1e-8
-#: Two optima are the same when their points differ by less than this, in half ranges.
+#: Distance between points, in half ranges, below which two optima are the same.
 SAME_POINT = 1e-4
-#: Largest difference of F between the solver's point and the optimum nearby, in parts of F's scale: the remainder of an
+#: Largest difference of F between the solver's point and the nearby optimum, in parts of F's scale: the remainder of an
 #: interior-point method's barrier.
 SAME_F = 1e-6
-#: Starts for each thread: with fewer, building another solver takes longer than the thread saves.
+#: Smallest number of starts for each thread: with fewer, building another solver takes longer than the thread saves.
 _STARTS_PER_JOB = 12
 
 
-#: Seconds between two looks at whether the work is requested to stop.
+#: Seconds between two checks for a requested stop.
 _LOOK = 0.05
 
 
 class StartStatus(enum.Enum):
-    """Outcome of the search from one starting point; each value is a sentence for people."""
+    """Outcome of the search from one starting point; each value is a sentence."""
 
     CONVERGED = "converged"
     ITERATION_LIMIT = "stopped at the iteration limit: raise solve.max_iterations"
@@ -85,13 +84,13 @@ class Start:
     """The search from one starting point.
 
     Attributes:
-        status: how it ended.
-        x: (n,) where it ended.
-        F: objective there, NaN where it is undefined.
-        stationarity: largest scaled derivative of the Lagrangian there.
-        violation: largest distance outside a limit there, in half ranges.
-        iterations: of the solvers.
-        solver: name of the solver that ended it: ``sqp`` where the search in C alone did.
+        status: outcome of the search.
+        x: (n,) last point of the search.
+        F: objective at the last point, NaN where it is undefined.
+        stationarity: largest scaled derivative of the Lagrangian at the last point.
+        violation: largest violation of a limit at the last point, in half ranges.
+        iterations: number of iterations of all solvers.
+        solver: name of the solver that ended the search; ``sqp`` for the search in C only.
     """
 
     status: StartStatus
@@ -109,17 +108,17 @@ def search_from(
     """Search a program from each of several points.
 
     Args:
-        nlp: the program.
+        nlp: the nonlinear program.
         points: (k, n) starting points.
-        search: the solver's settings.
-        jobs: number of threads; left out, as many as there are processors and work.
-        solver: the local solver.
+        search: settings of the solver.
+        jobs: number of threads; if left out, as many as processors and starts allow.
+        solver: local solver.
 
     Yields:
-        One start for each point, in their order; those that are done, where the work is requested to stop.
+        One start for each point, in order; if a stop is requested, only those that are done.
 
     Raises:
-        InputError: the objective is to be compiled, and cannot be.
+        InputError: the objective cannot be compiled, although the search asks for it.
     """
     threads = max(1, jobs) if jobs is not None else min(os.cpu_count() or 1, max(1, len(points) // _STARTS_PER_JOB))
     idle: SimpleQueue[LocalSearch] = SimpleQueue()
@@ -135,7 +134,7 @@ def search_from(
             idle.put(local_search)
 
     known: list[Start] = []
-    # The searches run in threads of their own also where there is one: this one sees at once when it is to stop.
+    # Even a single search runs in another thread, so that this one reacts to a stop request at once.
     pool = ThreadPoolExecutor(threads)
     try:
         for future in [pool.submit(search_one, point) for point in points]:
@@ -153,7 +152,7 @@ def search_from(
 
 
 def _wait_for(future: Future[SolverResult]) -> SolverResult | None:
-    """Return where a search stopped, or None when it is requested to stop earlier."""
+    """Return the result of a search, or None if a stop is requested before."""
     while not is_requested():
         try:
             return future.result(timeout=_LOOK)
@@ -164,9 +163,9 @@ def _wait_for(future: Future[SolverResult]) -> SolverResult | None:
 
 
 def known_optimum(nlp: Nlp, stopped: FloatArray, known: list[Start]) -> Start | None:
-    """Return the converged start whose optimum a solver's point is near, or None.
+    """Return a converged start whose optimum is close to a solver's point, or None.
 
-    Two searches ended at the same optimum where their points count as one and F agrees to the solver's accuracy: the
+    Two searches ended at the same optimum if their points count as equal and F agrees to the solver's accuracy: a
     correction would only find the optimum again.
     """
     x = np.clip(stopped, nlp.lower, nlp.upper)
@@ -178,7 +177,7 @@ def known_optimum(nlp: Nlp, stopped: FloatArray, known: list[Start]) -> Start | 
 
 
 def judge(nlp: Nlp, found: SolverResult) -> Start:
-    """Correct the point at which a solver stopped, and judge it by the program's own conditions."""
+    """Return the corrected last point of a solver, judged by the conditions of the program."""
     stopped = np.clip(found.x, nlp.lower, nlp.upper)
     raw = at = linearise(nlp, stopped)
     active = at.active()
@@ -188,7 +187,7 @@ def judge(nlp: Nlp, found: SolverResult) -> Start:
     for share in _SHARES if np.isfinite(raw.violation) and not is_exact else ():
         corrected = correct_point(nlp, stopped, _likely_active(nlp, raw, found, share))
         left = multipliers(corrected, corrected.active())[1]
-        # A correction that makes F worse leads to another stationary point.
+        # A correction that makes F worse has moved to another stationary point.
         kept = corrected.phi <= raw.phi + max(_WORSE, nlp.rounding) or raw.violation > FEASIBLE
         if kept and (corrected.violation, left) <= (max(at.violation, FEASIBLE), stationarity):
             at, stationarity = corrected, left
@@ -204,12 +203,11 @@ def judge(nlp: Nlp, found: SolverResult) -> Start:
 
 
 def _likely_active(nlp: Nlp, at: Linearisation, found: SolverResult, share: float) -> list[int]:
-    """Return the sides that may be active at an interior-point solution: near, with a multiplier that exceeds a share.
+    """Return the sides that may be active at an interior-point solution: near, with a large multiplier.
 
-    The share is a part of the side's slack.
-
-    An interior-point method ends with multiplier * slack about equal on all sides. A small share makes the choice
-    generous: an inactive side gets a multiplier of the wrong sign and leaves the active set in the correction.
+    A multiplier is large if it exceeds ``share`` times the slack of its side. An interior-point method ends with about
+    equal multiplier * slack on all sides. A small share makes the choice generous: an inactive side then gets a
+    multiplier of the wrong sign and leaves the active set in the correction.
     """
     sides = nlp.sides
     reported = np.concatenate([found.bound_multipliers, found.constraint_multipliers])[sides.place]
@@ -219,19 +217,19 @@ def _likely_active(nlp: Nlp, at: Linearisation, found: SolverResult, share: floa
     held = np.flatnonzero(sides.equal | near)
     if len(held) <= nlp.n:
         return [int(j) for j in held]
-    # n independent sides determine a point: of more, those with the least multipliers beside their slack are left out,
-    # and those that depend on the others, such as the sides of symmetric limbs.
+    # n independent sides determine a point. Further sides are left out in the order of multiplier / slack, and so are
+    # dependent ones, such as the sides of symmetric limbs.
     order = np.where(sides.equal[held], np.inf, strength[held] / np.maximum(at.slack[held], np.finfo(float).eps))
     return sorted(_independent(at.normals, held[np.argsort(-order, kind="stable")]))
 
 
 def _independent(normals: FloatArray, order: NDArray[np.intp]) -> list[int]:
-    """Return sides, in an order, whose unit normals (n,) are independent of those before."""
+    """Return the sides, in the given order, whose unit normals (n,) are independent of the preceding ones."""
     kept = list[int]()
     basis = np.zeros((0, normals.shape[1]))
     for j in order:
         left = normals[j]
-        for _ in range(2):  # once more for the rounding of the first
+        for _ in range(2):  # twice, because of rounding in the first projection
             left = left - basis.T @ (basis @ left)
         length = float(np.linalg.norm(left))
         if length > _DEPENDENT:
@@ -240,22 +238,22 @@ def _independent(normals: FloatArray, order: NDArray[np.intp]) -> list[int]:
     return kept
 
 
-#: Two optima have the same F when it differs by less than this part of F's scale.
+#: Difference of F, in parts of its scale, below which two optima have the same F.
 SAME_VALUE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Optimum:
-    """An optimum that starts converged to.
+    """An optimum to which starts converged.
 
     Attributes:
         F: objective.
-        count: number of starts that ended there.
-        x: (n,) one of the points.
+        count: number of starts that converged to the optimum.
+        x: (n,) one of its points.
         spread: largest distance between its points along one variable, as a part of that variable's range: 0 for an
-            isolated optimum, up to 1 for a set of them, which may have several pieces.
-        evidence: the evidence at ``x``.
-        nlp: the program.
+            isolated optimum, up to 1 for a set of optima, which may have several pieces.
+        evidence: evidence of optimality at ``x``.
+        nlp: nonlinear program of the optimum.
     """
 
     F: float
@@ -267,22 +265,22 @@ class Optimum:
 
     @cached_property
     def assembly(self) -> Assembly | None:
-        """The way in which the joints are assembled at ``x``, found when it is first used; None without loops."""
+        """Assembly mode at ``x``, computed at the first use; None without loops."""
         return assembly_over_poses(self.nlp, self.x)
 
 
 def same_value(nlp: Nlp) -> float:
-    """Return the largest difference of F between optima that have the same F."""
+    """Return the largest difference of F between optima with the same F."""
     return max(SAME_VALUE, nlp.rounding) * nlp.objective_scale
 
 
 def distinct_optima(nlp: Nlp, done: Sequence[Start], phase: PhaseProgress) -> tuple[list[Start], list[Optimum]]:
-    """Group converged starts by value and point, and examine one point of each group, once.
+    """Group converged starts by F and point, and examine one point of each group, once.
 
-    Saddles and singular limbs are marked by the status of their starts; the optima are those left, best first.
+    Saddles and singular limbs are marked in the status of their starts; the other points are optima, best first.
 
-    Where an optimum is not isolated, all points of its F count as one set; it may have several pieces. Points in
-    different working modes of a robot's limbs count as different sets.
+    If an optimum is not isolated, all points with its F count as one set, which may have several pieces. Points in
+    different working modes of a limb belong to different sets.
     """
     optima: list[Optimum] = []
     refused: dict[int, StartStatus] = {}
@@ -291,11 +289,11 @@ def distinct_optima(nlp: Nlp, done: Sequence[Start], phase: PhaseProgress) -> tu
     while remaining:
         phase(Phase.EVIDENCE, len(converged) - len(remaining), len(converged))
         best = remaining[0].F
-        # In the order of the starts: rounding chooses none of those with the same F.
+        # The order of the starts decides, so that rounding does not choose among points with the same F.
         level = [start for start in converged if start in remaining and abs(start.F - best) <= same_value(nlp)]
         lead = level[0]
         evidence = examine(nlp, lead.x)
-        # The lead is the first start of the level, and so of the first group: its evidence serves that group.
+        # The lead is the first start with this F, and so of the first group, which can use its evidence.
         isolated = evidence.kind is not PointKind.NOT_ISOLATED
         groups = _group_by_point(nlp, level) if isolated else _group_by_mode(nlp, level)
         examined = [evidence, *(examine(nlp, group[0].x) for group in groups[1:])]
@@ -315,7 +313,7 @@ def distinct_optima(nlp: Nlp, done: Sequence[Start], phase: PhaseProgress) -> tu
 
 
 def _group_by_point(nlp: Nlp, starts: Sequence[Start]) -> list[list[Start]]:
-    """Group starts whose points count as the same, in the order of the first of each group."""
+    """Group starts with equal points, in the order of the first start of each group."""
     groups: list[list[Start]] = []
     for start in starts:
         same = next((group for group in groups if _largest_distance(nlp, group[0].x, start.x) <= SAME_POINT), None)
@@ -327,7 +325,7 @@ def _group_by_point(nlp: Nlp, starts: Sequence[Start]) -> list[list[Start]]:
 
 
 def _group_by_mode(nlp: Nlp, starts: Sequence[Start]) -> list[list[Start]]:
-    """Group starts whose points are in the same working modes, in the order of the first of each group."""
+    """Group starts in the same working modes, in the order of the first start of each group."""
     groups: dict[tuple[tuple[str, ...], ...], list[Start]] = {}
     for start in starts:
         groups.setdefault(turned_over_poses(nlp, start.x), []).append(start)

@@ -1,4 +1,4 @@
-"""Status and phases of a solve: a module of its own, so that results are shown without loading a solver."""
+"""Status and phases of a solve, in a separate module so that results can be shown without loading a solver."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from typing import TypeAlias
 class Status(enum.Enum):
     """Status of a solve; each value is the word in results.
 
-    ``locally optimal`` stands for the best optimum found where a search that did not converge reached a better point;
-    ``interrupted`` also stands for a solve whose time was over, and ``not proved`` for a design whose limits over a
-    workspace or along a path are refuted or open.
+    ``locally optimal``: best known optimum, although a search that did not converge reached a better point.
+    ``interrupted``: stopped by the user or by a time limit. ``not proved``: limits over a workspace or along a path are
+    refuted or undecided for this design.
     """
 
     OPTIMAL = "optimal"
@@ -33,7 +33,7 @@ class Status(enum.Enum):
 
 
 class Phase(enum.Enum):
-    """What a solve is busy with; each value is a word for people."""
+    """Phase of a solve; each value is a word for progress messages."""
 
     FORMULATING = "formulating"
     STARTS = "starts"
@@ -41,10 +41,10 @@ class Phase(enum.Enum):
     EVIDENCE = "evidence"
 
 
-#: Called at the beginning of a phase, and during it, with the phase, and how many of how many of its parts are done:
-#: programs, starts, starts, and optima.
+#: Function to call at the beginning of a phase and during it, with the phase, the number of parts done, and the number
+#: of all parts. The parts are programs, starts, starts, and optima.
 PhaseProgress: TypeAlias = Callable[[Phase, int, int], None]
 
 
 def no_phase(phase: Phase, done: int, total: int) -> None:
-    """Report nothing."""
+    """Ignore the progress of a phase."""

@@ -1,8 +1,8 @@
-"""Trade-off curves: the optimum of a case as a function of one of its numbers, one solve for each value.
+"""Trade-off curves: the optimum of a case as a function of one of its values, with one solve for each value.
 
-The search at each value starts from the optimum at the value before it as well as from the case's starting points; a
-second pass, backwards, tries the optimum at the value behind it. So a better family of optima that one solve found is
-followed to the others.
+The search at each value starts from the optimum at the previous value and from the case's starting points. A second
+pass, backwards, tries the optimum at the next value. A better family of optima from one solve is thus followed along
+the curve.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from .multistart import ProgramSolution, solve_program
 from .solution import Solution
 from .solve import solve_programs
 
-#: A neighbour's optimum counts as better from this part of the objective's scale on: less is rounding.
+#: Smallest improvement by a neighbour's optimum, in parts of the objective's scale, that is more than rounding.
 _BETTER = 1e-9
 
 Given = ParamSpec("Given")
@@ -37,12 +37,12 @@ Given = ParamSpec("Given")
 
 @dataclass(frozen=True, eq=False)
 class TradeoffPoint:
-    """The optimum at one value.
+    """Optimum at one value.
 
     Attributes:
-        value: of the number, in the case's unit.
-        solution: of the case with this value; its status says whether it is an answer.
-        certified: certificates of an answer; None where none were asked for.
+        value: value, in the case's unit.
+        solution: solution of the case with this value; its status says whether it is an answer.
+        certified: certificates of an answer; None where they were not requested.
     """
 
     value: float
@@ -52,13 +52,13 @@ class TradeoffPoint:
 
 @dataclass(frozen=True, eq=False)
 class Tradeoff:
-    """Optima of a case over values of one of its numbers.
+    """Optima of a case as a function of one parameter, bound or limit.
 
     Attributes:
-        name: of the number, such as ``limits.leg_length.max``.
-        points: one for each value that is solved, in order.
+        name: name of the varied parameter, bound or limit, such as ``limits.leg_length.max``.
+        points: optimum at each solved value, in order.
         seconds: wall time.
-        unsolved: the values after these, which an interrupted command has not solved; none otherwise.
+        unsolved: remaining values that an interrupted command did not solve; empty otherwise.
     """
 
     name: str
@@ -68,7 +68,7 @@ class Tradeoff:
 
 
 def _with_earlier_form(tradeoff: Callable[Given, Tradeoff]) -> Callable[Given, Tradeoff]:
-    """Return the function, which takes its arguments of version 0.1.0 too: ``case_at``, ``values`` and ``name``."""
+    """Return the function; it also takes the arguments of version 0.1.0: ``case_at``, ``values`` and ``name``."""
 
     @wraps(tradeoff)
     def with_both(*args: Given.args, **given: Given.kwargs) -> Tradeoff:
@@ -96,24 +96,24 @@ def tradeoff(
     certified: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Tradeoff:
-    """Solve a case again for each value of one of its numbers.
+    """Solve a case again for each value of one parameter, bound or limit.
 
     Args:
-        case: the case; or a function from a value to a case, for a number that ``--set`` cannot name. All of its cases
-            have the same free numbers.
-        over: values of the number, in the case's unit, by its name, as for :func:`sweep`:
+        case: the case; or a function from a value to a case, if ``--set`` has no name for the varied quantity. All
+            cases have the same free variables.
+        over: name of the varied parameter, bound or limit, with its values in the case's unit, as for :func:`sweep`:
             ``{"limits.leg_length.max": [50, 55, 60]}``.
-        starts: number of starting points instead of the case's.
-        seed: seed instead of the case's.
+        starts: number of starting points; the case's number if left out.
+        seed: seed of the starting points; the case's seed if left out.
         jobs: number of threads; the result does not depend on it.
         first: points (n,) to start from at every value.
-        certified: whether the optimum at each value is proved too, in an equal part of the time left.
-        progress: called after each solve of the first pass with the numbers of solves done and of all.
+        certified: If true, also prove the optimum at each value, in an equal share of the remaining time.
+        progress: function to call after each solve of the first pass, with the number of solves done and of all.
 
     Raises:
-        CaseError: the case has no number of this name, or a value is not allowed; nothing has been solved by then.
-        InputError: there is not one number, it has no values, or the C kernel was not built, which a proof needs.
-        UncoveredError: an optimum is to be proved, and an expression has an operation without a rule.
+        CaseError: the case has nothing of this name, or a value is not allowed; nothing has been solved by then.
+        InputError: ``over`` has not exactly one name with values, or the C kernel for a proof was not built.
+        UncoveredError: an optimum is to be proved, and an expression has an operation without an interval rule.
     """
     axes = axes_of(over)
     if len(axes) != 1:
@@ -146,29 +146,29 @@ def solve_along(
     certified: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Tradeoff:
-    """Solve a case again for each value of one of its numbers.
+    """Solve a case again for each value of one parameter, bound or limit.
 
     Args:
-        case_at: returns the case with a value of the number; all of its cases have the same free numbers.
-        values: values of the number, in the case's unit, at least one.
-        name: name of the number.
-        starts: as for :func:`tradeoff`, like all others.
-        seed: likewise.
-        jobs: likewise.
-        first: likewise.
-        certified: likewise.
-        progress: likewise.
+        case_at: function that returns the case with a given value; all of its cases have the same free variables.
+        values: values in the case's unit, at least one.
+        name: name of the varied parameter, bound or limit.
+        starts: number of starting points; the case's number if left out.
+        seed: seed of the starting points; the case's seed if left out.
+        jobs: number of threads; the result does not depend on it.
+        first: points (n,) to start from at every value.
+        certified: If true, also prove the optimum at each value, in an equal share of the remaining time.
+        progress: function to call after each solve of the first pass, with the number of solves done and of all.
 
     Raises:
         CaseError: a value is not allowed; nothing has been solved by then.
-        InputError: there is no value, or the C kernel was not built, which a proof needs.
-        UncoveredError: an optimum is to be proved, and an expression has an operation without a rule.
+        InputError: there is no value, or the C kernel for a proof was not built.
+        UncoveredError: an optimum is to be proved, and an expression has an operation without an interval rule.
     """
     began = time.perf_counter()
     if certified:
-        kernel()  # before any solve where it is missing
+        kernel()  # a missing kernel is reported before any solve
     if not values:
-        raise InputError("a trade-off needs at least one value")
+        raise InputError(f"{name}: a trade-off needs at least one value")
     cases = [case_at(value) for value in values]
     solutions: list[Solution] = []
     for done, case in enumerate(cases, 1):
@@ -195,7 +195,7 @@ def solve_along(
 
 
 def _certified(point: TradeoffPoint, left: int, jobs: int | None) -> TradeoffPoint:
-    """Return an answer with its certificates, in an equal part of the time that so many values share."""
+    """Return an answer with its certificates, in an equal share of the remaining time, for ``left`` values."""
     if not point.solution.status.is_answer:
         return point
     with within(seconds_left() / left):
@@ -205,16 +205,16 @@ def _certified(point: TradeoffPoint, left: int, jobs: int | None) -> TradeoffPoi
 
 
 def _whole(solve: Callable[[], Solution]) -> Solution | None:
-    """Return the outcome of a solve; None where the work is requested to stop, before the solve or during it.
+    """Return the outcome of a solve; None if a stop is requested before or during it.
 
-    An interrupted search has some of its starts only, and its best point is not the optimum of its value.
+    An interrupted search has only some of its starts, and its best point is not the optimum of its value.
     """
     found = None if is_requested() else solve()
     return None if is_requested() else found
 
 
 def _solve(case: Case, search: Search, first: Sequence[FloatArray], jobs: int | None) -> Solution:
-    """Solve a case; one with a single task also from the first points that fit its program."""
+    """Solve a case; with a single task, start also from the first points that fit its program."""
     nlps = formulate_each(case)
     if len(nlps) > 1:
         return solve_programs(case, nlps, search, jobs=jobs)
@@ -223,12 +223,12 @@ def _solve(case: Case, search: Search, first: Sequence[FloatArray], jobs: int | 
 
 
 def _start_from(solution: Solution) -> list[FloatArray]:
-    """Return the point of an answer with variables, for its neighbours to start from."""
+    """Return the point of an answer with variables, as a start for its neighbours."""
     return [solution.x] if solution.status.is_answer and solution.x.size else []
 
 
 def _improved(solution: Solution, neighbour: Solution, search: Search, jobs: int | None) -> Solution:
-    """Return a solution, or a better one that a search from its neighbour's point finds."""
+    """Return a solution, or a better one from a search that starts at its neighbour's point."""
     own = solution.outcomes[0].own
     first = [x for x in _start_from(neighbour) if x.size == own.nlp.n]
     if solution.combination is not None or not first:

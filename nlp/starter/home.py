@@ -1,8 +1,8 @@
-"""The robot of a starter at home and at poses around it: freedoms, a motion that it can make, and its measures.
+"""Robot of a starter case in its home configuration: degrees of freedom, a feasible motion, and characteristic sizes.
 
-A twist is possible where the constraint wrenches do no work in it. The task of a starter is possible at home and at
-several closed poses around it, with all numbers free that are free in the starter, so that F of it has no part of
-constraints at an optimum. Where no motion is possible at all of these poses, the pose has no rotation.
+A twist is feasible if it is reciprocal to the constraint wrenches. The task of a starter case is feasible at home and
+at several poses around it, so that its F has no contribution of constraints at an optimum. If no motion is feasible at
+all of these poses, the rotation of the starter's pose is fixed.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from ...models import (
     homogenised,
     screw_from_axis,
 )
-from ...models.mechanism.freedoms import null_space
+from ...models.mechanism.mobility import null_space
 from ...models.rows import rank_of
 from ..case.case import Case
 from ..case.pose import Free, Rotation, Value
@@ -35,29 +35,28 @@ from ..program.formulation import formulate
 from ..program.nlp import Nlp
 from ..program.sampling import starting_points
 
-#: Half ranges of a free dimension, as a part of its typical value, and of the position, as a part of the robot's size.
-#: Limits hold a design within the second.
+#: Half range of a free dimension relative to its typical value, and of the position relative to the robot's size.
 _SPREAD, _REACH = 0.25, 0.3
-#: Half range of a rotation, and of one that follows from the position, radians.
+#: Half range of an independent rotation, and of a rotation that the position determines, radians.
 TURN, FOLLOWING_TURN = math.radians(20), math.radians(60)
-#: Number of poses, home among them, at which the task must be possible, and their seed.
+#: Number of poses at which the task must be feasible, including home, and seed of the others.
 _POSES, _SEED = 7, 0
-#: Components of unit twists, and parts of F, that are smaller are rounding: loops are closed to 1e-10.
+#: Rounding error of components of unit twists and of F: loops are closed to 1e-10.
 _ZERO = 1e-6
-#: Forces below this part of a unit have no arm that counts.
+#: Smallest force of a unit wrench that counts in the root mean square arm.
 _FORCE = 0.1
-#: Mantissas of numbers that people state.
+#: Mantissas of round numbers.
 _ROUND = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 _AXES = (2, 0, 1)
 
 
 class Turning(NamedTuple):
-    """Rotations of a starter's pose.
+    """Free rotations of a starter's pose.
 
     Attributes:
-        numbers: how many of them are free: 0, 1 about the axis, or 3 about any axis.
-        axis: (3,) unit axis in the world; z where it does not count.
-        follows: whether the rotation follows from the position by closed loops.
+        numbers: number of free rotations: 0, 1 about the axis, or 3 about any axis.
+        axis: (3,) unit axis in the world frame; z if it is not used.
+        follows: True if the position determines the rotation by the loop equations.
     """
 
     numbers: int
@@ -66,31 +65,32 @@ class Turning(NamedTuple):
 
     @property
     def largest(self) -> float:
-        """Largest size of the rotation, radians."""
+        """Largest angle of the rotation, radians."""
         return FOLLOWING_TURN if self.follows else TURN
 
 
 class Home(NamedTuple):
-    """A robot at home with what a starter states of it.
+    """Robot in its home configuration, with the values that a starter case states.
 
     Attributes:
         state: the robot at home.
-        arm: root mean square arm of the forces about the platform's origin, length; 1 where they have none. It is the
-            characteristic length, and divides moments in the condition number.
-        condition: condition number of J at home, or least one around it where home is singular; infinite for none.
-        freedoms: of its platform there, or around it where home is singular.
-        moves: whether each component of the position (3,) is free.
-        turning: rotations of the pose.
+        arm: root mean square arm of the forces about the platform origin, length; the robot's size if all arms are 0.
+            It is the characteristic length, and divides moments in the condition number.
+        condition: condition number of J at home, or the smallest one around a singular home; infinite if J is singular
+            everywhere.
+        mobility: degrees of freedom of the platform at home, or around a singular home.
+        moves: (3,) True for each free component of the position.
+        turning: free rotations of the pose.
         reach: half range of the free components of the position, length.
-        free: index of the parameter that is free; None for none.
-        motion: a motion that the platform can make at home and around it; None for one with six freedoms.
-        is_flat: whether F of this motion is the same at home and around it.
+        free: index of the free parameter; None for no free parameter.
+        motion: feasible motion of the platform at home and around it; None for six degrees of freedom.
+        is_flat: True if F of this motion is the same at home and around it.
     """
 
     state: RobotState
     arm: float
     condition: float
-    freedoms: int
+    mobility: int
     moves: tuple[bool, ...]
     turning: Turning
     reach: float
@@ -100,7 +100,7 @@ class Home(NamedTuple):
 
 
 class _Place(NamedTuple):
-    """A closed pose: unit constraint wrenches (k, 6), all rows (m, 6), about the world's origin, and the position."""
+    """Pose with closed loops: unit constraint wrenches (k, 6), rows of J (m, 6), and the position (3,)."""
 
     constraints: FloatArray
     rows: FloatArray
@@ -114,38 +114,38 @@ def round_number(value: float) -> float:
 
 
 def starter_values(parameter: Parameter) -> tuple[float, ...]:
-    """Return the values of a parameter's components in a starter."""
+    """Return the values of a parameter's components in a starter case."""
     return parameter.starter or parameter.typical
 
 
 def free_widths(parameter: Parameter) -> tuple[float, ...]:
-    """Return the half range of each component of a free parameter: a point stays in the planes in which it lies."""
+    """Return the half range of each component of a free parameter; components of a point that are 0 stay fixed."""
     values = starter_values(parameter)
     width = round_number(_SPREAD * max(abs(value) for value in values) or 1.0)
     return tuple(width if value or len(values) == 1 else 0.0 for value in values)
 
 
 def read_home(model: Model, size: float) -> Home:
-    """Return a robot at home with what a starter states of it.
+    """Return a robot in its home configuration, with the values that a starter case states.
 
     Args:
         model: the robot.
-        size: length of the order of the robot's.
+        size: length of the order of the robot's size.
     """
     reach = round_number(_REACH * size)
     every, any_axis = (True, True, True), Turning(3)
     places = _places(_program(model, every, any_axis, reach))
-    moves, turning = _pose_numbers(places, size)
+    moves, turning = _free_pose(places, size)
     free_pose = _program(model, moves, turning, reach)
     places = _places(free_pose)
     possible = _common_twists(places, size)
     if not len(possible):
-        # A rotation changes the motions that the platform can make.
+        # A rotation changes the feasible motions of the platform.
         moves, turning = _moves([_slides(_twists(places[0], size))]), Turning(0)
         free_pose = _program(model, moves, turning, reach)
         places = _places(free_pose)
         possible = _common_twists(places, size)
-    freedoms = len(_regular_twists(places, size)[0])
+    mobility = len(_regular_twists(places, size)[0])
     motion, is_flat = None, False
     if 0 < len(possible) < 6:
         motion, is_flat = _motion(possible, places, size)
@@ -153,13 +153,13 @@ def read_home(model: Model, size: float) -> Home:
     state, arm = evaluate(free_pose, _home_point(free_pose)), _arm(places[0], size)
     near = _places(_program(model, moves, turning, reach, length=arm))
     condition = min(_condition(each, arm) for each in (near if state.is_singular else near[:1]))
-    return Home(state, arm, condition, freedoms, moves, turning, reach, free, motion, is_flat)
+    return Home(state, arm, condition, mobility, moves, turning, reach, free, motion, is_flat)
 
 
 def _program(
     model: Model, moves: tuple[bool, ...], turning: Turning, reach: float, free: int | None = None, length: float = 1.0
 ) -> Nlp:
-    """Return the program of a robot with some numbers of its pose free, and a parameter."""
+    """Return the nonlinear program of a robot with some coordinates of its pose free, and optionally a parameter."""
     parameters: dict[str, tuple[Value, ...]] = {item.name: starter_values(item) for item in model.parameters}
     if free is not None:
         item = model.parameters[free]
@@ -183,17 +183,17 @@ def _program(
 
 
 def _home_point(nlp: Nlp) -> FloatArray:
-    """Return the program's start (n,) with closed loops."""
+    """Return the starting point (n,) of a program, with closed loops."""
     return closed_start(nlp) if nlp.n else nlp.start
 
 
 def _places(nlp: Nlp) -> list[_Place]:
-    """Return home, and closed poses around it."""
+    """Return the home pose, and poses around it with closed loops."""
     home = _home_point(nlp)
     points = [home]
     if nlp.n:
         around = starting_points(nlp, _POSES, _SEED)[1:]
-        # Driven joints that the pose does not determine stay at home.
+        # Free actuator coordinates stay at home.
         held = [index for at_pose in nlp.program.places.joints for index in at_pose]
         around[:, held] = home[held]
         near = (close_near(nlp, home, x) for x in around)
@@ -202,7 +202,7 @@ def _places(nlp: Nlp) -> list[_Place]:
 
 
 def _place(nlp: Nlp, x: FloatArray) -> _Place:
-    """Return the robot at a point (n,) of a program."""
+    """Return the pose of the robot at a point (n,) of a program."""
     model = nlp.program.model
     numbers = numbers_at(nlp, x)
     rows, position = numbers.jacobian, numbers.position.ravel()
@@ -213,12 +213,12 @@ def _place(nlp: Nlp, x: FloatArray) -> _Place:
 
 
 def _scaled(rows: FloatArray, centre: FloatArray, size: float) -> FloatArray:
-    """Return wrenches (m, 6) with moments about a centre, in parts of a length."""
+    """Return wrenches (m, 6) with moments about a centre, divided by a length."""
     return np.column_stack(homogenised(rows, centre, size))
 
 
 def _arm(place: _Place, size: float) -> float:
-    """Return the root mean square arm of a place's forces about the platform's origin; the robot's size for none."""
+    """Return the root mean square arm of the forces about the platform origin; the robot's size if it is 0."""
     rows = _scaled(place.rows, place.position, 1.0)
     sizes = np.linalg.norm(rows[:, :3], axis=1)
     forces = sizes > _FORCE
@@ -228,32 +228,32 @@ def _arm(place: _Place, size: float) -> float:
 
 
 def _condition(place: _Place, arm: float) -> float:
-    """Return the condition number of J at a place, with moments divided by an arm; infinite where J is singular."""
+    """Return the condition number of J at a pose, with moments divided by an arm; infinite if J is singular."""
     values = np.linalg.svd(_scaled(place.rows, place.position, arm), compute_uv=False)
-    # Fewer than six rows leave the platform a motion.
+    # With fewer than six rows, J does not have full rank.
     return float(values[0] / values[-1]) if len(values) == 6 and values[-1] > _ZERO * values[0] else math.inf
 
 
 def _twists(place: _Place, size: float) -> FloatArray:
-    """Return the twists (f, 6) of a place: velocity of the platform's origin, then angular velocity times the size."""
+    """Return the feasible twists (f, 6) at a pose: velocity of platform origin, then angular velocity times size."""
     return null_space(_scaled(place.constraints, place.position, size)).T
 
 
 def _regular_twists(places: list[_Place], size: float) -> list[FloatArray]:
-    """Return the twists (f, 6) of each place, of those alone that have fewest: at a singularity there are more."""
+    """Return the feasible twists (f, 6) of all poses with the fewest ones; singular poses have more."""
     every = [_twists(place, size) for place in places]
     least = min(map(len, every))
     return [each for each in every if len(each) == least]
 
 
 def _common_twists(places: list[_Place], size: float) -> FloatArray:
-    """Return the twists (f, 6) that are possible at all places; the velocity is that of the point at home's origin."""
+    """Return the twists (f, 6) that are feasible at all poses, with velocities of the point at the home position."""
     centre = places[0].position
     return null_space(np.vstack([_scaled(each.constraints, centre, size) for each in places])).T
 
 
-def _pose_numbers(places: list[_Place], size: float) -> tuple[tuple[bool, ...], Turning]:
-    """Return which numbers of the pose the robot can change at some place."""
+def _free_pose(places: list[_Place], size: float) -> tuple[tuple[bool, ...], Turning]:
+    """Return the components of the position and the rotations that the robot can change at some pose."""
     every = _regular_twists(places, size)
     moves = _moves(every)
     _, values, right = np.linalg.svd(np.vstack([each[:, 3:] for each in every]))
@@ -268,7 +268,7 @@ def _pose_numbers(places: list[_Place], size: float) -> tuple[tuple[bool, ...], 
 
 
 def _moves(twists: list[FloatArray]) -> tuple[bool, ...]:
-    """Return whether each component of the position (3,) changes in some of the twists (f, 6)."""
+    """Return True for each component of the position (3,) that changes in one of the twists (f, 6)."""
     every = np.vstack(twists)
     return tuple(bool(np.abs(every[:, k]).max(initial=0.0) > _ZERO) for k in range(3))
 
@@ -280,9 +280,9 @@ def _slides(twists: FloatArray) -> FloatArray:
 
 
 def _motion(possible: FloatArray, places: list[_Place], size: float) -> tuple[Screw, bool]:
-    """Return a motion that is possible at all places, and whether F of it is the same there.
+    """Return a motion that is feasible at all poses, and True if its F is the same at all of them.
 
-    Translations along z, x and y come first, then rotations about these directions, then any other.
+    Translations along z, x and y are preferred, then rotations about these directions, then any other motion.
     """
     slides = _slides(possible)
     spins = np.where(np.abs(possible[:, 3:]) > _ZERO, possible[:, 3:], 0.0)
@@ -307,13 +307,13 @@ def _motion(possible: FloatArray, places: list[_Place], size: float) -> tuple[Sc
 
 
 def _values(twist: FloatArray, places: list[_Place], size: float) -> list[float]:
-    """Return F of a twist (6,) at each place."""
+    """Return F of a twist (6,) at each pose."""
     centre = places[0].position
     return [float(np.sum((_scaled(each.rows, centre, size) @ twist) ** 2)) for each in places]
 
 
 def _screw(twist: FloatArray, centre: FloatArray, size: float) -> Screw:
-    """Return the screw of a twist (6,) of the velocity of a centre (3,)."""
+    """Return the screw of a twist (6,) with the velocity of a centre (3,)."""
     omega = twist[3:] / size
     return axis_from_screw(np.concatenate([omega, twist[:3] - np.cross(omega, centre)]))
 
@@ -321,7 +321,7 @@ def _screw(twist: FloatArray, centre: FloatArray, size: float) -> Screw:
 def _free_parameter(
     model: Model, moves: tuple[bool, ...], turning: Turning, reach: float, size: float, motion: Screw | None
 ) -> int | None:
-    """Return the first dimension on which F depends, and with any value of which the motion is possible."""
+    """Return the index of the first dimension that changes F and leaves the motion feasible; None for no such one."""
     twist = np.zeros(6)
     if motion is not None:
         omega, velocity = np.split(screw_from_axis(motion.axis, motion.point, motion.pitch), 2)
@@ -333,8 +333,10 @@ def _free_parameter(
             continue
         home = _home_point(nlp)
         other = home.copy()
-        own = [k for k, each in enumerate(nlp.program.variables) if each.name.removeprefix("robot.") in item.components]
-        other[own] = nlp.upper[own]
+        parts = [
+            k for k, each in enumerate(nlp.program.variables) if each.name.removeprefix("robot.") in item.components
+        ]
+        other[parts] = nlp.upper[parts]
         one, two = (_gram(_place(nlp, x), size) for x in (home, close_near(nlp, home, other)))
         if not np.allclose(one, two, atol=_ZERO):
             return index
@@ -342,6 +344,6 @@ def _free_parameter(
 
 
 def _gram(place: _Place, size: float) -> FloatArray:
-    """Return the form (6, 6) of which F is the value for a twist."""
+    """Return the quadratic form (6, 6) of F in the twist."""
     rows = _scaled(place.rows, place.position, size)
     return np.asarray(rows.T @ rows)

@@ -1,4 +1,4 @@
-"""Starter: a commented case file for any robot."""
+"""Text of a starter case: a commented case file for any robot."""
 
 from __future__ import annotations
 
@@ -24,28 +24,28 @@ from .home import TURN, Home, free_widths, read_home, round_number, starter_valu
 
 _UNITS = Units("cm", "deg")
 
-#: Shortest and longest leg, as parts of the shortest and longest at home: a leg that is half as long again.
+#: Smallest and largest leg length, relative to the shortest and the longest leg at home.
 _LEG = (0.8, 1.2)
-#: Half ranges of an actuator and of a cone about a joint's direction, degrees.
+#: Half range of a revolute actuator, and half angle of a joint's cone, degrees.
 _SWING, _CONE = 45, 30
-#: Most joints with a cone each in a starter.
+#: Largest number of cones in a starter case.
 _CONES = 6
-#: Largest condition number, as a multiple of home's.
+#: Largest condition number, relative to that at home.
 _CONDITION = 1.5
-#: Half range of a position in the workspace, as a part of that of the pose, and of a rotation, degrees.
+#: Half range of the workspace: of a position, relative to that of the pose; and of a rotation, degrees.
 _BOX, _BOX_TURN = 0.2, 5
-#: Longest text with which comments of other lines are aligned.
+#: Longest line whose comment is aligned with those of other lines.
 _WIDTH = 50
 
 
 def starter_case(model: Model, robot_file: str | None = None) -> str:
     """Return the text of a case file for a robot at its typical dimensions, with the pose and one dimension free.
 
-    The case can be solved as it is. Comments in the text explain its keys.
+    The case can be solved without changes. Comments in the text explain its keys.
 
     Args:
         model: the robot.
-        robot_file: name of the file that the robot is from, beside the case; None for a robot by name or definition.
+        robot_file: name of the robot file in the folder of the case; None for a robot by name or definition.
     """
     search, units = Search(), _units_of(model)
     lengths = [abs(value) for item in model.parameters if item.dimension is Dimension.LENGTH for value in item.typical]
@@ -56,12 +56,12 @@ def starter_case(model: Model, robot_file: str | None = None) -> str:
         f'title = "My {model.name}"',
         "",
         "[units]",
-        _commented(f"length = {json.dumps(units.length, ensure_ascii=False)}", "a label, carried to every output"),
+        _commented(f"length = {json.dumps(units.length, ensure_ascii=False)}", "name of the length unit in all output"),
         _commented(f'angle = "{units.angle}"', 'or "rad"'),
         "",
         *_robot_lines(model, robot_file, home.arm),
         "",
-        "# A number is fixed; { min = a, max = b } is free between its bounds, with an optional start.",
+        "# A number is a fixed value; { min = a, max = b } is a free variable, with an optional start.",
         "[robot.parameters]",
         *(_parameter_line(item, units, is_free=index == home.free) for index, item in enumerate(model.parameters)),
         "",
@@ -69,7 +69,7 @@ def starter_case(model: Model, robot_file: str | None = None) -> str:
         "",
         *_task_lines(model, home),
         "",
-        _commented("[limits]", "of a buildable design; see the documentation for all"),
+        _commented("[limits]", "limits of a buildable design; the documentation lists all"),
         *_limit_lines(model, home),
         "",
         *(f"# {line}".rstrip() for line in torques),
@@ -77,19 +77,19 @@ def starter_case(model: Model, robot_file: str | None = None) -> str:
         *(f"# {line}" for line in workspace),
         *([""] if workspace else []),
         "[solve]",
-        _commented(f"starts = {search.starts}", "starting points; more find the best of several optima more surely"),
+        _commented(f"starts = {search.starts}", "starting points; more are more likely to find the best optimum"),
         f"seed = {search.seed}",
     ]
     return "\n".join(_aligned(lines)) + "\n"
 
 
 def _commented(text: str, comment: str) -> str:
-    """Return a line with a comment behind it, which a tabulator separates."""
+    """Return a line with a comment, separated by a tabulator."""
     return f"{text}\t# {comment}"
 
 
 def _aligned(lines: Sequence[str]) -> list[str]:
-    """Return lines whose comments begin in one column in each table; tables have empty lines between them."""
+    """Return lines with the comments of each table aligned; empty lines separate tables."""
     found: list[str] = []
     for _, table in itertools.groupby(lines, bool):
         rows = [line.split("\t") for line in table]
@@ -100,42 +100,44 @@ def _aligned(lines: Sequence[str]) -> list[str]:
 
 
 def _robot_lines(model: Model, robot_file: str | None, arm: float) -> list[str]:
-    """Return the table of the robot, without its parameters."""
+    """Return the lines of the table ``[robot]``, without the parameters."""
     options = [f"{key} = {option_text(value)}" for key, value in model.options.items() if key != "definition"]
     definition = model.options.get("definition")
     robot = f'model = "{model.name}"' if definition is None else f"definition = {toml_text(plain_value(definition))}"
     if robot_file is not None:
         robot = f"file = {json.dumps(robot_file, ensure_ascii=False)}"
-    length = _commented(f"characteristic_length = {arm:g}", "by which unit couples count beside unit forces")
+    length = _commented(f"characteristic_length = {arm:g}", "makes unit couples comparable with unit forces")
     return ["[robot]", robot, *options, *([length] if model.has_couples else [])]
 
 
 def _pose_lines(model: Model, home: Home) -> list[str]:
-    """Return the table of the pose, with those numbers free that the robot can change."""
+    """Return the lines of the table ``[pose]``, with the coordinates free that the robot can change."""
     turning = home.turning
     lines = [
-        _commented("[pose]", "of the platform in the base's frame; its axes are parallel at home"),
+        _commented("[pose]", "pose of the platform in the base frame; all axes are parallel at home"),
         _position_line(model, home, home.reach),
     ]
     degrees = round(math.degrees(turning.largest))
     angle = f"angle = {{ min = {-degrees}, max = {degrees} }}"
     if turning.numbers == 3:
-        lines.append(_commented(f"rotation = {{ {angle} }}", f"about any axis, by at most {degrees} deg"))
+        lines.append(_commented(f"rotation = {{ {angle} }}", f"rotation about any axis by at most {degrees} deg"))
     if turning.numbers == 1:
-        lines.append(_commented(f"rotation = {{ axis = {_vector(turning.axis)}, {angle} }}", "about this axis alone"))
-    if home.freedoms == 6:
+        lines.append(
+            _commented(f"rotation = {{ axis = {_vector(turning.axis)}, {angle} }}", "rotation about this axis only")
+        )
+    if home.mobility == 6:
         other = f"# rotation = {{ axis = [0, 0, 1], {angle} }}"
-        lines.append(_commented(other, "about this axis only; left out: no rotation"))
+        lines.append(_commented(other, "rotation about this axis only; without rotation: none"))
     count = sum(home.moves) + turning.numbers
-    if count > home.freedoms:
-        lines.append(f"# {home.freedoms} of these numbers are independent; the others follow from the closed loops.")
+    if count > home.mobility:
+        lines.append(f"# {home.mobility} of these {count} coordinates are independent; the loops determine the rest.")
     return lines
 
 
 def _task_lines(model: Model, home: Home) -> list[str]:
-    """Return the task: a motion that the robot can make."""
+    """Return the lines of a task with a feasible motion of the robot."""
     motion = home.motion
-    sense = _commented('sense = "max"', 'or "min": much or little work rate of the actuators in this motion')
+    sense = _commented('sense = "max"', 'maximise F, the squared work rates in this motion; or "min"')
     if motion is None:
         pitch = 2 * 10.0 ** round(math.log10(math.hypot(*model.home) / 35)) if any(model.home) else 1.0
         name, motion = "screw motion", Screw(np.array([0.0, 1.0, 2.0]), np.array(model.home), pitch, 1.0)
@@ -145,34 +147,34 @@ def _task_lines(model: Model, home: Home) -> list[str]:
         kind = "rotation" if abs(motion.pitch) < 1e-9 * home.reach else "screw motion"
         name = f"{kind} about {_direction(motion.axis)}"
     lines = [
-        _commented("[[task]]", f"a motion of the platform; this robot has {home.freedoms} freedoms"),
+        _commented("[[task]]", f"motion of the platform, which has {_degrees(home.mobility)} of freedom"),
         f'name = "{name}"',
         sense,
     ]
     if home.is_flat:
-        lines.append("# F of this motion is the same at all poses: every design within the limits is as good.")
-    lines.append(_commented(f"axis = {_vector(motion.axis)}", "direction of the screw axis, any length but zero"))
+        lines.append("# F of this motion is the same at all poses: all designs within the limits are equally good.")
+    lines.append(_commented(f"axis = {_vector(motion.axis)}", "direction of the screw axis, of any length but zero"))
     if math.isinf(motion.pitch):
-        return [*lines, _commented("pitch = inf", "a translation along the axis; 0: a rotation about it")]
+        return [*lines, _commented("pitch = inf", "translation along the axis; 0: rotation about it")]
     return [
         *lines,
-        _commented(f"point = {_vector(motion.point)}", "any point on it"),
-        _commented(f"pitch = {_number(motion.pitch)}", "translation per radian; 0: a rotation; inf: a translation"),
+        _commented(f"point = {_vector(motion.point)}", "any point on the screw axis"),
+        _commented(f"pitch = {_number(motion.pitch)}", "translation per radian; 0: rotation; inf: translation"),
     ]
 
 
 def _limit_lines(model: Model, home: Home) -> list[str]:
-    """Return lines of limits that the robot keeps at home."""
+    """Return the lines of limits that the robot satisfies at home."""
     lines = [*_actuator_lines(model, home), *_free_joint_lines(model, home), *_joint_lines(model, home)]
     is_singular = home.state.is_singular
     if "base_joint_angle" in home.state.quantities and not is_singular:
-        return lines  # cones keep legs apart from a singularity, and are sooner proved
+        return lines  # cones keep the robot away from singularities, and are faster to prove
     if math.isfinite(home.condition):
         largest = float(f"{_CONDITION * home.condition:.2g}")
         place = "near home, which is singular" if is_singular else "at home"
         table = f"condition_number = {{ max = {largest:g}, length = {home.arm:g} }}"
         lines.append(
-            _commented(table, f"of J, moments divided by this length; {float(f'{home.condition:.2g}'):g} {place}")
+            _commented(table, f"of J, with moments divided by length; {float(f'{home.condition:.2g}'):g} {place}")
         )
     return lines
 
@@ -198,23 +200,23 @@ def _torque_lines(model: Model, home: Home) -> list[str]:
 
 
 def _actuator_lines(model: Model, home: Home) -> list[str]:
-    """Return limits on straight legs, or on actuators where these are no legs."""
+    """Return the lines of limits on straight legs, or on the actuators of other robots."""
     if not model.legs:
         lines = []
         for quantity in model.quantities:
             if quantity.name == "actuator_angle":
                 range_ = f"{{ min = {-_SWING}, max = {_SWING} }}"
-                lines.append(_commented(f"actuator_angle = {range_}", "of every motor, from home"))
+                lines.append(_commented(f"actuator_angle = {range_}", "of every revolute actuator, from home"))
             if quantity.name == "actuator_length":
                 range_ = f"{{ min = {-home.reach:g}, max = {home.reach:g} }}"
-                lines.append(_commented(f"actuator_length = {range_}", "of every slide, from home"))
+                lines.append(_commented(f"actuator_length = {range_}", "of every prismatic actuator, from home"))
         return lines
     ends = [ca.horzcat(*[getattr(leg, plate) for leg in model.legs]).T for plate in ("base", "platform")]
     values = np.array([value for item in model.parameters for value in starter_values(item)])
     base, platform = (each.full() for each in ca.Function("ends", [model.symbols], ends).call([values]))
     lengths = np.linalg.norm(platform + model.home - base, axis=1)
     low, high = (float(f"{each:.2g}") for each in (_LEG[0] * lengths.min(), _LEG[1] * lengths.max()))
-    # Legs that share a joint, or cross, have no clearance.
+    # Legs with a common joint, and crossing legs, have no clearance.
     segments = [(ca.SX(start), ca.SX(end - start)) for start, end in zip(base, platform + model.home, strict=True)]
     squares = [float(ca.evalf(squared_distance(*one, *two))) for one, two in itertools.combinations(segments, 2)]
     apart = math.sqrt(min(squares, default=0.0))
@@ -226,35 +228,35 @@ def _actuator_lines(model: Model, home: Home) -> list[str]:
 
 
 def _free_joint_lines(model: Model, home: Home) -> list[str]:
-    """Return limits on driven joints that the pose does not determine, where those on actuators are on legs."""
+    """Return the lines of limits on free actuator coordinates of a robot with legs."""
     lines = []
     for each in model.unknowns if model.legs else ():
         if each.is_free:
             most = _SWING if each.dimension is Dimension.ANGLE else home.reach
             table = f"joint.{toml_key(each.joint)} = {{ min = {-most:g}, max = {most:g} }}"
-            lines.append(_commented(table, "of a driven joint that the pose does not determine, from home"))
+            lines.append(_commented(table, "of an actuator that the pose does not determine, from home"))
     return lines
 
 
 def _joint_lines(model: Model, home: Home) -> list[str]:
-    """Return limits on the cones of passive joints."""
+    """Return the lines of limits on the cones of passive joints."""
     angles = home.state.quantities.get("base_joint_angle")
     if angles is not None:
         cone = max(_CONE, 5 * math.ceil((math.degrees(float(angles.max())) + 10) / 5))
         return [
-            _commented(f"{plate}_joint_angle = {cone}", f"half angle of each joint's cone about the {plate}'s normal")
+            _commented(f"{plate}_joint_angle = {cone}", f"largest angle of each leg to the z axis of the {plate}")
             for plate in ("base", "platform")
         ]
     balls = [joint for joint in model.joints if joint.type == "S" and joint.cone is not None]
     keys = list(dict.fromkeys(joint.name or joint.label for joint in balls))
     if len(keys) > _CONES:
         return []
-    comment = "half angle of the ball joint's cone about home"
+    comment = "half angle of the ball joint's cone, about its direction at home"
     return [_commented(f"joint.{toml_key(key)}.cone = {_CONE}", comment) for key in keys]
 
 
 def _workspace_lines(model: Model, home: Home, units: Units) -> list[str]:
-    """Return a box of poses about home as comments; nothing where the robot has one pose, or free joints."""
+    """Return the lines of a workspace around home; none for robots with a single pose or free actuator coordinates."""
     if model.free_joints or not (any(home.moves) or home.turning.numbers):
         return []
     reach = round_number(_BOX * home.reach)
@@ -267,7 +269,7 @@ def _workspace_lines(model: Model, home: Home, units: Units) -> list[str]:
         1: [f"rotation = {{ axis = {_vector(turning.axis)}, angle = {angle} }}"],
         3: [f"rotation = {{ angle = {angle} }}"],
     }[turning.numbers]
-    if turning.numbers == 3 and home.freedoms < 6:
+    if turning.numbers == 3 and home.mobility < 6:
         turn = math.radians(degrees)
         parts = [f"{name} = {angle}" for name in _turning_about(model, home, reach, turn)]
         rotation = [f"rotation = {{ {', '.join(parts)} }}"]
@@ -276,7 +278,7 @@ def _workspace_lines(model: Model, home: Home, units: Units) -> list[str]:
         item = model.parameters[home.free]
         value = [_number(units.shown(each, item.dimension)) for each in starter_values(item)]
         fixed = f" --set {item.name}={','.join(value)}"
-    question = f"for screwsynth workspace{fixed}: is the machine good at all these poses?"
+    question = f"screwsynth workspace{fixed} verifies all limits at all these poses"
     return [_commented("[workspace]", question), position, *rotation]
 
 
@@ -304,7 +306,7 @@ def _turning_about(model: Model, home: Home, reach: float, turn: float) -> list[
 
 
 def _position_line(model: Model, home: Home, half: float) -> str:
-    """Return the line of a position about home's, by so much to each side where the robot can move."""
+    """Return the line of a position with its movable components free within a half range around home."""
     parts = zip(model.home, home.moves, strict=True)
     texts = [_free_number(value, half) if is_free else f"{value:.10g}" for value, is_free in parts]
     return f"position = [{', '.join(texts)}]"
@@ -313,7 +315,7 @@ def _position_line(model: Model, home: Home, half: float) -> str:
 def _size(model: Model) -> float:
     """Return the largest distance of a point of a robot's drawing from the origin of its body, at typical dimensions.
 
-    It is 0 for a robot without a drawing, or with one that depends on more than the dimensions.
+    The result is 0 for a robot without a drawing, or with a drawing that does not depend on the dimensions only.
     """
     symbols, typical = model.symbols, ca.DM(model.typical)
     sizes = []
@@ -325,12 +327,12 @@ def _size(model: Model) -> float:
 
 
 def _units_of(model: Model) -> Units:
-    """Return the units of a starter: that of a robot given joint by joint, where it states one, or plainly ``unit``."""
+    """Return the units of a starter case; the length unit of a robot file without one is called ``unit``."""
     return _UNITS if not model.structure else Units(model.length_unit or "unit", "deg")
 
 
 def _parameter_line(parameter: Parameter, units: Units, *, is_free: bool) -> str:
-    """Return the line of a parameter, free about its value in a starter or fixed there."""
+    """Return the line of a parameter, free around its value in a starter case or fixed."""
     values = [units.shown(value, parameter.dimension) for value in starter_values(parameter)]
     widths = [units.shown(each, parameter.dimension) if is_free else 0.0 for each in free_widths(parameter)]
     domain = [units.shown(end, parameter.dimension) for end in (parameter.lower, parameter.upper)]
@@ -344,15 +346,20 @@ def _parameter_line(parameter: Parameter, units: Units, *, is_free: bool) -> str
 
 
 def _free_number(middle: float, width: float, domain: Sequence[float] = (-math.inf, math.inf)) -> str:
-    """Return a range about a number as TOML, whose ends are rounded; the number alone where its domain leaves none."""
+    """Return a rounded range around a number as TOML; the number itself if its domain allows no range."""
     digits = 1 - math.floor(math.log10(width))
     ends = [round(end, digits) + 0.0 for end in (middle - width, middle + width)]
     lower, upper = max(ends[0], domain[0]), min(ends[1], domain[1])
     return f"{{ min = {_number(lower)}, max = {_number(upper)} }}" if lower < upper else _number(middle)
 
 
+def _degrees(count: int) -> str:
+    """Return a number of degrees in words."""
+    return f"{count} degree{'' if count == 1 else 's'}"
+
+
 def _number(value: float) -> str:
-    """Return a number as TOML; one at rounding level is 0."""
+    """Return a number as TOML; rounding errors of 0 become 0."""
     return f"{value if abs(value) > 1e-9 else 0:.10g}"
 
 
@@ -362,7 +369,7 @@ def _vector(values: Sequence[float] | FloatArray) -> str:
 
 
 def _direction(axis: FloatArray) -> str:
-    """Return an axis in words."""
+    """Return the name of a coordinate axis; ``an axis`` for any other."""
     for k, name in enumerate("xyz"):
         if abs(axis[k]) > 1 - 1e-9:
             return name

@@ -1,1 +1,1 @@
-"""Files and programs of this machine, for every other room."""
+"""Files and programs of this computer, for every other room."""

@@ -1,7 +1,8 @@
-"""Comma-separated values as text.
+"""Comma-separated values as text, safe from formulas.
 
-A spreadsheet computes a cell that begins with ``=``, ``+``, ``-`` or ``@`` as a formula, which may call programs. Names
-of robots, joints and tasks are anybody's. Such a cell begins with an apostrophe here, unless it is numbers and a unit.
+A spreadsheet evaluates a cell that begins with ``=``, ``+``, ``-`` or ``@`` as a formula, which may call programs.
+Names of robots, joints and tasks may be anything. Such a cell gets a leading apostrophe, unless it is numbers and a
+unit.
 """
 
 from __future__ import annotations
@@ -14,12 +15,12 @@ from collections.abc import Iterable, Sequence
 #: First characters of formulas; some spreadsheets skip the last two.
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 _NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:inf|nan)"
-#: Numbers, as in a vector or a range, and a unit behind them: letters and signs of which no formula consists.
+#: Numbers, as in a vector or a range, followed by a unit of letters and signs that form no formula.
 _NUMBERS = re.compile(rf"(?:{_NUMBER})(?:(?:[,;]? +|, ?| \.\. | to )(?:{_NUMBER}))*(?: [A-Za-z0-9%°²³/·^()\[\] ]+)?")
 
 
 def csv_text(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """Return a table as comma-separated values; None is an empty cell, and no text is a formula."""
+    """Return a table as comma-separated values, with empty cells for None, and without formulas."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(csv_row(head))
@@ -28,7 +29,7 @@ def csv_text(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 
 def csv_row(cells: Sequence[object]) -> list[object]:
-    """Return the cells of a row, with texts that a spreadsheet would compute quoted as texts."""
+    """Return the cells of a row, with texts quoted that a spreadsheet would evaluate."""
     return [f"'{cell}" if isinstance(cell, str) and _is_formula(cell) else cell for cell in cells]
 
 
@@ -38,5 +39,5 @@ def text_of_cell(cell: str) -> str:
 
 
 def _is_formula(cell: str) -> bool:
-    """Return whether a spreadsheet may take a text for a formula: a sign alone is none, nor are numbers with a unit."""
+    """Return True if a spreadsheet may take a text for a formula, unlike a single sign or numbers with a unit."""
     return len(cell) > 1 and cell.startswith(_FORMULA) and not _NUMBERS.fullmatch(cell)

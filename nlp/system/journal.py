@@ -1,6 +1,6 @@
-"""Journal: a file to which lines of JSON are appended as work is done, and from which a killed run is resumed.
+"""Journal: a file of JSON lines, appended as work is done, from which an interrupted run is resumed.
 
-The first line is the head, each other line a row as JSON. An incomplete last line of a killed process is removed when
+The first line is the head, each other line a row as JSON. The incomplete last line of a killed process is removed when
 the journal is opened again. One process at a time holds a journal.
 """
 
@@ -44,25 +44,25 @@ def row_of(kind: type[Kind], line: str | bytes) -> Kind:
     """Return the row of a line.
 
     Raises:
-        ValueError: the line is none of :func:`line_of`.
+        ValueError: the line was not written by :func:`line_of`.
     """
     data, fields = json_tree(line), fields_of(kind)
     if not isinstance(data, list) or len(data) != len(fields):
-        raise ValueError("the line is no row")
+        raise ValueError("the line is not a row of this journal")
     return kind(*(value_of(of, value, name) for (name, of), value in zip(fields, data, strict=True)))
 
 
 class JournalFile:
-    """Lines of JSON in a file that this process holds.
+    """File of JSON lines, locked by this process.
 
     Args:
-        path: name of the file, which is made when missing.
-        head: first line of the file, which tells it from the journals of other work.
+        path: name of the file, created if missing.
+        head: first line of the file, which identifies the work.
         work: name of the work in messages.
-        other: advice about a journal of other work.
+        other: advice for a journal of other work.
 
     Raises:
-        InputError: the file cannot be written, belongs to other work, or is held by another process.
+        InputError: the file cannot be written, belongs to other work, or another process holds it.
     """
 
     def __init__(self, path: Path, head: Mapping[str, object], work: str, other: str) -> None:
@@ -80,20 +80,20 @@ class JournalFile:
             self._file.close()
             raise
 
-    def found(self, place: int, line: bytes) -> None:
-        """Take note of a line that is in the file, at a place."""
+    def load_entry(self, place: int, line: bytes) -> None:
+        """Process an existing line of the file at a byte position."""
         raise NotImplementedError
 
     @property
     def is_empty(self) -> bool:
-        """Whether there are no lines below the head."""
+        """True if there are no lines below the head."""
         return self._end == len(self._head)
 
     def append(self, lines: Iterable[str]) -> list[int]:
-        """Append lines, and return their places.
+        """Append lines, and return their byte positions.
 
         Raises:
-            InputError: the file cannot be written, as on a full disk; what is in it already stays.
+            InputError: the file cannot be written, as on a full disk; its earlier content stays.
         """
         with WRITING:
             content = [line.encode() for line in lines]
@@ -108,7 +108,7 @@ class JournalFile:
         return places
 
     def lines_at(self, places: Iterable[int]) -> Iterator[bytes]:
-        """Yield the lines at places."""
+        """Yield the lines at byte positions."""
         with self.path.open("rb") as file:
             after = -1
             for place in places:
@@ -125,21 +125,21 @@ class JournalFile:
         self.close()
 
     def close(self) -> None:
-        """Close the file, which another process may hold from then on; without lines it is removed."""
+        """Close the file and release it for other processes; a file without lines is removed."""
         if not self._file.closed and self.is_empty:
             self.path.unlink(missing_ok=True)
         self._file.close()
 
     def remove(self) -> None:
-        """Remove the file, once its rows are in a result."""
+        """Remove the file, after its rows are in a result."""
         self.path.unlink(missing_ok=True)
         self._file.close()
 
     def _read(self, refusal: str) -> int:
-        """Read the lines, cut off an incomplete last one, and return the file's end.
+        """Read the lines, remove an incomplete last one, and return the end of the file.
 
         Raises:
-            InputError: the journal is of other work, or no journal.
+            InputError: the journal belongs to other work, or the file is not a journal.
         """
         head = self._file.readline()
         if not head.endswith(b"\n") and self._head.startswith(head):
@@ -153,7 +153,7 @@ class JournalFile:
         for line in self._file:
             if not line.endswith(b"\n"):
                 break
-            self.found(place, line)
+            self.load_entry(place, line)
             place += len(line)
         self._file.truncate(place)
         return place

@@ -1,11 +1,11 @@
-"""Frozen values that JSON writes as objects: their base class, the declarations of their fields, and the conversion.
+"""Frozen values that JSON writes as objects: base class, declarations of fields, and conversion.
 
-A value of any room is declared once. A subclass of :class:`JsonObject` declares its fields as a dataclass does, and
-type checkers treat it as a dataclass. An annotation also states what JSON, its schema and its reader need: whether a
-field may be absent, its key, and the dimension of a number that results have in the case's unit.
+A subclass of :class:`JsonObject` declares its fields like a dataclass, and type checkers treat it as one. An annotation
+also states the needs of JSON, its schema and its reader: whether a field may be absent, its key, and the dimension of a
+value that results show in the case's unit.
 
-It is no dataclass, because ``dataclass`` compiles methods for each class, which takes 0.4 ms: forty classes would make
-a short command a thirtieth slower.
+It is not a dataclass, because ``dataclass`` compiles methods for each class, which takes 0.4 ms: forty classes would
+slow a short command by a thirtieth.
 """
 
 import enum
@@ -42,34 +42,34 @@ JsonValue: TypeAlias = "bool | int | float | str | list[JsonValue] | dict[str, J
 
 
 class Mark(enum.Enum):
-    """Treatment of a field that is not always written, or not as an attribute of its own."""
+    """Treatment of a field that is not always written, or not under its own key."""
 
-    ABSENT = "left out where it is None"
-    INLINE = "its own fields stand in its place; none of them where it is None"
-    HIDDEN = "for computations: never written, and its default where the value is read"
+    ABSENT = "left out if it is None"
+    INLINE = "replaced by its fields, or left out if it is None"
+    HIDDEN = "for computations: never written, and set to its default by the reader"
 
 
 class Key(NamedTuple):
-    """Key of a field in JSON, where the attribute has another name."""
+    """Key of a field in JSON, if it differs from the attribute."""
 
     name: str
 
 
 class Measure(enum.Enum):
-    """Relation of a number to the ``dimension`` of its object, which is a hidden field."""
+    """Relation of a value to the ``dimension`` of its object, which is a hidden field."""
 
-    NUMBER = "a number of that dimension"
-    SLOPE = "a derivative by such a number"
+    NUMBER = "a value of that dimension"
+    SLOPE = "a derivative with respect to such a value"
 
 
-#: A field that is absent from the object where the value is None; an empty text becomes None where it is copied.
+#: Field that is left out if its value is None; an empty text becomes None when it is copied.
 Absent: TypeAlias = Annotated[_T | None, Mark.ABSENT]
-#: A field whose own fields are written in its place.
+#: Field that is replaced by its own fields.
 Inline: TypeAlias = Annotated[_T, Mark.INLINE]
-#: A number of the object's dimension, and a derivative by such a number.
+#: Value of the object's dimension, and derivative with respect to such a value.
 Shown: TypeAlias = Annotated[float, Measure.NUMBER]
 Slope: TypeAlias = Annotated[_T, Measure.SLOPE]
-#: A field that JSON never has.
+#: Field that JSON never contains.
 Hidden: TypeAlias = Annotated[_T, Mark.HIDDEN]
 
 Vector: TypeAlias = tuple[float, ...]
@@ -78,9 +78,9 @@ Vector6: TypeAlias = Annotated[tuple[float, ...], Size(6)]
 Matrix: TypeAlias = tuple[tuple[float, ...], ...]
 
 if TYPE_CHECKING:
-    #: A number that may be none: null in JSON where it is not finite, and NaN where it is read.
+    #: Number that may be undefined: null in JSON if it is not finite, and NaN when it is read.
     Known: TypeAlias = float
-    #: An array (n,).
+    #: Array (n,).
     Row: TypeAlias = FloatArray
 else:
     Known = Annotated[float | None, Made(lambda value: math.nan if value is None else value)]
@@ -91,10 +91,10 @@ class Field(NamedTuple):
     """Declaration of a field.
 
     Attributes:
-        key: in JSON.
+        key: key in JSON.
         mark: treatment; None for a field that is always written.
-        measure: dimension of its number, or how its object's dimension applies; None for a number that stays as it is.
-        made: whether its value is another one than JSON's: see :data:`Known` and :data:`Row`.
+        measure: dimension of the value, or its relation to the object's dimension; None for a value without conversion.
+        made: True if the attribute's value differs from JSON's: see :data:`Known` and :data:`Row`.
     """
 
     key: str
@@ -105,10 +105,10 @@ class Field(NamedTuple):
 
 @dataclass_transform(eq_default=False, frozen_default=True, kw_only_default=True)
 class JsonObject:
-    """A frozen value with named fields, which JSON writes in the order of their declaration.
+    """Frozen value with named fields, which JSON writes in the order of their declaration.
 
     Attributes:
-        fields: the declarations of the fields by name, in order.
+        fields: declarations of the fields by name, in order.
     """
 
     fields: ClassVar[Mapping[str, Field]] = {}
@@ -130,13 +130,13 @@ class JsonObject:
 
     @classmethod
     def of(cls, row: object, units: Units | None = None, /, **given: object) -> "Self":
-        """Return an object whose fields are the attributes of the same names of another value, or of one of this class.
+        """Return an object with fields from the attributes of the same names of another value.
 
         Args:
-            row: the other value; its arrays become tuples where the field is one, and its numbers that are not finite
-                None.
-            units: units of the case in which numbers with a dimension are wanted; left out where they are in them.
-            given: fields that it has not, or not as they are.
+            row: other value, or object of this class; its arrays become tuples for fields that are tuples, and its
+                numbers that are not finite None.
+            units: units of the case for values with a dimension; None if the values have these units.
+            given: fields that are missing in the other value, or replace its attributes.
         """
         measured = None if units is None else getattr(row, "dimension", Dimension.NUMBER)
         copied = {
@@ -207,7 +207,7 @@ def _entry(name: str, field: Field, kind: object) -> Entry:
 
 
 def _copied(value: Any, field: Field, units: Units | None, dimension: Dimension | None) -> object:  # noqa: ANN401 - of any field
-    """Return a value as a field of another object has it, numbers with a dimension in the case's units where wanted."""
+    """Return a value for a field of another object, with dimensional values in the case's units if requested."""
     if isinstance(value, np.ndarray) and not field.made:
         value = vector(value) if value.ndim == 1 else matrix(value)
     if units is not None and dimension is not None:
@@ -241,7 +241,7 @@ def without_none(kind: object) -> Any:  # noqa: ANN401 - another annotation
 
 
 def _subclasses(kind: type[JsonObject]) -> Iterator[type[JsonObject]]:
-    """Yield the subclasses of a type, and theirs."""
+    """Yield the direct and indirect subclasses of a type."""
     for each in kind.__subclasses__():
         yield each
         yield from _subclasses(each)
@@ -251,7 +251,7 @@ def json_data(value: JsonObject) -> dict[str, JsonValue]:
     """Return a value as JSON's own types.
 
     Raises:
-        TypeError: a field holds a value that JSON has no type for.
+        TypeError: JSON has no type for the value of a field.
     """
     found: dict[str, JsonValue] = {}
     for name, each in value.fields.items():
@@ -281,7 +281,7 @@ def _json_value(value: object) -> JsonValue:
 
 
 def finite_or_none(value: float) -> float | None:
-    """Return a number, or None for one that JSON cannot hold."""
+    """Return a number; None if it is not finite."""
     return float(value) if math.isfinite(value) else None
 
 

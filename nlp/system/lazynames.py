@@ -1,6 +1,6 @@
-"""Names of a module that are imported when they are first used, so that the command line starts at once.
+"""Names of a module that are imported at first use, so that the command line starts at once.
 
-The names stand in the module's stub, in lines ``from .module import name as name``, which type checkers read too. The
+The names are in the module's stub, in lines ``from .module import name as name``, which type checkers read too. The
 stub is read line by line: parsing it as Python, as ``lazy_loader.attach_stub`` does, takes longer than importing the
 rest of a small package. ``from .package import *`` stands for all names of a package, which is imported at once.
 """
@@ -22,8 +22,8 @@ def lazy_names(module: str, package: str, file: str) -> tuple[list[str], Callabl
 
     Args:
         module: full name of the module.
-        package: full name of the package to which the places in the stub are relative.
-        file: the module's file, beside which the stub is.
+        package: full name of the package to which the modules in the stub are relative.
+        file: file of the module, next to its stub.
     """
     with open(f"{file.removesuffix('.py')}.pyi", encoding="utf-8") as stub:
         lines = [line.split() for line in stub if line.startswith("from .")]
@@ -40,7 +40,7 @@ def lazy_names(module: str, package: str, file: str) -> tuple[list[str], Callabl
         if places[name] == ".":  # a package of this one
             return import_module(f".{name}", package)
         value = getattr(import_module(places[name], package), name)
-        # The next look-up finds the name without this function.
+        # Later look-ups find the name without this function.
         setattr(sys.modules[module], name, value)
         return value
 

@@ -1,4 +1,4 @@
-"""Locks of files and folders: one process at a time writes them."""
+"""Locks of files and folders, which one process at a time writes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ except ImportError:  # a system without locks of files
 
 
 def hold(descriptor: int) -> bool:
-    """Hold an open file until it is closed; return whether no other process holds it."""
+    """Lock an open file until it is closed; return False if another process holds it."""
     if fcntl is None:
         return True
     try:
@@ -28,7 +28,7 @@ def hold(descriptor: int) -> bool:
 
 @contextmanager
 def held_folder(folder: Path) -> Iterator[None]:
-    """Hold a folder for the work of a block, which waits for the end of another process's block.
+    """Lock a folder for a block of work, after waiting for the block of another process.
 
     Raises:
         OSError: the folder cannot be opened.

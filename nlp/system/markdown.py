@@ -1,4 +1,4 @@
-"""Names as text in a page of Markdown: no tag, link, code or cell of a table begins in one."""
+"""Names as plain text in Markdown, without tags, links, code or table cells."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ import re
 
 from ..errors import one_line
 
-#: Characters of HTML, and of addresses that some viewers make links of, as entities.
+#: Characters of HTML, and of addresses that some viewers show as links, as entities.
 _ENTITIES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", "@": "&#64;"})
-#: What Markdown takes for a mark: an underscore only at the end of a word, and a sign only before a link's address.
+#: Marks of Markdown: an underscore only at the end of a word, and a sign only before a link's address.
 _MARKS = re.compile(r"[\\`*\[\]|~]|(?<!\w)_|_(?!\w)|(?<=\w):(?=//)|(?<=\bwww)\.", re.IGNORECASE)
 
 
 def markdown_text(name: str) -> str:
-    """Return a name in one line, which a viewer of Markdown shows as it is written."""
+    """Return a name in one line that a viewer of Markdown shows as it is written."""
 
     def marked(found: re.Match[str]) -> str:
         mark = found.group()
         return f"&#{ord(mark)};" if mark in ":." else f"\\{mark}"
 
-    # Entities have none of the marks.
+    # Entities contain no marks.
     return _MARKS.sub(marked, one_line(name).translate(_ENTITIES))

@@ -1,4 +1,4 @@
-"""Running of programs of this machine, such as compilers; C compiled into shared libraries, cached by content hash.
+"""Running of other programs, such as compilers; shared libraries of C, cached by content hash.
 
 A library is compiled once for its text, compiler and flags, and stored in the user's cache folder (``XDG_CACHE_HOME``,
 or ``~/.cache``).
@@ -14,11 +14,11 @@ from ..errors import InputError
 
 
 class RunError(Exception):
-    """A program that cannot be run or fails.
+    """Error of a program that cannot be run or fails.
 
     Attributes:
-        said: why, in one line.
-        is_started: whether it was run, and failed.
+        said: reason in one line.
+        is_started: True if the program was started, and failed.
     """
 
     def __init__(self, program: str, said: str, *, is_started: bool) -> None:
@@ -27,7 +27,7 @@ class RunError(Exception):
 
 
 def first_program(names: Iterable[str]) -> str | None:
-    """Return the path of the first program that is installed; None where there is none."""
+    """Return the path of the first installed program; None if there is none."""
     import shutil  # noqa: PLC0415 - programs are seldom run
 
     return next((found for found in map(shutil.which, names) if found), None)
@@ -37,11 +37,11 @@ def run_program(words: list[str], folder: Path | None = None) -> str:
     """Run a program and return its standard output.
 
     Args:
-        words: the program and its arguments.
-        folder: in which it runs; the current one if left out.
+        words: program and its arguments.
+        folder: working folder; None for the current one.
 
     Raises:
-        RunError: it cannot be run, or fails.
+        RunError: the program cannot be run, or fails.
     """
     import subprocess  # noqa: PLC0415 - programs are seldom run
 
@@ -62,10 +62,10 @@ def shared_library(files: Mapping[str, str]) -> Path:
     """Compile C texts into a shared library, or return the cached one.
 
     Args:
-        files: texts by file name; those whose names end in ``.c`` are compiled, the others are there to be included.
+        files: texts by file name; files ``*.c`` are compiled, the others are included.
 
     Raises:
-        InputError: there is no C compiler, or it fails.
+        InputError: no C compiler is installed, or it fails.
     """
     import hashlib  # noqa: PLC0415 - few solves are compiled
     import tempfile  # noqa: PLC0415 - few solves are compiled
@@ -85,29 +85,31 @@ def shared_library(files: Mapping[str, str]) -> Path:
             (Path(temporary) / name).write_text(text, encoding="utf-8")
         sources = [str(Path(temporary) / name) for name in sorted(files) if name.endswith(".c")]
         _run([compiler, *_FLAGS, *sources, "-lm", "-o", str(compiled)])
-        # A rename leaves a whole library or none, also when two processes compile it at the same time.
+        # A rename leaves a whole library or none, also if two processes compile it at the same time.
         compiled.replace(library)
     return library
 
 
 def _compiler() -> str:
-    """Find a C compiler.
+    """Return the path of a C compiler.
 
     Raises:
-        InputError: there is none.
+        InputError: no C compiler is installed.
     """
     wanted = [os.environ["CC"]] if os.environ.get("CC") else ["cc", "gcc", "clang"]
     found = first_program(wanted)
     if found:
         return found
-    raise InputError(f"compiling needs a C compiler, and none was found: {' or '.join(wanted)}; CC names another one")
+    raise InputError(
+        f"no C compiler is installed: {' or '.join(wanted)} is needed; the variable CC may name another one"
+    )
 
 
 def _run(words: list[str]) -> str:
     """Run the compiler and return its standard output.
 
     Raises:
-        InputError: it cannot be run, or fails.
+        InputError: the compiler cannot be run, or fails.
     """
     try:
         return run_program(words)
@@ -117,7 +119,7 @@ def _run(words: list[str]) -> str:
 
 
 def _folder() -> Path:
-    """Return the user's cache folder; a new temporary folder where it cannot be written."""
+    """Return the user's cache folder; a new temporary folder if it cannot be written."""
     import tempfile  # noqa: PLC0415 - few solves are compiled
 
     base = os.environ.get("XDG_CACHE_HOME") or "~/.cache"

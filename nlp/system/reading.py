@@ -1,4 +1,4 @@
-"""Reading of files up to a size, each fault as one sentence."""
+"""Reading of files up to a size, with each fault as one sentence."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ def read_limited(source: str | Path, largest: int, *, is_regular: bool = False) 
     """Return the bytes of a file.
 
     Args:
-        source: name of the file, as messages write it.
-        largest: size of the largest file that is read, bytes; a device has no end.
-        is_regular: whether pipes and devices are refused.
+        source: name of the file, as written in messages.
+        largest: largest size that is read, bytes, also for devices without an end.
+        is_regular: If true, pipes and devices are refused.
 
     Raises:
-        InputError: it cannot be read, is no regular file where it must be, or is larger.
+        InputError: the file cannot be read, is not a regular file if it must be, or is too large.
     """
     path = Path(source)
     try:
         if is_regular and path.exists() and not path.is_file():
-            raise InputError(f"{source}: cannot be read: it is no file")
+            raise InputError(f"{source}: cannot be read: it is not a regular file")
         with path.open("rb") as file:
             content = file.read(largest + 1)
     except (OSError, ValueError) as error:
@@ -35,24 +35,24 @@ def read_limited(source: str | Path, largest: int, *, is_regular: bool = False) 
 
 
 def text_of_bytes(content: bytes) -> str:
-    """Return UTF-8 text without a byte order mark, with the line ends of Unix.
+    """Return UTF-8 text without a byte order mark, with Unix line ends.
 
     Raises:
-        UnicodeDecodeError: it is no such text.
+        UnicodeDecodeError: the content is not UTF-8 text.
     """
     return content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
 
 
 def check_version(kind: FileVersions, tables: Mapping[str, object], source: str | None = None) -> None:
-    """Refuse a file of a version that is not read; one that states none is of version 1.
+    """Refuse a file of an unsupported version; the default is version 1.
 
     Args:
-        kind: of the file.
-        tables: the file's content.
+        kind: kind of the file.
+        tables: content of the file.
         source: name of the file, for the message.
 
     Raises:
-        CaseError: the version is another one.
+        CaseError: the version is not supported.
     """
     if fault := kind.fault(tables.get(VERSION_KEY, 1)):
         raise CaseError(VERSION_KEY, fault, tables[VERSION_KEY], source)

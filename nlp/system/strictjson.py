@@ -1,7 +1,7 @@
 """Strict reading of JSON: plain values first, then typed values by their annotations.
 
-The text is not trusted: its depth and its number of values are limited, every number is finite, no key stands twice,
-and every text can be written again. A fault is a ``ValueError`` of one sentence.
+The text is not trusted: its depth and number of values are limited, every number is finite, keys are unique, and every
+text can be written again. A fault is a ``ValueError`` of one sentence.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args
 
 from ..errors import listing, nearest
 
-#: Largest number of lists and objects within each other, and of commas and brackets: each stands for a value that takes
-#: many times its bytes.
+#: Largest nesting depth, and largest number of commas and brackets: each stands for a value that takes many times its
+#: bytes.
 _DEPTH, _MOST = 64, 1_000_000
-#: Integers up to this size are numbers without loss.
+#: Largest integer that is exact as a floating-point number.
 _LARGEST_INTEGER = 2**53
 _WORDS: dict[object, str] = {
     bool: "true or false",
@@ -34,16 +34,16 @@ Kind = TypeVar("Kind")
 
 
 class Size(NamedTuple):
-    """Mark of an annotated list: the number of its entries."""
+    """Mark of an annotated list: number of its entries."""
 
     entries: int
 
 
 class Made(NamedTuple):
-    """Mark of an annotation of which a field has another value than JSON.
+    """Mark of an annotation for a field with a value that differs from JSON's.
 
     Attributes:
-        of: returns the field's value from that of the annotation.
+        of: function from the annotated value to the field's value.
     """
 
     of: Callable[[Any], object]
@@ -73,7 +73,7 @@ class Entry(NamedTuple):
 
 
 class WrongValueError(ValueError):
-    """A value that its type does not allow.
+    """Error of a value that its type does not allow.
 
     Attributes:
         key: dotted key of the value.
@@ -88,7 +88,7 @@ def json_tree(content: str | bytes) -> object:
     """Return the value of a JSON text, which may begin with a byte order mark.
 
     Raises:
-        ValueError: it is no JSON, or is refused as this module's docstring says.
+        ValueError: the text is not valid JSON, or is refused as in the description of this module.
     """
     try:
         text = content.decode("utf-8-sig") if isinstance(content, bytes) else content
@@ -97,11 +97,11 @@ def json_tree(content: str | bytes) -> object:
         tree = json.loads(
             text, parse_constant=_number, parse_float=_number, parse_int=_integer, object_pairs_hook=_unique
         )
-        # An escape may be half of a character, which no file takes.
+        # An escape may be half of a surrogate pair, which no file can contain.
         if "\\ud" in text or "\\uD" in text:
             json.dumps(tree, ensure_ascii=False).encode()
     except UnicodeEncodeError:
-        raise ValueError("a text holds half of a character") from None
+        raise ValueError("a text contains half of a character (a lone surrogate)") from None
     except RecursionError:
         raise ValueError("lists or objects are nested too deeply") from None
     level = [tree]
@@ -117,15 +117,15 @@ def _parts(value: list[object] | dict[str, object]) -> Iterable[object]:
 
 
 def _number(text: str) -> float:
-    """Return a finite number; ``NaN`` and ``Infinity`` are no JSON."""
+    """Return a finite number; ``NaN`` and ``Infinity`` are not JSON."""
     value = float(text)
     if not math.isfinite(value):
-        raise ValueError(f"{_short(text)} is no finite number")
+        raise ValueError(f"{_short(text)} is not a finite number")
     return value
 
 
 def _integer(text: str) -> int:
-    """Return an integer of a size that some other number type has."""
+    """Return an integer of a size that other number types can represent."""
     if len(text) > len(str(-_LARGEST_INTEGER)) or abs(int(text)) > _LARGEST_INTEGER:
         raise ValueError(f"the integer {_short(text)} is too large")
     return int(text)
@@ -136,11 +136,11 @@ def _short(text: str) -> str:
 
 
 def _unique(pairs: Iterable[tuple[str, object]]) -> dict[str, object]:
-    """Return an object, each of whose keys stands once."""
+    """Return an object with unique keys."""
     found: dict[str, object] = {}
     for key, value in pairs:
         if key in found:
-            raise ValueError(f"the key {_short(key)!r} stands twice in an object")
+            raise ValueError(f"the key {_short(key)!r} occurs twice in an object")
         found[key] = value
     return found
 
@@ -205,7 +205,7 @@ def _compound(kind: object, value: object, key: str) -> object:
 
 
 def _marked(marks: tuple[object, ...], found: object, key: str) -> object:
-    """Return a value as the marks of its annotation have it; the errors are those of :func:`value_of`."""
+    """Return a value converted by the marks of its annotation; the errors are those of :func:`value_of`."""
     for mark in marks:
         if isinstance(mark, Size) and isinstance(found, tuple) and len(found) != mark.entries:
             raise WrongValueError(key, f"must have {mark.entries} entries, got {len(found)}")
@@ -218,10 +218,10 @@ def _one_of(kinds: tuple[object, ...], value: object, key: str) -> object:
     """Return a value of the first of several annotations that allows it.
 
     Raises:
-        WrongValueError: none does; the fault that lies deepest is the one of the annotation that was meant.
+        WrongValueError: no annotation allows the value; the deepest fault is that of the intended annotation.
     """
     faults = []
-    # An exact type goes before a number that an integer could become.
+    # An exact type comes before a number type to which an integer could be converted.
     for kind in sorted(kinds, key=lambda each: each is not type(value)):
         try:
             return value_of(kind, value, key)

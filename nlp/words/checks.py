@@ -1,4 +1,4 @@
-"""Checks of cases as lines and tables of text."""
+"""Checks of cases: lines and tables."""
 
 from collections.abc import Iterable, Iterator, Sequence
 
@@ -6,22 +6,26 @@ from ..results.checks import CaseCheck, PublishedCheck, decimals_of
 from .lines import counted
 from .text import Line, TextTable, Tone, in_part
 
-#: So many numbers that do not hold are shown in full in a short view.
+#: Number of failed values that a short view shows in full.
 _FAULTS = 8
 
 
 def checks_summary(checks: Sequence[CaseCheck]) -> Iterator[Line | TextTable]:
-    """Yield the count of numbers that hold in each case, and every number that does not."""
+    """Yield the number of values that agree, by case, and every value that does not agree."""
     faults = [fault for check in checks for fault in _faults(check)]
-    yield Line(f"{len(faults)} do not hold", tone=Tone.NO_ANSWER) if faults else Line("all hold", tone=Tone.HOLDS)
+    yield (
+        Line(f"{counted(len(faults), 'value')} not as expected", tone=Tone.NO_ANSWER)
+        if faults
+        else Line("all values as expected", tone=Tone.HOLDS)
+    )
     published = [row for check in checks for row in check.published]
     held = sum(row.passed for check in checks for row in check.expected)
-    count = f"{held} of {sum(len(check.expected) for check in checks)} expected numbers hold"
+    count = f"{held} of {sum(len(check.expected) for check in checks)} expected values agree"
     reproduced = sum(row.is_reproduced for row in published)
-    words = f"; of {len(published)} published ones {reproduced} are reproduced" if published else ""
+    words = f"; {reproduced} of {len(published)} published values are reproduced" if published else ""
     yield Line(f"{counted(len(checks), 'case')}: {count}{words}")
     for k, fault in enumerate(faults):
-        yield Line(fault, tone=Tone.FAULT, part="numbers that do not hold" if k >= _FAULTS else "")
+        yield Line(fault, tone=Tone.FAULT, part="values not as expected" if k >= _FAULTS else "")
     rows = tuple(_summary_row(check) for check in checks)
     yield from in_part("cases", [TextTable(("case", "expected", "published", "seconds"), rows)])
 
@@ -32,11 +36,11 @@ def _summary_row(check: CaseCheck) -> tuple[str | Line, ...]:
     held = sum(row.passed for row in check.expected)
     published = f"{reproduced} reproduced, {len(check.published) - reproduced} not" if check.published else ""
     name = Line(check.name, tone=Tone.PLAIN if check.passed else Tone.NO_ANSWER)
-    return name, f"{held} of {len(check.expected)} hold", published, f"{check.seconds:.1f}"
+    return name, f"{held} of {len(check.expected)} agree", published, f"{check.seconds:.1f}"
 
 
 def _faults(check: CaseCheck) -> Iterator[str]:
-    """Yield a sentence for each number of a case that does not hold."""
+    """Yield a sentence for each value of a case that is not as expected."""
     for row in check.expected:
         if not row.passed:
             yield f"{check.name}: {row.quantity} is {row.computed}, expected {row.expected} within {row.tolerance:g}"
@@ -46,7 +50,7 @@ def _faults(check: CaseCheck) -> Iterator[str]:
 
 
 def reproduction_table(checks: Iterable[CaseCheck]) -> TextTable:
-    """Return the published numbers of cases: printed, computed, verdict and reason."""
+    """Return the published values of cases: printed, computed, verdict and reason."""
     rows = []
     for check in checks:
         for row in check.published:
@@ -56,7 +60,7 @@ def reproduction_table(checks: Iterable[CaseCheck]) -> TextTable:
 
 
 def published_table(check: CaseCheck) -> TextTable:
-    """Return the published numbers of one case beside the computed ones."""
+    """Return the published values of one case with the computed ones."""
     rows = [
         (
             row.quantity,
@@ -68,11 +72,11 @@ def published_table(check: CaseCheck) -> TextTable:
         )
         for row in check.published
     ]
-    return TextTable(("quantity", "published", "computed", "", "where", "how it is known"), tuple(rows))
+    return TextTable(("quantity", "published", "computed", "verdict", "where", "rule or reason"), tuple(rows))
 
 
 def published_words(row: PublishedCheck) -> str:
-    """Return a published number, the computed one and the rule, in one line."""
+    """Return a published value, the computed value and the rule, in one line."""
     return f"{_quantity(row)}: printed {_printed(row)}, computed {_computed(row)} ({row.rule})"
 
 
@@ -82,12 +86,12 @@ def _quantity(row: PublishedCheck) -> str:
 
 
 def _printed(row: PublishedCheck) -> str:
-    """Return a published number with the digits that were printed."""
+    """Return a published value with the printed digits."""
     return _tuple(f"{value:.{_decimals(row, value)}f}" for value in row.value)
 
 
 def _computed(row: PublishedCheck) -> str:
-    """Return the computed number with two digits more than were printed."""
+    """Return the computed value with two digits more than the printed one."""
     if not row.computed:
         return "none"
     shown = zip(row.computed, row.value, strict=True)

@@ -1,4 +1,4 @@
-"""Refuted claims of a judged workspace in words, and the commands that show them."""
+"""Violated claims over a workspace in words, and the commands that show them; words about ranks."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 from ..case.task import Sense
 from ..proof.statement.claims import CONSTRAINTS, REGULAR
+from ..proof.workspace.verdict import Outcome
 from ..results.claims import PosedClaim, refuted_claims
+from .motors import OUTCOME_WORDS, TONES
 from .numbers import number
 from .text import Line
 from .verdicts import SHOWN
@@ -17,14 +19,39 @@ if TYPE_CHECKING:
     from ..evidence.state import WorkspacePose
     from ..results.workspace import WorkspaceResult
 
-_SINGULAR = {REGULAR: f"{REGULAR}: J is singular", CONSTRAINTS: f"{CONSTRAINTS}: their rank is lost"}
+#: Claims about ranks in words; a singularity of each; its label; and the sentence that is proved.
+CLAIM_WORDS = {REGULAR: "full rank of J", CONSTRAINTS: "rank of the constraint wrenches"}
+SINGULAR = {REGULAR: "J is singular", CONSTRAINTS: "the constraint wrenches lose rank"}
+_LABELS = {REGULAR: "singularities", CONSTRAINTS: "constraint singularities"}
+_REGULAR = {REGULAR: "J has full rank", CONSTRAINTS: "the constraint wrenches keep their rank"}
+#: Start of the names of claims that a limb reaches every pose.
+_REACH = "reach limb "
+
+
+def rank_line(name: str, outcome: Outcome, after: str = "") -> Line:
+    """Return the verdict on a rank.
+
+    Args:
+        name: name of the claim.
+        outcome: outcome of the claim.
+        after: words after the verdict.
+    """
+    words = {
+        Outcome.PROVED: f"none: {_REGULAR[name]} at every pose (proved)",
+        Outcome.REFUTED: SINGULAR[name],
+        Outcome.OPEN: "undecided",
+    }
+    return Line(words[outcome], label=_LABELS[name], tone=TONES[outcome], after=after)
 
 
 def claim_words(claim: PosedClaim) -> str:
-    """Return a claim, with its value and its limit where it is about a number."""
+    """Return a claim at a pose: a singularity, a limb that does not reach, or a value with its limit."""
     each, length = claim.verdict, claim.length
     if each is None:
-        return _SINGULAR[claim.name]
+        return SINGULAR[claim.name]
+    if each.name.startswith(_REACH) and each.reached is not None and each.reached < 0:
+        limb = each.name.removeprefix(_REACH)
+        return f"limb {limb} cannot reach the pose: reach margin {number(each.reached, digits=4)}, required >= 0"
     worst = "smallest" if each.sense is Sense.MIN else "largest"
     value = "" if each.reached is None else f" {worst} {number(each.reached)} {each.unit}".rstrip()
     limit = "" if each.limit is None else f", limit {each.key} = {number(each.limit)} {each.unit}".rstrip()
@@ -35,11 +62,11 @@ def claim_words(claim: PosedClaim) -> str:
     return f"{each.name}:{value}{limit}{where}"
 
 
-def seeing_lines(result: WorkspaceResult, command: Callable[[WorkspacePose], str]) -> Iterator[Line]:
-    """Yield the commands that show what refutes claims: of each limit the claim that is farthest beyond it.
+def violation_lines(result: WorkspaceResult, command: Callable[[WorkspacePose], str]) -> Iterator[Line]:
+    """Yield the commands that show violations: for each limit, the claim that is farthest beyond it.
 
     Args:
-        result: judgement over the workspace.
+        result: verdicts over the workspace.
         command: returns the command that shows a pose.
     """
     claims = list(refuted_claims(result))
@@ -52,10 +79,10 @@ def seeing_lines(result: WorkspaceResult, command: Callable[[WorkspacePose], str
         if each.beyond == farthest[each.key] and (not own or own[0].name == each.name):
             own.append(each)
     for k, each in enumerate(itertools.chain.from_iterable(shown.values())):
-        part = "refuted claims" if k >= SHOWN else ""
-        yield Line(claim_words(each), label="refuted", part=part)
+        part = "violated claims" if k >= SHOWN else ""
+        yield Line(claim_words(each), label=OUTCOME_WORDS[Outcome.REFUTED], part=part)
         yield Line(command(each.pose), label="see it with", is_command=True, part=part)
-    # One number may have two limits: a claim is its name with the limit's key.
+    # A quantity may have two limits: a claim is a name with the key of the limit.
     left = len({(each.name, each.key) for each in claims}) - len(shown)
     if left:
-        yield Line(f"{left}: --all, --csv FILE and --json FILE list them", label="other refuted claims")
+        yield Line(f"{left}: --all, --csv FILE and --json FILE list them", label="other violated claims")

@@ -1,4 +1,4 @@
-"""Robots compared on one case as columns of a table of designs, and in words."""
+"""Comparison of robots on one case: columns of a table of designs, and sentences."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _DIGITS, _FEW = 7, 4
 
 
 def comparison_lines(result: ComparisonResult) -> Iterator[Line]:
-    """Yield the lines below the table: words and dimensions robot by robot, then the rules."""
+    """Yield the lines below the table: sentences and dimensions of each robot, then the rules."""
     for robot in result.robots:
         for sentence in robot.sentences:
             yield Line(sentence, label=robot.name, tone=Tone.CAUTION)
@@ -32,7 +32,7 @@ def comparison_lines(result: ComparisonResult) -> Iterator[Line]:
 
 
 def comparison_columns(result: ComparisonResult) -> Iterator[Column[ComparedRobotData]]:
-    """Yield the columns: robot and rank, F, rates and sizes, limits, workspace, strokes, and the certificate."""
+    """Yield the columns: robot, rank, F, rates, sizes, limits, workspace, strokes, and certificate."""
     robots, proofs = result.robots, ColumnKind.PROOF
     tasks = next((each.tasks for each in robots if each.tasks), ())
     several, unit = len(tasks) > 1, result.units.length
@@ -44,7 +44,7 @@ def comparison_columns(result: ComparisonResult) -> Iterator[Column[ComparedRobo
         "freedoms",
         lambda robot: robot.freedoms,
         holds=int,
-        label="freedoms",
+        label="DOF",
         text=lambda robot: "" if robot.freedoms is None else str(robot.freedoms),
     )
     yield Column("status", lambda robot: None if robot.status is None else robot.status.value, holds=str)
@@ -75,7 +75,7 @@ def comparison_columns(result: ComparisonResult) -> Iterator[Column[ComparedRobo
         "limits_kept",
         lambda robot: robot.limits_kept,
         holds=int,
-        label="limits kept" if result.limits > 0 else "",
+        label="limits satisfied" if result.limits > 0 else "",
         text=lambda robot: f"{robot.limits_kept} of {result.limits}",
     )
     yield _joined("limits_left_out", lambda robot: (each.key for each in robot.limits_left_out))
@@ -99,7 +99,7 @@ def comparison_columns(result: ComparisonResult) -> Iterator[Column[ComparedRobo
 
 
 def _task_columns(k: int, task: ComparedTaskData, *, is_shown: bool) -> Iterator[Column[ComparedRobotData]]:
-    """Yield the columns of a task; in tables F alone is shown, where there are several."""
+    """Yield the columns of a task; tables of several tasks show F only."""
 
     def of(cell: Callable[[ComparedTaskData], Cell]) -> Callable[[ComparedRobotData], Cell]:
         return lambda robot: cell(robot.tasks[k]) if robot.tasks else None
@@ -122,18 +122,19 @@ def _joined(name: str, texts: Callable[[ComparedRobotData], Iterable[str]]) -> C
 
 
 def dimension_words(robot: ComparedRobotData) -> str:
-    """Return the free dimensions of a design in one line, all where none is free; an end of a range is marked."""
+    """Return the free dimensions of a design in one line, or all where none is free; values at a bound are marked."""
     parts = []
     free = [each for each in robot.dimensions if each.range is not None]
     for each in free or robot.dimensions:
         ends = each.range or ()
-        mark = next((word for end, word in zip(ends, ("least", "most"), strict=False) if _is_at(each.value, end)), "")
+        words = zip(ends, ("lower bound", "upper bound"), strict=False)
+        mark = next((word for end, word in words if _is_at(each.value, end)), "")
         parts.append(f"{each.name} = {each.value:.5g} {each.unit}".rstrip() + (f" ({mark})" if mark else ""))
     return ", ".join(parts)
 
 
 def _is_at(value: float, end: float) -> bool:
-    """Return whether a number is at an end of its range, within the rounding of a search."""
+    """Return whether a value is at a bound of its range, within the rounding error of a search."""
     return abs(value - end) <= 1e-6 * max(abs(value), abs(end))
 
 
@@ -142,20 +143,20 @@ def _text(value: float | None, digits: int) -> str:
 
 
 def _constraints(robot: ComparedRobotData) -> str:
-    """Return the largest part of F that constraints carry, in percent."""
+    """Return the largest part of F from constraint wrenches, in percent."""
     known = [each.constraint for each in robot.tasks if each.constraint is not None]
     return f"{100 * max(known):.3g}" if known else ""
 
 
 def _largest_rate(robot: ComparedRobotData) -> str:
-    """Return the rate that is largest in size among all tasks, with its unit."""
+    """Return the largest magnitude of a rate among all tasks, with its unit."""
     rates: list[ComparedRateData] = [rate for each in robot.tasks for rate in each.rates]
     if not rates:
         return ""
     if any(rate.rate is None for rate in rates):
         return "undetermined"
     largest = max(rates, key=lambda each: abs(each.rate or 0.0))
-    # A motion that no actuator drives leaves rounding errors of a size that F tells.
+    # For a motion that no actuator drives, the rates are rounding errors, relative to the root of F.
     size = max((math.sqrt(each.F) for each in robot.tasks if each.F is not None), default=0.0)
     return f"{number(abs(largest.rate or 0.0), size, digits=_FEW)} {largest.unit}"
 
@@ -165,7 +166,7 @@ def _strokes(robot: ComparedRobotData) -> str:
 
 
 def _proof(robot: ComparedRobotData) -> str:
-    """Return the status of a certificate with its gap; ``none`` where it is refused."""
+    """Return the status of a certificate with its gap; ``none`` where there is no certificate."""
     proof = robot.certificate
     if proof is None:
         return "none" if robot.certificate_fault else ""

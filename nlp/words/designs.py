@@ -1,4 +1,4 @@
-"""Tables of designs, which sweeps, trade-offs, fronts and comparisons fill, and which every output reads."""
+"""Tables of designs: filled by sweeps, trade-offs, fronts and comparisons, read by every output."""
 
 from __future__ import annotations
 
@@ -26,37 +26,37 @@ Cell: TypeAlias = "float | str | bool | None"
 class ColumnKind(enum.Enum):
     """Meaning of the cells of a column."""
 
-    VARIED = "number that is varied"
+    VARIED = "varied limit or parameter"
     OBJECTIVE = "objective or goal"
-    VARIABLE = "free number of the design"
+    VARIABLE = "design variable"
     ACTIVE = "active bounds and limits"
-    EVIDENCE = "evidence of the search"
-    PROOF = "proven bound"
+    EVIDENCE = "evidence"
+    PROOF = "proved bound"
     OTHER = "name, status or note"
 
 
 class Join(enum.Enum):
-    """Relation of the rows, which a picture shows."""
+    """Relation of the rows, as pictures show it."""
 
-    CURVE = "neighbours along one number, or along a front of two goals"
-    GRID = "points of a grid over one or more numbers"
+    CURVE = "neighbours along a varied value, or along a front of two goals"
+    GRID = "points of a grid over one or more varied values"
     CLOUD = "points without an order"
-    LIST = "robots side by side"
+    LIST = "independent rows"
 
 
 @dataclass(frozen=True)
 class Column(Generic[Row]):
-    """A column of a table of designs.
+    """Column of a table of designs.
 
     Attributes:
-        name: name in CSV; empty for a column of tables of text alone.
+        name: name in CSV; empty for a column that CSV does not have.
         cell: returns the exact value of a row.
         kind: meaning of the cells.
         holds: type of the cells: ``float``, ``int`` or ``str``.
-        label: name in tables of text, pages and pictures; empty for a column of CSV alone.
-        unit: unit of the numbers; empty for a plain number.
+        label: name in tables of text, pages and pictures; empty for a column that only CSV has.
+        unit: unit of the values; empty for a plain number.
         text: returns the text of a row in tables.
-        series: name of the line in pictures, where it is not the label.
+        series: name of the line in pictures; empty for the label.
     """
 
     name: str
@@ -75,17 +75,17 @@ class Column(Generic[Row]):
 
 
 class DrawnDesign(NamedTuple):
-    """A design that can be drawn.
+    """Design for a drawing.
 
     Attributes:
-        name: name of the robot, or the value or the goals of the design.
-        words: its result.
-        numbers: free numbers of the design, each with its name and unit.
-        active: bounds and limits that it lies on.
-        nlp: its program.
-        x: (n,) its point.
-        state: the robot there at the first pose; None where it does not exist.
-        task: index of the task that is drawn.
+        name: name of the robot, or the varied value or the goals of the design.
+        words: result of the design.
+        numbers: variables of the design, with name, value and unit.
+        active: active bounds and limits.
+        nlp: nonlinear program of the design.
+        x: (n,) point of the program.
+        state: robot at the point and the first pose; None where its equations have no value.
+        task: index of the task of the drawing.
     """
 
     name: str
@@ -99,7 +99,7 @@ class DrawnDesign(NamedTuple):
 
 
 class DesignDetails(NamedTuple):
-    """Part of a page about one design: its name, sentences, and a table of its dimensions; None without one."""
+    """Part of a page about one design: name, sentences, and a table of dimensions, which may be None."""
 
     name: str
     sentences: Sequence[str]
@@ -110,16 +110,16 @@ class PageWords(NamedTuple):
     """Words of the page about a table of designs.
 
     Attributes:
-        subtitle: below the title.
-        answer: sentence of the answer.
-        picture: anchor and heading of the section of the picture.
-        table: anchor and heading of the section of the table.
+        subtitle: line below the title.
+        answer: sentence with the answer.
+        picture: anchor and heading of the section with the picture.
+        table: anchor and heading of the section with the table.
         rules: sentences above the picture.
-        cautions: sentences below it.
+        cautions: sentences of caution below the picture.
         below: text below the picture.
-        designs: heading of the section of the designs.
+        designs: heading of the section with the designs.
         bends: heading of the sentences about changes of active limits; empty for none.
-        is_answer: whether there is an answer.
+        is_answer: If true, there is an answer.
     """
 
     subtitle: str
@@ -136,22 +136,22 @@ class PageWords(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Designs(Generic[Row]):
-    """A table of designs.
+    """Table of designs.
 
     Attributes:
         word: kind of the table, such as ``trade-off``.
         case: the case, or the case of the first row.
         caption: description of the rows.
-        columns: in order.
-        rows: one for each design.
+        columns: columns in order.
+        rows: rows, one per design.
         join: relation of the rows: a curve, a grid, a cloud or a list.
         page: words of the page.
         before, after: lines above and below the table on a terminal.
-        drawn: returns the designs that can be drawn.
+        drawn: returns the designs for drawings.
         gaps: indices of rows that a curve does not join with the next one.
         missing: sentences about rows without an answer.
         throughout: bounds and limits that are active in every row with an answer, in words.
-        details: text of a page about each design.
+        details: texts of a page about the designs.
     """
 
     word: str
@@ -180,13 +180,13 @@ class Designs(Generic[Row]):
 
 
 def designs_csv(found: Designs[Row]) -> str:
-    """Return a table of designs as CSV, one row for each design; what has no value is an empty cell."""
+    """Return a table of designs as CSV, one row for each design; a missing value is an empty cell."""
     columns = [each for each in found.columns if each.name]
     return csv_text([each.name for each in columns], [[each.cell(row) for each in columns] for row in found.rows])
 
 
 def designs_table(found: Designs[Row], most: int | None = None) -> TextTable:
-    """Return a table of designs as text, of at most so many rows."""
+    """Return a table of designs as text, with at most the given number of rows."""
     columns = [each for each in found.columns if each.label]
     is_curve = found.join in (Join.CURVE, Join.CLOUD)
     return TextTable(
@@ -206,7 +206,7 @@ def designs_summary(found: Designs[Row]) -> Iterator[Line | TextTable]:
 
 
 def certificate_columns(certificate_of: Callable[[Row], CertificateData | None]) -> Iterator[Column[Row]]:
-    """Yield the columns of the proof of each design: its status, the bound and the gap."""
+    """Yield the columns of certificates: status, bound and gap."""
 
     def number_of(name: str) -> Callable[[Row], float | None]:
         return lambda row: None if (proof := certificate_of(row)) is None else getattr(proof, name)
@@ -219,8 +219,8 @@ def certificate_columns(certificate_of: Callable[[Row], CertificateData | None])
     yield Column("gap", number_of("gap"), ColumnKind.PROOF)
 
 
-def free_numbers(nlp: Nlp, x: FloatArray) -> tuple[str, ...]:
-    """Return the dimensions and poses of a program that are free, each with its name, value and unit."""
+def design_values(nlp: Nlp, x: FloatArray) -> tuple[str, ...]:
+    """Return the free dimensions and pose coordinates of a program, with name, value and unit."""
     units, variables = nlp.case.units, nlp.program.variables
     found = []
     for k in design_indices(nlp.program):

@@ -10,7 +10,7 @@ import numpy as np
 from ...models.statics import driven_joints
 from ..case.case import Case
 from ..evidence.inverse import InversePoses
-from .lines import title_line
+from .lines import counted, title_line
 from .numbers import number
 from .text import Line, TextTable, Tone
 
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
 
 def inverse_summary(case: Case, found: InversePoses, file: str, rows: Sequence[int]) -> Iterator[Line | TextTable]:
-    """Yield how many poses are closed or singular, the first row of those that need attention, and the coordinates.
+    """Yield the numbers of poses without a solution and of singular poses, and the ranges of the actuators.
 
     Args:
         case: the case.
-        found: the joints at its poses.
+        found: joint coordinates at the poses.
         file: name of the file of poses.
-        rows: number of each pose's row in it.
+        rows: row numbers of the poses in the file.
     """
     yield title_line(case)
     if found.held:
@@ -35,17 +35,16 @@ def inverse_summary(case: Case, found: InversePoses, file: str, rows: Sequence[i
         yield Line(words, label="note")
     total, closed = len(rows), int(found.closed.sum())
     if closed == total:
-        yield Line("the pose is closed" if total == 1 else f"all {total} poses are closed", tone=Tone.HOLDS)
+        where = "the pose" if total == 1 else f"all {total} poses"
+        yield Line(f"solved at {where}", label="inverse kinematics", tone=Tone.HOLDS)
     else:
-        yield Line(f"{_of(total - closed, total)} not closed", tone=Tone.FAULT, after=_first(~found.closed, file, rows))
+        words = f"no solution at {total - closed} of {counted(total, 'pose')}"
+        yield Line(words, label="inverse kinematics", tone=Tone.FAULT, after=_first(~found.closed, file, rows))
     if found.dependent:
-        yield Line(", ".join(found.dependent), label="follow", after=" from the other coordinates of each pose")
+        yield Line(", ".join(found.dependent), label="dependent coordinates", after=", set by the others of each pose")
     if found.singular.any():
-        yield Line(
-            f"{_of(int(found.singular.sum()), total)} singular",
-            tone=Tone.CAUTION,
-            after=_first(found.singular, file, rows),
-        )
+        words = f"{int(found.singular.sum())} of {counted(total, 'pose')}"
+        yield Line(words, label="singular", tone=Tone.CAUTION, after=_first(found.singular, file, rows))
     if closed:
         smallest, largest = (each(found.coordinates, axis=0) for each in (np.nanmin, np.nanmax))
         ends = []
@@ -54,10 +53,6 @@ def inverse_summary(case: Case, found: InversePoses, file: str, rows: Sequence[i
             cells = [number(each, max(map(abs, shown))) for each in shown]
             ends.append((joint.name, found.measures[k], *cells, case.units.label(joint.dimension)))
         yield TextTable(("actuator", "quantity", "smallest", "largest", "unit"), tuple(ends), "actuators")
-
-
-def _of(count: int, total: int) -> str:
-    return f"{count} of {total} pose{'s' if total > 1 else ''} {'is' if count == 1 else 'are'}"
 
 
 def _first(chosen: NDArray[np.bool_], file: str, rows: Sequence[int]) -> str:

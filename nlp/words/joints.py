@@ -1,4 +1,4 @@
-"""Motions and wrenches in words; sentences about joints: actuator rates, freedoms, singularities, assembly."""
+"""Motions and wrenches in words; sentences on actuator rates, degrees of freedom, singularities and assembly modes."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ def motion_words(motion: ScrewMotion, units: Units, size: float = 0.0, part: flo
     """Return a motion in words: its axis, point and pitch.
 
     Args:
-        motion: of the platform.
-        units: of the case.
-        size: length that the motion was computed from, beside which its point and pitch have rounding error.
+        motion: motion of the platform.
+        units: units of the case.
+        size: length to which the rounding errors of the motion's point and pitch are relative.
         part: error bound of its pitch, as a part of this length.
     """
     if motion.point is None or motion.pitch == "inf":
@@ -36,20 +36,20 @@ def motion_words(motion: ScrewMotion, units: Units, size: float = 0.0, part: flo
 
 
 def screw_words(motion: ScrewMotion, units: Units, size: float, part: float = NOISE) -> str:
-    """Return pitch and axis of a motion that is no translation; other arguments are those of :func:`motion_words`."""
+    """Return pitch and axis of a motion with rotation; the arguments are those of :func:`motion_words`."""
     pitch = settled(0.0 if motion.pitch == "inf" else motion.pitch, size, part)
     words = f"screw of pitch {pitch:.5g} {units.length}" if pitch else "rotation"
     return f"{words} about {triple(motion.axis, 1.0)}"
 
 
 def reach_of(motion: ScrewMotion, size: float) -> float:
-    """Return the length beside which a motion's point and pitch have rounding error: |v| / |omega| at least."""
+    """Return the length to which rounding errors of a motion's point and pitch are relative: at least |v| / |omega|."""
     omega, v = math.hypot(*motion.twist[:3]), math.hypot(*motion.twist[3:])
     return max(size, v / omega if omega else 0.0)
 
 
 def triple(values: Sequence[float], size: float) -> str:
-    """Return three numbers in parentheses, 0 where they are rounding error beside a size."""
+    """Return three numbers in parentheses, 0 where they are rounding error relative to a size."""
     return f"({', '.join(number(value, size, digits=4) for value in values)})"
 
 
@@ -62,16 +62,16 @@ def wrench_words(wrench: ScrewWrench, units: Units, size: float) -> str:
     return f"{words} along {triple(wrench.axis, 1.0)} through {triple(wrench.point, size)}"
 
 
-#: Change of F, as a part of it, from which on a convention is named: F is shown with seven digits.
+#: Relative change of F from which on a convention is named: F is shown with seven digits.
 _NAMED = 1e-6
 
 
 def joint_lines(robot: RobotData, joints: JointsData, units: Units) -> Iterator[Line]:
-    """Yield the rates of the actuators, whether the motion is possible, the freedoms, singularities and assembly."""
+    """Yield actuator rates, the feasibility of the motion, degrees of freedom, singularities and the assembly mode."""
     task = robot.task
     if joints.actuators and task is not None:
         largest = max((abs(each.rate) for each in joints.actuators if each.rate is not None), default=1.0)
-        # Where the task moves no actuator, all rates are rounding of the platform's velocity.
+        # Where the task moves no actuator, all rates are rounding errors relative to the platform's velocity.
         reach = robot_size(robot)
         speed = math.hypot(*task.motion.twist[3:]) + reach * math.hypot(*task.motion.twist[:3])
         sizes = {"length": max(largest, speed), "angle": max(largest, speed / reach)}
@@ -90,18 +90,18 @@ def joint_lines(robot: RobotData, joints: JointsData, units: Units) -> Iterator[
     yield from _unlimited_lines(robot, units)
     if joints.constrained:
         part = number(100 * joints.constrained, 100.0, digits=3)
-        words = f"the platform cannot make the task's motion exactly: constraints carry {part} % of F"
+        words = f"the platform cannot follow this motion exactly; {part} % of F is constraint wrenches, not actuation"
         yield Line(words, label="note")
-    possible = ", among them the task's motion" if joints.feasible and robot.task_is_free is False else ""
-    yield Line(f"{joints.freedoms} with free actuators{possible}", label="freedoms")
+    possible = ", including the task's motion" if joints.feasible and robot.task_is_free is False else ""
+    yield Line(f"{joints.freedoms} with free actuators{possible}", label="degrees of freedom")
     for each in joints.singularities:
         yield from _singularity_lines(each, robot, units)
     for sentence in joints.assembly:
-        yield Line(f"assembly: {sentence}", tone=Tone.CAUTION)
+        yield Line(f"assembly mode: {sentence}", tone=Tone.CAUTION)
 
 
 def _unlimited_lines(robot: RobotData, units: Units) -> Iterator[Line]:
-    """Yield the ranges of free positions of driven joints that no limit of the case gives."""
+    """Yield the ranges of free actuator coordinates that the case does not limit."""
     groups: dict[tuple[float, float, str, str], list[str]] = {}
     for each in robot.free_joints or ():
         none = "no limits" if not (each.lower_is_limit or each.upper_is_limit) else "no upper limit"
@@ -112,34 +112,34 @@ def _unlimited_lines(robot: RobotData, units: Units) -> Iterator[Line]:
     for (lower, upper, kind, none), names in groups.items():
         unit = units.label(Dimension(kind))
         who, have = ("joints", "have") if len(names) > 1 else ("joint", "has")
-        searched = f"a solve searches from {lower:.6g} to {upper:.6g} {unit}"
-        yield Line(f"{who} {', '.join(names)} {have} {none}: {searched}; [limits.joint] states a range", label="note")
+        searched = f"solve searches from {lower:.6g} to {upper:.6g} {unit}"
+        yield Line(f"{who} {', '.join(names)} {have} {none}: {searched}; set limits in [limits.joint]", label="note")
 
 
 def idle_words(names: Sequence[str]) -> str:
-    """Return the sentence about actuators whose rates the motion of the platform does not determine."""
+    """Return the sentence about actuators with rates that the motion of the platform does not determine."""
     rates, who = ("rates of actuators", "they") if len(names) > 1 else ("rate of actuator", "it")
     words = f"the platform's motion does not determine the {rates} {', '.join(names)}"
     return f"{words}: {who} can move while the platform stands still"
 
 
 def convention_lines(robot: RobotData) -> Iterator[Line]:
-    """Yield remarks where F depends on the characteristic length, or on a centre that the joints do not determine."""
+    """Yield notes where F depends on the characteristic length, or on a centre that the joints do not determine."""
     slope = robot.length_dependence or 0.0
     if abs(slope) > _NAMED:
-        words = f"F depends on robot.characteristic_length: 1 % more of it changes F by {slope:+.2g} %"
+        words = f"F depends on robot.characteristic_length: 1 % more length changes F by {slope:+.2g} %"
         yield Line(words, label="note")
     change = None if robot.joints is None else robot.joints.centre_dependence
     if change is not None and change > _NAMED:
         words = (
-            "F depends on the place of a limb's centre on the axis of its last passive joint: one characteristic "
-            f"length along it changes F by up to {100 * change:.2g} %; the limb's key centre sets it"
+            "F depends on where a limb's centre lies on the axis of its last passive joint: a shift by one "
+            f"characteristic length changes F by up to {100 * change:.2g} %; set the centre by the limb's key centre"
         )
         yield Line(words, label="note")
 
 
 def limb_part_table(case: Case, robot: RobotData) -> TextTable | None:
-    """Return F limb by limb, with the parts of actuation and constraints; None where these are not known."""
+    """Return F by limb, with the parts of actuation and constraints; None where these are not known."""
     parts = None if robot.joints is None else robot.joints.limb_parts
     if not parts or robot.task is None:
         return None
@@ -151,14 +151,14 @@ def limb_part_table(case: Case, robot: RobotData) -> TextTable | None:
         cells = (number(each.F, total), number(each.actuation, total), number(each.constraints, total))
         rows.append((each.limb, *cells, Figure(f"{share:.3g}", share)))
     headers = ("limb", f"F\n{unit}", f"actuation\n{unit}", f"constraints\n{unit}", "constraints\n% of F")
-    return TextTable(headers, tuple(rows), "actuation", "actuation and constraints by limb")
+    return TextTable(headers, tuple(rows), "actuation", "F by limb: actuation and constraints")
 
 
 def _singularity_lines(each: Singularity, robot: RobotData, units: Units) -> Iterator[Line]:
-    """Yield a singularity, then the motions gained, or the wrenches that lock motions."""
+    """Yield a singularity, then the gained motions, or the wrenches that lock motions."""
     yield Line(f"singular: {each.words}", tone=Tone.CAUTION)
     size = robot_size(robot)
     for motion in each.gained or ():
-        yield Line(f"  gained: {motion_words(motion, units, size)}")
+        yield Line(f"  gained motion: {motion_words(motion, units, size)}")
     for wrench in each.locking or ():
-        yield Line(f"  locked in addition: motions in which work is done by the {wrench_words(wrench, units, size)}")
+        yield Line(f"  lost: every motion on which this wrench does work: {wrench_words(wrench, units, size)}")

@@ -1,4 +1,4 @@
-"""Results in words: lines of text, each with a label and a tone."""
+"""Results as lines of text, with a label and a tone each."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from ..evidence.optimality import CURVED, PointKind
 from ..proof.certificate.certificate import CertificateStatus
 from ..results.rounding import ordered, robot_size, settled, task_F
 from ..solver.status import Status
-from ..units import Units, objective_unit, slope_unit
+from ..units import Units, objective_unit
 from .joints import convention_lines, joint_lines, motion_words, reach_of, screw_words, triple
-from .numbers import number, residual, rounded_to
+from .numbers import number, per_words, residual, rounded_to
 from .objective import objective_words
 from .text import Line, Tone
 
@@ -25,18 +25,18 @@ if TYPE_CHECKING:
     from ..results.data import CertificateData, CombinedData, CombinedResult, SolveResult, StartsData
     from ..results.parts import LimitData, RobotData, TaskData, ViolationData
 
-#: So many violated limits, and so many optima, are shown.
+#: Largest number of violated limits, and of optima, that are shown.
 _VIOLATIONS, _OPTIMA = 8, 5
-#: Digits of a number that a limit would have to have.
+#: Digits of the value that would make an infeasible limit feasible.
 _DIGITS = 6
-#: Part of an objective by which rounding changes it by no more than two solves of one program differ.
+#: Relative change of an objective that two solves of one program differ by: a smaller one is no effect of rounding.
 _UNCHANGED = 1e-9
-#: An optimum is a set when its points lie apart by more than this part of the ranges.
+#: Distance of optimal points, as a part of the ranges, from which on they are a set, not one optimum.
 SET = 1e-3
 
 
 def counted(count: int, noun: str) -> str:
-    """Return a number of things, the noun in the plural but for one."""
+    """Return a count with its noun, in the plural unless the count is 1."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
@@ -46,7 +46,7 @@ def title_line(case: Case) -> Line:
 
 
 def task_lines(task: TaskData, units: Units) -> Iterator[Line]:
-    """Yield a task: name, sense, motion, and the axis's point nearest to the origin where the case states another."""
+    """Yield a task: name, sense and motion; then the point of its axis nearest to the origin, if not the stated one."""
     points = _stated_and_nearest(task)
     if points is None:
         yield Line(f"{task.name}, {task.sense.value} F: {motion_words(task.motion, units)}", label="task")
@@ -54,11 +54,11 @@ def task_lines(task: TaskData, units: Units) -> Iterator[Line]:
     stated, nearest = points
     screw = screw_words(task.motion, units, reach_of(task.motion, 0.0))
     yield Line(f"{task.name}, {task.sense.value} F: {screw} through {stated}", label="task")
-    yield Line(f"nearest to the origin at {nearest}", label="task's axis")
+    yield Line(f"nearest to the origin at {nearest}", label="task axis")
 
 
 def task_words(task: TaskData, units: Units) -> str:
-    """Return a task's motion in words, with the point that the case states beside the one nearest to the origin."""
+    """Return a task's motion in words, with the stated point of its axis and the point nearest to the origin."""
     points = _stated_and_nearest(task)
     if points is None:
         return motion_words(task.motion, units)
@@ -68,14 +68,14 @@ def task_words(task: TaskData, units: Units) -> str:
 
 
 class _Points(NamedTuple):
-    """The points of a task's axis as text: the stated one, and the one nearest to the origin."""
+    """Points of a task's axis as text: the stated point, and the point nearest to the origin."""
 
     stated: str
     nearest: str
 
 
 def _stated_and_nearest(task: TaskData) -> _Points | None:
-    """Return the points of a task's axis; None where its case states none, or the nearest one."""
+    """Return the points of a task's axis; None unless its case states a point other than the nearest one."""
     if task.stated_point is None or task.motion.point is None:
         return None
     size = reach_of(task.motion, 0.0)
@@ -86,10 +86,10 @@ def _stated_and_nearest(task: TaskData) -> _Points | None:
 def headline(result: SolveResult, case: Case) -> Line:
     """Return F with its unit, or the status of a solve without an answer.
 
-    A singular answer has another tone, unless its case expects it.
+    A singular answer is a caution, unless its case expects the singularity.
 
     Args:
-        result: of a task.
+        result: result of a task.
         case: the case.
     """
     robot = result.robot
@@ -99,18 +99,18 @@ def headline(result: SolveResult, case: Case) -> Line:
     unit = unit if measured is None else f" {measured.unit}"
     if result.status is Status.INTERRUPTED:
         best = None if result.reached is None or result.reached.violated else result.reached.F
-        words = ", without a design within the limits" if best is None else f": best F so far = {number(best)}{unit}"
+        words = ", no design within the limits so far" if best is None else f": best F so far = {number(best)}{unit}"
         return Line(f"stopped before the end{words}{_not_proved(result, case, ', ')}", tone=Tone.NO_ANSWER)
     if result.status is Status.NOT_PROVED:
         found = "" if result.reached is None or result.reached.F is None else number(result.reached.F) + unit
-        return Line(f"{_not_proved(result, case)}: the best design found has F = {found}", tone=Tone.NO_ANSWER)
+        return Line(f"{_not_proved(result, case)}: the best design has F = {found}", tone=Tone.NO_ANSWER)
     if result.F is None:
-        return Line(f"{result.status.value}: this is not an optimum", tone=Tone.NO_ANSWER)
+        return Line(_no_optimum_words(result), tone=Tone.NO_ANSWER)
     several = None if robot is None else robot.several
     is_measured = measured is not None and measured.minimise is not None
     how = "" if several is None else "largest" if is_measured else several.over_poses.value
     over = "" if several is None else f", {how} over {len(several.poses)} poses"
-    word, status = "fixed point:", result.status.value
+    word, status = "at the given point", result.status.value
     is_compared = result.choice is not None or result.rounding is not None
     if result.status is Status.LOCAL:
         word = "local maximum" if result.sense is Sense.MAX else "local minimum"
@@ -123,19 +123,30 @@ def headline(result: SolveResult, case: Case) -> Line:
     if robot is not None and robot.singular:
         status += f", singular: rank {robot.rank}"
     tone = Tone.CAUTION if is_unasked_singularity(robot, case) else Tone.ANSWER
-    # What is left of an F that nothing resists is rounding.
+    # F of a task that nothing resists is rounding error.
     F = 0.0 if robot is not None and robot.task_is_free and several is None else task_F(robot, result.F)
     return Line(number(F), tone=tone, before=f"{word} F = ", after=f"{unit}   ({status}{over})")
 
 
+def _no_optimum_words(result: SolveResult) -> str:
+    """Return the status of a solve without an answer, with F of its best points where these did not converge."""
+    reached, starts = result.reached, result.starts
+    is_open = result.status is Status.NOT_CONVERGED and bool(starts.optima) and reached is not None
+    if not is_open or reached is None or reached.F is None or reached.violated:
+        return f"{result.status.value}: this is not an optimum"
+    best = starts.optima[0]
+    converged = f"{best.count} of {starts.run} searches converged at F = {number(best.F)}"
+    return f"not converged: {converged}, but an unconverged point has F = {number(reached.F)}"
+
+
 def _not_proved(result: SolveResult, case: Case, before: str = "") -> str:
-    """Return words after a text for limits over a workspace or along a path that are not proved; empty for others."""
+    """Return ``not proved`` with the domain, after a text; empty where no limit over a domain is unproved."""
     proof = result.workspace or result.path
     return "" if proof is None or proof.proved else f"{before}not proved {case.limits_where}"
 
 
 def is_unasked_singularity(robot: RobotData | None, case: Case) -> bool:
-    """Return whether a robot is singular, at one of its poses at least, and its case does not expect that."""
+    """Return whether a robot is singular at a pose at least, although its case does not expect a singularity."""
     if robot is None or case.expect.singular:
         return False
     return robot.singular or (robot.several is not None and any(pose.singular for pose in robot.several.poses))
@@ -149,42 +160,44 @@ def heading_lines(case: Case, result: SolveResult) -> Iterator[Line]:
     yield from objective_lines(case)
     yield headline(result, case)
     if result.objective is not None and result.objective.over is not None and result.F is not None:
-        value, side = result.objective.value, "smaller" if result.sense is Sense.MAX else "larger"
+        value, sign = result.objective.value, ">=" if result.sense is Sense.MAX else "<="
         words = (
-            f"not bounded over the {result.objective.over}"
+            f"no bound of F over the {result.objective.over} is proved"
             if value is None
-            else f"at no pose {side} than {number(value)}"
+            else f"F {sign} {number(value)} everywhere {case.limits_where} (proved)"
         )
-        yield Line(words, label="F", tone=Tone.NO_ANSWER if value is None else Tone.ANSWER)
+        yield Line(words, label="bound", tone=Tone.NO_ANSWER if value is None else Tone.ANSWER)
 
 
 def objective_lines(case: Case) -> Iterator[Line]:
-    """Yield what F stands for where it is no work rate."""
+    """Yield the meaning of F where F is not the sum of squared work rates."""
     words = objective_words(case)
     if words:
         yield Line(words, label="F is")
 
 
 def evidence_lines(result: SolveResult, case: Case) -> Iterator[Line]:
-    """Yield the verdict, the evidence for it, and the limits that a failed solve violates or that must be moved."""
+    """Yield the kind of the point, its evidence, and the limits that a failed solve violates or that must be moved."""
     if result.optimality is not None:
-        yield verdict_line(result.optimality)
+        yield optimality_line(result.optimality)
     yield from check_lines(result)
     yield from fault_lines(result, case)
 
 
 def check_lines(result: SolveResult) -> Iterator[Line]:
-    """Yield the evidence for the verdict: flat directions, stationarity, feasibility and curvature."""
+    """Yield the evidence of optimality: flat directions, stationarity, feasibility and curvature."""
     evidence = result.optimality
     if evidence is not None:
         for direction in evidence.flat:
-            yield Line(", ".join(f"{name} {rate:+.4g}" for name, rate in direction.items()), label="flat along")
+            yield Line(", ".join(f"{name} {rate:+.4g}" for name, rate in direction.items()), label="flat direction")
         if math.isfinite(evidence.stationarity):
             checks = f"stationarity {residual(evidence.stationarity)}, feasibility {residual(evidence.feasibility)}"
             curvature = evidence.eigenvalues
-            smallest = ", no free direction left"
+            smallest = "; active bounds and limits leave no free direction"
             if len(curvature):
-                smallest = f", smallest curvature {settled(min(curvature), 1.0, CURVED) or 0:.3g}"
+                smallest = (
+                    f"; smallest eigenvalue of the reduced Hessian {settled(min(curvature), 1.0, CURVED) or 0:.3g}"
+                )
             yield Line(checks + (smallest if result.reached is None else ""), label="evidence")
 
 
@@ -195,19 +208,19 @@ def fault_lines(result: SolveResult, case: Case) -> Iterator[Line]:
         yield Line(sentence)
 
 
-def verdict_line(evidence: Evidence) -> Line:
-    """Return the verdict about a point."""
-    return Line(evidence.kind.value, label="verdict")
+def optimality_line(evidence: Evidence) -> Line:
+    """Return the kind of a point, such as a strict local maximum."""
+    return Line(evidence.kind.value, label="optimality")
 
 
 def relaxation_sentences(result: SolveResult, case: Case) -> Iterator[str]:
-    """Yield the movement of each limit with which an infeasible case would be feasible.
+    """Yield the value of each limit with which an infeasible case would be feasible.
 
-    Over a workspace or along a path it is known from a few poses, and so as one that is needed at least.
+    Over a workspace or along a path this value is known from a few poses only, and so it is a necessary one.
     """
     for row in result.relaxation or ():
         unit, is_upper = f" {row.unit}" if row.unit else "", row.needed > row.limit
-        # Rounded to the side where the sentence is true.
+        # The rounding keeps the sentence true.
         needed = rounded_to(row.needed, _DIGITS, up=is_upper)
         if case.limits_over:
             more = "more" if is_upper else "less"
@@ -217,20 +230,20 @@ def relaxation_sentences(result: SolveResult, case: Case) -> Iterator[str]:
 
 
 def costliest_words(limits: Sequence[LimitData]) -> str | None:
-    """Return a sentence about the active limit with the largest cost per part of its size; None without a cost."""
+    """Return a sentence about the active limit with the largest relative effect on F; None without such a limit."""
     costly = [(row, row.cost) for row in limits if row.active and row.cost]
     if not costly:
         return None
     row, cost = max(costly, key=lambda each: ordered(abs(each[1] * (each[0].limit or 1.0))))
-    return f"Per part of its own size, {row.key} costs most: {cost:+.4g} {slope_unit(row.unit)}."
+    return f"The active limit with the largest relative effect is {row.key}: F {cost:+.4g} {per_words(row.unit)}."
 
 
-def holding_lines(limits: Sequence[LimitData], title: str = "") -> Iterator[Line]:
-    """Yield the limits that hold a design, each with its cost, or how many are kept; nothing without a limit.
+def active_limit_lines(limits: Sequence[LimitData], title: str = "") -> Iterator[Line]:
+    """Yield the active limits of a design with the derivative of F, and the violated limits; nothing without limits.
 
     Args:
-        limits: of the case.
-        title: at which poses they hold; empty for all poses of the case.
+        limits: limits of the case.
+        title: poses that the limits cover; empty for all poses of the case.
     """
     where = f"; {title}" if title else ""
     if not limits:
@@ -239,20 +252,21 @@ def holding_lines(limits: Sequence[LimitData], title: str = "") -> Iterator[Line
     kept = len(active) + sum(not (row.active or row.violated) for row in limits)
     texts = []
     for row in active:
-        cost = f" ({row.cost:+.4g} {slope_unit(row.unit)})" if row.cost else ""
+        cost = f" (F {row.cost:+.4g} {per_words(row.unit)})" if row.cost else ""
         texts.append(f"{row.key} = {number(row.limit, digits=6)} {row.unit}".rstrip() + cost)
+    share = "1" if len(limits) == 1 else f"all {kept}" if kept == len(limits) else f"{kept} of {len(limits)}"
     if texts:
-        rest = f", of {kept} that are kept" if kept > len(active) else ""
-        yield Line(", ".join(texts), label="held by limits", after=rest + where)
+        rest = f"; {share} limits satisfied" if kept > len(active) else ""
+        yield Line(", ".join(texts), label="active limits", after=rest + where)
     elif kept:
-        yield Line(f"{kept} kept, of which none holds the design", label="limits", after=where)
+        yield Line(f"{share} satisfied, none active", label="limits", after=where)
     if kept < len(limits):
         words = ", ".join(row.key for row in limits if row.violated)
         yield Line(words, label="violated limits", tone=Tone.FAULT)
 
 
 def violation_lines(sides: Sequence[ViolationData]) -> Iterator[Line]:
-    """Yield the bounds and constraints that a point lies outside of."""
+    """Yield the violated bounds and limits of a point."""
     if len(sides) > _VIOLATIONS:
         yield Line(f"{len(sides)} limits are violated; the first {_VIOLATIONS}:", tone=Tone.FAULT)
     for side in sides[:_VIOLATIONS]:
@@ -262,20 +276,20 @@ def violation_lines(sides: Sequence[ViolationData]) -> Iterator[Line]:
 
 
 def better_line(starts: StartsData) -> Line | None:
-    """Return the caution that a search reached a better point than the best optimum; None where none did."""
+    """Return the caution that an unconverged search reached a better point; None where there is no such search."""
     if starts.better is None or not starts.optima:
         return None
-    reached = f"a search that did not converge reached {number(starts.better)} within the limits"
+    reached = f"an unconverged search reached F = {number(starts.better)} within the limits"
     best = f"{starts.converged} of {starts.run} searches converged, the best at F = {number(starts.optima[0].F)}"
     return Line(f"{best}; {reached}: raise solve.max_iterations or solve.starts", label="note", tone=Tone.CAUTION)
 
 
 def starts_lines(starts: StartsData, robot: RobotData | None = None) -> Iterator[Line]:
-    """Yield how the starts ended.
+    """Yield the outcomes of the starts.
 
     Args:
-        starts: of a solve.
-        robot: at the best optimum, whose task tells the error of F.
+        starts: starts of a solve.
+        robot: robot at the best optimum, from which the rounding error of F follows; None where it is not known.
     """
     if not starts.run:
         return
@@ -283,19 +297,19 @@ def starts_lines(starts: StartsData, robot: RobotData | None = None) -> Iterator
     for sentence, count in starts.failed.items():
         yield Line(f"  {count}: {sentence}", tone=Tone.CAUTION)
     for index, found in enumerate(starts.optima[:_OPTIMA]):
-        note = f", spread over {100 * found.spread:.0f} % of the ranges" if found.spread > SET else ""
+        note = f", a set over {100 * found.spread:.0f} % of the ranges" if found.spread > SET else ""
         F = number(task_F(robot, found.F))
         if index and number(task_F(robot, starts.optima[index - 1].F)) == F:
-            note += ", at another point"
+            note += ", at a different point"
         note += f", in {found.assembly}" if found.assembly else ""
         yield Line(f"  {found.count} at F = {F}{note}")
     worse = len(starts.optima) - _OPTIMA
     if worse > 0:
-        yield Line(f"  and {worse} worse {'optimum' if worse == 1 else 'optima'}")
+        yield Line(f"  and {worse} {'optimum' if worse == 1 else 'optima'} with a worse F")
 
 
 def singularity_lines(robot: RobotData, units: Units) -> Iterator[Line]:
-    """Yield the rank of the Jacobian, and the motions that nothing resists."""
+    """Yield the rank of the Jacobian, and the motions that are free with all actuators locked."""
     if robot.task_is_free and robot.task is not None:
         words = task_words(robot.task, units)
         free = f"singular: F is 0, so the platform can make the task's motion ({words}) with every actuator locked"
@@ -307,42 +321,42 @@ def singularity_lines(robot: RobotData, units: Units) -> Iterator[Line]:
         yield Line(f"{robot.rank}", label="rank of J")
         return
     several = " combinations of" if len(robot.free_motions) > 1 else ""
-    yield Line(f"{robot.rank}: the structure is singular; nothing resists{several}", label="rank of J")
+    yield Line(f"{robot.rank}: singular; with all actuators locked nothing resists{several}", label="rank of J")
     for motion in robot.free_motions:
         yield Line(f"  {motion_words(motion, units, robot_size(robot))}")
 
 
 def tolerance_line(lost: ToleranceLoss, F: float | None, units: Units) -> Line:
-    """Return the loss of F by inexact joint centres."""
+    """Return the loss of F by joint-centre errors."""
     part = f" ({100 * lost.loss / F:.2g} %)" if F else ""
-    text = f"{lost.tolerance:g} {units.length} at every joint centre: F may be worse by {lost.loss:.4g}{part}"
+    text = f"joint centres off by {lost.tolerance:g} {units.length}: F may be worse by {lost.loss:.4g}{part}"
     return Line(text, label="tolerance")
 
 
 def certificate_lines(certificate: CertificateData | None) -> Iterator[Line]:
-    """Yield the proved statement, the gap, and the size of the search."""
+    """Yield the proved statement, the gap, and the size of the search for it."""
     if certificate is None:
         return
     tone = Tone.ANSWER if certificate.status is CertificateStatus.PROVED else Tone.NO_ANSWER
     yield Line(certificate.statement, label="certificate", tone=tone)
     if certificate.gap is not None:
-        share = "" if certificate.relative_gap is None else f" ({certificate.relative_gap:.2e} of it)"
+        share = "" if certificate.relative_gap is None else f" (relative {certificate.relative_gap:.2e})"
         yield Line(f"{certificate.gap:.3g}{share}", label="gap", part="search")
-    left = f", {certificate.open:,} left" if certificate.open else ""
+    left = f", {certificate.open:,} undecided," if certificate.open else ""
     word = "box" if certificate.boxes == 1 else "boxes"
-    boxes = f"{certificate.boxes:,} {word}{left} in {certificate.seconds:.2f} s"
+    boxes = f"{certificate.boxes:,} {word} examined{left} in {certificate.seconds:.2f} s"
     yield Line(f"{boxes}, engine {certificate.engine}", label="search", part="search")
 
 
 def choice_lines(
     choice: ChoiceData | None, rounding: RoundingData | None = None, *, is_answer: bool = True
 ) -> Iterator[Line]:
-    """Yield the values that were chosen from lists, how dimensions were rounded, and what these searches found.
+    """Yield the values chosen from lists, the rounding of dimensions, and the outcomes of these searches.
 
     Args:
-        choice: among listed values; None for none.
-        rounding: of the dimensions; None for none.
-        is_answer: whether the solve gave an answer.
+        choice: choice among listed values; None without lists.
+        rounding: rounding of the dimensions; None where they are not rounded.
+        is_answer: If true, the solve gave an answer.
     """
     tone = Tone.PLAIN if is_answer else Tone.FAULT
     if choice is not None:
@@ -351,31 +365,31 @@ def choice_lines(
             for each in choice.numbers
             if math.isfinite(each.value)
         )
-        yield Line(f"{chosen}: {choice.statement}" if is_answer else choice.statement, label="values", tone=tone)
+        yield Line(f"{chosen}: {choice.statement}" if is_answer else choice.statement, label="chosen values", tone=tone)
     if rounding is not None:
         yield Line(rounding.statement, label="rounded", tone=tone)
         if rounding.loss is not None:
             size = settled(rounding.loss, abs(rounding.before), _UNCHANGED)
             word = "worse" if rounding.loss >= 0 else "better"
             part = "" if rounding.relative_loss is None else f" ({100 * abs(rounding.relative_loss):.2g} %)"
-            text = f"{word} by {abs(rounding.loss):.3g}{part} than {rounding.before:.7g} before"
-            yield Line(text if size else f"{rounding.before:.7g}, as before", label="objective")
+            text = f"{word} by {abs(rounding.loss):.3g}{part} than {rounding.before:.7g} before rounding"
+            yield Line(text if size else f"{rounding.before:.7g}, unchanged by rounding", label="objective")
 
 
 def combined_lines(result: CombinedResult) -> Iterator[Line]:
     """Yield the method of combination, and the limits that the combined point violates."""
     combined, status = result.combined, result.status.value
-    yield Line(f"{combined.method.value} ({status})", label="combined by")
+    yield Line(f"{combined.method.value} ({status})", label="tasks combined by")
     if combined.method_point is None:
-        yield Line(f"{status}: this is no answer", tone=Tone.NO_ANSWER)
+        yield Line(f"{status}: this is not an optimum", tone=Tone.NO_ANSWER)
     for name in combined.violated:
         yield Line(f"violated: {name}", tone=Tone.FAULT)
 
 
 def combined_value_lines(combined: CombinedData) -> Iterator[Line]:
-    """Yield the value of the combined objective and the verdict about the point, where there is a value."""
+    """Yield the value of the combined objective and the kind of its point; nothing without a value."""
     if combined.value is None:
         return
-    yield Line(number(combined.value), label=combined.method.value)
+    yield Line(number(combined.value), label=f"{combined.method.value} objective")
     if combined.optimality is not None:
-        yield verdict_line(combined.optimality)
+        yield optimality_line(combined.optimality)

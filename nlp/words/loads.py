@@ -1,4 +1,4 @@
-"""Forces, powers and speeds of actuators, and the wrenches of constraints that hold loads, as tables of text."""
+"""Tables of actuator forces, powers and speeds, and of the constraint wrenches under loads."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def loading_tables(case: Case, robot: RobotData) -> Iterator[TextTable]:
-    """Yield the forces and powers of the actuators, the wrenches of constraints, and the speeds of the actuators."""
+    """Yield actuator forces and powers, constraint wrenches, displacements, and actuator speeds."""
     data = robot.loading
     if data is None:
         return
@@ -51,10 +51,10 @@ def _force_table(case: Case, loads: Sequence[HeldLoad]) -> TextTable:
 
 
 def _constraint_table(case: Case, loads: Sequence[HeldLoad], length: float) -> Iterator[TextTable]:
-    """Yield the wrenches by which the constraints of limbs hold the loads, where statics determines one of them.
+    """Yield the constraint wrenches of the limbs under loads, where statics determines at least one of them.
 
-    They are what is left of the load, which actuators may hold alone: their rounding is a part of it, of its moments
-    that with the robot's ``length`` as an arm.
+    They balance the part of the load that actuators do not: their rounding error is relative to the load, for moments
+    with the robot's ``length`` as an arm.
     """
     rows = []
     for load in loads:
@@ -70,14 +70,13 @@ def _constraint_table(case: Case, loads: Sequence[HeldLoad], length: float) -> I
         parts = [f"f_{axis}\n{case.units.label(Dimension.FORCE)}" for axis in "xyz"]
         parts += [f"m_{axis}\n{case.units.label(Dimension.TORQUE)}" for axis in "xyz"]
         headers = (*_pose_header(loads), "load", "limb", *parts)
-        yield TextTable(headers, tuple(rows), "constraints", "wrenches of the limbs' constraints on the platform")
+        yield TextTable(headers, tuple(rows), "constraints", "constraint wrenches of the limbs on the platform")
 
 
 def _deflection_table(case: Case, loads: Sequence[HeldLoad], length: float) -> Iterator[TextTable]:
     """Yield the platform's displacement under every load, where the actuators' stiffness is known.
 
-    Its rounding is a part of it: of its turn also that of the translation by so much with the robot's ``length`` as an
-    arm, and the other way around.
+    Rounding errors of rotation and translation are relative to the larger of both, with the robot's ``length`` as arm.
     """
     rows = []
     for load in loads:
@@ -93,9 +92,9 @@ def _deflection_table(case: Case, loads: Sequence[HeldLoad], length: float) -> I
         ]
         rows.append((*_pose(load), load.name, *parts[0], _text(found.largest), *parts[1]))
     if rows:
-        names = [f"{name}\n{case.units.label(Dimension.LENGTH)}" for name in ("x", "y", "z", "at most")]
+        names = [f"{name}\n{case.units.label(Dimension.LENGTH)}" for name in ("x", "y", "z", "largest")]
         names += [f"about {name}\n{case.units.label(Dimension.ANGLE)}" for name in "xyz"]
-        title = "displacement of the platform as its actuators give way"
+        title = "displacement of the platform by actuator compliance"
         yield TextTable((*_pose_header(loads), "load", *names), tuple(rows), "deflections", title)
 
 

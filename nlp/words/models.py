@@ -1,4 +1,4 @@
-"""Robots as tables of text: options, parameters, rows of the Jacobian, measures, and the unknowns of a certificate."""
+"""Tables of robots: options, parameters, quantities, rows of the Jacobian, and loops."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ def models_table(models: Iterable[tuple[str, str]]) -> TextTable:
 
 
 def models_words(models: Iterable[tuple[str, str]]) -> Iterator[Line | TextTable]:
-    """Yield the names of robots by their motions, which end the descriptions, then the descriptions."""
+    """Yield the names of robots by motion, which is the end of a description, then the descriptions."""
     listed = tuple(models)
     motions: dict[str, list[str]] = {}
     for name, description in listed:
-        motions.setdefault(description.rpartition("; ")[2] if "; " in description else "others", []).append(name)
-    yield Line(f"{counted(len(listed), 'robot')}; models NAME shows one", tone=Tone.TITLE)
-    for motion, names in sorted(motions.items(), key=lambda each: (each[0] == "others", -len(each[1]))):
+        motions.setdefault(description.rpartition("; ")[2] if "; " in description else "other robots", []).append(name)
+    yield Line(f"{counted(len(listed), 'robot')}; screwsynth models NAME shows one", tone=Tone.TITLE)
+    for motion, names in sorted(motions.items(), key=lambda each: (each[0] == "other robots", -len(each[1]))):
         yield Line(", ".join(names), label=motion)
     yield from in_part("descriptions", [models_table(listed)])
 
 
 def model_words(name: str, model: Model | None, options: Sequence[ModelOption]) -> Iterator[Line | TextTable]:
-    """Yield one robot: its options, parameters, rows and measures.
+    """Yield a robot: its options, parameters, quantities, loops and rows.
 
     Args:
-        name: of the robot.
-        model: the robot; None where an option without a default keeps it from being built: then only options are shown.
-        options: its options.
+        name: name of the robot.
+        model: the robot; None where an option without a default is not given: then only the options are shown.
+        options: options of the robot.
     """
     yield Line(name, tone=Tone.TITLE)
     if model is not None:
@@ -50,7 +50,7 @@ def model_words(name: str, model: Model | None, options: Sequence[ModelOption]) 
     if model is None:
         return
     yield TextTable(
-        ("parameter", "measures", "allowed (angles in deg)", "meaning"),
+        ("parameter", "kind", "allowed (angles in deg)", "meaning"),
         tuple(
             (", ".join(item.components), item.dimension.value, _domain(item), item.description)
             for item in model.parameters
@@ -59,13 +59,13 @@ def model_words(name: str, model: Model | None, options: Sequence[ModelOption]) 
     if model.structure:
         yield from _freedom_lines(model)
         if model.legs:
-            words = f"{', '.join(leg.name for leg in model.legs)}: straight, so that limits of legs can be set"
-            yield Line(words, label="legs")
-    words = "rows with forces of the norm f exert at most f sqrt(F) along a task"
-    yield Line(words if not model.actuators else f"{words}; [[load]] tells those of actuators", label="forces")
+            words = f"{', '.join(leg.name for leg in model.legs)} (limits on leg lengths apply)"
+            yield Line(words, label="straight legs")
+    words = "wrenches whose magnitudes have the norm f do work at a rate of at most f sqrt(F) in the task"
+    yield Line(words if not model.actuators else f"{words}; [[load]] gives actuator forces", label="forces")
     if model.quantities:
         rows = [(item.name, item.dimension.value, item.description) for item in model.quantities]
-        yield TextTable(("quantity", "measures", "meaning"), tuple(rows))
+        yield TextTable(("quantity", "kind", "meaning"), tuple(rows))
     for remark in model.remarks:
         yield Line(remark, label="note")
     yield from in_part("members", _member_tables(model))
@@ -75,24 +75,24 @@ def model_words(name: str, model: Model | None, options: Sequence[ModelOption]) 
 
 
 def _member_tables(model: Model) -> Iterator[TextTable]:
-    """Yield the members of a robot given joint by joint."""
+    """Yield the members of a robot defined by joints."""
     rows = [(each.name, each.joints, str(each.wrenches), str(each.constraints)) for each in model.structure]
     if rows:
-        yield TextTable(("member", "joints (* actuated)", "dim W", "dim C"), tuple(rows))
+        yield TextTable(("member", "joints (* actuated)", "wrenches", "constraints"), tuple(rows))
 
 
 def _freedom_lines(model: Model) -> Iterator[Line]:
-    """Yield the freedoms and ranks of a robot given joint by joint."""
+    """Yield the degrees of freedom and the ranks of a robot defined by joints."""
     if model.generic is not None:
         freedoms, rank = 6 - model.generic.constraints, model.rank
-        yield Line(f"{freedoms} with free actuators", label="freedoms")
-        yield Line(f"{rank} of all wrenches, {model.generic.constraints} of the constraints", label="ranks")
+        yield Line(f"{freedoms} with free actuators", label="degrees of freedom")
+        yield Line(f"{rank} of J, {model.generic.constraints} of the constraint wrenches", label="ranks")
         if model.generic.undetermined:
             yield Line(idle_words(model.generic.undetermined), label="note")
 
 
 def _loop_words(model: Model) -> Iterator[Line | TextTable]:
-    """Yield the opened loops of a robot given joint by joint."""
+    """Yield the opened loops of a robot defined by joints."""
     if not model.structure:
         return
     unknowns, every = len(model.unknowns), sum(each.equations for each in model.structure)
@@ -100,8 +100,8 @@ def _loop_words(model: Model) -> Iterator[Line | TextTable]:
     if free:
         yield Line(f"{free}, which the pose does not determine", label="variables")
     if every == 0:
-        how = f"the pose and these {len(model.free_joints)} variables: no equations"
-        how = how if free else "the pose alone: no unknowns, no equations"
+        how = f"the pose and these {len(model.free_joints)} variables (no equations)"
+        how = how if free else "the pose (no unknowns, no equations)"
         yield Line(f"closed by {how}", label="loops")
         return
     loops = [
@@ -110,19 +110,15 @@ def _loop_words(model: Model) -> Iterator[Line | TextTable]:
     ]
     yield TextTable(("loop", "opened at", "unknowns", "equations", "dropped"), tuple(loops))
     kept = len(model.closure)
-    words = f"{unknowns} unknowns{', these variables among them' if free else ''}, {every} equations"
-    words += (
-        f", of which {every - kept} follow from the others"
-        if kept < every
-        else ", none of which follows from the others"
-    )
+    words = f"{unknowns} unknowns{', including these variables' if free else ''}, {every} equations"
+    words += f", {every - kept} of them redundant" if kept < every else ", none of them redundant"
     yield Line(words, label="loops")
 
 
 def _free_joint_words(model: Model) -> str:
-    """Return the words for the positions of driven joints that the pose does not determine; empty without any."""
+    """Return the names of the free actuator coordinates in words; empty without any."""
     joints, ending = model.free_joints, "s" * (len(model.free_joints) > 1)
-    return f"position{ending} of driven joint{ending} {', '.join(joints)}" if joints else ""
+    return f"coordinate{ending} of actuated joint{ending} {', '.join(joints)}" if joints else ""
 
 
 def _domain(parameter: Parameter) -> str:
@@ -134,11 +130,11 @@ def _domain(parameter: Parameter) -> str:
 
 
 def unknown_lines(model: Model, *, all_assemblies: bool) -> Iterator[Line]:
-    """Yield the joint positions that are variables of the program: free ones, then those of closed loops, by limb.
+    """Yield the joint coordinates that are variables of the nonlinear program: free ones, then unknowns of loops.
 
     Args:
         model: the robot.
-        all_assemblies: whether all working modes are covered, and not home's alone.
+        all_assemblies: If true, all working modes are covered, not only that of home.
     """
     if free := _free_joint_words(model):
         yield Line(f"{free}, which the pose does not determine", label="variables")
@@ -154,7 +150,7 @@ def unknown_lines(model: Model, *, all_assemblies: bool) -> Iterator[Line]:
         if count:
             groups.setdefault((count, limb in modes), []).append(limb)
     for (count, in_mode), limbs in groups.items():
-        who = f"limb {limbs[0]} needs" if len(limbs) == 1 else f"limbs {', '.join(limbs)} need"
-        what = f"{count} joint position{'s' * (count > 1)}{' each' * (len(limbs) > 1)}"
-        where = "in home's working mode" if in_mode else "in every assembly"
-        yield Line(f"{who} {what} and the loop equations, {where}", label="unknowns")
+        who = f"limb {limbs[0]}" if len(limbs) == 1 else f"limbs {', '.join(limbs)}"
+        what = f"{count} joint coordinate{'s' * (count > 1)}{' each' * (len(limbs) > 1)}"
+        where = "home's working mode" if in_mode else "all assembly modes"
+        yield Line(f"{who}: {what}, from the loop equations; covers {where}", label="unknowns")

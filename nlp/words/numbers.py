@@ -1,6 +1,6 @@
-"""Numbers as text, 0 where they are below their error bound.
+"""Numbers as text.
 
-Where a number is smaller than its error bound (``results.rounding``), its digits mean nothing, and its text is 0.
+A number below its error bound (``results.rounding``) has no significant digit: its text is 0.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from .text import Figure
 
 #: Error bound of a residual in scaled terms: corrections end at a tenth of it.
 _RESIDUAL = 1e-12
-#: Significant digits of a number that a search has found: the others are rounding error.
+#: Significant digits of the result of a search; further digits are rounding error.
 _SOLVED = 9
 
 
@@ -22,29 +22,34 @@ def number(value: float, size: float = 0.0, *, digits: int = 7, signed: bool = F
 
     Args:
         value: the number.
-        size: of its terms, its neighbours or its range; the number is 0 where it is below a part of this.
+        size: size of its terms, its neighbours or its range, to which its error bound is relative.
         digits: number of significant digits.
-        signed: whether a positive number has its sign.
-        part: the error bound as a part of the size.
+        signed: If true, a positive number has a sign.
+        part: error bound, as a part of the size.
     """
     value = settled(value, size, part)
     return Figure(f"{value:{'+' if signed and value else ''}.{digits}g}", value)
 
 
 def rounded_to(value: float, digits: int, *, up: bool) -> str:
-    """Return the text of a number, rounded up or down where it has more digits than rounding error leaves of it."""
+    """Return the text of a number, rounded up or down after digits without significance are removed."""
     settled_value = Context(prec=_SOLVED).create_decimal(value)
     context = Context(prec=digits, rounding=ROUND_CEILING if up else ROUND_FLOOR)
     return f"{float(context.plus(settled_value)):.{digits}g}"
 
 
 def listed(values: Iterable[float]) -> str:
-    """Return numbers with five digits each, 0 where they are rounding error beside the largest."""
+    """Return numbers with five digits, 0 where they are rounding error of the largest one."""
     numbers = list(values)
     size = max(map(abs, numbers), default=0.0)
     return "  ".join(number(value, size, digits=5) for value in numbers)
 
 
+def per_words(unit: str | None) -> str:
+    """Return the unit in which a derivative is stated, such as ``per cm``; ``per 1`` for a quantity without a unit."""
+    return f"per {unit or 1}"
+
+
 def residual(value: float) -> str:
-    """Return the text of a residual in scaled terms, of which no digit means anything below its error bound."""
+    """Return the text of a residual in scaled terms; below its error bound it has no significant digit."""
     return f"{value:.1e}" if value > _RESIDUAL else f"below {_RESIDUAL:.0e}"

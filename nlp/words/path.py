@@ -1,4 +1,4 @@
-"""Verdicts on a programmed path in words: the answer, the first fault with its line, and the table of claims."""
+"""Verdicts along a tool path: the answer, the first violation with its line, and the table of quantities."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from ..case.pathfile import PLACE
 from ..case.pose import Free
 from ..case.task import Sense
 from ..proof.workspace.verdict import Outcome
-from .motors import TONES
+from .claims import SINGULAR, rank_line
+from .motors import OUTCOME_WORDS, TONES
 from .numbers import number
 from .text import Line, TextTable, Tone, in_part
 from .verdicts import (
@@ -17,11 +18,11 @@ from .verdicts import (
     answer_words,
     exchange_lines,
     head_lines,
-    machine_lines,
     open_lines,
     outcome_lines,
     proof_line,
     tightest_table,
+    tolerance_lines,
     verdict_table,
 )
 
@@ -30,19 +31,21 @@ if TYPE_CHECKING:
     from ..evidence.state import WorkspacePose
     from ..results.path import PathData, PathFaultData, PathProofData, PathResult, PathVerdictData
 
-#: So many words that move nothing are shown.
+#: Title of the table of limits with the smallest margin.
+TIGHTEST_ALONG = "limits with the smallest margin along the path"
+#: Number of words without motion that are shown.
 _SHOWN = 6
 
 
 def path_summary(
     case: Case, result: PathResult, command: Callable[[WorkspacePose], str] | None = None
 ) -> Iterator[Line | TextTable]:
-    """Yield the verdicts on a machine along a path.
+    """Yield the verdicts on a robot along a tool path.
 
     Args:
         case: the case.
         result: the verdicts.
-        command: returns the command that shows a pose; left out, for a page, only tables have single claims.
+        command: returns the command that shows a pose; None for a page, where only tables have single claims.
     """
     path, answer = result.path, verdict_words(result)
     limited = [each for each in path.claims if each.limit is not None]
@@ -50,13 +53,13 @@ def path_summary(
     yield from head_lines(case, answer, path.claims, path.dependent, is_proved=result.proved, subject=subject)
     wrong = first_refuted(result)
     if wrong is not None and wrong.fault is not None:
-        yield Line(fault_words(wrong, wrong.fault), label="first fault", tone=Tone.FAULT)
+        yield Line(fault_words(wrong, wrong.fault), label="first violation", tone=Tone.FAULT)
         if command is not None:
-            yield Line(command(wrong.fault.pose), label="see it", is_command=True)
+            yield Line(command(wrong.fault.pose), label="see it with", is_command=True)
     for each in path.claims:
         if each.sense is None:
             after = f": {each.reason}" if each.reason else ""
-            yield Line(each.outcome.value, label=each.name, tone=TONES[each.outcome], after=after + _place_words(each))
+            yield rank_line(each.name, each.outcome, after + _place_words(each))
     yield from outcome_lines(limited)
     if command is not None:
         yield from _other_faults(path, wrong)
@@ -64,68 +67,70 @@ def path_summary(
     yield from _knot_lines(path, case.units.length)
     if path.time is not None or path.knots is not None:
         yield _actuator_table(path)
-    yield from in_part("tightest limits", tightest_table(limited, "tightest limits along the path"))
-    yield from in_part("every number", along_table(case, path.claims))
+    yield from in_part("smallest margins", tightest_table(limited, TIGHTEST_ALONG))
+    yield from in_part("all quantities", along_table(case, path.claims))
 
 
 def _subject_lines(path: PathData) -> Iterator[Line]:
-    """Yield the path: its file, its time, and words of it that move nothing."""
+    """Yield the path: its file, its time, and its words without motion."""
     yield Line(f"{path.file}: {path.segments:,} segment{'s' * (path.segments != 1)}", label="path")
     if path.time is not None:
         yield Line(f"{number(path.time)} s", label="time", after=_untimed_words(path))
     if path.idle:
         words = ", ".join(f"{each.word} (line {each.line})" for each in path.idle[:_SHOWN])
         rest = len(path.idle) - _SHOWN
-        yield Line(words + (f", and {rest} more" if rest > 0 else ""), label="moves nothing")
+        yield Line(words + (f", and {rest} more" if rest > 0 else ""), label="ignored (no motion)")
 
 
 def _other_faults(path: PathData, first: PathVerdictData | None) -> Iterator[Line]:
-    """Yield the faults of other claims than the first, in the order of the path; a few belong to the answer."""
+    """Yield the violations of claims other than the first one, in the order of the path."""
     others = [(each, each.fault) for each in path.claims if each.fault is not None and each is not first]
     others.sort(key=lambda pair: (pair[1].segment, pair[1].parameter) if pair[1] is not None else (0, 0.0))
     for k, (each, fault) in enumerate(others):
         if fault is not None:
-            part = "refuted claims" if k >= SHOWN else ""
-            yield Line(fault_words(each, fault), label="refuted", tone=Tone.FAULT, part=part)
+            part = "violated claims" if k >= SHOWN else ""
+            yield Line(fault_words(each, fault), label=OUTCOME_WORDS[Outcome.REFUTED], tone=Tone.FAULT, part=part)
 
 
 def along_table(case: Case, verdicts: Sequence[PathVerdictData]) -> Iterator[TextTable]:
-    """Yield the table of the numbers among verdicts."""
+    """Yield the table of the verdicts on quantities."""
     rows = [each for each in verdicts if each.sense is not None]
-    title, lines = "numbers at every point of the path", [each.line for each in rows]
+    title, lines = "quantities along the path", [each.line for each in rows]
     yield from verdict_table(case, "claims", title, rows, lines=lines)
 
 
 def _untimed_words(path: PathData) -> str:
-    """Return how many segments have no time; else nothing."""
+    """Return the number of segments without a time; empty where all have one."""
     if not path.untimed:
         return ""
     verb = "has" if path.untimed == 1 else "have"
-    return f"; {path.untimed:,} of {path.segments:,} segments {verb} no time, and speeds there are not known"
+    return f"; {path.untimed:,} of {path.segments:,} segments {verb} no feed rate or time: no speed is checked there"
 
 
 def _knot_lines(path: PathData, unit: str) -> Iterator[Line]:
-    """Yield the number of knots, and the distance that is proved between them."""
+    """Yield the number of knots, and the proved deviation from the path between them."""
     knots = path.knots
     if knots is None:
         return
     lost = knots.number - knots.closed
-    yield Line(f"{knots.number:,}", label="knots", after=f"; {lost:,} of them are not reached" if lost else "")
+    yield Line(f"{knots.number:,}", label="knots", after=f"; {lost:,} of them are out of reach" if lost else "")
     if knots.within is None:
         return
     asked = f"{number(knots.within)} {unit}"
     if knots.deviation is None:
-        yield Line("open", label=f"within {asked}", tone=TONES[Outcome.OPEN], after=f": {knots.reason}")
+        yield Line(
+            OUTCOME_WORDS[Outcome.OPEN], label=f"within {asked}", tone=TONES[Outcome.OPEN], after=f": {knots.reason}"
+        )
     else:
         words = f"proved: between knots the platform stays within {number(knots.deviation)} {unit} of the path"
         yield Line(words, label=f"within {asked}", tone=TONES[Outcome.PROVED])
 
 
 def _actuator_table(path: PathData) -> TextTable:
-    """Return the table of the actuators' numbers."""
+    """Return the table of the actuators' ranges, speeds and accelerations."""
 
     def column(word: str, values: Iterable[float | None]) -> list[str]:
-        """Return a column with its head; none where nothing is known."""
+        """Return a column with its head; empty where no value is known."""
         cells = ["" if each is None else number(each) for each in values]
         return [word, *cells] if any(cells) else []
 
@@ -140,20 +145,22 @@ def _actuator_table(path: PathData) -> TextTable:
     ]
     headers, *rows = zip(*filter(None, columns), strict=True)
     has_knots = path.knots is not None and path.time is not None
-    title = "proven ranges and largest speeds by seconds" if path.time is not None else "proven ranges"
+    title = "proved ranges and largest speeds (per second)" if path.time is not None else "proved ranges"
     title += ", and largest accelerations between knots" if has_knots else ""
     return TextTable(headers, tuple(rows), name="actuators", title=title)
 
 
 def checked_claims(result: PathResult) -> list[PathVerdictData]:
-    """Return the claims that are demanded of every point: ranks, and numbers with limits."""
+    """Return the claims that the verdict counts: ranks, and quantities with a limit."""
     return [each for each in result.path.claims if each.sense is None or each.limit is not None]
 
 
 def verdict_words(result: PathResult) -> str:
-    """Return the answer: whether everything is proved, or how many claims are refuted, open and proved."""
-    outcomes = [each.outcome for each in checked_claims(result)]
-    return answer_words(outcomes, "at every point", is_proved=result.proved)
+    """Return the answer: everything is proved, or the numbers of violated, undecided and proved claims."""
+    claims = checked_claims(result)
+    ranks = [each.outcome for each in claims if each.sense is None]
+    limits = [each.outcome for each in claims if each.sense is not None]
+    return answer_words(ranks, limits, "at every point", is_proved=result.proved)
 
 
 def path_proof_lines(case: Case, proof: PathProofData) -> Iterator[Line]:
@@ -167,36 +174,41 @@ def path_proof_lines(case: Case, proof: PathProofData) -> Iterator[Line]:
             between = ""
             if isinstance(value, Free):
                 ends = (number(case.units.shown(end, dimension)) for end in (value.lower, value.upper))
-                between = f", free between {' and '.join(ends)}"
-            yield Line(f"{number(given)} {case.units.label(dimension)}", label=f"place {name}", after=between)
+                between = f" (bounds {' .. '.join(ends)})"
+            yield Line(f"{number(given)} {case.units.label(dimension)}", label=f"path placement {name}", after=between)
     yield from exchange_lines(proof, "path")
-    yield from machine_lines(case, proof.joint_centre)
+    yield from tolerance_lines(case, proof.joint_centre)
 
 
 def tightest_along(proof: PathProofData) -> Iterator[TextTable]:
-    """Yield the tightest claims about a solved design along its path."""
-    yield from tightest_table(proof.claims, "tightest limits along the path")
+    """Yield the limits of a solved design with the smallest margin along its path."""
+    yield from tightest_table(proof.claims, TIGHTEST_ALONG)
 
 
 def first_refuted(result: PathResult) -> PathVerdictData | None:
-    """Return the claim that is refuted at the first known point in the order of the path; None without one."""
+    """Return the claim that is violated first in the order of the path; None without a violation."""
     claims = [(each, each.fault) for each in checked_claims(result)]
     places = [(fault.segment, fault.parameter, k) for k, (_, fault) in enumerate(claims) if fault is not None]
     return claims[min(places)[2]][0] if places else None
 
 
 def fault_words(each: PathVerdictData, fault: PathFaultData) -> str:
-    """Return a refuted claim at its first known point."""
-    where = f"line {fault.line}, {number(fault.parameter, 1.0)} of its segment"
+    """Return a violated claim at the first point where the violation is known."""
+    where = f"line {fault.line}, {_along_words(fault.parameter)}"
     if each.limit is None or fault.value is None:
-        return f"{where}: {'J is singular' if each.name == 'regular' else 'the constraint wrenches lose rank'}"
-    side = "below" if each.sense is Sense.MIN else "above"
+        return f"{where}: {SINGULAR[each.name]}"
+    verb = "falls below" if each.sense is Sense.MIN else "exceeds"
     limit = f"{number(each.limit)} {each.unit}".rstrip()
-    return f"{where}: {each.name} goes {side} {limit}"
+    return f"{where}: {each.name} {verb} {limit}"
+
+
+def _along_words(parameter: float) -> str:
+    """Return the place on a segment."""
+    return f"at {number(parameter, 1.0)} of its segment"
 
 
 def _place_words(each: PathVerdictData) -> str:
-    """Return the place of a claim, after a comma."""
+    """Return the line and the place on its segment, after a comma; empty where they are not known."""
     if each.line is None or each.parameter is None:
         return ""
-    return f", in line {each.line}, {number(each.parameter, 1.0)} of its segment"
+    return f", in line {each.line} {_along_words(each.parameter)}"

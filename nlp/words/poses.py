@@ -1,4 +1,4 @@
-"""Poses in words, in the form in which their case states rotations, and the command that shows one with few digits."""
+"""Poses in words, with rotations in the form of their case, and the command that shows a pose."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ if TYPE_CHECKING:
     from ..case.overrides import Settings
     from ..evidence.state import WorkspacePose
 
-#: Digits of a pose in a command: as few as show what all digits show, and so many where they show nothing.
+#: Digits of a pose in a command: the smallest number, the number where no limit is violated, and all digits.
 _FEWEST, _ENOUGH, _ALL = 3, 6, 17
-#: Names of a pose without values, and of one at which loops are not closed, among those of violated limits.
+#: Names for a pose without values, and for a pose with open loops, among the names of violated limits.
 _IMPOSSIBLE, _OPEN = "impossible", "open loops"
 #: Keys of a rotation, behind the prefix of its pose.
 _ROTATION = ("axis", "angle", *(each.value for each in (RotationForm.RPY, RotationForm.QUATERNION)))
 
 
 def _rotation(case: Case, numbers: Mapping[str, list[float]]) -> Rotation:
-    """Return the rotation of such numbers.
+    """Return the rotation that numbers state in a form of the case.
 
     Raises:
         CaseError: a quaternion is rounded too much.
@@ -42,7 +42,7 @@ def _rotation(case: Case, numbers: Mapping[str, list[float]]) -> Rotation:
 
 
 def _rotation_words(case: Case, axis: Sequence[float], angle: float, form: RotationForm) -> str:
-    """Return a rotation in words; empty for none."""
+    """Return a rotation in words; empty without a rotation."""
     if abs(case.units.to_internal(angle, Dimension.ANGLE)) <= TURNED:
         return ""
     numbers, unit = rotation_numbers(case, axis, angle, form), case.units.angle
@@ -62,7 +62,7 @@ def pose_words(case: Case, pose: WorkspacePose, form: RotationForm | None = None
     Args:
         case: the case.
         pose: the pose.
-        form: of its rotation; left out, that of the case.
+        form: form of its rotation; None for the form of the case.
     """
     stated = () if case.workspace is None else case.workspace.position
     ends = [part for each in stated for part in ((each.lower, each.upper) if isinstance(each, Free) else (each,))]
@@ -75,16 +75,16 @@ def pose_words(case: Case, pose: WorkspacePose, form: RotationForm | None = None
 def evaluate_command(
     name: str, case: Case, settings: Settings, pose: WorkspacePose, form: RotationForm | None = None
 ) -> str:
-    """Return the command that shows a machine at a pose, for a shell.
+    """Return the shell command that shows a robot at a pose.
 
-    The pose has as few digits as show every limit violated, and every rank lost, that all its digits show.
+    The pose has the fewest digits with which the command shows the same violated limits and singularities.
 
     Args:
-        name: of the case, or of its file, as it was given.
+        name: name of the case, or of its file, as the user wrote it.
         case: the case, with fixed dimensions.
-        settings: numbers that replace those of the case's file.
+        settings: values that replace those of the case's file.
         pose: the pose.
-        form: of its rotation; left out, that of the case.
+        form: form of its rotation; None for the form of the case.
     """
     turn = rotation_numbers(case, pose.axis, pose.angle, rotation_form(case) if form is None else form)
     position = list(pose.position)
@@ -104,7 +104,7 @@ def evaluate_command(
 
 
 def _shown(case: Case, position: Sequence[float], turn: Mapping[str, list[float]]) -> frozenset[str]:
-    """Return what an evaluation at a pose shows: names of violated limits, a lost rank, or that it is impossible."""
+    """Return the faults that an evaluation at a pose shows: violated limits, a lost rank, or an impossible pose."""
     from ..errors import ScrewsynthError  # noqa: PLC0415 - few results have a pose to be shown
     from ..evidence.closing import closed_start  # noqa: PLC0415
     from ..evidence.margins import margins_of  # noqa: PLC0415
@@ -123,7 +123,7 @@ def _shown(case: Case, position: Sequence[float], turn: Mapping[str, list[float]
 
 
 def _rounded(values: Sequence[float], digits: int) -> list[float]:
-    """Return numbers that are rounded at one place after the point, so that the largest has so many digits."""
+    """Return numbers rounded at the same decimal place, so that the largest has the given number of digits."""
     size = max(map(abs, values))
     if size == 0:
         return list(values)
@@ -131,6 +131,6 @@ def _rounded(values: Sequence[float], digits: int) -> list[float]:
 
 
 def _digits(value: float | list[float]) -> str:
-    """Return a number, or several with commas, with the digits that they have."""
+    """Return a number, or several with commas, with all digits."""
     values = value if isinstance(value, list) else [value]
     return ",".join(repr(float(each) + 0.0).removesuffix(".0") for each in values)

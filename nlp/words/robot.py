@@ -1,4 +1,4 @@
-"""The design and the robot as tables of text: numbers free and fixed, limbs, measures by pose and limb, Jacobian."""
+"""Tables of the design and the robot: variables, fixed values, limbs, quantities by pose and limb, the Jacobian."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from ...models import Dimension, Model, WrenchKind, component_names
 from ..case.case import Case
 from ..case.pose import Free, RotationForm, Value, sizes_of_turn
-from ..case.task import Sense
+from ..case.task import Method, Sense
 from ..results.poses import rotation_numbers
 from ..results.rounding import (
     STATED,
@@ -26,7 +26,7 @@ from ..results.rounding import (
     size_of,
     size_of_F,
 )
-from ..units import Units, rate_unit, slope_unit
+from ..units import Units, rate_unit
 from .loads import loading_tables
 from .numbers import listed, number
 from .text import FEWEST_FOLDED, Figure, TextTable
@@ -39,11 +39,11 @@ if TYPE_CHECKING:
     from ..results.data import CombinedData, SolveResult
     from ..results.parts import ByOwner, PosesData, PoseStateData, RobotData, TaskData
 
-#: So many fixed numbers are shown where others are free; those that F feels most, where that is known.
+#: Number of fixed values that are shown beside variables: those with the largest relative sensitivity of F.
 _FIXED = 6
-#: So many free positions of driven joints are shown among the free numbers, and those of further poses at the end.
+#: Number of free actuator coordinates that are shown among the variables; further ones stand at the end.
 _JOINTS = 12
-#: So many values of a number are shown, else the first two and the last.
+#: Number of listed values that are shown; of a longer list, the first two and the last.
 _LISTED = 5
 
 
@@ -56,38 +56,48 @@ class _Place(enum.IntEnum):
 
 
 class _Row(NamedTuple):
-    """A row of the table.
+    """Row of the table.
 
     Attributes:
-        place: in the table.
-        cells: name, value, unit, range, and the reason that holds the number.
-        felt: change of F by a change of the number by its own size; 0 where that is not known.
+        place: place in the table.
+        cells: name, value, unit, bounds, status, and derivative of the optimal F.
+        sensitivity: relative sensitivity: change of F per 100 % change of the value; 0 where it is not known.
     """
 
     place: _Place
     cells: tuple[str, ...]
-    felt: float = 0.0
+    sensitivity: float = 0.0
 
 
-class _Reasons:
-    """What holds each number: an active bound with its multiplier, or that it is fixed.
+#: Sides of a bound or limit in words.
+_SIDES = {"min": "at lower bound", "max": "at upper bound", "equal": "fixed by a limit"}
+
+
+class _Rows:
+    """Rows of the design table, with the status of each value, and the derivative of the optimal F by a bound or value.
 
     Args:
-        units: of the case.
-        size: of the robot, beside which a length of 0 has its error.
-        F: size of the terms of F, of which a derivative has its error.
-        active: bounds and limits that hold the point.
-        sensitivity: of the optimal F to fixed numbers.
+        units: units of the case.
+        size: size of the robot, to which the rounding error of a length of 0 is relative.
+        F: size of the terms of F, to which the rounding error of a derivative is relative.
+        active: active bounds and limits.
+        sensitivity: derivatives of the optimal F by the fixed values.
+        sense: sense of the objective.
     """
 
     def __init__(
-        self, units: Units, size: float, F: float, active: Sequence[ActiveSide], sensitivity: Sequence[Sensitivity]
+        self,
+        units: Units,
+        size: float,
+        F: float,
+        active: Sequence[ActiveSide],
+        sensitivity: Sequence[Sensitivity],
+        sense: Sense,
     ) -> None:
-        self._units, self._size, self._F = units, size, F
-        # Variables' bounds come first among the active ones, so that a constraint of the same name hides none of them.
+        self._units, self._size, self._F, self._sense = units, size, F, sense
+        # Bounds of variables come first in the active set: a constraint of the same name must not hide them.
         self._active = {side.name: side for side in reversed(active)}
         self._fixed: Mapping[str, Sensitivity] = {row.name: row for row in sensitivity}
-        self.any = bool(active or sensitivity)
 
     def row(
         self,
@@ -98,15 +108,15 @@ class _Reasons:
         beside: float,
         limits: Sequence[str] = (),
     ) -> _Row:
-        """Return the row of a number.
+        """Return the row of a value.
 
         Args:
-            name: of the number.
-            value: of the number, in the case's units.
-            given: the number in the case.
-            dimension: of the number.
-            beside: largest of the numbers that were stated with it, in the case's units.
-            limits: names of limits of the case on this number alone.
+            name: name of the variable or fixed value.
+            value: value, in the case's units.
+            given: bounds or fixed value in the case.
+            dimension: kind of the value.
+            beside: largest of the values that were stated with it, in the case's units.
+            limits: names of limits of the case on this variable only.
         """
         label = self._units.label(dimension)
         if isinstance(given, Free):
@@ -117,25 +127,26 @@ class _Reasons:
             shown, between = number(value, beside, part=STATED), ""
         fixed = self._fixed.get(name)
         side = next((self._active[each] for each in (name, *limits) if each in self._active), None)
-        place, why, felt = _Place.FREE if between else _Place.FIXED, "", 0.0
+        place, status, slope, change = _Place.FREE if between else _Place.FIXED, "", None, 0.0
         held = "fixed" if not isinstance(given, Free) else "chosen" if given.values else "rounded"
         if side is not None:
-            place = _Place.ACTIVE
-            cost = settled(side.multiplier, self._F / ((upper - lower) or 1.0))
-            why = f"{side.bound}, {cost:.4g} {slope_unit(label)}"
+            place, status = _Place.ACTIVE, _SIDES[side.bound]
+            # A multiplier is an improvement of F by relaxing a bound: upwards for an upper one, downwards for a lower.
+            sign = self._sense.sign * (-1.0 if side.bound == "min" else 1.0)
+            slope = sign * settled(side.multiplier, self._F / ((upper - lower) or 1.0))
         elif fixed is not None and fixed.derivative is None:
-            why = "" if fixed.hindrance is None else f"{held}: {fixed.hindrance.value}"
+            status = "" if fixed.hindrance is None else f"{held}: {fixed.hindrance.value}"
         elif fixed is not None and fixed.derivative is not None:
             natural = {Dimension.LENGTH: self._size, Dimension.ANGLE: self._units.shown(1.0, dimension)}
             size = max(abs(value), natural.get(dimension, 1.0))
-            slope = settled(fixed.derivative, self._F / size)
-            why = f"{held}, {f'{slope:+.4g}' if slope else '0'} {slope_unit(label)}"
-            felt = abs(slope) * size
-        return _Row(place, (name, shown, label, between, *((why,) if self.any else ())), felt)
+            status, slope = held, settled(fixed.derivative, self._F / size)
+            change = abs(slope) * size
+        derivative = "" if slope is None else number(slope, digits=4, signed=True)
+        return _Row(place, (name, shown, label, between, status, derivative), change)
 
 
 def free_words(value: Free, units: Units, dimension: Dimension, digits: int = 6) -> str:
-    """Return the values that a free number may have: its ends, or the values of which it has one."""
+    """Return the allowed values of a variable: its bounds, or its listed values."""
     if not value.values:
         return " .. ".join(f"{units.shown(end, dimension):.{digits}g}" for end in (value.lower, value.upper))
     shown = [f"{units.shown(each, dimension):.{digits}g}" for each in value.values]
@@ -152,18 +163,20 @@ def design_table(
     active: Sequence[ActiveSide] = (),
     sensitivity: Sequence[Sensitivity] = (),
     F: float | None = None,
+    combined: bool = False,
 ) -> TextTable:
-    """Return every dimension and the pose: value, unit, the range it was free in, and the limit that holds it.
+    """Return every dimension and the pose: value, unit, bounds, status, and derivative of the optimal objective.
 
     Args:
         case: the case.
-        robot: at the point.
-        reached: whether the point is merely where a failed solve ended.
-        active: bounds and limits that hold the point.
-        sensitivity: of the optimal F to fixed numbers.
+        robot: robot at the point.
+        reached: If true, the point is the end of a failed solve.
+        active: active bounds and limits.
+        sensitivity: derivatives of the optimal F by the fixed values.
         F: objective; None where there is none.
+        combined: If true, the objective combines several tasks.
     """
-    reasons = _Reasons(case.units, robot_size(robot), size_of_F(robot, F or 0.0), active, sensitivity)
+    reasons = _Rows(case.units, robot_size(robot), size_of_F(robot, F or 0.0), active, sensitivity, _sense(case))
     rows: list[_Row] = []
     for parameter in case.model.parameters:
         shown = robot.parameters[parameter.name]
@@ -181,18 +194,20 @@ def design_table(
     folded = len(fixed) - _FIXED if len(fixed) < len(rows) else 0
     folded = folded if folded >= FEWEST_FOLDED else 0
     if folded:
-        fixed.sort(key=lambda row: -ordered(row.felt))
+        fixed.sort(key=lambda row: -ordered(row.sensitivity))
         rows[len(rows) - len(fixed) :] = fixed
-    words, named, more = "more fixed numbers", len(fixed), joints[_JOINTS:]
+    words, named, more = "more fixed values", len(fixed), joints[_JOINTS:]
     if more:
         rows += more
-        words, named, folded = "more numbers", len(rows), folded + len(more)
-    headers = ("", "reached" if reached else "value", "unit", "free between", *(("held by",) if reasons.any else ()))
-    cells = tuple(row.cells for row in rows)
-    return TextTable(headers, cells, "design", folded=folded, folded_words=words, named=named)
+        words, named, folded = "more values", len(rows), folded + len(more)
+    slope = "derivative" if combined else "dF/dx"
+    headers = ("", "reached" if reached else "value", "unit", "bounds", "status", slope)
+    columns = len(headers) if any(row.cells[4] for row in rows) else 4
+    cells = tuple(row.cells[:columns] for row in rows)
+    return TextTable(headers[:columns], cells, "design", folded=folded, folded_words=words, named=named)
 
 
-def _pose_rows(case: Case, k: int, found: PlatformPose, reasons: _Reasons) -> list[_Row]:
+def _pose_rows(case: Case, k: int, found: PlatformPose, reasons: _Rows) -> list[_Row]:
     """Return the rows of a stated pose: position, and rotation in the form in which the case states it."""
     prefix, pose = case.pose_prefixes[k], case.poses[k]
     largest = max(map(abs, found.position))
@@ -209,18 +224,18 @@ def _pose_rows(case: Case, k: int, found: PlatformPose, reasons: _Reasons) -> li
     angle, is_held = pose.rotation.angle, pose.rotation.axis is not None
     turned = abs(case.units.to_internal(found.angle, Dimension.ANGLE)) > TURNED
     if not is_held and isinstance(angle, Free):
-        # The sign of the angle means nothing then: its size is limited.
+        # About a free axis the sign of the angle has no meaning: only its size has bounds.
         angle = Free(*sizes_of_turn(angle))
     last = reasons.row(
         f"{prefix}angle", found.angle, angle, Dimension.ANGLE, case.units.shown(math.pi, Dimension.ANGLE)
     )
     axis = listed(found.axis) if turned or is_held else "none"
-    cells = (f"{prefix}axis", axis, "", "" if is_held else "any direction", *(("",) if reasons.any else ()))
-    return [*rows, _Row(last.place, cells, last.felt), last]
+    cells = (f"{prefix}axis", axis, "", "" if is_held else "free", "", "")
+    return [*rows, _Row(last.place, cells, last.sensitivity), last]
 
 
-def _free_joint_rows(case: Case, joints: Sequence[FreeJoint], reasons: _Reasons) -> list[_Row]:
-    """Return the rows of driven joints whose positions the pose does not determine."""
+def _free_joint_rows(case: Case, joints: Sequence[FreeJoint], reasons: _Rows) -> list[_Row]:
+    """Return the rows of free actuator coordinates: those that the pose does not determine."""
     rows = []
     for each in joints:
         dimension = Dimension(each.kind)
@@ -228,6 +243,14 @@ def _free_joint_rows(case: Case, joints: Sequence[FreeJoint], reasons: _Reasons)
         given = Free(lower, upper)
         rows.append(reasons.row(each.name, each.value, given, dimension, abs(each.value), each.limits))
     return rows
+
+
+def _sense(case: Case) -> Sense:
+    """Return the sense of the objective; of tasks of both senses, a sum is maximised, and the worst loss minimised."""
+    senses = {task.sense for task in case.tasks}
+    if len(senses) == 1:
+        return senses.pop()
+    return Sense.MIN if case.method is Method.WORST_CASE else Sense.MAX
 
 
 def solved_design_table(case: Case, result: SolveResult, robot: RobotData) -> TextTable:
@@ -238,29 +261,29 @@ def solved_design_table(case: Case, result: SolveResult, robot: RobotData) -> Te
 
 
 def combined_design_table(case: Case, combined: CombinedData, robot: RobotData) -> TextTable:
-    """Return the design that several tasks were combined to."""
+    """Return the design of a combined solve of several tasks."""
     reached = combined.method_point is None
     active = () if reached or combined.optimality is None else combined.optimality.active
-    return design_table(case, robot, reached=reached, active=active, F=combined.value)
+    return design_table(case, robot, reached=reached, active=active, F=combined.value, combined=True)
 
 
-#: Poses with F nearer than this part to the worst are as bad.
+#: Relative difference of F up to which a pose counts as a worst one.
 _AS_BAD = 1e-6
-#: So many poses are shown by limb on a terminal.
+#: Number of poses that a terminal shows by limb.
 _POSES = 12
-#: Largest component of the difference of two unit axes that are one.
+#: Largest component of the difference of two unit axes that count as equal.
 _SAME_AXIS = 1e-6
 
 
 class _Measure(NamedTuple):
-    """A measure of the robot's limbs.
+    """Quantity of the robot's limbs.
 
     Attributes:
-        name: of the quantity.
-        dimension: of its numbers.
-        words: its name for people.
-        reference: direction that an angle is measured from, as a limit of the case has it; else empty.
-        unit: of its numbers, with the direction that an angle is measured from.
+        name: name of the quantity.
+        dimension: kind of its values.
+        words: name for people.
+        reference: direction that an angle is measured from, as a limit of the case states it; else empty.
+        unit: unit of its values, with the direction that an angle is measured from.
     """
 
     name: str
@@ -270,7 +293,7 @@ class _Measure(NamedTuple):
     unit: str
 
     def of(self, robot: RobotData | PoseStateData) -> ByOwner:
-        """Return its numbers, as the limits of the case speak of them, by limb."""
+        """Return the values by limb, as the limits of the case define them."""
         return (robot.limited_quantities or {}).get(self.name, robot.quantities.get(self.name, {}))
 
 
@@ -280,7 +303,7 @@ def plural_name(quantity: str) -> str:
 
 
 def _measures(case: Case, robot: RobotData) -> list[_Measure]:
-    """Return the measures of a robot."""
+    """Return the quantities of a robot's limbs."""
     references = {limit.name: limit.reference for limit in case.limits}
 
     def measure(name: str, dimension: Dimension) -> _Measure:
@@ -290,32 +313,32 @@ def _measures(case: Case, robot: RobotData) -> list[_Measure]:
         return _Measure(name, dimension, name.replace("_", " "), reference, unit)
 
     found = {item.name: item.dimension for item in case.model.quantities if item.name in robot.quantities}
-    # Lengths of legs of a robot given joint by joint are no quantity of it.
+    # Leg lengths of a robot defined by joints are no quantity of its model.
     limited = robot.limited_quantities or {}
     found |= {each.name: each.numbers["max"].dimension for each in case.limits if each.name in limited.keys() - found}
     return [measure(*item) for item in found.items()]
 
 
 def robot_table(case: Case, robot: RobotData) -> TextTable:
-    """Return the robot at every pose, or every limb where there is one pose."""
+    """Return a row for each pose, or a row for each limb where there is one pose."""
     return _limb_table(case, robot) if robot.several is None else _pose_table(case, robot, robot.several)
 
 
 def robot_tables(case: Case, robot: RobotData) -> Iterator[TextTable]:
-    """Yield every limb, or with several poses the robot at each of them; then what holds the loads."""
+    """Yield the limbs, or the poses where there are several; then actuator forces and constraint wrenches."""
     yield robot_table(case, robot)
     yield from robot_tables_by_limb(case, robot)
     yield from loading_tables(case, robot)
 
 
 def robot_tables_by_limb(case: Case, robot: RobotData) -> Iterator[TextTable]:
-    """Yield the rates and measures by pose and limb; nothing for one pose."""
+    """Yield rates and quantities by pose and limb; nothing for one pose."""
     if robot.several is not None:
         yield from _tables_by_limb(case, robot, robot.several)
 
 
 def _pose_table(case: Case, robot: RobotData, several: PosesData) -> TextTable:
-    """Return the robot at every pose: F, where it stands, and the range of each measure over its limbs."""
+    """Return a row for each pose: F, position, angle, and the range of each quantity over the limbs."""
     measures, units = _measures(case, robot), case.units
     labels = [f"{each.words.removesuffix(' angle')}\n{each.unit}" for each in measures]
     values = [_settled_pose_F(pose, robot.task) for pose in several.poses]
@@ -342,7 +365,7 @@ def _settled_pose_F(pose: PoseStateData, task: TaskData | None) -> float:  # noq
 
 
 def _worst(values: Sequence[float], task: TaskData | None) -> list[bool]:
-    """Return whether F is the worst at each pose; nowhere where all are equal, or the sense is not known."""
+    """Return for each pose whether its F is the worst; false for all where F is equal or the sense is not known."""
     low, high = min(values), max(values)
     if task is None or high - low <= _AS_BAD * abs(high):
         return [False] * len(values)
@@ -351,14 +374,14 @@ def _worst(values: Sequence[float], task: TaskData | None) -> list[bool]:
 
 
 def _range_text(values: ByOwner, measure: _Measure, case: Case) -> str:
-    """Return the range of a measure over the limbs; of an angle the largest only."""
+    """Return the range of a quantity over the limbs; of an angle, the largest value only."""
     size = size_of(measure.dimension, values.values(), case.units)
     low, high = (number(end(values.values()), size, digits=5) for end in (min, max))
     return high if measure.dimension is Dimension.ANGLE else f"{low} .. {high}"
 
 
 def _signed_angle(case: Case, index: int, pose: PoseStateData) -> float:
-    """Return the angle of a pose, negative where it turns backwards about the axis that its case holds or a task's."""
+    """Return the angle of a pose, negative for a rotation against the stated axis or the axis of a task."""
     counts = np.cumsum([len(each.displacements) for each in case.poses])
     stated = case.poses[int(np.searchsorted(counts, index, side="right"))]
     axis = np.asarray(pose.pose.axis)
@@ -374,7 +397,7 @@ def _signed_angle(case: Case, index: int, pose: PoseStateData) -> float:
 
 
 def _tables_by_limb(case: Case, robot: RobotData, several: PosesData) -> Iterator[TextTable]:
-    """Yield the rates, then each measure, with a row for each pose and a column for each limb."""
+    """Yield the rates, then the quantities, with a row for each pose and a column for each limb."""
     rows, task = case.model.rows, robot.task
     folded = len(several.poses) - _POSES
     folded = folded if folded >= FEWEST_FOLDED else 0
@@ -409,12 +432,12 @@ def _measure_cells(values: ByOwner, owners: Sequence[str], measure: _Measure, ca
 
 
 def rate_word(model: Model) -> str:
-    """Return the name of a row's rate: that of a leg's length, or the work rate of a wrench that is no actuator's."""
+    """Return the name of the rate of a row of J: rate of a leg length, or work rate of a wrench."""
     return "work rate" if model.structure else "rate"
 
 
 def _limb_table(case: Case, robot: RobotData) -> TextTable:
-    """Return every row of the Jacobian: its rate and share of F, for a single task, and the measures of its limb."""
+    """Return the rows of the Jacobian with the quantities of their limbs, and for a single task rate and share of F."""
     model, task = case.model, robot.task
     rates: Sequence[float] = ()
     if task is not None and robot.rates is not None:
@@ -442,7 +465,7 @@ def _limb_table(case: Case, robot: RobotData) -> TextTable:
 
 
 def jacobian_table(case: Case, robot: RobotData) -> TextTable:
-    """Return the Jacobian: forces are parts of a unit vector, and moments have the error of the longest arm."""
+    """Return the Jacobian; the rounding error of moments is relative to the longest arm."""
     arm = max((abs(value) for row in robot.jacobian for value in row[3:]), default=0.0)
     rows = []
     for row, values in zip(case.model.rows, robot.jacobian, strict=True):

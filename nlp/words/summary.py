@@ -1,4 +1,7 @@
-"""Results as sequences of lines and tables for a terminal, and every table of a result, by name."""
+"""Summaries of results for a terminal, as lines and tables; the tables of a result by name.
+
+A summary begins with the answer, then its evidence, the design with its active limits, and parts for a longer view.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +16,7 @@ from ..results.rounding import robot_size, size_of_F
 from ..units import objective_unit
 from .joints import limb_part_table
 from .lines import (
+    active_limit_lines,
     better_line,
     certificate_lines,
     check_lines,
@@ -21,15 +25,14 @@ from .lines import (
     combined_value_lines,
     fault_lines,
     heading_lines,
-    holding_lines,
     is_unasked_singularity,
     objective_lines,
+    optimality_line,
     singularity_lines,
     starts_lines,
     task_lines,
     title_line,
     tolerance_line,
-    verdict_line,
     violation_lines,
 )
 from .loads import loading_tables
@@ -63,32 +66,32 @@ def case_summary(case: Case, result: CaseResult) -> Summary:
 
 
 def _task_summary(case: Case, result: SolveResult) -> Summary:
-    """Yield the result of a solve of one task: F, the design with what holds it, the verdict; then the parts."""
+    """Yield the result of a solve of one task: F, its evidence, the design, active limits; then the parts."""
     robot = result.robot
     yield from heading_lines(case, result)
     yield from choice_lines(result.choice, result.rounding, is_answer=result.F is not None)
     yield from fault_lines(result, case)
     if result.F is None:
         yield from starts_lines(result.starts, robot)
-        if case.limits_over == "workspace" and case.not_held is not None:
-            yield Line(case.not_held.sentence, label="note")
+        if case.limits_over == "workspace" and case.outside_workspace is not None:
+            yield Line(case.outside_workspace.sentence, label="note")
     elif (caution := better_line(result.starts)) is not None:
         yield caution
     yield from _proof_lines(case, result)
-    if robot is not None:
-        yield solved_design_table(case, result, robot)
-    yield from holding_lines(result.limits, limits_title(case, result.workspace or result.path))
     if result.optimality is not None:
-        yield verdict_line(result.optimality)
+        yield optimality_line(result.optimality)
+    yield from certificate_lines(result.certificate)
     if robot is not None and result.reached is None:
         yield from singularity_lines(robot, case.units)
     yield from _remark_lines(case)
-    yield from certificate_lines(result.certificate)
+    if robot is not None:
+        yield solved_design_table(case, result, robot)
+    yield from active_limit_lines(result.limits, limits_title(case, result.workspace or result.path))
     yield from _task_parts(case, result)
 
 
 def _task_parts(case: Case, result: SolveResult) -> Summary:
-    """Yield what stands behind the answer of a solve of one task."""
+    """Yield the parts behind the answer of a solve of one task."""
     robot = result.robot
     if robot is not None:
         yield from in_part("limbs" if robot.several is None else "poses", [robot_table(case, robot)])
@@ -104,7 +107,7 @@ def _task_parts(case: Case, result: SolveResult) -> Summary:
         yield from in_part("limits", [limit_table(result.limits, size, title)])
     if result.tolerance is not None:
         yield from in_part("tolerance", [tolerance_line(result.tolerance, result.F, case.units)])
-    yield from in_part("tightest limits", _proof_digest(result))
+    yield from in_part("smallest margins", _proof_digest(result))
     if robot is not None and result.reached is None:
         yield from in_part("actuation", _limb_parts(case, robot))
 
@@ -112,12 +115,12 @@ def _task_parts(case: Case, result: SolveResult) -> Summary:
 def _proof_lines(case: Case, result: CaseResult) -> Iterator[Line]:
     """Yield the proof of a design over a workspace, or along a path."""
     if result.workspace is not None:
-        # Few cases have a proof, and what shows it loads the room of proofs.
-        from .verdicts import machine_lines  # noqa: PLC0415
+        # Few cases have a proof, and these modules load the rooms of proofs.
+        from .verdicts import tolerance_lines  # noqa: PLC0415
         from .workspace import proof_lines  # noqa: PLC0415
 
         yield from proof_lines(result.workspace)
-        yield from machine_lines(case, result.workspace.joint_centre)
+        yield from tolerance_lines(case, result.workspace.joint_centre)
     if result.path is not None:
         from .path import path_proof_lines  # noqa: PLC0415 - in the same way
 
@@ -125,7 +128,7 @@ def _proof_lines(case: Case, result: CaseResult) -> Iterator[Line]:
 
 
 def _proof_digest(result: CaseResult) -> Summary:
-    """Yield the tightest claims of the proof of a design."""
+    """Yield the limits with the smallest margin in the proof of a design."""
     if result.workspace is not None:
         from .verdicts import tightest_table  # noqa: PLC0415 - as above
 
@@ -150,16 +153,16 @@ def _combined_summary(case: Case, result: CombinedResult) -> Summary:
     if combined.starts is not None and (caution := better_line(combined.starts)) is not None:
         yield caution
     yield from _proof_lines(case, result)
-    if robot is not None:
-        yield combined_design_table(case, combined, robot)
-    if point is not None:
-        yield from holding_lines(point.limits or (), limits_title(case, result.workspace or result.path))
     yield from combined_value_lines(combined)
     for task in result.tasks:
         name = task.robot.task.name if task.robot is not None and task.robot.task is not None else None
         yield from _named(certificate_lines(task.certificate), name)
     yield from certificate_lines(combined.certificate)
     yield from _remark_lines(case)
+    if robot is not None:
+        yield combined_design_table(case, combined, robot)
+    if point is not None:
+        yield from active_limit_lines(point.limits or (), limits_title(case, result.workspace or result.path))
     yield from in_part("notes", (Line(notice, label="note") for notice in combined.notices))
     if robot is not None:
         part = "" if is_unasked_singularity(robot, case) else "rank"
@@ -167,11 +170,11 @@ def _combined_summary(case: Case, result: CombinedResult) -> Summary:
     if point is not None and point.limits:
         title = limits_title(case, result.workspace or result.path)
         yield from in_part("limits", [limit_table(point.limits, combined.value or 0.0, title)])
-    yield from in_part("tightest limits", _proof_digest(result))
+    yield from in_part("smallest margins", _proof_digest(result))
 
 
 def certified_summary(case: Case, result: CertifiedResult) -> Summary:
-    """Yield the proven bounds of a case."""
+    """Yield the proved bounds of a case."""
     several = len(result.tasks) > 1
     yield title_line(case)
     yield from objective_lines(case)
@@ -183,17 +186,17 @@ def certified_summary(case: Case, result: CertifiedResult) -> Summary:
             yield Line(f"{task.name}, {task.sense.value} F", label="task")
         yield from _named(certificate_lines(task.certificate), task.name if several else None)
     if several and result.certificate is not None:
-        yield Line(case.method.value, label="combined by")
+        yield Line(case.method.value, label="tasks combined by")
         yield from certificate_lines(result.certificate)
 
 
 def _named(lines: Iterable[Line], name: str | None) -> Iterator[Line]:
-    """Yield lines about a task, with its name where there are several."""
+    """Yield lines about a task, with the name of the task where there are several."""
     return (line if name is None else replace(line, text=f"{name}: {line.text}") for line in lines)
 
 
 def evaluation_summary(case: Case, result: EvaluationResult) -> Summary:
-    """Yield the robot at one point: F, what is violated, the rank; then its parts, with its Jacobian."""
+    """Yield the robot at one point: F, violated limits, the rank; then its parts, with its Jacobian."""
     robot = result.robot
     yield title_line(case)
     if result.objective is not None:
@@ -209,7 +212,7 @@ def evaluation_summary(case: Case, result: EvaluationResult) -> Summary:
         kept = sum(not row.violated for row in result.limits)
         where = f"; {limits_title(case)}" if limits_title(case) else ""
         tone = Tone.HOLDS if kept == len(result.limits) else Tone.FAULT
-        yield Line(f"{kept} of {len(result.limits)} kept", label="limits", tone=tone, after=where)
+        yield Line(f"{kept} of {len(result.limits)} satisfied", label="limits", tone=tone, after=where)
     yield from singularity_lines(robot, case.units)
     yield from _remark_lines(case)
     yield from in_part("design", [design_table(case, robot)])
@@ -219,7 +222,7 @@ def evaluation_summary(case: Case, result: EvaluationResult) -> Summary:
     if result.limits:
         yield from in_part("limits", [limit_table(result.limits, size_of_F(robot), limits_title(case))])
     yield from in_part("J", [jacobian_table(case, robot)])
-    # As many are zero as the rank says: what is left of them is rounding error.
+    # Singular values beyond the rank are 0: their computed values are rounding error.
     values = (value if k < robot.rank else 0.0 for k, value in enumerate(robot.singular_values))
     yield from in_part("singular values", [Line(listed(values), label="singular values")])
     yield from in_part("motions", [principal_table(result.principal_motions, case.units, robot_size(robot))])
@@ -227,14 +230,14 @@ def evaluation_summary(case: Case, result: EvaluationResult) -> Summary:
 
 
 def _limb_parts(case: Case, robot: RobotData) -> Summary:
-    """Yield actuation and constraints by limb, where constraints carry a part of F."""
+    """Yield the parts of actuation and constraints by limb, where constraint wrenches contribute to F."""
     table = limb_part_table(case, robot)
     if table is not None and robot.joints is not None and robot.joints.constrained:
         yield table
 
 
 def _remark_lines(case: Case) -> Summary:
-    """Yield remarks on what may be a mistake in the robot."""
+    """Yield remarks on possible mistakes in the robot."""
     for remark in case.model.remarks:
         yield Line(remark, label="note")
 
@@ -244,7 +247,7 @@ def table_names(case: Case, *, at_point: bool) -> tuple[str, ...]:
 
     Args:
         case: the case.
-        at_point: whether it is evaluated at a point, and not solved.
+        at_point: If true, the case is evaluated at a point, not solved.
     """
     names = ["design"]
     if case.pose_count == 1:
@@ -252,7 +255,7 @@ def table_names(case: Case, *, at_point: bool) -> tuple[str, ...]:
     else:
         names += ["poses", *(["rates"] if at_point or len(case.tasks) == 1 else [])]
         measured = [item.name for item in case.model.quantities]
-        # Lengths of legs that are no quantity of the robot are shown where they are limited.
+        # Leg lengths that are no quantity of the model are shown where the case limits them.
         measured += [each.name for each in case.limits if each.name == "leg_length"]
         names += [plural_name(name) for name in dict.fromkeys(measured)]
     if case.loading.loads:
@@ -270,7 +273,7 @@ def table_names(case: Case, *, at_point: bool) -> tuple[str, ...]:
 
 
 def case_tables(case: Case, result: CaseResult) -> Iterator[TextTable]:
-    """Yield the tables of a solve: those of its summary, then every margin."""
+    """Yield the tables of a solve: the tables of its summary, then every margin."""
     yield from _tables(case_summary(case, result))
     if not isinstance(result, CombinedResult) and result.robot is not None:
         yield from _limb_parts_left_out(case, result.robot, is_shown=result.reached is None)
@@ -283,14 +286,14 @@ def case_tables(case: Case, result: CaseResult) -> Iterator[TextTable]:
 
 
 def evaluation_tables(case: Case, result: EvaluationResult) -> Iterator[TextTable]:
-    """Yield the tables of an evaluation: those of its summary, then every margin."""
+    """Yield the tables of an evaluation: the tables of its summary, then every margin."""
     yield from _tables(evaluation_summary(case, result))
     yield from _limb_parts_left_out(case, result.robot, is_shown=True)
     yield from _margins(result.margins)
 
 
 def _limb_parts_left_out(case: Case, robot: RobotData, *, is_shown: bool) -> Iterator[TextTable]:
-    """Yield actuation and constraints by limb, unless a summary that may show them does so."""
+    """Yield actuation and constraints by limb, unless the summary shows them."""
     table = limb_part_table(case, robot)
     if table is not None and not (is_shown and robot.joints is not None and robot.joints.constrained):
         yield table

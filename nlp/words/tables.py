@@ -1,4 +1,4 @@
-"""Limits, margins, tasks, optima and motions as tables of text."""
+"""Tables of limits, margins, tasks, optima and motions."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 from ..evidence.kkt import ACTIVE
 from ..results.data import CombinedData
 from ..results.rounding import NOISE, rate_sizes, settled, settled_F, task_F
-from ..units import Units, slope_unit
+from ..units import Units
 from .joints import motion_words
 from .lines import SET, counted
-from .numbers import number
+from .numbers import number, per_words
 from .text import TextTable
 
 if TYPE_CHECKING:
@@ -28,95 +28,96 @@ if TYPE_CHECKING:
     from ..results.workspace import WorkspaceProofData
     from ..solver.multistart import ProgramSolution
 
-#: So many places where a limit is active are named.
+#: Largest number of places where a limit is active that are named.
 _PLACES = 3
-#: Error of the margin in an active limit, as a part of the limit: that of the test whether a point lies on it.
+#: Error of the margin of an active limit, as a part of the limit: tolerance of the test for active limits.
 _ON_LIMIT = 10 * ACTIVE
-#: Error bound of the pitch of a principal motion, as a part of the robot's size: motions whose F are nearly equal are
-#: eigenvectors that mix, and robot files give their numbers with six to nine digits.
+#: Error bound of the pitch of a principal motion, as a part of the robot's size: eigenvectors of nearly equal F mix,
+#: and robot files give their values with six to nine digits.
 _EIGENVECTOR = 1e-6
-#: So many optima are shown in full.
+#: Largest number of optima that are shown in full.
 MOST_OPTIMA = 12
 
 
 def principal_table(motions: TaskAnalysis, units: Units, size: float) -> TextTable:
-    """Return the motions at which F is stationary: those of unit rotation, then translations of unit speed.
+    """Return the motions at which F is stationary: motions of unit rotation, then translations of unit speed.
 
     Args:
-        motions: to show.
-        units: of the case.
-        size: of the robot, length.
+        motions: principal motions.
+        units: units of the case.
+        size: size of the robot, length.
     """
     rows = []
     for kind in (motions.rotations, motions.translations):
         for rank, motion in zip(("least", "", "most"), kind, strict=True):
             words = motion_words(motion.motion, units, size, _EIGENVECTOR)
             rows.append((rank, number(motion.F, kind[-1].F), words))
-    return TextTable(("resisted", "F", "motion"), tuple(rows), "motions")
+    return TextTable(("resistance", "F", "motion"), tuple(rows), "motions")
 
 
 def limits_title(case: Case, proof: WorkspaceProofData | PathProofData | None = None) -> str:
-    """Return at which poses the rows of the limits hold, where a case has limits beside its poses; else nothing.
+    """Return the poses that the rows of the limits cover, for limits over a domain; empty for limits at stated poses.
 
     Args:
         case: the case.
-        proof: of a solved design over the workspace or along the path, of which some poses became constraints.
+        proof: proof of a solved design over the workspace or along the path; None without one.
     """
     if not case.limits_over:
         return ""
-    stated = "limits at the stated pose" if case.pose_count == 1 else "limits at the stated poses"
+    stated = "checked at the stated pose" if case.pose_count == 1 else "checked at the stated poses"
     if proof is None or not proof.poses:
-        return f"{stated}, not {case.limits_where}"
-    return f"{stated}, and where a pose of the {case.limits_over} became a constraint of its limit"
+        return f"{stated} only, not {case.limits_where}"
+    return f"{stated} and at {case.limits_over} poses that were added as constraints"
 
 
 def limit_table(limits: Sequence[LimitData], F: float = 0.0, title: str = "") -> TextTable:
-    """Return every limit of the case: how near the design comes to it, its cost, and where; violated and active first.
+    """Return the limits of a case with the value nearest to each, its margin, the derivative of F, and the place.
+
+    Violated limits come first, then active ones.
 
     Args:
-        limits: of the case.
-        F: size of F, of which costs have their error.
-        title: of the table; empty for none.
+        limits: limits of the case.
+        F: size of F, to which the rounding error of derivatives is relative.
+        title: title of the table; empty for none.
     """
     rows = []
     for row in sorted(limits, key=lambda each: (not each.violated, not each.active)):
         where = [_place(name) for name in row.violated or row.active] or [_place(row.nearest)]
         more = f" and {len(where) - _PLACES} more" if len(where) > _PLACES else ""
         slope = settled(row.cost or 0.0, abs(F) / (abs(row.limit) or 1.0))
-        cost = f"{slope:+.4g} {slope_unit(row.unit)}" if row.active and slope else ""
+        cost = f"{slope:+.4g} {per_words(row.unit)}" if row.active and slope else ""
         beside = abs(row.limit) or 1.0
         word = "violated" if row.violated else "active" if row.active else ""
         shown = ", ".join(where[:_PLACES]) + more
         limit, value = number(row.limit, digits=6), _text(row.value, beside)
         rows.append((row.key, limit, row.unit, value, _margin_text(row.margin, beside, word), word, cost, shown))
-    return TextTable(
-        ("limit", "number", "unit", "nearest", "margin", "", "costs", "where"), tuple(rows), "limits", title
-    )
+    headers = ("limit", "allowed", "unit", "nearest value", "margin", "status", "change of F", "where")
+    return TextTable(headers, tuple(rows), "limits", title)
 
 
 def _text(value: float, size: float) -> str:
-    """Return a number's text, 0 where it is rounding error beside a size."""
+    """Return the text of a number, 0 where it is rounding error relative to a size."""
     return number(value, size, digits=6) if math.isfinite(value) else "none"
 
 
 def _margin_text(margin: float, beside: float, word: str) -> str:
-    """Return a margin's text; at an active limit its error is that of the test for active limits."""
+    """Return the text of a margin; at an active limit, its error is the tolerance of the test for active limits."""
     if not math.isfinite(margin):
         return "none"
     return number(margin, beside, digits=6, part=_ON_LIMIT if word == "active" else NOISE)
 
 
 def _place(name: str) -> str:
-    """Return the place of a limit: its name without the first word."""
+    """Return the place of a limit: the name without its first word."""
     return name.partition(" ")[2]
 
 
 def outcome_table(combined: CombinedData, tasks: Sequence[SolveResult] = ()) -> TextTable:
-    """Return each task at the combined point.
+    """Return a row for each task at the combined point.
 
     Args:
         combined: the combined tasks.
-        tasks: each task by itself, whose motions tell the error of F.
+        tasks: results of the separate solves, from which the rounding error of F follows.
     """
     robot = None if combined.point is None else combined.point.robot
     rows = []
@@ -133,7 +134,7 @@ def outcome_table(combined: CombinedData, tasks: Sequence[SolveResult] = ()) -> 
         cells[1] += "" if task.unique else " (not unique)"
         verdict = "" if task.verdict is None else task.verdict.value
         rows.append((task.name, task.sense.value, f"{task.weight:g}", *cells, verdict))
-    headers = ("task", "sense", "weight", "F", "best alone", "loss", "at this point")
+    headers = ("task", "sense", "weight", "F", "separate optimum", "loss", "this point for the task")
     return TextTable(headers, tuple(rows), "tasks", extra=1)
 
 
@@ -146,26 +147,33 @@ def margin_table(margins: Sequence[Margin]) -> TextTable:
         limit, value = number(row.limit, digits=6), _text(row.value, beside)
         cells = (row.name, row.bound, value, limit, _margin_text(row.margin, beside, word), row.unit, word)
         rows.append(cells)
-    return TextTable(("where", "bound", "value", "limit", "margin", "unit", ""), tuple(rows), "margins")
+    return TextTable(("quantity", "bound", "value", "limit", "margin", "unit", "status"), tuple(rows), "margins")
 
 
 def active_table(result: SolveResult | CombinedData, F: float, *, is_answer: bool) -> TextTable:
-    """Return the bounds and limits that the point lies on or outside of, with their multipliers.
+    """Return the active and violated bounds and limits of a point, with their multipliers.
 
-    A point that is no answer has no multipliers: the numbers that the solver left say nothing.
+    A point that is no answer has no multipliers: the solver's values of them have no meaning there.
 
     Args:
-        result: with evidence.
-        F: size of F, of which multipliers have their error.
-        is_answer: whether the point is an answer.
+        result: result with evidence.
+        F: size of F, to which the rounding error of multipliers is relative.
+        is_answer: If true, the point is an answer.
     """
     active = () if result.optimality is None else result.optimality.active
     violated = _violated(result)
-    headers, rows = ("", "side", "value", "unit", "state", "multiplier"), []
+    headers, rows = ("", "bound", "value", "unit", "status", "multiplier"), []
     for side in active:
         slope = number(side.multiplier, abs(F) / (abs(side.value) or 1.0), digits=4)
         state = "violated" if side.name in violated else "active"
-        cells = (side.name, side.bound, number(side.value), side.unit or "", state, f"{slope} {slope_unit(side.unit)}")
+        cells = (
+            side.name,
+            side.bound,
+            number(side.value),
+            side.unit or "",
+            state,
+            f"F better by {slope} {per_words(side.unit)} relaxed",
+        )
         rows.append(cells if is_answer else cells[:-1])
     return TextTable(headers if is_answer else headers[:-1], tuple(rows), "active")
 
@@ -178,17 +186,17 @@ def _violated(result: SolveResult | CombinedData) -> Collection[str]:
 
 
 def sizes_of_variables(nlp: Nlp) -> list[float]:
-    """Return the size of each variable's range in the case's units, beside which its values have rounding error."""
+    """Return the sizes of the variables' ranges in the case's units, to which rounding errors are relative."""
     pairs = zip(nlp.scale, nlp.program.variables, strict=True)
     return [nlp.case.units.shown(float(size), variable.dimension) for size, variable in pairs]
 
 
 def optimum_table(solution: ProgramSolution, robot: RobotData | None = None) -> TextTable:
-    """Return the best of the distinct optima that a solve found: F, and every variable.
+    """Return the best of the distinct optima of a solve: F, and every variable.
 
     Args:
-        solution: of one program.
-        robot: at the best of them, whose task tells the error of F.
+        solution: solution of one nonlinear program.
+        robot: robot at the best optimum, from which the rounding error of F follows; None where it is not known.
     """
     units, variables = solution.nlp.case.units, solution.nlp.program.variables
     labels = [(variable.name, units.label(variable.dimension)) for variable in variables]
@@ -208,7 +216,7 @@ def optimum_table(solution: ProgramSolution, robot: RobotData | None = None) -> 
 
 
 def origin_table(versions: VersionsData, search: Search | None = None, seconds: float = 0.0) -> TextTable:
-    """Return versions, and of a search seed, starts and time: all that the numbers depend on."""
+    """Return versions, and seed, starts and time of a search: everything on which the results depend."""
     rows = [(name, str(getattr(versions, name))) for name in versions.fields]
     if search is not None:
         rows += [("seed", str(search.seed)), ("starts", str(search.starts)), ("seconds", f"{seconds:.3g}")]

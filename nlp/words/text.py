@@ -1,4 +1,4 @@
-"""Text without a format: lines and tables, which terminal, Markdown and page render, each in its own way."""
+"""Lines and tables without a format, for the terminal, Markdown and pages."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from dataclasses import replace
 
 from ...models.values import dataclass
 
-#: Fewer rows than these are not worth folding.
+#: Smallest number of rows that a table folds.
 FEWEST_FOLDED = 3
 
 
 class Tone(enum.Enum):
-    """Meaning of a text beside its words."""
+    """Meaning of a text, which outputs show as colour."""
 
     PLAIN = "plain"
     TITLE = "title"
@@ -26,14 +26,14 @@ class Tone(enum.Enum):
 
 @dataclass(frozen=True)
 class Line:
-    """A line of text.
+    """Line of text.
 
     Attributes:
-        text: the words that the tone belongs to.
-        label: name of the text; empty without one.
-        tone: of the text.
+        text: words with the tone.
+        label: name of the text; empty without a name.
+        tone: tone of the text.
         before, after: words around the text, without a tone.
-        is_command: whether the text is a command to be copied: it is broken so that a shell still reads it.
+        is_command: If true, the text is a command: it is broken into lines so that a shell still reads it.
         part: name of the part of the result that the line belongs to; empty for the answer.
     """
 
@@ -52,7 +52,7 @@ class Line:
 
 
 class Figure(str):
-    """Text of a number, with the number for outputs that keep every digit.
+    """Text of a number, with its value for outputs that keep every digit.
 
     Attributes:
         value: the number; 0 where it is below its error bound.
@@ -70,19 +70,19 @@ class Figure(str):
 
 @dataclass(frozen=True)
 class TextTable:
-    """A table of text.
+    """Table of text.
 
     Attributes:
-        headers: of the columns; a second line is the unit.
-        rows: a cell for each column; a line where its tone matters, a figure for a number with all its digits.
-        name: one word, by which a table is asked for; empty for a table that nobody asks for.
-        title: line above the table on a terminal; empty where the table needs none.
+        headers: heads of the columns; a second line is the unit.
+        rows: rows with a cell for each column: text, a line with a tone, or a figure with all digits of a number.
+        name: name in CSV and for ``--table``, one word; empty for a table that is shown only.
+        title: line above the table on a terminal; empty without a title.
         folded: number of the last rows that are of less interest: a terminal counts them, a page opens them.
-        folded_words: name of these rows in the plural.
-        named: number of the last rows that this name is for; None for all rows.
+        folded_words: name of the folded rows in the plural.
+        named: number of the last rows that this name fits; None for all rows.
         part: name of the part of the result that the table belongs to; empty for the answer.
         extra: number of the last columns that a short view leaves out where the table is too long for it.
-        is_curve: whether the rows are points of a curve: a short view takes some in equal steps, not the first ones.
+        is_curve: If true, the rows are points of a curve: a short view shows some in equal steps, not the first ones.
     """
 
     headers: tuple[str, ...]
@@ -98,6 +98,6 @@ class TextTable:
 
 
 def in_part(name: str, items: Iterable[Line | TextTable]) -> Iterator[Line | TextTable]:
-    """Yield lines and tables as a part of a result that stands behind the answer."""
+    """Yield lines and tables as a part of a result, after the answer."""
     for item in items:
         yield replace(item, part=name)

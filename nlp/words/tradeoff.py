@@ -1,4 +1,4 @@
-"""Trade-off curves as a table of designs."""
+"""Trade-off curves as tables of designs."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ from ..case.case import Case
 from ..results.tradeoff import LIMITS, TradeoffPointData, TradeoffResult
 from ..solver.status import Status
 from ..solver.tradeoff import Tradeoff
-from ..units import slope_unit
-from .designs import Column, ColumnKind, Designs, DrawnDesign, Join, PageWords, certificate_columns, free_numbers
+from .designs import Column, ColumnKind, Designs, DrawnDesign, Join, PageWords, certificate_columns, design_values
 from .lines import title_line
-from .numbers import number
+from .numbers import number, per_words
 from .text import Line, Tone
 
 
@@ -22,7 +21,7 @@ def tradeoff_designs(result: TradeoffResult, case: Case, found: Tradeoff | None 
     Args:
         result: the trade-off.
         case: the case at one of the values.
-        found: the same with its solutions, for drawings of the designs; None without them.
+        found: the trade-off with its solutions, for drawings of the designs; None without drawings.
     """
     throughout, cautions, over = _active_throughout(result), _faults(result), over_words(result)
     solved = sum(point.status.is_answer for point in result.points)
@@ -39,12 +38,12 @@ def tradeoff_designs(result: TradeoffResult, case: Case, found: Tradeoff | None 
         PageWords(
             f"{case.name}, robot {case.model.name}: {over}",
             f"{solved} of {len(result.points)} values have an answer",
-            ("curve", "F against the number"),
-            ("values", "Every value"),
-            rules=("Each point is a solve of its own, with everything that is free chosen anew.",),
+            ("curve", "Trade-off curve"),
+            ("values", "All values"),
+            rules=("Each point is a separate solve: all variables are optimised again.",),
             cautions=tuple(f"{line}." for line in cautions),
-            designs="The design at each value",
-            bends="Where the curve bends",
+            designs="Designs along the curve",
+            bends="Changes of the active limits",
             is_answer=solved > 0,
         ),
         before=before,
@@ -56,7 +55,7 @@ def tradeoff_designs(result: TradeoffResult, case: Case, found: Tradeoff | None 
 
 
 def _columns(result: TradeoffResult, throughout: Sequence[str]) -> Iterator[Column[TradeoffPointData]]:
-    """Yield the columns: the number, F with that of each of several tasks, its slope, what is active, the design."""
+    """Yield the columns: varied value, F, F of each of several tasks, slope, active limits, and the design."""
     objective, names = ColumnKind.OBJECTIVE, result.tasks
     yield Column(
         result.over,
@@ -76,7 +75,7 @@ def _columns(result: TradeoffResult, throughout: Sequence[str]) -> Iterator[Colu
         lambda point: point.slope,
         ColumnKind.EVIDENCE,
         label="slope",
-        unit=slope_unit(result.unit),
+        unit=f"F {per_words(result.unit)}",
         text=lambda point: "" if point.slope is None else _signed(point.slope),
     )
     if any(point.certificate is not None for point in result.points):
@@ -110,12 +109,12 @@ def _column_of_task(k: int, name: str) -> Column[TradeoffPointData]:
 
 
 def _column_of_number(name: str) -> Column[TradeoffPointData]:
-    """Return the column of a number of the design."""
+    """Return the column of a variable of the design."""
     return Column(name, lambda point: _design(point).get(name), ColumnKind.VARIABLE)
 
 
 def _drawn(result: TradeoffResult, found: Tradeoff) -> list[DrawnDesign]:
-    """Return the designs at values that have an answer."""
+    """Return the designs at the values that have an answer."""
     designs = []
     for row, point in zip(result.points, found.points, strict=False):
         if row.status.is_answer:
@@ -126,7 +125,7 @@ def _drawn(result: TradeoffResult, found: Tradeoff) -> list[DrawnDesign]:
                 DrawnDesign(
                     f"{result.over} = {row.value:.5g} {result.unit}".rstrip(),
                     F or ", ".join(of_each),
-                    free_numbers(outcome.own.nlp, outcome.x),
+                    design_values(outcome.own.nlp, outcome.x),
                     tuple(each.removeprefix(LIMITS) for each in row.active),
                     outcome.own.nlp,
                     outcome.x,
@@ -137,7 +136,7 @@ def _drawn(result: TradeoffResult, found: Tradeoff) -> list[DrawnDesign]:
 
 
 def over_words(result: TradeoffResult) -> str:
-    """Return the number that is varied, with its range and unit."""
+    """Return the name of the varied limit or parameter, with its range and unit."""
     first, last = result.points[0].value, result.points[-1].value
     count = len(result.points)
     return f"{result.over} from {first:g} to {last:g} {result.unit}".rstrip() + f", {count} value{'s'[: count != 1]}"
@@ -153,13 +152,13 @@ def _listed(names: Iterable[str]) -> str:
 
 
 def _faults(result: TradeoffResult) -> list[str]:
-    """Return a clause about the values of each status that is no answer."""
+    """Return the values without an answer, a clause for each status."""
     missing = [point for point in result.points if not point.status.is_answer]
     return [_status_words(result, status) for status in dict.fromkeys(point.status for point in missing)]
 
 
 def _status_words(result: TradeoffResult, status: Status) -> str:
-    """Return the values of a status; of those that an interrupted command has not solved, the last ones, the number."""
+    """Return the values of a status; for an interrupted command, the number of solved values instead."""
     own = [point.value for point in result.points if point.status is status]
     if status is Status.INTERRUPTED:
         return f"stopped before the end: {len(result.points) - len(own)} of {len(result.points)} values are solved"
@@ -179,7 +178,7 @@ def _signed(value: float) -> str:
 
 
 def _design(point: TradeoffPointData) -> dict[str, float]:
-    """Return the numbers of a design by name: components of its parameters, then position, axis and angle."""
+    """Return the values of a design by name: components of its parameters, then position, axis and angle."""
     if point.parameters is None or point.pose is None:
         return {}
 

@@ -1,4 +1,4 @@
-"""Verdicts on a workspace in words: a digest of the claims that are nearest to their limits, then every number."""
+"""Verdicts over a workspace: the answer, singularities, limits with the smallest margin, and all quantities."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 
 from ...models import Dimension
 from ..case.case import Case
-from ..case.motors import MotorNumber
+from ..case.motors import ActuatorQuantity
 from ..case.pose import ends_of
 from ..case.task import Sense
 from ..interruption import STOPPED
+from ..proof.statement.claims import CONSTRAINTS, REGULAR
 from ..proof.workspace.verdict import EVERYWHERE, Outcome
-from .claims import seeing_lines
-from .motors import TONES, ends_of_motor, motor_tables
+from .claims import CLAIM_WORDS, rank_line, violation_lines
+from .motors import OUTCOME_WORDS, ends_of_motor, motor_tables
 from .numbers import number
 from .poses import pose_words
 from .text import Line, TextTable, Tone, in_part
@@ -22,13 +23,13 @@ from .verdicts import (
     answer_words,
     exchange_lines,
     head_lines,
-    machine_lines,
     open_lines,
     outcome_lines,
     proof_line,
-    refuting_machine,
     tightest_table,
+    tolerance_lines,
     verdict_table,
+    violating_robot,
 )
 
 if TYPE_CHECKING:
@@ -38,8 +39,8 @@ if TYPE_CHECKING:
 
 
 def _about_lines(case: Case, result: WorkspaceResult) -> Iterator[Line]:
-    """Yield the robots and the poses that a verdict covers, beside the exact robot and the box."""
-    yield from machine_lines(case, result.joint_centre)
+    """Yield the tolerance and the set of poses that a verdict covers, where these are not the robot and the box."""
+    yield from tolerance_lines(case, result.joint_centre)
     if result.poses is not None:
         yield Line(result.poses, label="poses")
 
@@ -50,44 +51,48 @@ def _objective_lines(extremes: Sequence[VerdictData]) -> Iterator[Line]:
         if low.bound is None or high.bound is None:
             continue
         if low.name == high.name and low.name.partition(" ")[0] == "F":
-            ends = f"{number(low.bound)} to {number(high.bound)} {low.unit}".rstrip()
-            yield Line(ends, label=low.name, after=", at no pose smaller or larger")
+            ends = f"{number(low.bound)} .. {number(high.bound)} {low.unit}".rstrip()
+            yield Line(ends, label=low.name, after=" over the workspace (proved)")
 
 
 def verdict_words(result: WorkspaceResult) -> str:
-    """Return the verdict in one clause: counts of ranks and limits, and of numbers without a limit that stay open."""
-    outcomes = [each.outcome for each in (result.regular, result.constraints) if each is not None]
-    outcomes += [each.outcome for each in result.extremes if each.limit is not None]
-    words = answer_words(outcomes, "for every pose", is_proved=result.proved)
+    """Return the verdict in one clause: counts of ranks and limits, and of undecided quantities without a limit."""
+    ranks = [each.outcome for each in (result.regular, result.constraints) if each is not None]
+    limits = [each.outcome for each in result.extremes if each.limit is not None]
+    words = answer_words(ranks, limits, "at every pose", is_proved=result.proved)
     ends = [
-        end for each in result.motors or () if each.number is not MotorNumber.COORDINATE for end in ends_of_motor(each)
+        end
+        for each in result.motors or ()
+        if each.number is not ActuatorQuantity.COORDINATE
+        for end in ends_of_motor(each)
     ]
     shown = sum(each.limit is None and each.outcome is Outcome.OPEN for each in result.extremes)
     shown += sum(each.limit is None and each.outcome is Outcome.OPEN for each in ends)
     if not shown:
         return words
-    return f"{words}; {shown} number{' without a limit stays' if shown == 1 else 's without a limit stay'} open"
+    quantities = "1 quantity" if shown == 1 else f"{shown} quantities"
+    return f"{words} ({quantities} without a limit undecided, for information)"
 
 
 def _needs_line(case: Case, result: WorkspaceResult) -> Iterator[Line]:
-    """Yield the lengths that the actuators of straight legs need."""
+    """Yield the proved range of the lengths of straight legs."""
     legs = [each for each in result.extremes if each.name.startswith("leg_length limb ") and each.bound is not None]
     short = [each.bound for each in legs if each.sense is Sense.MIN and each.bound is not None]
     long = [each.bound for each in legs if each.sense is Sense.MAX and each.bound is not None]
     if short and long:
-        words = f"{number(min(short))} to {number(max(long))} {case.units.length}"
-        yield Line(words, label="lengths of legs", after=", at no pose shorter or longer")
+        words = f"{number(min(short))} .. {number(max(long))} {case.units.length}"
+        yield Line(words, label="leg lengths", after=" over the workspace (proved)")
 
 
 def workspace_summary(
     case: Case, result: WorkspaceResult, command: Callable[[WorkspacePose], str] | None = None
 ) -> Iterator[Line | TextTable]:
-    """Yield the verdicts on a machine over its workspace: the answer, then every number.
+    """Yield the verdicts on a robot over its workspace: the answer, then all quantities.
 
     Args:
         case: the case.
         result: the verdicts.
-        command: returns the command that shows a pose; left out, for a page, only tables have single claims.
+        command: returns the command that shows a pose; None for a page, where only tables have single claims.
     """
     limited, answer = [each for each in result.extremes if each.limit is not None], verdict_words(result)
     about = _about_lines(case, result)
@@ -96,37 +101,37 @@ def workspace_summary(
     yield from _pose_lines(case)
     yield from _regular_lines(case, result.regular)
     if result.constraints is not None:
-        yield from _regular_lines(case, result.constraints, "constraints regular", "the constraint wrenches lose")
+        yield from _regular_lines(case, result.constraints, CONSTRAINTS)
     yield from outcome_lines(limited)
     if command is not None:
-        yield from seeing_lines(result, command)
+        yield from violation_lines(result, command)
         yield from open_lines(limited)
     yield from _needs_line(case, result)
     if result.scale is not None:
         yield from _scale_lines(case, result.scale)
     yield from tightest_table(result.extremes)
     yield from in_part("motors", motor_tables(case, result.motors or ()))
-    for regular, label in ((result.regular, "search"), (result.constraints, "search of constraints")):
+    for regular, label in ((result.regular, "search"), (result.constraints, "search for constraint singularities")):
         if regular is not None:
             yield from in_part("searches", _search_lines(case, regular, label))
-    yield from in_part("the machine that refutes", _machine_lines(case, result.extremes))
-    yield from in_part("every number", _tables(case, result.extremes))
+    yield from in_part("robot that violates a limit", _violating_robot_table(case, result.extremes))
+    yield from in_part("all quantities", _tables(case, result.extremes))
 
 
 def _pose_lines(case: Case) -> Iterator[Line]:
-    """Yield the pose about which the workspace of a case with a fixed pose is."""
+    """Yield the pose that a workspace of offsets is relative to; nothing for a workspace in world coordinates."""
     if case.workspace is not None and case.workspace.about_pose:
         position, (angle, _) = [ends_of(value)[0] for value in case.position], ends_of(case.rotation.angle)
         words = ", ".join(number(each, max(map(abs, position)), digits=5) for each in position)
-        turned = f", turned by {case.units.text(angle, Dimension.ANGLE)}" if angle else ""
-        yield Line(f"the pose ({words}){turned}", label="about")
+        turned = f", rotated by {case.units.text(angle, Dimension.ANGLE)}" if angle else ""
+        yield Line(f"the stated pose ({words}){turned}", label="workspace relative to")
 
 
-def _machine_lines(case: Case, extremes: Sequence[VerdictData]) -> Iterator[TextTable]:
-    """Yield the machine of the first limit that is refuted by one within the tolerance."""
+def _violating_robot_table(case: Case, extremes: Sequence[VerdictData]) -> Iterator[TextTable]:
+    """Yield the errors of the robot within the tolerance that violates the first such limit."""
     for each in extremes:
         if each.outcome is Outcome.REFUTED and each.machine is not None:
-            yield refuting_machine(case, each.name, each.machine)
+            yield violating_robot(case, each.name, each.machine)
             return
 
 
@@ -138,54 +143,61 @@ def proof_lines(proof: WorkspaceProofData | None) -> Iterator[Line]:
 
 
 def proof_tables(case: Case, proof: WorkspaceProofData) -> Iterator[TextTable]:
-    """Yield the limits and numbers of a solved design over its workspace."""
+    """Yield the limits and the other quantities of a solved design over its workspace."""
     yield from _tables(case, proof.extremes)
 
 
 def _tables(case: Case, extremes: Sequence[VerdictData]) -> Iterator[TextTable]:
-    """Yield the numbers with a limit, and those without."""
+    """Yield the quantities with a limit, and those without."""
     limited = [each for each in extremes if each.limit is not None]
-    yield from verdict_table(case, "limits", "limits over every pose", limited)
+    yield from verdict_table(case, "limits", "limits over all poses", limited)
     others = [each for each in extremes if each.limit is None]
-    yield from verdict_table(case, "ranges", "numbers over every pose", others)
+    yield from verdict_table(case, "ranges", "quantities without a limit, over all poses", others)
 
 
-def _regular_lines(case: Case, regular: RegularData, label: str = "regular", of: str = "") -> Iterator[Line]:
-    """Yield the verdict on a rank: that of J, or of the wrenches that a clause names."""
-    share = f"{100 * regular.share:.3g} % of the box"
-    found = f", {regular.reason}" if regular.reason and regular.between is None else ""
-    at = "every pose" if regular.reason == EVERYWHERE else "a pose"
-    boxes = "box is" if regular.open == 1 else "boxes are"
-    words = {
-        Outcome.PROVED: ": the constraint wrenches keep their rank at every pose"
-        if of
-        else ": J has full rank at every pose",
-        Outcome.REFUTED: f": {of} rank at a pose{found}" if of else f": J is singular at {at}{found}",
-        Outcome.OPEN: f": {regular.open:,} {boxes} left, {share} ({regular.reason or ''})",
-    }
-    yield Line(regular.outcome.value, label=label, tone=TONES[regular.outcome], after=words[regular.outcome])
+def _regular_lines(case: Case, regular: RegularData, name: str = REGULAR) -> Iterator[Line]:
+    """Yield the verdict on a rank, by the name of its claim: that of J, or of the constraint wrenches."""
+    after = ""
+    if regular.outcome is Outcome.REFUTED:
+        after = f" at {'every pose' if regular.reason == EVERYWHERE else 'a pose'}"
+        after += f", {regular.reason}" if regular.reason and regular.between is None else ""
+    elif regular.outcome is Outcome.OPEN:
+        boxes = "1 box remains" if regular.open == 1 else f"{regular.open:,} boxes remain"
+        reason = f" ({regular.reason})" if regular.reason else ""
+        after = f": {boxes}, {100 * regular.share:.3g} % of the workspace{reason}"
+    yield rank_line(name, regular.outcome, after)
     if regular.pose is not None:
-        yield Line(pose_words(case, regular.pose), label="at" if regular.outcome is Outcome.REFUTED else "left about")
+        is_singular = regular.outcome is Outcome.REFUTED
+        label = "singular pose" if is_singular else "undecided boxes near"
+        yield Line(pose_words(case, regular.pose), label=label)
 
 
 def _search_lines(case: Case, regular: RegularData, label: str) -> Iterator[Line | TextTable]:
-    """Yield the machine that refutes a rank, and the size of the search."""
+    """Yield the robot within the tolerance that is singular, and the size of the search."""
     if regular.machine is not None:
-        yield refuting_machine(case, "regular", regular.machine)
+        yield violating_robot(case, "full rank of J", regular.machine)
     word = "box" if regular.boxes == 1 else "boxes"
-    yield Line(f"{regular.boxes:,} {word} in {regular.seconds:.2f} s, engine {regular.engine}", label=label)
+    yield Line(f"{regular.boxes:,} {word} examined in {regular.seconds:.2f} s, engine {regular.engine}", label=label)
 
 
 def _scale_lines(case: Case, scale: ScaleData) -> Iterator[Line]:
-    """Yield the largest box."""
+    """Yield the largest proved box, and the claim that fails on the next larger one."""
     ended = f"; the search ended early: {scale.reason}" if scale.reason else ""
     if scale.factor is not None:
-        yield Line(f"{scale.factor:.4g}", label="scale", tone=Tone.ANSWER, after=f" times the box is proved{ended}")
+        words = f"{scale.factor:.4g} times the workspace"
+        yield Line(words, label="largest proved box", tone=Tone.ANSWER, after=ended)
     else:
-        within = "the search was interrupted" if scale.reason == STOPPED else "none found within the time"
-        words = within if scale.reason else "none found; not even the smallest box that is tried is proved"
-        yield Line(f"largest proved box: {words}", label="scale", tone=Tone.NO_ANSWER)
+        within = "the search was interrupted" if scale.reason == STOPPED else "none found within the time limit"
+        words = within if scale.reason else "none found; even the smallest box tried is not proved"
+        yield Line(words, label="largest proved box", tone=Tone.NO_ANSWER)
     if scale.claim:
-        beyond = "" if scale.refuted is None else f"at {scale.refuted:.4g} times: "
-        at = "" if scale.pose is None else f", at {pose_words(case, scale.pose)}"
-        yield Line(f"{beyond}{scale.claim}{at}", label="beyond")
+        size = "" if scale.refuted is None else f"{scale.refuted:.4g} times, "
+        near = "" if scale.pose is None else f", near {pose_words(case, scale.pose)}"
+        yield Line(f"{size}fails on {_failed_words(scale.claim)}{near}", label="next larger box")
+
+
+def _failed_words(claim: str) -> str:
+    """Return a claim with its outcome, of which the results have the name and the outcome's status."""
+    name, comma, status = claim.rpartition(", ")
+    words = {each.value: word for each, word in OUTCOME_WORDS.items()}
+    return f"{CLAIM_WORDS.get(name, name)}{comma}{words.get(status, status)}"

@@ -265,17 +265,17 @@ def test_a_mechanism_that_contradicts_itself_is_refused_in_one_sentence() -> Non
     good = broken()
     first, *rest = good.joints
     cases = [
-        (broken(base="ground"), "base: is 'ground', which is no link"),
+        (broken(base="ground"), "base: is 'ground', which is not a link"),
         (broken(platform="base"), "platform: is 'base', which is the base"),
         (broken(joints=tuple(replace(j, actuated=False) for j in good.joints)), "actuated: is given at no joint"),
         (broken(joints=(replace(first, axis=np.zeros(3)), *rest)), "joint 1:1, axis: is zero; a direction is needed"),
         (broken(joints=(replace(first, axis=2 * first.axis), *rest)), "has length 2; a unit vector is needed"),
         (broken(joints=(replace(first, outer="none"), *rest)), "has the link 'none', which is unknown"),
-        (broken(joints=(replace(first, outer=first.inner), *rest)), "joins the link 'base' to itself"),
+        (broken(joints=(replace(first, outer=first.inner), *rest)), "connects the link 'base' to itself"),
         (broken(joints=(first, *good.joints)), "joint 1:1: is given twice"),
-        (broken(joints=(replace(first, kind="S"), *rest)), "joint 1:1 (S): is actuated; only R, P and H can be"),
+        (broken(joints=(replace(first, kind="S"), *rest)), "joint 1:1 (S): is actuated; only R, P and H joints can be"),
         (broken(joints=(replace(first, point=np.full(3, np.nan)), *rest)), "has a point that is not finite"),
-        (broken(links=(*good.links, MechanismLink("loose"))), "link loose: is joined to the base by no joint"),
+        (broken(links=(*good.links, MechanismLink("loose"))), "link loose: is not connected to the base"),
         (broken(joints=good.joints[:3], links=tuple(e for e in good.links if e.name[5:6] in ("", "1", "o"))), "chain"),
         (broken(couplings=(Coupling("c", (("1:1", 1.0),)),)), "coupling c: couples fewer than two joints"),
         (broken(couplings=(Coupling("c", (("1:1", 1.0), ("9", 1.0))),)), "has the joint '9', which is unknown"),
@@ -286,7 +286,7 @@ def test_a_mechanism_that_contradicts_itself_is_refused_in_one_sentence() -> Non
             check_mechanism(mechanism)
         assert sentence in str(error.value)
         assert str(error.value).isprintable()
-    with pytest.raises(MechanismError, match=r"^joints .*motor1.*are no limb with branches: "):
+    with pytest.raises(MechanismError, match=r"^joints .*motor1.*do not form a limb with branches: "):
         limbs_of(mechanism_of(four_bar_delta()))
 
 

@@ -135,13 +135,13 @@ def test_a_symbol_that_stands_for_two_things_is_refused() -> None:
         {"unknowns": (toy.length, replace(toy.length, name="again", symbol=toy.pose.position[1]))},
         {"parameters": (toy.base, replace(toy.base, name="again", symbol=toy.pose.position))},
     ):
-        with pytest.raises(ModelError, match="model 'toy': a symbol stands for two things"):
+        with pytest.raises(ModelError, match="model 'toy': a symbol is used for two parameters or unknowns"):
             toy.model(**changed)
 
 
 def test_an_expression_where_a_symbol_must_stand_is_refused() -> None:
     toy = parts()
-    fault = "is an expression where a symbol must stand"
+    fault = "is an expression; a symbol is required"
     for changed in (
         {"parameters": (replace(toy.base, symbol=2 * toy.base.symbol),)},
         {"parameters": (replace(toy.base, symbol=SX([1.0, 2.0, 3.0])),)},
@@ -180,8 +180,8 @@ def test_no_wrenches_and_a_drawing_of_what_does_not_exist_are_refused() -> None:
     with pytest.raises(ModelError, match="model 'toy': it has no wrenches"):
         toy.model(wrenches=())
     for link, fault in (
-        (Link("C", "A", Body.BASE), "a link ends at 'C', which is no point"),
-        (Link("A", "leg", Body.BASE), "a link ends at 'leg', which is no point"),
+        (Link("C", "A", Body.BASE), "a link ends at 'C', which is not a point"),
+        (Link("A", "leg", Body.BASE), "a link ends at 'leg', which is not a point"),
         (Link("A", "B", Body.LIMB, "arm"), "a link belongs to limb 'arm', which has no wrench"),
     ):
         with pytest.raises(ModelError, match=fault):
@@ -314,11 +314,11 @@ def test_rows_of_a_machine_built_exactly_are_those_of_the_design(model: Model) -
 
 def test_legs_and_built_rows_that_fit_no_limb_are_refused() -> None:
     sound = models.stewart_gough()
-    with pytest.raises(ModelError, match="leg 'x' is no limb"):
+    with pytest.raises(ModelError, match="leg 'x' is not a limb"):
         replace(sound, legs=(*sound.legs, models.Leg("x", SX.zeros(3), SX.zeros(3))))
     with pytest.raises(ModelError, match=r"legs .* are not in the order of their forces"):
         replace(sound, legs=sound.legs[::-1])
-    with pytest.raises(ModelError, match="rows of the built machine"):
+    with pytest.raises(ModelError, match="rows with joint-centre errors"):
         replace(sound, built=sound.built[1:])
     with pytest.raises(ModelError, match="leg 1- base should have shape"):
         replace(sound, legs=(models.Leg("1-", SX.zeros(2), SX.zeros(3)),))

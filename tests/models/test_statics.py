@@ -19,7 +19,7 @@ from screwsynth.models import Dimension, hexapod, robot, three_upu
 from screwsynth.models.catalog import gallery_names
 from screwsynth.models.mechanism import mechanism_of
 from screwsynth.models.mechanism.singularities import closed_configurations
-from screwsynth.models.statics import driven_joints, freedoms_of, statics_hindrance
+from screwsynth.models.statics import degrees_of_freedom, driven_joints, statics_hindrance
 from screwsynth.nlp.case.loads import Load, Loading, Motion
 from screwsynth.nlp.errors import CaseError
 
@@ -39,7 +39,7 @@ def test_all_robots_of_the_gallery_have_as_many_actuators_as_freedoms() -> None:
     assert set(gallery_names()) == {*GALLERY, *NETWORKS}
     for name in GALLERY:
         model, ranks = model_of(name), RANKS[name]
-        assert (len(driven_joints(model)), freedoms_of(model)) == (ranks.freedoms, ranks.freedoms)
+        assert (len(driven_joints(model)), degrees_of_freedom(model)) == (ranks.freedoms, ranks.freedoms)
         assert statics_hindrance(model) == ""
 
 
@@ -95,9 +95,10 @@ def test_forces_of_mechanisms_of_any_topology_equal_those_of_virtual_work_in_muj
 #: Tables of mechanisms whose forces no load determines, by their seeds, and why.
 HINDERED = {
     0: "its platform cannot move",
-    12: "it has 2 actuators for 1 freedom, so that they can load each other with forces that no load determines",
-    20: "its 2 actuators do not hold the 4 freedoms of its platform",
-    112: "its 1 actuator does not hold the 2 freedoms of its platform",
+    12: "it has 2 actuators for 1 degree of freedom, so internal forces between actuators are not determined by the "
+    "load",
+    20: "its 2 actuators do not control the 4 degrees of freedom of its platform",
+    112: "its 1 actuator does not control the 2 degrees of freedom of its platform",
 }
 
 

@@ -131,11 +131,11 @@ def test_a_case_with_an_objective_is_the_same_when_it_is_written_and_read_again(
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        (('[[load]]\nname = "handling"\nforce = [2, 2, -10]\n', ""), "needs a [[load]]"),
-        (('"actuator_force"', '"actuator_speed"'), "needs [motion]"),
+        (('[[load]]\nname = "handling"\nforce = [2, 2, -10]\n', ""), "needs a table [[load]]"),
+        (('"actuator_force"', '"actuator_speed"'), "needs the table [motion]"),
         (('"actuator_force"', '"leg_length"'), "must be one of 'actuator_force'"),
-        (("[objective]", TASK.replace("min", "max") + "[objective]"), "contradicts [objective]"),
-        (("[objective]", 2 * TASK + "[objective]"), "one at most beside [objective]"),
+        (("[objective]", TASK.replace("min", "max") + "[objective]"), "must be 'min' with objective.minimise"),
+        (("[objective]", 2 * TASK + "[objective]"), "one at most with objective.minimise"),
         (("minimise", "maximise"), "no such key"),
     ],
     ids=["no load", "no motion", "unknown", "sense", "two tasks", "maximise"],
@@ -150,7 +150,7 @@ def test_a_proof_file_states_the_root_of_what_its_tree_bounds(cli: Run, tmp_path
     status, _, _ = cli("certify", str(case), "--gap", "0.01", "--proof", str(proof))
     assert status == 0
     out = unbroken(output_of(cli("verify-proof", str(proof), str(case))))
-    assert "holds: the largest actuator force over all actuators and loads, at 8 poses is at least 7.45" in out
+    assert "PROOF VALID: the largest actuator force over all actuators and loads, at 8 poses is at least 7.45" in out
     stated = json.loads(proof.read_text())
     (claim,) = stated["claims"]
     claim["bound"] *= 1.03**2

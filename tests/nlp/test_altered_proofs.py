@@ -235,8 +235,8 @@ def alterations(content: dict[str, Any], rng: np.random.Generator, per_field: in
 
 
 BOUND = re.compile(r"at (most|least) ([^\s,]+)")
-BOXES = re.compile(r"[\d,]+ leaves, shown on .*\n")
-REASONS = re.compile(r"(?<=^not on paper: ).*?: .*", re.MULTILINE)
+BOXES = re.compile(r"[\d,]+ leaves of the proof trees?, checked on .*\n")
+REASONS = re.compile(r"(?<=^no proof: ).*?: .*", re.MULTILINE)
 LOSSES = re.compile(r"F being the largest of (\S+) \((\S+) - F\('one'\)\) and (\S+) \(F\('other'\) - (\S+)\)")
 
 
@@ -252,7 +252,7 @@ def least_loss(weight: float, best: float, other_weight: float, other_best: floa
 def is_true(before: str, after: str, reached: dict[tuple[str, str], float]) -> bool:
     """Whether an output says what another one said, but for bounds that are still beyond values that are reached."""
     before, after = (REASONS.sub("", BOXES.sub("", each)) for each in (before, after))
-    if before.startswith("holds: there is no feasible point"):
+    if before.startswith("PROOF VALID: there is no feasible point"):
         # Every claim about the points of an empty set is true.
         return before.partition(" within ")[2] in after or ", F being that of task 'one'" in after
     if (found := LOSSES.search(after)) and after[found.start() :] != before[found.start() :]:
@@ -321,11 +321,11 @@ def test_errors_of_legs_are_those_of_the_command(cli: Run, folder: Path) -> None
     case, proof = str(folder / "machines.toml"), str(folder / "machines.json")
     code, out, err = cli("verify-proof", proof, case)
     assert (code, out) == (1, "")
-    assert "by at most 0.01 in, and not 0: see --leg-error" in err
+    assert "leg errors of at most 0.01 in, but 0 was given: see --leg-error" in err
     assert cli("verify-proof", proof, case, "--leg-error", "-0.019999999999")[0] == 2
     out = output_of(cli("verify-proof", proof, case, "--leg-error", "0.01", "--all"))
-    assert "for every machine whose joint centres are off by at most 0.01 in" in out
-    errors = re.findall(r"(position|rotation) error: at most (\S+) (?:in|deg), for lengths of legs that are (.*)", out)
+    assert "for every robot whose joint centres are off by at most 0.01 in" in out
+    errors = re.findall(r"(position|rotation) error: at most (\S+) (?:in|deg), for leg lengths that are (.*)", out)
     assert [(each[0], each[2]) for each in errors] == [
         ("position", "off by at most 0.01 in"),
         ("rotation", "off by at most 0.01 in"),
@@ -408,24 +408,24 @@ def test_proofs_of_machines_with_settings_or_of_a_result(cli: Run, tmp_path: Pat
     free = str(saved(tmp_path / "free.toml", edited(MACHINE, ("x2 = 11.543", "x2 = { min = 8, max = 15 }"))))
     assert cli("evaluate", fixed, "--json", result)[0] in (0, 1)
     code, _, err = cli("workspace", free, "--gap", "0.1", "--of", result, "--proof", proof)
-    assert (code, err) == (0, f"--of {result}: has the dimensions of the case 'fixed'\n")
+    assert (code, err) == (0, f"--of {result}: gives the dimensions of the case 'fixed'\n")
     for command in (("verify-proof", proof, free), ("workspace", free)):
         assert "robot.parameters.x2: is free" in cli(*command)[2]
     for options in (("--of", result), ("--set", "x2=11.543")):
         code, out, err = cli("verify-proof", proof, free, *options)
         assert code == 0, err
         assert "F: of the task 'push'" in out
-        refusal_of(cli("verify-proof", proof, *options), "needs the CASE")
+        refusal_of(cli("verify-proof", proof, *options), "needs the argument CASE")
     code, _, err = cli("verify-proof", proof, free, "--set", "x2=11.6")
     assert (code, err) == (1, "rejected: the proof is for other joint centres than this case's\n")
     for option in (("--above", "1"), ("--all-assemblies",)):
-        refusal_of(cli("verify-proof", proof, *option), "means nothing for this proof")
+        refusal_of(cli("verify-proof", proof, *option), "is no option for this kind of proof")
 
 
 def test_a_result_in_other_units_or_of_another_robot_is_refused(cli: Run, tmp_path: Path) -> None:
     result = str(tmp_path / "result.json")
     cli("evaluate", str(saved(tmp_path / "inches.toml", MACHINE)), "--json", result)
-    units = "has the units 'in' and 'deg', and the case "
+    units = "has the units 'in' and 'deg', but the case has "
     radians = edited(MACHINE, ('"in"', '"in"\nangle = "rad"'), ("x3 = 1, x4 = 5", "x3 = 0.1, x4 = 0.1"))
     for text, words in (
         (edited(MACHINE, ('"in"', '"mm"')), f"{units}'mm' and 'deg'"),
@@ -439,7 +439,7 @@ def test_errors_of_legs_are_refused_for_a_robot_without_six_legs(cli: Run, folde
     case, claim = str(saved(folder / "legless.toml", CRANKS)), ProofClaim("regular", "", "regular", tree=b"\x02")
     proof = Proof("", "legless", Premises((), (), (), 0.01), (claim,)).as_text()
     for command in (("workspace", case), ("verify-proof", str(saved(folder / "legless.json", proof)), case)):
-        refusal_of(cli(*command, *ERROR), "--leg-error 0.01: is for six straight legs, which '6-rus' is not")
+        refusal_of(cli(*command, *ERROR), "--leg-error 0.01: is only for six straight legs, which '6-rus' is not")
 
 
 def test_the_smallest_f_at_the_worst_of_several_poses_is_refused(cli: Run, tmp_path: Path) -> None:

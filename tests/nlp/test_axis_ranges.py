@@ -193,7 +193,7 @@ def test_the_command_shows_ranges_and_pairs(cli: Run, tmp_path: Path) -> None:
     assert (result["axes"][0]["lower"], result["axes"][5]["upper"]) == ({"value": -2.0}, {"value": 15.0})
     assert [each["factor"] for each in result["pairs"]] == [1.0] * 15
     axes = table.read_text().partition("\n\n")[0].partition("\n")[2]
-    assert [row["limited below by"] for row in rows_of(axes)] == ["the largest range"] * 6
+    assert [row["lower end limited by"] for row in rows_of(axes)] == ["the search range"] * 6
     status, shown, _ = cli(*command, "0,0,50,0,0,0")
     assert status == 1
     none = json.loads(out.read_text())
@@ -203,14 +203,14 @@ def test_the_command_shows_ranges_and_pairs(cli: Run, tmp_path: Path) -> None:
     for options, words in (
         ("", "the table [path], or the file of a path"),
         (f"--range --of {out}", "is no result of solve or evaluate"),
-        ("--range --along a.ngc", "--along: is not for --range"),
-        ("--range --unit mm", "--unit: is not for --range"),
+        ("--range --along a.ngc", "--along: cannot be used with --range"),
+        ("--range --unit mm", "--unit: cannot be used with --range"),
         ("--along a.ngc --most 1,1", "--most: needs --range"),
         ("--range --most 1,-1", "--most 1,-1: must be two positive"),
     ):
         refusal_of(cli("path", "hexapod-linuxcnc", *options.split()), words)
     free = cli("path", "paper-4.1-helical", "--range")
-    refusal_of(free, "paper-4.1-helical", "pose: has free numbers", "state it with --start")
+    refusal_of(free, "paper-4.1-helical", "pose: has free coordinates", "state it with --start")
 
 
 def test_without_time_nothing_is_claimed() -> None:

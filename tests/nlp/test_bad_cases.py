@@ -148,7 +148,7 @@ MISSING = [
 
 UNKNOWN = [
     paper("unknown-top-key", "title =", "titel =", "titel", "no such key", "'title'"),
-    paper("unknown-task-list", "[[task]]", "[[tasks]]", "tasks", "no such key", "'task'"),
+    paper("unknown-task-list", "[[task]]", "[[tasks]]", "tasks", "the name of a CSV file", "[[task]]"),
     paper("unknown-in-units", "length =", "lenght =", "units.lenght", "no such key", "'length'"),
     paper("unknown-option", "layout =", "layuot =", "robot.layuot", "no such key", "'layout'"),
     hexapod("option-of-no-use", "model =", "layout = 3\nmodel =", "robot.layout", "no such key", "parameters"),
@@ -242,12 +242,18 @@ OUT_OF_RANGE = [
     paper("zero-axis-translation", MOTION, "axis = [0, 0, 0]\npitch = inf\n", "task[0].axis", "must not be zero"),
     paper("zero-rotation-axis", ROTATION, "rotation = { axis = [0, 0, 0], angle = 3 }", "pose.rotation.axis", "zero"),
     hexapod("zero-twist", "[0, 0.5, 0, 1, 0, 0]", "[0, 0, 0, 0, 0, -0.0]", "task[0].twist", "must not be zero"),
-    hexapod("twist-and-axis", "twist =", "axis = [0, 0, 1]\ntwist =", "task[0].axis", "beside twist", "one way"),
-    hexapod("twist-and-point", "twist =", "point = [0, 0, 1]\ntwist =", "task[0].point", "beside twist", "one way"),
-    hexapod("twist-and-pitch", "twist =", "pitch = inf\ntwist =", "task[0].pitch", "beside twist", "one way"),
-    paper("twist-and-all", "axis = [2", "twist = [0, 0, 1, 0, 0, 0]\naxis = [2", "task[0].axis", "beside twist"),
+    hexapod(
+        "twist-and-axis", "twist =", "axis = [0, 0, 1]\ntwist =", "task[0].axis", "conflicts with twist", "one way"
+    ),
+    hexapod(
+        "twist-and-point", "twist =", "point = [0, 0, 1]\ntwist =", "task[0].point", "conflicts with twist", "one way"
+    ),
+    hexapod("twist-and-pitch", "twist =", "pitch = inf\ntwist =", "task[0].pitch", "conflicts with twist", "one way"),
+    paper(
+        "twist-and-all", "axis = [2", "twist = [0, 0, 1, 0, 0, 0]\naxis = [2", "task[0].axis", "conflicts with twist"
+    ),
     paper("free-axis-half-turn", "max = 30 } }", "max = 180 } }", "pose.rotation.angle", "at most 179 deg", "free"),
-    paper("free-axis-more", "min = -30", "min = -270", "pose.rotation.angle", "at most 179 deg", "axis free"),
+    paper("free-axis-more", "min = -30", "min = -270", "pose.rotation.angle", "at most 179 deg", "a free axis"),
     paper("free-axis-fixed", ROTATION, "rotation = { angle = 180 }", "pose.rotation.angle", "at most 179 deg", "free"),
     paper("held-axis-over-a-turn", ROTATION, "rotation = { axis = [0, 0, 1], angle = 361 }", "pose.rotation.a", "360"),
     paper("rad-read-as-deg", '"deg"', '"rad"', "robot.parameters.x3", "between 0 rad and 0.523"),
@@ -263,7 +269,7 @@ OUT_OF_RANGE = [
 ]
 
 COMBINED = [
-    paper("combine", "[expect]", '[combine]\nmethod = "average"\n[expect]', "combine", "means nothing for one task"),
+    paper("combine", "[expect]", '[combine]\nmethod = "average"\n[expect]', "combine", "has no effect with one task"),
     paper("tolerance", "[expect]", "[tolerance]\nposition = 0.1\n[expect]", "tolerance.position", "joint_centre"),
     paper("two-tasks-of-one-name", TASK, TASK + TASK, "task[1].name", "used by an earlier task"),
     paper("combine-misspelt", "[expect]", '[combine]\nmethod = "mean"\n[expect]', "combine.method", "average"),
@@ -301,7 +307,7 @@ LIMITS = [
     limit("axis-nested", "base_joint_angle = { max = 9, about = [[0, 0]] }", "base_joint_angle.about[0]", "3 entries"),
     limit("axes-too-few", f"base_joint_angle = {TWO_AXES}", "base_joint_angle.about", "one for each of the 6 legs"),
     limit("home-missing", 'base_joint_angle = { max = 9, about = "home" }', "home", "missing"),
-    limit("home-alone", "home = { position = [0, 0, 30] }", "home", "means nothing"),
+    limit("home-alone", "home = { position = [0, 0, 30] }", "home", "has no effect"),
     limit("home-short", "home = { position = [0, 30] }", "home.position", "3 entries"),
     limit("spacing-zero", "joint_spacing = { min = 0 }", "joint_spacing.min", "above 0 cm"),
     limit("spacing-max", "joint_spacing = { max = 3 }", "joint_spacing.max", "allowed: min"),
@@ -318,13 +324,15 @@ LIMITS = [
         "tolerance-zero", "[expect]", "[tolerance]\njoint_centre = 0\n[expect]", "tolerance.joint_centre", "positive"
     ),
     paper("over-poses-of-one", "[expect]", '[combine]\nover_poses = "sum"\n[expect]', "combine.over_poses", "one pose"),
-    along("along-and-grid", "first = 0, last = 1, count = 2", "pose.grid", "beside", grid="\ngrid = {}"),
+    along(
+        "along-and-grid", "first = 0, last = 1, count = 2", "pose.grid", "conflicts with along_task", grid="\ngrid = {}"
+    ),
     along("along-one", "first = 0, last = 1, count = 1", "pose.along_task.count", "2"),
     along("along-nowhere", "first = 1, last = 1, count = 3", "pose.along_task.last", "differ"),
-    along("along-no-task", 'task = "mill", first = 0, last = 1, count = 3', "pose.along_task.task", "no task"),
+    along("along-no-task", 'task = "mill", first = 0, last = 1, count = 3', "pose.along_task.task", "no such task"),
     paper("grid-empty", ROTATION, f"{ROTATION}\ngrid = {{}}", "pose.grid", "offsets"),
     paper("grid-crossed", ROTATION, f"{ROTATION}\ngrid.x = {CROSSED}", "pose.grid.x.min", "below max"),
-    paper("grid-huge", ROTATION, f"{ROTATION}\ngrid = {HUGE}", "pose.grid", "729 poses"),
+    paper("grid-huge", ROTATION, f"{ROTATION}\ngrid = {HUGE}", "pose.grid", "at most 200 poses", "got 729"),
 ]
 
 LINES = [
@@ -379,8 +387,8 @@ def no_numbers() -> list[Broken]:
             text = edited(base, (old, new.format(value)))
             found.append(Broken(f"{value}-{place}", text.encode(), key, (gist,)))
     found += [
-        paper("nan-pitch", "pitch = 1", "pitch = nan", "task[0].pitch", "a number or inf"),
-        paper("-inf-pitch", "pitch = 1", "pitch = -inf", "task[0].pitch", "a number or inf"),
+        paper("nan-pitch", "pitch = 1", "pitch = nan", "task[0].pitch", "a number, or inf"),
+        paper("-inf-pitch", "pitch = 1", "pitch = -inf", "task[0].pitch", "a number, or inf"),
         paper("inf-starts", "starts = 2", "starts = inf", "solve.starts", "whole number"),
         paper("nan-seed", "seed = 0", "seed = nan", "solve.seed", "whole number"),
     ]

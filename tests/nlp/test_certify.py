@@ -228,7 +228,7 @@ def test_nothing_outside_the_box_is_taken_for_a_better_point() -> None:
     outside = solution.nlp.upper + 1e-6 * solution.nlp.scale
     found = certify_program(solution.nlp, outside)
     assert found.status is CertificateStatus.REFUSED
-    assert "outside of the limits" in found.statement
+    assert "violates the limits" in found.statement
 
 
 def test_an_incumbent_that_is_too_good_is_refused_and_one_that_is_beaten_replaced() -> None:
@@ -239,7 +239,7 @@ def test_an_incumbent_that_is_too_good_is_refused_and_one_that_is_beaten_replace
     found = certify_program(solution.nlp, solution.nlp.centre)
     assert found.status is CertificateStatus.PROVED
     assert found.was_beaten
-    assert "better than the one given" in found.statement
+    assert "better than the given point" in found.statement
     assert found.incumbent == pytest.approx(solution.F, rel=1e-4)
 
 

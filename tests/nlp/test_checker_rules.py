@@ -31,7 +31,7 @@ from screwsynth.nlp.proof.checker.workspace.motion_matrix import PosedRobot
 from screwsynth.nlp.proof.checker.workspace.number_claims import change_of_jacobian
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import pose_root
 from screwsynth.nlp.proof.checker.workspace.ranks import RankClaim, change_of_rows
-from screwsynth.nlp.proof.statement.machine import Legs, workspace_of_case
+from screwsynth.nlp.proof.statement.fixed_robot import Legs, workspace_of_case
 from screwsynth.nlp.proof.statement.standard_form import Condition, StandardForm, standard_form
 from screwsynth.nlp.solver.multistart import ProgramSolution, solve_program
 
@@ -456,7 +456,7 @@ def test_what_was_tampered_with_is_rejected(proof: ProofClaim, nlp: Nlp) -> None
         ((b, tilted, Q), "could not be shown"),
         ((b[swap], g[swap], Q[swap]), "could not be shown"),
         ((empty, g, Q), "could not be shown"),
-        ((b, unknown, Q), "no number"),
+        ((b, unknown, Q), "is NaN, or infinite"),
     ):
         assert proof.tree.count(node) == 1
         assert fault in rejected(replace(proof, tree=proof.tree.replace(node, leaf_bytes(*numbers))), nlp)

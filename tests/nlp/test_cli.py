@@ -114,7 +114,7 @@ def test_a_solve_as_a_process_prints_only_its_table(solved: Solved) -> None:
     assert title == "Pose of a given 6-6 platform for a screw motion of pitch 1"
     assert task.startswith("task  drive the screw, max F: screw of pitch 1 cm about (0.6667, 0.6667, 0.3333)")
     assert task.endswith("through (2, 3, 6)")
-    assert axis == "task's axis  nearest to the origin at (-1.556, -0.5556, 4.222)"
+    assert axis == "task axis  nearest to the origin at (-1.556, -0.5556, 4.222)"
     assert found.startswith("largest F = 407.2107")
     assert "4 of 4 converged" in ended.stdout
     assert not re.search(r"Ipopt|IPOPT|EXIT:|CasADi|Eclipse|coin-or|nlp_f|solver|\*\*\*\*|\x1b", ended.stdout)
@@ -439,7 +439,7 @@ def test_a_new_case_solves(model: str, tmp_path: Path, cli: Run) -> None:
 def test_models_lists_the_shipped_robots_and_shows_one(cli: Run) -> None:
     shown = unbroken(output_of(cli("models")))
     assert all(re.search(rf"(?<!\S){name}\b", shown) for name in model_names())
-    assert "six freedoms  6-pus, 6-rss, 6-rus, 6-sps, 6-ups\n" in shown
+    assert "six degrees of freedom  6-pus, 6-rss, 6-rus, 6-sps, 6-ups\n" in shown
     rows = [line.split()[0] for line in output_of(cli("models", "--all")).splitlines() if line[0] != " "]
     assert rows[rows.index("robot") :][1:3] == ["stewart-gough", "hexapod"]
     words = ("x1", "x4", "layout", '"octahedral"', "length", "angle", "leg_length", ">= 0, <= 30", "1-", "3+")
@@ -452,8 +452,8 @@ def test_commands_that_do_not_exist_or_lack_something(cli: Run) -> None:
         ("models hexapode", "did you mean 'hexapod'?"),
         ("new hexapode", "did you mean 'hexapod'?"),
         ("frobnicate", "frobnicate: no such command; allowed: new, models, solve"),
-        ("solve", "CASE: is missing: a case file"),
-        ("evaluate", "CASE: is missing: a case file"),
+        ("solve", "CASE: is missing: case file"),
+        ("evaluate", "CASE: is missing: case file"),
         ("new", "MODEL: is missing: name of a robot"),
         ("solve a --no", "--no: no such option of solve; did you mean '--of'? allowed: --set, "),
         ("solve a b", "it takes CASE"),

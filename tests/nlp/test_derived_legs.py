@@ -413,7 +413,7 @@ def test_a_robot_with_fewer_freedoms_and_loops(tolerance: float) -> None:
             # Poses of other machines are not those of the design: the claim stays open, with the reason.
             (extreme,) = (each for each in judged.extremes if each.name == name)
             assert extreme.outcome is Outcome.OPEN
-            assert extreme.reason == "numbers of the pose that follow from others differ from machine to machine"
+            assert extreme.reason == "dependent coordinates of the pose differ between robots within the tolerance"
         else:
             assert outcomes[name] is Outcome.PROVED
             assert bounds[name, "min"] <= segment_distance(base[i], ends[i], base[j], ends[j])
@@ -475,10 +475,12 @@ def test_robots_without_legs_refuse_their_limits_by_name(cli: Run, tmp_path: Pat
     for robot_name, (key, limit) in itertools.product(("delta", "6-rss"), OF_LEGS.items()):
         text = output_of(cli("new", robot_name)).replace("[limits]", f"[limits]\n{key} = {limit}\n#")
         path = saved(tmp_path / "case.toml", text)
-        refusal_of(cli("solve", str(path)), f"limits.{key}: is nothing that '{robot_name}' has; it has actuator_angle")
+        refusal_of(cli("solve", str(path)), f"no such limit for the robot '{robot_name}'; allowed: actuator_angle")
     # Cones of the joints of a file's legs are stated by joint.
     path = saved(tmp_path / "case.toml", CASE.replace("[solve]", "base_joint_angle = 30\n[solve]"))
-    refusal_of(cli("solve", str(path)), "limits.base_joint_angle: is nothing that '6-ups' has; it has leg_length")
+    refusal_of(
+        cli("solve", str(path)), "limits.base_joint_angle: no such limit for the robot '6-ups'; allowed: leg_length"
+    )
 
 
 @pytest.mark.parametrize("name", ["6-ups", "3-rps", "planar-3-rpr", "tricept"])

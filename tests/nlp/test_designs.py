@@ -306,9 +306,9 @@ def test_none_is_found_and_refusals_are_one_sentence(tmp_path: Path, cli: Run) -
     path = saved(tmp_path / "case.toml", case_text(case_from(tables_with(ONE, limits={"custom": ["x1 == 7.5"]}))))
     status, said, _ = cli("solve", str(path), "--round", "1")
     assert status == 1
-    none = "rounded  to multiples of 1 cm: no multiples within 4 steps were found that keep all limits"
+    none = "rounded  to multiples of 1 cm: no multiples within 4 steps were found that satisfy all limits"
     assert none in unbroken(said)
-    sentence = "--round 20: robot.parameters.x1 has no multiple of it between 6 and 14 cm"
+    sentence = "--round 20: robot.parameters.x1 has no multiple of the step between 6 and 14 cm"
     refusal_of(cli("solve", str(path), "--round", "20"), sentence)
     refusal_of(cli("solve", str(path), "--round", "-1"), "--round -1: must be positive and finite")
     refusal_of(cli("solve", str(path), "--round", "x"), "--round x: must be a number")
@@ -328,7 +328,7 @@ def test_the_result_says_what_was_rounded_and_lost(tmp_path: Path, cli: Run) -> 
     path = saved(tmp_path / "case.toml", case_text(case_from(tables_with(values))))
     target = tmp_path / "result.json"
     said = output_of(cli("solve", str(path), "--round", "0.5", "--json", str(target)))
-    assert "values  x1 = 11.5 cm: the best of 2 combinations" in said
+    assert "chosen values  x1 = 11.5 cm: the best of 2 combinations" in said
     assert "rounded  to multiples of 0.5 cm and 0.5 deg: the best of " in said
     result = json.loads(target.read_text(encoding="utf-8"))
     jsonschema.validate(result, result_schema())

@@ -54,7 +54,7 @@ def test_the_cpp_header_and_its_example_compile_and_run(compiler: str, folder: P
     other = [compiler, "-fsyntax-only", "-DSCREWSYNTH_VERSION=1", "example.cpp"]
     done = subprocess.run(other, cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode != 0
-    assert "are of different versions of screwsynth" in done.stderr
+    assert "have different versions of screwsynth" in done.stderr
 
 
 THROWS = """#include <cmath>
@@ -94,7 +94,7 @@ int main() {
 def test_the_real_time_loop_compiles_and_keeps_within_its_steps(folder: Path) -> None:
     source = (folder / "realtime.c").read_text(encoding="utf-8")
     # The same loop, which checks each step.
-    hook = "/* Here x goes to the machine. */"
+    hook = "/* Send x to the robot here. */"
     assert source.count(hook) == 1
     check = """
         {

@@ -66,8 +66,8 @@ def test_refusals_are_one_sentence_and_write_nothing(tmp_path: Path, cli: Run, m
     (tmp_path / "full" / "mine.txt").write_text("mine", encoding="utf-8")
     case = "paper-4.1-helical"
     for words, fault in {
-        ("--format", "stl", "--out", str(out)): "--format stl: is no format; allowed: mjcf, urdf, csv, dxf, all",
-        ("--format", "mjcf", "--out", str(tmp_path / "full")): "holds mine.txt, which screwsynth did not write",
+        ("--format", "stl", "--out", str(out)): "--format stl: no such format; allowed: mjcf, urdf, csv, dxf, all",
+        ("--format", "mjcf", "--out", str(tmp_path / "full")): "contains mine.txt, not written by screwsynth",
         ("--format", "mjcf", "--out", str(out), "--pose", "2"): "--pose 2: the case has 1 pose",
     }.items():
         refusal_of(cli("export", case, *words), fault)
@@ -118,7 +118,7 @@ def test_a_result_of_another_case_or_assembly_is_refused(tmp_path: Path, cli: Ru
     data = json.loads(result.read_text(encoding="utf-8"))
     data["jacobian"][0][0] += 1e-3
     saved(result, json.dumps(data))
-    refusal_of(cli("export", "paper-4.1-helical", *words), "another assembly of its joints")
+    refusal_of(cli("export", "paper-4.1-helical", *words), "another assembly mode")
     saved(result, "{}")
     assert cli("export", "paper-4.1-helical", *words)[0] == 2
 
@@ -164,42 +164,42 @@ PAIRS = "closed_loop: [[loop1_A, loop1_B]]\ntype: [3d]\nname_mot: [stewart_1]\n"
 #: Name of the file, its text, arguments, and words of the sentence.
 FAULTS: list[tuple[str, str | bytes, tuple[str, ...], str]] = [
     # Platform, base and actuators.
-    ("m.xml", HEAD, (), "--platform: is missing: BODY, body, link or site that is the platform"),
+    ("m.xml", HEAD, (), "--platform: is missing: BODY, platform: a body, link or site of the model"),
     ("m.xml", HEAD, ("--platform", "haed"), "--platform haed: no such body or frame; did you mean 'head'?"),
     ("m.xml", HEAD, ("--platform", ""), "--platform: needs a value, BODY"),
     ("m.xml", HEAD, (*BODY, "--base", "tors"), "--base tors: no such body; did you mean 'torso'?"),
     ("m.xml", HEAD, ("--platform", "torso"), "--platform torso: is rigidly joined to the base world"),
-    ("m.xml", ARM, ("--platform", "hand"), "--platform hand: is at the end of an open chain of 2 joints from the base world; a parallel robot has two or more"),
-    ("m.xml", HEAD.replace("<equality>", "<equality><!--").replace("</equality>", "--></equality>"), BODY, "no joints lead to it from the base world; choose the base by --base"),
-    ("m.xml", HEAD, (*BODY, "--actuated", "stewart_7"), "--actuated stewart_7: is no joint between base and platform; did you mean 'stewart_6'?"),
-    ("m.xml", HEAD, (*BODY, "--actuated", "ear"), "--actuated ear: is no joint between base and platform"),
-    ("m.xml", HEAD, (*BODY, "--actuated", "passive_1"), "the ball joint passive_1 has an actuator; hinges and slides may have one"),
-    ("m.urdf", URDF, BODY, "no joint between base and platform has an actuator; name them by --actuated, of stewart_1"),
-    ("m.xml", HEAD, (*BODY, "--loops", "x.yaml"), "--loops x.yaml: is for URDF files"),
+    ("m.xml", ARM, ("--platform", "hand"), "--platform hand: is at the end of an open chain of 2 joints from the base world; a parallel robot has two or more chains"),
+    ("m.xml", HEAD.replace("<equality>", "<equality><!--").replace("</equality>", "--></equality>"), BODY, "no joints connect it to the base world; choose the base with --base"),
+    ("m.xml", HEAD, (*BODY, "--actuated", "stewart_7"), "--actuated stewart_7: no such joint between base and platform; did you mean 'stewart_6'?"),
+    ("m.xml", HEAD, (*BODY, "--actuated", "ear"), "--actuated ear: no such joint between base and platform"),
+    ("m.xml", HEAD, (*BODY, "--actuated", "passive_1"), "the ball joint passive_1 must not have an actuator; only hinges and slides may"),
+    ("m.urdf", URDF, BODY, "no joint between base and platform has an actuator; name actuated joints with --actuated; allowed: stewart_1"),
+    ("m.xml", HEAD, (*BODY, "--loops", "x.yaml"), "--loops x.yaml: is only for URDF files"),
     # Loops.
     ("m.xml", reachy.mjcf(lift=0.001), BODY, "the loop loop_1 is open by 0.001 and 0 deg, more than 1e-06 of the robot's size 0.117; --close closes it by Newton's method"),
     # Hostile and broken files.
-    ("m.xml", BOMB, BODY, "it declares a document type or entities, which are not read"),
-    ("m.urdf", OUTSIDE, BODY, "it declares a document type or entities, which are not read"),
+    ("m.xml", BOMB, BODY, "it declares a document type or entities, which are not allowed"),
+    ("m.urdf", OUTSIDE, BODY, "it declares a document type or entities, which are not allowed"),
     ("m.xml", "<mujoco>" + " " * 17 * 2**20, BODY, "it is larger than 16 MB"),
     ("m.xml", "<body>" * 500, BODY, "its elements are nested more than 400 deep"),
     ("m.xml", f"<mujoco>{'<a/>' * 200_001}</mujoco>", BODY, "it has more than 200000 elements"),
     ("m.xml", "<mujoco", BODY, "is not valid XML"),
     ("m.xml", b"\xff\xfe\x00", BODY, "is not valid XML"),
     ("m.xml", "", BODY, "is not valid XML"),
-    ("m.xml", "<sdf/>", BODY, "begins with <sdf>; <mujoco> of MJCF or <robot> of URDF is needed"),
+    ("m.xml", "<sdf/>", BODY, "expected <mujoco> of MJCF or <robot> of URDF as root element, got <sdf>"),
     # MJCF.
     ("m.xml", '<mujoco><include file="m.xml"/></mujoco>', BODY, "includes m.xml, which includes itself"),
-    ("m.xml", '<mujoco><include file="n.xml"/></mujoco>', BODY, "includes n.xml, which cannot be found"),
-    ("m.xml", "<mujoco><include/></mujoco>", BODY, "an include names no file"),
-    ("m.xml", '<mujoco><worldbody><replicate count="99999999"><body/></replicate></worldbody></mujoco>', BODY, "replicate count = 99999999: at most 2000 copies in all are read"),
-    ("m.xml", '<mujoco><worldbody><attach model="arm" prefix="a"/></worldbody></mujoco>', BODY, "attaches 'arm'; write the model as one file first"),
+    ("m.xml", '<mujoco><include file="n.xml"/></mujoco>', BODY, "includes n.xml, which does not exist"),
+    ("m.xml", "<mujoco><include/></mujoco>", BODY, "<include>: file is missing"),
+    ("m.xml", '<mujoco><worldbody><replicate count="99999999"><body/></replicate></worldbody></mujoco>', BODY, "replicate count = 99999999: must give at most 2000 copies in total"),
+    ("m.xml", '<mujoco><worldbody><attach model="arm" prefix="a"/></worldbody></mujoco>', BODY, "attaches 'arm', which is not supported; save the model as a single file first"),
     ("m.xml", HEAD.replace('name="passive_2"', 'name="passive_1"'), BODY, "MuJoCo cannot read it: "),
     ("m.xml", HEAD.replace('axis="', 'axis="nan '), BODY, "MuJoCo cannot read it: "),
-    ("m.xml", HEAD.replace('joint="stewart_3"', 'joint="stewart_9"'), BODY, "an actuator drives 'stewart_9', which is no joint that can be driven"),
-    ("m.xml", HEAD.replace("<equality>", '<equality><joint joint1="stewart_1" joint2="stewart_2" polycoef="0 1 2 0 0"/>'), BODY, "has a polynomial"),
-    ("m.xml", HEAD.replace('name="rod_1"', 'name="rod&#10;1"'), BODY, r"the body 'rod\n1' has a name with characters that cannot be shown"),
-    ("m.xml", HEAD.replace('model="head"', 'model="a&#9;b"'), BODY, r"the robot 'a\tb' has a name with characters that cannot be shown"),
+    ("m.xml", HEAD.replace('joint="stewart_3"', 'joint="stewart_9"'), BODY, "an actuator drives 'stewart_9', which is not a hinge or slide of the model"),
+    ("m.xml", HEAD.replace("<equality>", '<equality><joint joint1="stewart_1" joint2="stewart_2" polycoef="0 1 2 0 0"/>'), BODY, "must be linear"),
+    ("m.xml", HEAD.replace('name="rod_1"', 'name="rod&#10;1"'), BODY, r"the body 'rod\n1' must have a name of printable characters"),
+    ("m.xml", HEAD.replace('model="head"', 'model="a&#9;b"'), BODY, r"the robot 'a\tb' must have a name of printable characters"),
     ("m.xml", HEAD.replace('model="head"', 'model="a&#27;[31mb"'), BODY, "is not valid XML"),
     # URDF.
     ("m.urdf", URDF.replace('type="spherical"', 'type="rod"', 1), ALL, 'constraint closing_1, type = "rod": must be one of spherical, ball, fixed'),
@@ -207,19 +207,19 @@ FAULTS: list[tuple[str, str | bytes, tuple[str, ...], str]] = [
     ("m.urdf", URDF.replace('type="revolute"', 'type="hinge"', 1), ALL, 'type = "hinge": must be one of revolute'),
     ("m.urdf", URDF.replace('xyz="1.0 0.0 0.0"', 'xyz="0 0 0"', 1), ALL, 'axis = "0 0 0": must be a direction'),
     ("m.urdf", URDF.replace('xyz="1.0 0.0 0.0"', 'xyz="1 0"', 1), ALL, 'axis, xyz = "1 0": must be three finite numbers'),
-    ("m.xml", HEAD.replace('pos="0.0 0.0 ', 'pos="1e200 0.0 '), BODY, "has a coordinate above 1e+09, or one that is no number"),
+    ("m.xml", HEAD.replace('pos="0.0 0.0 ', 'pos="1e200 0.0 '), BODY, "must have finite coordinates of at most 1e+09"),
     ("m.urdf", URDF.replace('xyz="1.0 0.0 0.0"', 'xyz="1 0 inf"', 1), ALL, "must be three finite numbers"),
     ("m.urdf", URDF.replace('<link name="rod_2"/>', '<link name="rod_1"/>'), ALL, "has two elements <link> with the name 'rod_1'"),
-    ("m.urdf", URDF.replace('<link name="torso"/>', '<link name="torso"/><link name="spare"/>'), ALL, "must have one root link; it has torso, spare"),
-    ("m.urdf", '<robot xmlns:xacro="http://ros.org/wiki/xacro"><xacro:include filename="a"/></robot>', ALL, "has elements of xacro: write it out as plain URDF first"),
-    ("m.urdf", '<robot><link name="a"/><joint name="j" type="fixed"><parent link="a"/><child link="a"/></joint></robot>', ALL, "must have one root link; it has none"),
-    ("m.urdf", URDF.replace('<child link="horn_1"/>', '<child link="horn_1"/><mimic joint="x"/>'), ALL, 'mimic = "x": must be another joint'),
+    ("m.urdf", URDF.replace('<link name="torso"/>', '<link name="torso"/><link name="spare"/>'), ALL, "must have exactly one root link, which is no joint's child, got torso, spare"),
+    ("m.urdf", '<robot xmlns:xacro="http://ros.org/wiki/xacro"><xacro:include filename="a"/></robot>', ALL, "has xacro elements, which are not supported; convert it to plain URDF first"),
+    ("m.urdf", '<robot><link name="a"/><joint name="j" type="fixed"><parent link="a"/><child link="a"/></joint></robot>', ALL, "must have exactly one root link, which is no joint's child, got none"),
+    ("m.urdf", URDF.replace('<child link="horn_1"/>', '<child link="horn_1"/><mimic joint="x"/>'), ALL, 'mimic = "x": must be the name of another joint'),
     # Dimensions.
-    ("m.xml", HEAD, (*BODY, "--free", "circle9"), "--free circle9: no such joint or offer; did you mean 'circle3'?"),
-    ("m.xml", HEAD, (*BODY, "--free", "circle1", "stewart_1"), "--free stewart_1: the place of stewart_1 is a dimension already"),
-    ("m.xml", HEAD, (*BODY, "--free", "passive_1.axis"), "--free passive_1.axis: the joint is of the type S, which has no axis alone"),
-    ("m.xml", HEAD, (*BODY, "--free", "circle1=a", "circle2=a"), "--free: the dimension a would be given twice"),
-    ("m.xml", HEAD, (*BODY, "--free", "circle1=sin"), "the robot file would not be read: "),
+    ("m.xml", HEAD, (*BODY, "--free", "circle9"), "--free circle9: no such joint, circle or symmetry; did you mean 'circle3'?"),
+    ("m.xml", HEAD, (*BODY, "--free", "circle1", "stewart_1"), "--free stewart_1: the centre of stewart_1 is a dimension already"),
+    ("m.xml", HEAD, (*BODY, "--free", "passive_1.axis"), "--free passive_1.axis: the joint is of type S, which has no single axis"),
+    ("m.xml", HEAD, (*BODY, "--free", "circle1=a", "circle2=a"), "--free: the dimension a exists already"),
+    ("m.xml", HEAD, (*BODY, "--free", "circle1=sin"), "the robot cannot be written as a robot file: "),
 ]  # fmt: skip
 
 
@@ -244,14 +244,17 @@ def test_yaml_of_loops_is_checked(tmp_path: Path, cli: Run) -> None:
     )
     for text, words in [
         ("closed_loop: [[a, b]", "is not valid YAML"),
-        ("[1, 2]", "is not a table of loops"),
+        ("[1, 2]", "must be a table of loops"),
         ("closed_loop: [[a]]", "closed_loop: must be a list of pairs of names"),
-        (PAIRS.replace("loop1_A", "loop9_A"), 'closed_loop = "loop9_A": is no link or joint of the URDF'),
+        (PAIRS.replace("loop1_A", "loop9_A"), 'closed_loop = "loop9_A": no such link or joint in the URDF file'),
         (PAIRS.replace("3d", "4d"), 'type = "4d": must be 3d or 6d'),
-        (PAIRS.replace("[3d]", "[3d, 3d]"), "type: has 2 entries for 1 loops"),
-        (PAIRS.replace("[stewart_1]", "[stewart_x]"), 'name_mot = "stewart_x": is no joint of the URDF'),
+        (PAIRS.replace("[3d]", "[3d, 3d]"), "type: must have 1 entries, one for each loop, got 2"),
+        (PAIRS.replace("[stewart_1]", "[stewart_x]"), 'name_mot = "stewart_x": no such joint in the URDF file'),
         (PAIRS + "joint_name: [stewart_2]\njoint_type: [BALL]\n", 'joint_type = "BALL": must be SPHERICAL, FIXED or'),
-        (PAIRS + "joint_name: [stewart_2]\n", "joint_type: has 0 entries for 1 joints"),
+        (
+            PAIRS + "joint_name: [stewart_2]\n",
+            "joint_type: must have 1 entries, one for each name in joint_name, got 0",
+        ),
         ("x: &a [1]\n" + "y: " + "[" * 1100, "is not valid YAML"),
         (" " * (2**20 + 1), "it is larger than 1 MB"),
     ]:

@@ -15,7 +15,7 @@ from measures import circle_joints
 from path_cases import turns_of
 
 from screwsynth.nlp import Case, CaseError, Solution, case_text, compare, judge_workspace, solve
-from screwsynth.nlp.proof.statement.machine import workspace_of_case
+from screwsynth.nlp.proof.statement.fixed_robot import workspace_of_case
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseNumbers, pose_box
 from screwsynth.nlp.solver.frames import pose_of
 
@@ -236,23 +236,23 @@ def test_a_case_is_written_as_it_is_stated() -> None:
     [
         (
             {"pose": [{"position": [0, 0, 1]}, {"position": [0, 0, 0.9]}]},
-            """workspace.about = "pose": must be 'world' where a case has several poses""",
+            """workspace.about = "pose": must be 'world' for a case with several or displaced poses""",
         ),
         (
             {"pose": {"position": [0, 0, 1], "displacements": [{"translation": [0, 0, 0.1]}]}},
-            "must be 'world' where a case has several poses, or displaced ones",
+            "must be 'world' for a case with several or displaced poses",
         ),
         (
             {"pose": {"position": [0, 0, 1], "rotation": {"axis": [0, 1, 0], "angle": 10}}},
-            "workspace.rotation: must be about the pose's axis, or left out, where the pose is turned and about",
+            "workspace.rotation: must be left out, or about the axis of the pose: with about",
         ),
         (
             {"pose": {"position": [0, 0, 1], "rotation": {"angle": {"min": -10, "max": 10}}}},
-            "workspace.rotation: must be about the pose's axis",
+            "workspace.rotation: must be left out, or about the axis of the pose",
         ),
         (
             {"pose": {"position": [0, 0, 1], "rotation": {"axis": [1, 0, 0], "angle": {"min": 0, "max": 145}}}},
-            "workspace.rotation.roll: reaches 155 deg with the angle of the pose, and at most 150 deg are allowed",
+            "workspace.rotation.roll: must be at most 150 deg together with the angle of the pose, got 155 deg",
         ),
     ],
 )
@@ -263,9 +263,9 @@ def test_what_is_no_box_in_world_coordinates_is_refused(changes: dict[str, Any],
 
 
 def test_a_free_pose_is_refused_where_one_machine_is_judged(tmp_path: Path, cli: Run) -> None:
-    words = "pose.position[2]: is free, and the workspace is about the pose: give it with --set p_z=..., or a result"
+    words = "pose.position[2]: is free, but the workspace is about the pose: fix it with --set p_z=..., or use --of"
     command = ("workspace", str(case_file(tmp_path, BASE)), "--set", "x1=0.8")
-    refusal_of(cli(*command), f"{words} with")
+    refusal_of(cli(*command), words)
     code, out, err = cli(*command, "--set", "p_z=0.8", "--time", "5")
     assert (code, err, "refuted" in out) == (1, "", True)
     turned = tables(pose={"position": [0, 0, 1], "rotation": {"angle": ends(10)}})
@@ -282,7 +282,7 @@ def test_all_commands_take_the_workspace_at_the_pose_of_a_result(tmp_path: Path,
     drawn = [word for pair in zip(("--plot", "--plot-pose", "--html"), pictures, strict=True) for word in pair]
     words = ("--of", result, "--proof", proof, *drawn, "--quantity", "condition_number")
     out = output_of(cli("workspace", str(file), *words))
-    assert "everything is proved for every pose" in unbroken(out)
+    assert "PROVED at every pose" in unbroken(out)
     assert f"about  the pose (0, 0, {height:.5g})" in unbroken(out)
     assert all(Path(each).stat().st_size > 1000 for each in pictures)
     out = unbroken(output_of(cli("verify-proof", proof, str(file), "--of", result, "--all")))
@@ -322,19 +322,19 @@ def test_the_schema_has_the_origin(cli: Run) -> None:
 
 
 HELD = {
-    "z is -0.1 to 0.1 m, and the pose has 0.5 to 1.4 m": {},
-    "x is -0.1 to 0.1 m, and the pose has 0.3 m": {"pose": {"position": [0.3, 0, {"min": -0.3, "max": 0}]}},
-    "roll is -10 to 10 deg, and the pose has 20 deg": {
+    "z is -0.1 to 0.1 m there and 0.5 to 1.4 m at the pose": {},
+    "x is -0.1 to 0.1 m there and 0.3 m at the pose": {"pose": {"position": [0.3, 0, {"min": -0.3, "max": 0}]}},
+    "roll is -10 to 10 deg there and 20 deg at the pose": {
         "pose": {"position": [0, 0, 0], "rotation": {"axis": [1, 0, 0], "angle": 20}}
     },
-    "yaw is 0 deg, and the pose has 19.": {"pose": {"position": [0, 0, 0], "rotation": {"rpy": [5, 0, 19.5]}}},
+    "yaw is 0 deg there and 19.": {"pose": {"position": [0, 0, 0], "rotation": {"rpy": [5, 0, 19.5]}}},
     "": {"pose": {"position": [0.1, -0.1, {"min": 0.1, "max": 1.4}], "rotation": {"rpy": [10, -10, 0]}}},
 }
 
 
 def notice_of(given: dict[str, Any]) -> str:
     """The sentence about a workspace that holds no pose; empty for another."""
-    found = case_from(given).not_held
+    found = case_from(given).outside_workspace
     assert found is None or len(found.sentence) < 200
     return "" if found is None else found.sentence
 
@@ -343,8 +343,8 @@ def notice_of(given: dict[str, Any]) -> str:
 def test_a_workspace_that_does_not_hold_the_pose_is_said_before_the_search(words: str) -> None:
     given = tables(about=None, **HELD[words])
     notice = notice_of(given)
-    offer = '; write about = "pose" in [workspace] if its numbers are excursions about the pose'
-    assert notice.startswith("the workspace does not hold the pose: " + words if words else "")
+    offer = '; write about = "pose" in [workspace] if its values are excursions from the pose'
+    assert notice.startswith("the workspace does not contain the pose: " + words if words else "")
     assert notice.endswith(offer if words else "")
     if "rotation" not in HELD[words].get("pose", {}):
         given["workspace"]["about"] = "pose"
@@ -355,14 +355,14 @@ def test_of_several_poses_one_in_the_workspace_is_enough() -> None:
     given = tables(about=None, pose=[{"position": [0, 0, 0]}, {"position": [0, 0, 2]}])
     assert not notice_of(given)
     given["pose"][0]["position"][2] = 1
-    notice = "the workspace does not hold the poses: z is -0.1 to 0.1 m, and the pose has 1 m"
+    notice = "the workspace does not contain the poses: z is -0.1 to 0.1 m there and 1 m at the pose"
     assert notice_of(given) == notice
 
 
 def test_a_workspace_elsewhere_is_no_mistake_of_excursions(tmp_path: Path, cli: Run) -> None:
     given = tables(about=None, pose={"position": [0, 0, 1.2]})
     given["workspace"]["position"][2], given["robot"]["parameters"]["x1"] = {"min": 0.7, "max": 0.8}, 0.8
-    notice = "the workspace does not hold the pose: z is 0.7 to 0.8 m, and the pose has 1.2 m"
+    notice = "the workspace does not contain the pose: z is 0.7 to 0.8 m there and 1.2 m at the pose"
     assert notice_of(given) == notice
     del given["limits"]["over"]
     assert cli("workspace", str(case_file(tmp_path, given)), "--time", "1")[2] == ""
@@ -372,7 +372,7 @@ def test_the_commands_say_it_and_nothing_else_on_standard_error(tmp_path: Path, 
     """A point without a finite value gave a warning of NumPy, and the evidence of a stationary point."""
     limits = {"leg_length": {"min": 0.75, "max": 1.2}, "over": "workspace"}
     file = case_file(tmp_path, tables(about=None, solve={"starts": 1}, limits=limits))
-    said = "the workspace does not hold the pose: z is -0.1 to 0.1 m, and the pose has 0.5 to 1.4 m; write about"
+    said = "the workspace does not contain the pose: z is -0.1 to 0.1 m there and 0.5 to 1.4 m at the pose; write about"
     for command in (("solve",), ("workspace", "--set", "x1=0.7", "--time", "2")):
         code, out, err = cli(command[0], str(file), *command[1:])
         assert code == 1

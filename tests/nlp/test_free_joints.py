@@ -184,10 +184,10 @@ def test_starts_are_spread_and_assembled_as_at_home(tmp_path: Path) -> None:
 def test_rows_are_in_every_answer(tmp_path: Path, cli: Run) -> None:
     file, result, table = planar(tmp_path), tmp_path / "result.json", tmp_path / "result.csv"
     shown = output_of(cli("solve", file, "--json", str(result), "--csv", str(table)))
-    for joint, held in (("1:1", "-0.2 m -0.2 .. 0.2 min,"), ("2:1", "0.2 m -0.2 .. 0.2 max,")):
+    for joint, held in (("1:1", "-0.2 m -0.2 .. 0.2 at lower bound"), ("2:1", "0.2 m -0.2 .. 0.2 at upper bound")):
         (row,) = [line for line in shown.splitlines() if line.startswith(f"joint.{joint} ")]
         assert " ".join(row.split()).startswith(f"joint.{joint} {held}")
-    assert "fixed point" not in shown
+    assert "at the given point" not in shown
     joints = json.loads(result.read_text())["free_joints"]
     ends = [(each["joint"], each["lower"], each["upper"], each["lower_is_limit"]) for each in joints]
     assert ends == [(f"{k}:1", pytest.approx(-0.2), pytest.approx(0.2), True) for k in (1, 2, 3)]
@@ -263,7 +263,7 @@ def test_legs_on_rails_without_limits(tmp_path: Path, cli: Run) -> None:
     assert found["F"] == pytest.approx(leg_squares(np.linspace(-30, 0, PLACES), 22.0).max(), rel=1e-6)
     assert [each["value"] for each in found["free_joints"]] == pytest.approx([11 - 26.5] * 3, abs=1e-5)
     # Four times the robot's size: of r and the largest number that the file has as such, 4 hypot(26.5, 20).
-    assert "joints 1:1, 2:1, 3:1 have no limits: a solve searches from -132.801 to 132.801" in shown
+    assert "joints 1:1, 2:1, 3:1 have no limits: solve searches from -132.801 to 132.801" in shown
     assert "assembly" not in shown
     (certificate,) = certify(load_case(file)).tasks
     assert certificate.status is CertificateStatus.PROVED
@@ -274,8 +274,8 @@ def test_one_limit_is_one_end(tmp_path: Path, cli: Run) -> None:
     limits = '[limits.joint]\n"1:1" = { max = -16 }\n"2:1" = { min = -10, max = 0 }\n'
     file = saved_with_robot(tmp_path, LEGS, LEGS_CASE + limits)
     shown = unbroken(output_of(cli("solve", file, "--all")))
-    assert "joint 1:1 has no lower limit: a solve searches from -132.801 to -16" in shown
-    assert "joint 3:1 has no limits: a solve searches from -132.801 to 132.801" in shown
+    assert "joint 1:1 has no lower limit: solve searches from -132.801 to -16" in shown
+    assert "joint 3:1 has no limits: solve searches from -132.801 to 132.801" in shown
     rails = {line.split()[0]: float(line.split()[1]) for line in shown.splitlines() if line.startswith("joint.")}
     wanted = {"joint.1:1": -16, "joint.2:1": -10, "joint.3:1": -15.5}
     assert {name: rails[name] for name in wanted} == pytest.approx(wanted, abs=1e-4)
@@ -283,7 +283,7 @@ def test_one_limit_is_one_end(tmp_path: Path, cli: Run) -> None:
 
 def test_what_is_judged_over_poses_is_refused(tmp_path: Path, cli: Run) -> None:
     poses = str(saved(tmp_path / "poses.csv", "x,y,z\n0,0,0\n0.05,0.02,0\n"))
-    words = "the pose does not determine the positions of driven joints 1:1, 2:1, 3:1 of 'three rails'"
+    words = "the pose does not determine the coordinates of actuated joints 1:1, 2:1, 3:1 of 'three rails'"
     half = "{ min = -0.05, max = 0.05 }"
     workspace = ("[solve]", f"workspace.position = [{half}, {half}, 0]\n[solve]")
     file = planar(tmp_path, workspace)
@@ -293,7 +293,7 @@ def test_what_is_judged_over_poses_is_refused(tmp_path: Path, cli: Run) -> None:
     over = ("[limits.joint]", '[limits]\nover = "workspace"\n[limits.joint]')
     refusal_of(cli("solve", planar(tmp_path, workspace, over)), "limits.over", words)
     load = planar(tmp_path, ("[solve]", "load = [{ force = [10, 0, 0] }]\n[solve]"))
-    refusal_of(cli("solve", load), "6 actuators for 3 freedoms", "can move while its platform stands still")
+    refusal_of(cli("solve", load), "6 actuators for 3 degrees of freedom", "can move while the platform stands still")
 
 
 def test_inverse_holds_the_rails_at_home(tmp_path: Path, cli: Run) -> None:
@@ -335,10 +335,10 @@ def test_a_sweep_has_a_column_for_each_rail(tmp_path: Path, cli: Run) -> None:
 
 
 def test_robots_say_which_joints_are_free(tmp_path: Path, cli: Run) -> None:
-    for text, loops in ((PLANAR, "these variables among them"), (LEGS, "these 3 variables: no equations")):
+    for text, loops in ((PLANAR, "including these variables"), (LEGS, "these 3 variables (no equations)")):
         robot = str(saved(tmp_path / "robot.toml", text))
         shown = unbroken(output_of(cli("models", robot, "--all")))
-        assert "positions of driven joints 1:1, 2:1, 3:1, which the pose does not determine" in shown
+        assert "coordinates of actuated joints 1:1, 2:1, 3:1, which the pose does not determine" in shown
         assert loops in shown
         starter = output_of(cli("new", robot))
         assert "[workspace]" not in starter
@@ -346,7 +346,7 @@ def test_robots_say_which_joints_are_free(tmp_path: Path, cli: Run) -> None:
         evaluated = cli("evaluate", str(saved(tmp_path / "starter.toml", starter)))
         assert evaluated[0] == 0
     certified = unbroken(output_of(cli("certify", planar(tmp_path))))
-    assert "limbs 1, 2, 3 need 2 joint positions each and the loop equations, in home's working mode" in certified
+    assert "limbs 1, 2, 3: 2 joint coordinates each, from the loop equations; covers home's working mode" in certified
 
 
 @pytest.mark.slow

@@ -93,7 +93,7 @@ def test_every_starter_is_solved_to_a_machine_that_makes_its_task(given: str | M
     assert f'model = "{model.name}"' in text
     case = case_from(text)
     freedoms, task = TASKS.get(model.name, (6, "screw motion"))
-    assert f"this robot has {freedoms} freedoms" in text
+    assert f"which has {freedoms} degree{'s' * (freedoms != 1)} of freedom" in text
     assert case.tasks[0].name == task
     has_turn = isinstance(case.rotation.angle, sn.Free)
     assert has_turn == (model.name not in UPRIGHT)
@@ -237,8 +237,8 @@ def test_a_number_that_the_robot_has_no_choice_of_has_no_sensitivity() -> None:
         rows = {row.name: row for row in sn.sensitivities(solution.nlp, solution.x)}
         if name == "delta":
             assert {name for name, row in rows.items() if row.derivative is None} == {"angle"}
-            assert rows["angle"].hindrance is Hindrance.NO_CHOICE
-            assert "fixed: the robot has no choice of it" in solution.table(width=120)
+            assert rows["angle"].hindrance is Hindrance.LOOPS
+            assert "fixed: loops close at no other value" in solution.table(width=120)
         else:
             assert rows["angle"].derivative
 
@@ -388,8 +388,8 @@ def test_results_have_f_by_limb_and_name_conventions() -> None:
 
 
 def test_members_of_which_f_says_little_are_named() -> None:
-    assert [note for note in robot_function("planar-3-rrr")().remarks if "says little" in note] == []
-    (five_bar,) = [note for note in robot_function("five-bar")().remarks if "says little" in note]
+    assert [note for note in robot_function("planar-3-rrr")().remarks if "not informative" in note] == []
+    (five_bar,) = [note for note in robot_function("five-bar")().remarks if "not informative" in note]
     assert five_bar.startswith("member 1 resists with 5 wrenches or more")
     joints = [
         {"type": "R", "at": [0, 0, 0], "axis": "z", "actuated": True},
@@ -397,7 +397,11 @@ def test_members_of_which_f_says_little_are_named() -> None:
         {"type": "R", "at": [1, 0, 1], "axis": "y"},
         {"type": "S", "at": [2, 0, 1]},
     ]
-    (arm,) = [note for note in robot(name="arm", home=(2, 0, 1), limb=[{"joints": joints}]).remarks if "little" in note]
+    (arm,) = [
+        note
+        for note in robot(name="arm", home=(2, 0, 1), limb=[{"joints": joints}]).remarks
+        if "not informative" in note
+    ]
     assert arm.startswith("the robot has one member only")
 
 

@@ -193,7 +193,9 @@ def test_suggestions_become_dimensions(tmp_path: Path, cli: Run) -> None:
     model, out = tmp_path / "head.xml", tmp_path / "robot.toml"
     model.write_text(reachy.mjcf(names=False), encoding="utf-8")
     text = output_of(cli("import", str(model), "--platform", "head", "--close", "--suggest"))
-    assert_words(text, "circle1", "circle2", "circle3", "limbs 1, 3, 5; 2, 4, 6 are copies by 120 deg", "mirror")
+    assert_words(
+        text, "circle1", "circle2", "circle3", "limbs 1, 3, 5; 2, 4, 6 are copies, rotated by 120 deg", "mirror"
+    )
     dimensions = ("--free", "fold", "circle3=rp", "stewart_1.axis")
     output_of(cli("import", str(model), "--platform", "nose", "--close", "--out", str(out), *dimensions))
     tables = tomllib.loads(out.read_text(encoding="utf-8"))
@@ -277,7 +279,7 @@ def test_the_written_robot_is_refused_where_it_is_another(tmp_path: Path) -> Non
     for number, wrong in (("0.0766", "0.0767"), ("0.1495", "0.1496")):
         other = text.replace(number, wrong, 1)
         assert other != text
-        with pytest.raises(InputError, match="differs from the model: its work rates are off by"):
+        with pytest.raises(InputError, match="work rates of the robot file must differ by at most"):
             check_text(other, found.mechanism, found.size)
     with pytest.raises(RobotError):
         robot(**{**found.tables, "limb": [{"joints": []}]})
@@ -366,10 +368,10 @@ def test_a_straight_chain_is_closed_from_another_start(tmp_path: Path) -> None:
 
 def test_a_loop_that_cannot_close_is_named_with_its_least_gap(tmp_path: Path) -> None:
     """All hinges are parallel to z, in which the ends differ by 0.25: no motion of any joint changes that."""
-    with pytest.raises(InputError, match="Newton's method, which came no closer") as fault:
+    with pytest.raises(InputError, match="Newton's method, also from other starts") as fault:
         imported(tmp_path, model("1 0.3 0.25"), "loop.xml", Ends("plate"))
     words = str(fault.value)
-    assert "a loop stays open by parts of the size: shut by" in words
+    assert "gaps relative to the size: shut by" in words
     size = float(words.partition("robot's size ")[2].split()[0])
     assert float(words.partition("shut by ")[2].split(";")[0]) * size == pytest.approx(0.25, rel=0.02)
     assert "correct the frames" in words

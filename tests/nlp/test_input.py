@@ -122,7 +122,7 @@ def test_pages_and_c_carry_the_case_with_its_settings(tmp_path: Path, cli: Run) 
     ("setting", "words"),
     [
         ("y=1", "cannot be set"),
-        ("x1.min=1", "x1 is not free"),
+        ("x1.min=1", "x1 is fixed"),
         ("limits.leg_lenght.max=1", "limits.leg_lenght"),
         ("limits.leg_length=1", "limits.leg_length"),
         ("limits.leg_length.mx=1", "no such key"),
@@ -226,20 +226,20 @@ def test_poses_and_tasks_from_csv_files_are_those_of_tables(tmp_path: Path, cli:
     ("text", "words"),
     [
         ("x,y,z\n1,2,30\n\n1,2,abc\n", ("trajectory.csv: row 4, column z", '"abc"', "must be a number")),
-        ("x,y,z\n1,,30\n", ("row 2, column y", "is empty")),
+        ("x,y,z\n1,,30\n", ("row 2, column y", "got an empty cell")),
         ("x,y,z\n1,inf,30\n", ("row 2, column y = inf", "finite")),
         ("x,y,z\n1,2,30\n1e40,2,3\n", ("row 3, column x = 1e+40", "at most 1e+30")),
         ("x,y,z,angle\n1,2,30,400\n", ("row 2, column angle = 400", "at most 179 deg")),
         ("x,y,z,qw,qx,qy,qz\n1,2,3,1,0,0,0\n1,2,30,1,1,0,0\n", ("row 3, columns qw, qx, qy, qz", "unit quaternion")),
         ("x,y,z,axis_x,axis_y,axis_z\n1,2,30,0,0,1\n", ("row 2", "angle", "missing")),
         ("x,y,z\n1,2\n", ("row 2", "must have 3 cells, got 2")),
-        ("x,y\n1,2\n", ("row 1", "column z missing")),
+        ("x,y\n1,2\n", ("row 1", "column z is missing")),
         ("x,y,z,rol\n1,2,3,4\n", ("row 1", "no such column", "did you mean 'roll'?")),
-        ("x,y,z,z\n1,2,3,4\n", ("row 1", "'z' is there twice")),
-        ("x,y,z,angle,roll,pitch,yaw\n1,2,3,4,5,6,7\n", ("row 1", "'angle' cannot stand beside 'roll'")),
+        ("x,y,z,z\n1,2,3,4\n", ("row 1", "'z' appears twice")),
+        ("x,y,z,angle,roll,pitch,yaw\n1,2,3,4,5,6,7\n", ("row 1", "'angle' conflicts with 'roll'")),
         ("x,y,z\n", ("trajectory.csv", "no rows")),
         ("", ("trajectory.csv", "no rows")),
-        ("x,y,z\n" + "1,2,3\n" * 1001, ("trajectory.csv", "1001 rows", "at most 1000")),
+        ("x,y,z\n" + "1,2,3\n" * 1001, ("trajectory.csv", "at most 1000 rows", "got 1001")),
         ("x,y,z\n" + " " * 4_000_001, ("poses", "larger than 4 MB")),
         ("\0", ("trajectory.csv",)),
     ],
@@ -266,7 +266,7 @@ def test_faults_of_a_task_row(tmp_path: Path) -> None:
 
 def test_a_csv_file_that_is_not_there_or_not_alone(tmp_path: Path) -> None:
     head = f'poses = "missing.csv"\n{HEAD}'
-    for text, words in ((head, "cannot be read: No such file"), (head + POSE, r"cannot stand beside \[\[pose\]\]")):
+    for text, words in ((head, "cannot be read: No such file"), (head + POSE, r"conflicts with \[\[pose\]\]")):
         with pytest.raises(CaseError, match=f'^case.toml: poses = "missing.csv": {words}'):
             load_case(written(tmp_path, text + TASK))
     (tmp_path / "missing.csv").write_bytes(b"x,y,z\n\xff")
@@ -319,9 +319,9 @@ def test_forms_of_a_rotation_in_python() -> None:
         ("quaternion = [1, 0, 0]", ("pose.rotation.quaternion", "4 entries")),
         ("rpy = [1, 2]", ("pose.rotation.rpy", "3 entries")),
         ("rpy = [1, 2, nan]", ("pose.rotation.rpy[2]", "finite")),
-        ("rpy = [1, 2, 3], angle = 3", ("pose.rotation.angle", "cannot stand beside rpy")),
-        ("quaternion = [1, 0, 0, 0], axis = [0, 0, 1]", ("pose.rotation.axis", "cannot stand beside quaternion")),
-        ("rpy = [1, 2, 3], quaternion = [1, 0, 0, 0]", ("pose.rotation.quaternion", "cannot stand beside rpy")),
+        ("rpy = [1, 2, 3], angle = 3", ("pose.rotation.angle", "conflicts with rpy")),
+        ("quaternion = [1, 0, 0, 0], axis = [0, 0, 1]", ("pose.rotation.axis", "conflicts with quaternion")),
+        ("rpy = [1, 2, 3], quaternion = [1, 0, 0, 0]", ("pose.rotation.quaternion", "conflicts with rpy")),
         ("axis = [0, 0, 1]", ("pose.rotation.angle", "is missing")),
     ],
 )
@@ -398,7 +398,7 @@ def test_a_file_has_degrees_and_no_word_of_radians() -> None:
     case = case_from(tables, "delta")
     assert case_from(tomllib.loads(case.to_toml())).parameters["tilt"] == case.parameters["tilt"]
     tables["pose"]["rotation"] = {"angle": 400}
-    with pytest.raises(CaseError, match=r"must be at most 179 deg in size with the axis free$"):
+    with pytest.raises(CaseError, match=r"must be at most 179 deg in magnitude with a free axis$"):
         case_from(tables, "delta")
     # Numbers that are no angles, and angles up to a turn, are taken.
     assert plain(rotation=Rotation((0, 0, 1), 2 * pi)).rotation.angle == 2 * pi

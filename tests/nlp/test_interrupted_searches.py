@@ -30,13 +30,13 @@ from screwsynth.nlp.proof.certificate import branch_and_bound
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.enclosure.forms import Forms
-from screwsynth.nlp.proof.statement.machine import Legs
+from screwsynth.nlp.proof.statement.fixed_robot import Legs
 from screwsynth.nlp.proof.workspace import scale
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Bounds, Goal, Number, smallest_values
 from screwsynth.nlp.proof.workspace.numbers.expressions import Expressions
 from screwsynth.nlp.proof.workspace.numbers.extremes import goal_of
-from screwsynth.nlp.proof.workspace.numbers.machines import Machines
+from screwsynth.nlp.proof.workspace.numbers.within_tolerance import RobotsWithinTolerance
 from screwsynth.nlp.proof.workspace.ranks import ranks
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
@@ -143,8 +143,8 @@ def workspace_case(name: str, width: float, turn: float, tolerance: float | None
     return replace(case, workspace=Workspace(place, turns), joint_centre_tolerance=tolerance)
 
 
-def every_machine(case: Case) -> Machines:
-    return Machines(case, closed_form(case.model), problem_of(case))
+def every_machine(case: Case) -> RobotsWithinTolerance:
+    return RobotsWithinTolerance(case, closed_form(case.model), problem_of(case))
 
 
 class Bowl(Number):

@@ -205,7 +205,7 @@ def test_an_interrupted_solve_shows_its_best_answer(case: str, tmp_path: Path) -
     ended = interrupted(", best ", "solve", case, "--json", str(result))
     assert ended.status == 130
     words = plain(ended.shown)
-    assert_words(words, "stopped before the end: best F so far = ", "verdict", "evidence", "base_1_x")
+    assert_words(words, "stopped before the end: best F so far = ", "optimality", "evidence", "base_1_x")
     assert '"status": "interrupted"' in result.read_text(encoding="utf-8")
 
 

@@ -12,7 +12,7 @@ from robot_gallery import random_displacements, random_twist, table
 
 from screwsynth.nlp import Case, Free, InputError, Rotation, Task, build_model, evaluate, formulate, inverse, load_case
 from screwsynth.nlp.evidence.closing import closed_start
-from screwsynth.nlp.proof.statement.machine import joint_centres
+from screwsynth.nlp.proof.statement.fixed_robot import joint_centres
 from screwsynth.nlp.units import Units
 
 TASK = Task(np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2]))
@@ -158,7 +158,7 @@ def test_a_robot_of_another_size_has_the_same_joints() -> None:
 
 def test_input_that_is_none_is_refused() -> None:
     case = typical_case("delta")
-    with pytest.raises(InputError, match=r"must be arrays \(N, 3\) and \(N, 3, 3\), got \(3, 2\)"):
+    with pytest.raises(InputError, match=r"expected arrays \(N, 3\) and \(N, 3, 3\), got \(3, 2\)"):
         inverse(case, np.zeros((3, 2)))
     with pytest.raises(InputError, match=r"got \(\) and"):
         inverse(case, 1.0)
@@ -182,7 +182,7 @@ def test_the_command_writes_a_row_for_each_pose(tmp_path: Path, cli: Run) -> Non
         np.testing.assert_allclose(float(row["rate 2- omega_y"]), rates[2, 1], atol=1e-11)
         np.testing.assert_allclose(float(row["J 6 m_z"]), J[5, 5], atol=1e-11)
     text = output_of(cli("inverse", "hexapod-linuxcnc", "--poses", str(poses)))
-    assert "all 2 poses are closed" in text
+    assert "solved at all 2 poses" in text
 
 
 def test_the_command_ends_with_status_1_where_poses_are_not_closed(tmp_path: Path, cli: Run) -> None:
@@ -191,7 +191,7 @@ def test_the_command_ends_with_status_1_where_poses_are_not_closed(tmp_path: Pat
     poses = saved(tmp_path / "poses.csv", f"x,y,z\n{x},{y},{z + 0.05}\n0,0,-9\n0,0,-8\n")
     code, text, err = cli("inverse", str(case), "--poses", str(poses), "--csv", str(out))
     assert (code, err) == (1, "")
-    assert "2 of 3 poses are not closed, the first in row 3 of" in " ".join(text.split())
+    assert "no solution at 2 of 3 poses, the first in row 3 of" in " ".join(text.split())
     assert str(poses).replace(" ", "") in "".join(text.split())
     rows = rows_of(out.read_text(encoding="utf-8"))
     assert [row["closed"] for row in rows] == ["yes", "no", "no"]

@@ -300,12 +300,12 @@ def test_an_active_limit_has_its_cost_and_a_case_file_of_its_own(tmp_path: Path)
 
 
 REFUSALS = {
-    "slade = { max = 1 }": "limits.joint.slade: is no joint of '3-RPS'; it has slide, ball, 1:1, 1:2, 1:3",
-    '"4:1" = { max = 1 }': "limits.joint.4:1: is no joint of '3-RPS'",
-    '"1:ball" = { max = 1 }': "limits.joint.1:ball: joint 1:3 is of type S, which may have only cone",
-    '"1:1" = { cone = 9 }': "limits.joint.1:1.cone: joint 1:1 (R) has none: a cone is for joints U and S",
-    '"1:1" = { first = { max = 9 } }': "limits.joint.1:1.first: joint 1:1 is of type R, which may have min and max",
-    '"1:1" = {}': "limits.joint.1:1: must have min, max, first, second, angle, stroke or cone",
+    "slade = { max = 1 }": "limits.joint.slade: no such joint of '3-RPS'; allowed: slide, ball, 1:1, 1:2, 1:3",
+    '"4:1" = { max = 1 }': "limits.joint.4:1: no such joint of '3-RPS'",
+    '"1:ball" = { max = 1 }': "limits.joint.1:ball: joint 1:3 is of type S; allowed is only cone",
+    '"1:1" = { cone = 9 }': "limits.joint.1:1.cone: joint 1:1 (R) has no cone: cone is allowed only for joints U and S",
+    '"1:1" = { first = { max = 9 } }': "limits.joint.1:1.first: joint 1:1 is of type R; allowed are min and max",
+    '"1:1" = {}': "limits.joint.1:1: is empty: it must have min, max, first, second, angle, stroke or cone",
     '"1:1" = { max = 181 }': "limits.joint.1:1.max = 181.0: must be finite and at most 180 deg",
     '"1:1" = { min = -181 }': "limits.joint.1:1.min = -181.0: must be at least -180 deg",
     '"1:1" = { min = 9, max = 3 }': "limits.joint.1:1.min = 9.0: must be below max = 3 deg",
@@ -317,7 +317,7 @@ REFUSALS = {
     "ball = { axis = [0, 0, 1] }": "limits.joint.ball",
     "ball = { cone = 9, axis = [0, 0, 0] }": "limits.joint.ball.axis = [0.0, 0.0, 0.0]: must be three finite numbers",
     "ball = { cone = 9, axis = [0, 0] }": "limits.joint.ball.axis: must",
-    "[limits]\nbase_joint_angle = 30": "limits.base_joint_angle: is nothing that '3-RPS' has",
+    "[limits]\nbase_joint_angle = 30": "limits.base_joint_angle: no such limit for the robot '3-RPS'",
     "[limits]\nlink_clearance = { min = 0 }": "limits.link_clearance.min = 0.0: must be above 0 m",
     "[limits]\nactuator_rate = { max = -1 }": "limits.actuator_rate.max = -1.0: must be above 0",
     "[limits]\njoint = 3": "limits.joint = 3: must be a table",
@@ -339,7 +339,9 @@ def test_limits_that_mean_nothing_are_refused_in_one_sentence(tmp_path: Path) ->
         load_case(saved_with_robot(tmp_path, two, RPS_CASE + SLIDE))
     legs = case_from(starter_tables(stewart_gough()), "legs")
     for limit, key in ((JointMotion("1:1", max=1.0), "joint.1:1"), (LinkClearance(1.0), "link_clearance")):
-        with pytest.raises(CaseError, match=rf"limits\.{key}: is nothing that 'stewart-gough' has; it has leg_length"):
+        with pytest.raises(
+            CaseError, match=rf"limits\.{key}: no such limit for the robot 'stewart-gough'; allowed: leg_length"
+        ):
             replace(legs, limits=Limits(limit))
     rods = robot(name="rods", limb=[{"joints": [joint("S", B), joint("S", A)]}, {"joints": LIMBS["hinge"]}])
     with pytest.raises(CaseError, match="joint 1:1 is of type S"):

@@ -244,14 +244,16 @@ def test_a_robot_without_legs_has_limits_on_its_own_measures_only() -> None:
     common: dict[str, Any] = {"model": bare, "parameters": parameters, "position": [Free(-9, 9), 0, 35]}
     task = Task.screw("max", axis=[1, 2, 3], point=[0, 0, 9], pitch=1)
     for limit in (LegClearance(1.0), JointSpacing(1.0), BaseJointAngle(1.0)):
-        with pytest.raises(CaseError, match=r"is nothing that 'hexapod' has; it has leg_length, base_joint_angle"):
+        with pytest.raises(
+            CaseError, match=r"no such limit for the robot 'hexapod'; allowed: leg_length, base_joint_angle"
+        ):
             Case(**common, tasks=[task], limits=Limits(limit))
-    refused = r"tolerance\.joint_centre: is not computed for '{}', {}"
-    with pytest.raises(CaseError, match=refused.format("hexapod", "whose joints")):
+    refused = r"tolerance\.joint_centre: is not supported for the robot '{}': {}"
+    with pytest.raises(CaseError, match=refused.format("hexapod", "its joint centres")):
         Case(**common, tasks=[task], joint_centre_tolerance=0.1)
     by_joints = robot_function("6-ups")()
     values = {item.name: item.typical[0] for item in by_joints.parameters}
-    with pytest.raises(CaseError, match=refused.format("6-ups", "which is given joint by")):
+    with pytest.raises(CaseError, match=refused.format("6-ups", r"add a \[workspace\]")):
         Case(by_joints, values, by_joints.home, [task], joint_centre_tolerance=0.1)
     for limit in (QuantityLimit("leg_length", max=37.0), LegLength(max=37.0)):
         limited = Case(**common, tasks=[task], limits=Limits(limit))
@@ -280,7 +282,7 @@ def test_limits_in_python_are_those_of_a_file() -> None:
     assert built.of(LegClearance) == LegClearance(2.0)
     assert built.of(JointSpacing) is None
     assert not Limits()
-    with pytest.raises(CaseError, match=r"limits\.leg_length: is given more than once"):
+    with pytest.raises(CaseError, match=r"limits\.leg_length: must be given once, got 2"):
         Limits(LegLength(max=45.0), LegLength(min=20.0))
 
 
@@ -488,7 +490,7 @@ def test_a_limit_is_added_by_its_file_and_a_row_of_the_registry(tmp_path: Path) 
     assert crossed == "high.toml: limits.platform_height.min = 40.0: must be below max = 30 cm"
     assert text == 'high.toml: limits.platform_height.min = "high": must be a number'
     assert negative == "high.toml: limits.platform_height.min = -1.0: must be above 0 cm"
-    assert "limits.platform_heigth: is nothing that 'stewart-gough' has" in misspelt
+    assert "limits.platform_heigth: no such limit for the robot 'stewart-gough'" in misspelt
     assert "rate_share, platform_height, custom" in misspelt
     assert "platform_height" in found["constraints"]
     assert found["optimal"]

@@ -137,7 +137,7 @@ def test_wrong_arguments_are_refused_in_a_sentence(compiled: CompiledCase) -> No
         ({"limits": {"angel.max": 0.1}}, "did you mean 'angle.max'"),
         ({"limits": {"angle.max": -0.1}}, r"limits\['angle.max'\] = -0.1 rad: must be above 0 and at most 3.12"),
         ({"limits": {"angle.max": np.nan}}, "must be finite"),
-        ({"limits": {"angle.max": [[0.1]]}}, "must be a number or one for each problem"),
+        ({"limits": {"angle.max": [[0.1]]}}, "must be one number, or one for each problem"),
         ({"seeds": 17}, "from 0 to 16"),
         ({"seeds": True}, "whole number"),
         ({"seeds": 0}, "without x0"),
@@ -148,7 +148,7 @@ def test_wrong_arguments_are_refused_in_a_sentence(compiled: CompiledCase) -> No
         ({"max_iterations": 1e300}, "must be a whole number"),
         ({"deadline_seconds": -1}, "deadline_seconds = -1: must be above 0"),
         ({"deadline_seconds": np.nan}, "deadline_seconds = nan: must be finite"),
-        ({"deadline_seconds": [[1.0]]}, r"got \(1, 1\)"),
+        ({"deadline_seconds": [[1.0]]}, r"got shape \(1, 1\)"),
         ({"max_iterations": [1, 2], "deadline_seconds": [1.0]}, "max_iterations has 2, deadline_seconds has 1"),
     ]
     for arguments, match in wrong:
@@ -184,12 +184,12 @@ def test_other_folders_are_refused_in_a_sentence(folder: Path, tmp_path: Path, m
             load_compiled(where)
         assert "\n" not in str(error.value)
 
-    refused("is no folder", tmp_path / "nowhere")
-    refused("is no folder", tmp_path)
+    refused("is not a folder written by", tmp_path / "nowhere")
+    refused("is not a folder written by", tmp_path)
     changes: tuple[dict[str, Any], ...] = ({"variables": [1]}, {"sources": ["../x.c"]})
     for text in ("", "[]", "{}", '{"schema": 1}', *(json.dumps(manifest | change) for change in changes)):
         saved(copy / "manifest.json", text)
-        refused("is not as")
+        refused("does not have the form")
     saved(copy / "manifest.json", json.dumps(manifest | {"schema": 99}))
     refused("schema = 99: this screwsynth reads folders of generated C of schema 1")
     saved(copy / "manifest.json", json.dumps(manifest))

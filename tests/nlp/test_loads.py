@@ -32,23 +32,24 @@ task = [{ sense = "max", axis = [2, 2, 1], point = [2, 3, 6], pitch = 1 }]
 LOAD = "[[load]]\nforce = [1, 2, 3]\n"
 MOVED = "[motion]\nlinear = 1\n"
 VECTOR = "must be a list of 3 numbers"
-NO_LOAD = "load[0]: is no load: give force, moment, any or mass"
-BESIDE = "cannot stand beside mass; write another [[load]]"
+NO_LOAD = "load[0]: is empty: give force, moment, any or mass"
+BESIDE = "conflicts with mass; write another [[load]]"
 
 
 #: What is added to the case, and the sentence after the file's name, or its beginning.
 FAULTS = {
     '[units]\nlength = "mm"\n[[load]]\nmass = 2': (
-        "gravity.acceleration: is missing: a mass times it is a weight in N, [0, 0, -9.81] for a mass in kg\n"
+        "gravity.acceleration: is missing: give [gravity] acceleration, with mass times acceleration in N, such as "
+        "[0, 0, -9.81] for a mass in kg\n"
     ),
     '[units]\nforce = "lbf"\n[[load]]\nmass = 2': (
-        "gravity.acceleration: is missing: a mass times it is a weight in lbf\n"
+        "gravity.acceleration: is missing: give [gravity] acceleration, with mass times acceleration in lbf\n"
     ),
     '[units]\nlength = "mm"\n[gravity]\n[[load]]\nmass = 2': "gravity.acceleration: is missing",
     "[gravity]\nacceleration = [0, 0, 0]": "gravity.acceleration: must not be zero",
     "[gravity]\nacceleration = 9.81": f"gravity.acceleration = 9.81: {VECTOR}",
     "[gravity]\nacceleration = [0, 0, nan]": "gravity.acceleration[2] = nan: must be finite",
-    "[gravity]\nacceleration = [0, 0, 1e300]": "gravity.acceleration[2] = 1e+300: must be at most 1e+30 in size",
+    "[gravity]\nacceleration = [0, 0, 1e300]": "gravity.acceleration[2] = 1e+300: must be at most 1e+30 in magnitude",
     "[gravity]\naccelerations = [0, 0, 1]": (
         "gravity.accelerations: no such key; did you mean 'acceleration'? allowed: acceleration"
     ),
@@ -65,20 +66,20 @@ FAULTS = {
         'load[1].name = "load 2": is used by an earlier load'
     ),
     '[[load]]\nname = "cut"\nforce = [1, 0, 0]\nsign = "both"\n[[load]]\nname = "cut reversed"\nforce = [0, 1, 0]': (
-        "load: has loads that act together under one name, 'cut reversed', twice; rename a load"
+        "load: gives two load cases with the name 'cut reversed'; rename a load"
     ),
     '[[load]]\nforce = [1, 0, 0]\nsign = "both"\nalways = true\n' * 30: (
-        "load: has 30 loads with always and both signs, which act together in 2^30 ways; at most 6"
+        "load: must have at most 6 loads with always = true and both signs, got 30: they give 2^30 load cases"
     ),
-    "[motion]": "motion: must have linear, angular, or both, above 0",
-    "[motion]\nlinear = 0\nangular = 0": "motion: must have linear, angular, or both, above 0",
+    "[motion]": "motion: is empty: give linear, angular, or both, above 0",
+    "[motion]\nlinear = 0\nangular = 0": "motion: is empty: give linear, angular, or both, above 0",
     "[motion]\nlinear = -1": "motion.linear = -1: must be greater than or equal to 0",
     "[motion]\nangular = nan": "motion.angular = nan: must be finite",
     '[motion]\nlinear = "1 m/s"': 'motion.linear = "1 m/s": must be a number',
-    "[motion]\nlinear = 1e31": "motion.linear = 1e+31: must be at most 1e+30 in size",
+    "[motion]\nlinear = 1e31": "motion.linear = 1e+31: must be at most 1e+30 in magnitude",
     "[motion]\nliner = 1": "motion.liner: no such key; did you mean 'linear'? allowed: linear, angular",
     "[[motion]]\nlinear = 1": "motion: must be a table",
-    "[limits]\nactuator_force = { max = 3 }": "limits.actuator_force: means nothing without [[load]]",
+    "[limits]\nactuator_force = { max = 3 }": "limits.actuator_force: needs a table [[load]]",
     "[units]\nforce = 3": "units.force = 3: must be text in quotes",
 }
 #: What is written below [[load]], and the rest of the sentence.
@@ -87,14 +88,14 @@ OF_LOADS = {
     "mass = 0": ".mass = 0: must be greater than 0",
     "mass = nan": ".mass = nan: must be finite",
     'mass = "2 kg"': '.mass = "2 kg": must be a number',
-    "mass = 1e31": ".mass = 1e+31: must be at most 1e+30 in size",
+    "mass = 1e31": ".mass = 1e+31: must be at most 1e+30 in magnitude",
     "mass = 2\nforce = [1, 2, 3]": f".force: {BESIDE}",
     "mass = 2\nmoment = [1, 2, 3]": f".moment: {BESIDE}",
     "mass = 2\npoint = [1, 2, 3]": f".point: {BESIDE}",
     "mass = 2\nany = { force = 1 }": f".any: {BESIDE}",
     'mass = 2\nsign = "both"': f".sign: {BESIDE}",
     'mass = 2\nframe = "platform"': f".frame: {BESIDE}",
-    "force = [0, 0, 1]\ncentre = [0, 0, 1]": ".centre: means nothing without mass; a force acts at point",
+    "force = [0, 0, 1]\ncentre = [0, 0, 1]": ".centre: has no effect without mass; for a force, use point",
     "force = [nan, 0, 0]": ".force[0] = nan: must be finite",
     "moment = [0, inf, 0]": ".moment[1] = inf: must be finite",
     "force = [1, 2]": ".force: must have 3 entries, got 2",
@@ -102,12 +103,12 @@ OF_LOADS = {
     "moment = 5": f".moment = 5: {VECTOR}",
     "mass = 1\ncentre = 5": f".centre = 5: {VECTOR}",
     'force = [1, "a", 3]': '.force[1] = "a": must be a number',
-    "force = [1e300, 0, 0]": ".force[0] = 1e+300: must be at most 1e+30 in size",
+    "force = [1e300, 0, 0]": ".force[0] = 1e+300: must be at most 1e+30 in magnitude",
     "any = { force = -1 }": ".any.force = -1: must be greater than or equal to 0",
     "any = { moment = nan }": ".any.moment = nan: must be finite",
     "any = 3": ".any = 3: must be a table",
     "any = { forces = 3 }": ".any.forces: no such key; did you mean 'force'? allowed: force, moment",
-    'any = { force = 2 }\nsign = "both"': '.sign = "both": means nothing without force or moment',
+    'any = { force = 2 }\nsign = "both"': '.sign = "both": has no effect without force or moment; remove it',
     'force = [1, 0, 0]\nsign = "plus"': ".sign = \"plus\": must be one of 'given' or 'both'",
     'force = [1, 0, 0]\nframe = "tool"': ".frame = \"tool\": must be one of 'world' or 'platform'",
     "force = [1, 0, 0]\nalways = 1": ".always = 1: must be true or false",
@@ -118,10 +119,10 @@ OF_LOADS = {
 FAULTS |= {f"[[load]]\n{table}": f"load[0]{sentence}" for table, sentence in OF_LOADS.items()}
 #: What stands before [limits], a limit, and the rest of the sentence.
 OF_LIMITS = [
-    (MOVED, "actuator_power = { max = 3 }", "actuator_power: means nothing without [[load]]"),
-    (LOAD, "actuator_power = { max = 3 }", "actuator_power: means nothing without [motion]"),
-    (LOAD, "actuator_speed = { max = 3 }", "actuator_speed: means nothing without [motion]"),
-    (LOAD, "actuator_force = {}", "actuator_force: must have min, max, or both"),
+    (MOVED, "actuator_power = { max = 3 }", "actuator_power: needs a table [[load]] with a load on the platform"),
+    (LOAD, "actuator_power = { max = 3 }", "actuator_power: needs [motion], the largest speeds"),
+    (LOAD, "actuator_speed = { max = 3 }", "actuator_speed: needs [motion], the largest speeds"),
+    (LOAD, "actuator_force = {}", "actuator_force: is empty: it must have min, max, or both"),
     (LOAD + MOVED, "actuator_power = {}", "actuator_power.max: is missing"),
     (LOAD, "actuator_force = 3", "actuator_force = 3: must be a table"),
     (LOAD, "actuator_force = [3]", "actuator_force: must be a table"),
@@ -138,11 +139,11 @@ OF_LIMITS = [
         'actuator_force = { "1+" = { maxi = 3 } }',
         "actuator_force.1+.maxi: no such key; did you mean 'max'? allowed: min, max",
     ),
-    (LOAD, 'actuator_force = { "3*" = { max = 3 } }', "actuator_force.3*: is no actuator of 'stewart-gough'; "),
+    (LOAD, 'actuator_force = { "3*" = { max = 3 } }', "actuator_force.3*: no such actuator of 'stewart-gough'; "),
     (
         LOAD,
         'actuator_force = { max = 4, "1+" = { max = 3 } }',
-        "actuator_force: has numbers for all actuators beside a table for one; write one table for each actuator\n",
+        "actuator_force: has both numbers for all actuators and a table for one; write a table for each actuator\n",
     ),
 ]
 FAULTS |= {f"{given}[limits]\n{limit}": f"limits.{sentence}" for given, limit, sentence in OF_LIMITS}
@@ -177,12 +178,12 @@ robot = { file = "robot.toml", parameters = { rb = 1.0 } }
 pose.position = [0.01, 0.02, 0]
 task = [{ sense = "max", axis = [0, 0, 1], point = [0, 0, 0], pitch = 0 }]
 """
-KINDS = "means actuators that turn and actuators that slide; give one table for each, by its name: 1, 2, 3\n"
+KINDS = "matches both revolute and prismatic actuators; give one table for each, by name: 1, 2, 3\n"
 REDUNDANT = (
-    "is not for 'mixed': it has 5 actuators for 3 freedoms, so that they can load each other with forces that no load "
-    "determines\n"
+    "is not supported for the robot 'mixed': it has 5 actuators for 3 degrees of freedom, so internal forces between "
+    "actuators are not determined by the load\n"
 )
-IDLE = "does no work in any motion of 'mixed': its actuators do not hold it; allowed is a load"
+IDLE = "does no work in any motion of 'mixed', so no actuator balances it; give"
 #: Robot, tables and sentence.
 OF_ROBOTS = [
     (MIXED, f"{LOAD}[limits]\nactuator_force = {{ max = 3 }}", f"limits.actuator_force: {KINDS}"),
@@ -190,24 +191,24 @@ OF_ROBOTS = [
     (
         MIXED,
         f'{LOAD}[limits]\nactuator_force = {{ "4" = {{ max = 3 }} }}',
-        "limits.actuator_force.4: is no actuator of 'mixed'; allowed: 1, 2, 3\n",
+        "limits.actuator_force.4: no such actuator of 'mixed'; allowed: 1, 2, 3\n",
     ),
     (MORE, LOAD, f"load: {REDUNDANT}"),
-    (MORE, MOVED, "motion: is not for 'mixed': it has 5 actuators for 3 freedoms"),
+    (MORE, MOVED, "motion: is not supported for the robot 'mixed': it has 5 actuators for 3 degrees of freedom"),
     (
         MIXED,
         '[[load]]\nname = "tool"\nmass = 2\ncentre = [1, 0, 0]',
-        f"load[0].mass = 2.0: load 'tool' {IDLE} with a force along x or y, or a moment about z\n",
+        f"load[0].mass = 2.0: load 'tool' {IDLE} a force along x or y, or a moment about z\n",
     ),
     (
         MIXED,
         f"{LOAD}[[load]]\nforce = [0, 0, 5]",
-        f"load[1].force = [0.0, 0.0, 5.0]: load 'load 2' {IDLE} with a force along x or y, or a moment about z\n",
+        f"load[1].force = [0.0, 0.0, 5.0]: load 'load 2' {IDLE} a force along x or y, or a moment about z\n",
     ),
     (
         MIXED,
         '[[load]]\nforce = [0, 0, 5]\nmoment = [1, 2, 0]\nframe = "platform"',
-        f"load[0]: load 'load 1' {IDLE} with a force along x or y, or a moment about z\n",
+        f"load[0]: load 'load 1' {IDLE} a force along x or y, or a moment about z\n",
     ),
     (MORE, "[limits]\nactuator_force = { max = 3 }", f"limits.actuator_force: {REDUNDANT}"),
 ]
@@ -236,27 +237,27 @@ def test_what_a_robot_does_not_have_is_one_sentence(
 
 #: The same in Python: a loading, limits, and the sentence.
 IN_PYTHON = [
-    (Loading((Load(mass=1.0, any_force=2.0),)), (), r"load\[0\]\.mass = 1\.0: cannot stand beside"),
-    (Loading((Load(mass=1.0, both_signs=True),)), (), r"load\[0\]\.mass = 1\.0: cannot stand beside"),
-    (Loading((Load("a", (1, 0, 0), mass=1.0),)), (), r"load\[0\]\.mass = 1\.0: cannot stand beside"),
+    (Loading((Load(mass=1.0, any_force=2.0),)), (), r"load\[0\]\.mass = 1\.0: conflicts with"),
+    (Loading((Load(mass=1.0, both_signs=True),)), (), r"load\[0\]\.mass = 1\.0: conflicts with"),
+    (Loading((Load("a", (1, 0, 0), mass=1.0),)), (), r"load\[0\]\.mass = 1\.0: conflicts with"),
     (Loading((Load(mass=-1.0),)), (), r"load\[0\]\.mass = -1\.0: must be at least 0"),
     (Loading((Load(mass=float("nan")),)), (), r"load\[0\]\.mass = nan: must be at least 0 and finite"),
     (Loading((Load(any_moment=float("nan")),)), (), r"load\[0\]\.any\.moment = nan: must be at least 0"),
-    (Loading((Load("a", (0, float("nan"), 0)),)), (), r"load\[0\]\.force: must be three finite"),
+    (Loading((Load("a", (0, float("nan"), 0)),)), (), r"load\[0\]\.force = .*: must be three finite"),
     (Loading((Load("a", "abc"),)), (), r"load\[0\]\.force\[0\]: must be a number, got str 'a'"),
-    (Loading((Load("a", (1, 2)),)), (), r"load\[0\]\.force: must be three finite numbers"),
-    (Loading((Load(),)), (), r"load\[0\]: is no load"),
+    (Loading((Load("a", (1, 2)),)), (), r"load\[0\]\.force = .*: must be three finite numbers"),
+    (Loading((Load(),)), (), r"load\[0\]: is empty"),
     (Loading((Load("", (1, 0, 0)),)), (), r'load\[0\]\.name = "": must not be empty'),
     (Loading((), Motion(-1.0)), (), r"motion\.linear = -1\.0: must be at least 0 and finite"),
-    (Loading((), Motion()), (), r"motion: must have linear, angular, or both"),
-    (Loading((), None, (0.0, 0.0)), (), r"gravity\.acceleration: must be three finite numbers"),
-    (Loading(), (ActuatorForce(max=2.0),), r"limits\.actuator_force: means nothing without \[\[load\]\]"),
+    (Loading((), Motion()), (), r"motion: is empty: give linear, angular, or both"),
+    (Loading((), None, (0.0, 0.0)), (), r"gravity\.acceleration = .*: must be three finite numbers"),
+    (Loading(), (ActuatorForce(max=2.0),), r"limits\.actuator_force: needs a table \[\[load\]\]"),
     (
         Loading((Load("a", (1, 0, 0)),)),
         (ActuatorForce("1+", max=float("nan")),),
         r"limits\.actuator_force\.1\+\.max = nan: must be above 0 N",
     ),
-    (Loading((Load("a", (1, 0, 0)),)), (ActuatorForce("1+"),), r"limits\.actuator_force\.1\+: must have"),
+    (Loading((Load("a", (1, 0, 0)),)), (ActuatorForce("1+"),), r"limits\.actuator_force\.1\+: is empty: it must have"),
     (Loading((), Motion(1.0)), (ActuatorSpeed(),), r"limits\.actuator_speed"),
     (Loading((Load("a", (1, 0, 0)),), Motion(1.0)), (ActuatorPower("1+"),), r"limits\.actuator_power\.1\+"),
 ]
@@ -362,8 +363,8 @@ load = [{ force = [2, 2, -10] }]
     [
         ("0", "robot.actuator_stiffness = 0.0: must be above 0"),
         ("-3", "must be above 0 and finite"),
-        ('{ "1-" = 3 }', "has none for actuator 1+"),
-        (EACH.replace('"3+"', '"4"'), "robot.actuator_stiffness.4: is no actuator of the robot"),
+        ('{ "1-" = 3 }', "is missing for actuator 1+: give one number for all"),
+        (EACH.replace('"3+"', '"4"'), "robot.actuator_stiffness.4: no such actuator"),
     ],
 )
 def test_stiffness_that_means_nothing_is_refused(stiffness: str, sentence: str) -> None:
@@ -377,7 +378,7 @@ def test_a_limit_on_the_deflection_needs_loads_and_stiffness() -> None:
     limit = "[limits]\ndeflection = { max = 1 }\n"
     with pytest.raises(CaseError, match=r"deflection: needs robot.actuator_stiffness"):
         case_from(text_of("") + limit)
-    with pytest.raises(CaseError, match=r"deflection: means nothing without \[\[load\]\]"):
+    with pytest.raises(CaseError, match=r"deflection: needs a table \[\[load\]\]"):
         case_from(text_of("4000", text=HEXAPOD) + limit)
     case = case_from(text_of(EACH) + limit)
     assert case_from(case.to_toml()).to_toml() == case.to_toml()
@@ -486,7 +487,7 @@ def test_pictures_of_forces_have_no_rates_and_arrows_the_name_of_their_load() ->
     assert drawing.forces is not None
     (arrow,) = drawing.forces.arrows
     assert (arrow.kind, arrow.name, arrow.words) == ("load", "tool", "weight of tool: 19.62 N")
-    assert drawing.forces.words.startswith("weight of tool, forces under load cut: longest arrow 19.62 N")
+    assert drawing.forces.words.startswith("weight of tool, actuator forces under load cut: longest arrow 19.62 N")
     assert drawings_of(handling(), 1)[0].forces.words.startswith("load handling: longest arrow")
 
 

@@ -229,7 +229,7 @@ def test_commands_and_json_state_the_screws(tmp_path: Path) -> None:
     case = str(case_file(tmp_path, tables))
     output = ran("evaluate", case).output
     assert "singular: the constraints are dependent" in output
-    assert output.count("  gained: rotation about") == 2
+    assert output.count("  gained motion: rotation about") == 2
     assert "through (0, 0, 1.4)" in output
     joints = json.loads(ran("evaluate", case, "--json", "-").output)["joints"]
     (each,) = joints["singularities"]

@@ -26,7 +26,7 @@ from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.loads import HeldLoad, loads_at
 from screwsynth.nlp.evidence.state import evaluate
 from screwsynth.nlp.program.formulation import formulate
-from screwsynth.nlp.proof.statement.machine import Legs
+from screwsynth.nlp.proof.statement.fixed_robot import Legs
 from screwsynth.nlp.proof.statement.motors import motor_claims
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.searched import Subject, motor_extremes
@@ -384,7 +384,7 @@ def test_the_motor_sheet_is_in_all_outputs(tmp_path: Path) -> None:
     page = files["html"].read_text(encoding="utf-8")
     assert 'id="workspace-motors"' in page
     assert f"{by['2-', 'force']['largest']['bound']:.7g}" in page
-    assert "motors: what each actuator needs" in ended.out
+    assert "motor requirements: proved bounds" in ended.out
     plain = json.loads(ran("workspace", "hexapod-linuxcnc", "--json", "-").out)
     assert "motors" not in plain
 
@@ -392,9 +392,9 @@ def test_the_motor_sheet_is_in_all_outputs(tmp_path: Path) -> None:
 def test_bounds_that_are_missing_are_said_in_the_sheet_or_open_with_the_reason() -> None:
     found = judge_workspace(replace(at_home("3-rrs"), loading=Loading((Load("w", (0.0, 0.0, -1.0)),))), time_limit=1e-4)
     (table,) = motor_tables(found.case, workspace_of(found).motors or ())
-    assert [header.partition("\n")[0] for header in table.headers][3:5] == ["largest torque", "backwards"]
+    assert [header.partition("\n")[0] for header in table.headers][3:5] == ["torque forwards", "torque backwards"]
     assert {str(row[3]) for row in table.rows} == {"no bound"}
-    assert "without a limit stay open" in verdict_words(workspace_of(found))
+    assert "without a limit undecided" in verdict_words(workspace_of(found))
     case = replace(at_home("exechon"), loading=Loading((Load("push", (0.0, 0.0, -10.0)),)))
     found = list(motor_extremes(Subject(case, case.model, None, "errors take freedoms from the robot")))
     assert len(found) == 6

@@ -49,7 +49,7 @@ def test_values_show_in_a_line(solution: sn.Solution, certified: sn.Certified) -
         assert len(text) <= 240
         assert "\n" not in text
         assert str(value) == text
-    assert repr(solution.case) == "<Case 'paper-4.1-helical': robot 'stewart-gough', 4 free numbers, 1 task, 1 pose>"
+    assert repr(solution.case) == "<Case 'paper-4.1-helical': robot 'stewart-gough', 4 variables, 1 task, 1 pose>"
     assert repr(hexapod()) == "<Model 'hexapod': 12 parameters, 6 limbs, 6 rows>"
     assert repr(solution) == "<Solution of 'paper-4.1-helical': optimal, F = 407.2107>"
     failed = sn.solve(replace(solution.case, search=sn.Search(starts=1, max_iterations=1)))

@@ -179,7 +179,7 @@ def test_f_along_a_path_is_its_worst_too_and_tasks_are_combined_along_it(tmp_pat
     solution = solve(case_from(tables | {"objective": {"over": "path"}}))
     assert solution.path.is_proved
     assert pytest.approx(worst.max(), rel=2e-3) == solution.F
-    assert "along the path, to be as large as possible" in solution.table()
+    assert "the smallest value along the path (maximised)" in solution.table()
     tasks = [LIFT | {"weight": 100}, TURN]
     both = solve(case_from(tables | {"task": tasks, "combine": {"method": "weighted-sum"}}))
     value = np.array([200, 2]) / 101 @ [rates_squared(RADII, [HOME], name)[:, 0] for name in ("lift", "turn")]
@@ -199,7 +199,7 @@ def test_results_of_several_tasks_have_the_proof(tmp_path: Path) -> None:
     tables["workspace"] = {"position": [ends(0.2), ends(0.2), ends(0.1, 1.1)], "rotation": rotation}
     solution = solve(case_from(tables | {"units": {"length": "m"}, "solve": {"starts": 1}}))
     shown, written = solution.table(), solution.to_dict()
-    assert "proved: regular and within the limits at every pose" in shown
+    assert "proved: no singularity and no violated limit at any pose" in shown
     assert "where a pose of the workspace became a constraint" in shown
     jsonschema.validate(written, result_schema())
     assert json_data(load_result(saved(tmp_path / "out.json", json.dumps(written)))) == written
@@ -214,11 +214,11 @@ def test_what_cannot_be_combined_over_a_workspace_is_refused(cli: Run, tmp_path:
     average = "combine.method = \"average\": must be 'weighted-sum' or 'worst-case' where limits hold"
     for keys, words in [
         (tables_of([LIFT, TURN]), average),
-        (tables_of([LIFT, TURN], **both, **worst), 'objective.over = "workspace": is for a case with one [[task]]'),
-        (tables_of(limits={}, **worst), 'objective.over = "workspace": needs limits that hold there too'),
-        (tables_of(objective={"over": "path"}), 'objective.over = "path": needs limits that hold there too'),
+        (tables_of([LIFT, TURN], **both, **worst), 'objective.over = "workspace": needs exactly one [[task]], got 2'),
+        (tables_of(limits={}, **worst), 'objective.over = "workspace": needs limits over the same poses'),
+        (tables_of(objective={"over": "path"}), 'objective.over = "path": needs limits over the same poses'),
         (tables_of(objective={}), "objective.minimise: is missing: give minimise, over, or both"),
-        (tables_of(pose=poses, **worst), "combine.over_poses = \"sum\": must be 'worst' beside objective.over"),
+        (tables_of(pose=poses, **worst), "combine.over_poses = \"sum\": must be 'worst' together with objective.over"),
     ]:
         refusal_of(cli("solve", str(case_file(tmp_path, keys))), words)
     path = {"file": "path.csv", "place": {"x": {"min": -1, "max": 1}}}

@@ -214,7 +214,7 @@ def changed(tmp_path: Path, name: str, *changes: tuple[str, str]) -> str:
 
 
 def test_a_users_own_file_is_checked_and_an_expectation_that_does_not_hold_fails(tmp_path: Path, cli: Run) -> None:
-    assert "all hold" in output_of(cli("check", changed(tmp_path, "paper-4.3-axis-x")))
+    assert "all values as expected" in output_of(cli("check", changed(tmp_path, "paper-4.3-axis-x")))
     for change in (
         ("F = 407.0562", "F = 407.0570"),
         ("singular = false", "singular = true"),

@@ -379,5 +379,5 @@ def test_all_designs_have_one_scale(tmp_path: Path, cli: Run) -> None:
         drawn = [next(each for each in svg.iter() if each.get("id") == plate) for _, svg in figures]
         assert len(set(map(ElementTree.tostring, drawn))) == count
     assert changed_words(["a"], ["a", "b"]) == "b becomes active"
-    assert changed_words(["a", "b"], ["c", "d"]) == "c, d become active; a, b no longer are"
-    assert changed_words(["a"], []) == "a no longer is"
+    assert changed_words(["a", "b"], ["c", "d"]) == "c, d become active; a, b become inactive"
+    assert changed_words(["a"], []) == "a becomes inactive"

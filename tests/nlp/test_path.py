@@ -278,7 +278,7 @@ def test_options_of_programs() -> None:
 
 #: A line that is refused, its word, and words of the sentence.
 REFUSED = [
-    ("X1", "X1", "no motion"),
+    ("X1", "X1", "active motion mode"),
     ("G1 X1", "G1", "needs a feed"),
     ("G94 F5\nG94\nG1 X1", "G1", "needs a feed"),
     ("F5 G93", "F5", "G93"),
@@ -290,20 +290,20 @@ REFUSED = [
     ("G0 G1 X1", "G1", "exclude each other"),
     ("G90 G91", "G91", "exclude each other"),
     ("M3 M4", "M4", "exclude each other"),
-    ("G0 X1 G92", "G92", "cannot stand beside G0"),
-    ("G92", "G92", "words of axes"),
+    ("G0 X1 G92", "G92", "conflicts with G0"),
+    ("G92", "G92", "axis words"),
     ("G52 X1", "G52", "G92 and G92.1"),
     ("G92.3", "G92.3", "G92 and G92.1"),
     ("G10 L2 P10 X1", "G10", "1 to 9"),
     ("G10 L2 P1.5 X1", "G10", "1 to 9"),
     ("G10 L1 P1 X1", "G10", "L2 and L20"),
-    ("G10 L2 P1", "G10", "words of axes"),
+    ("G10 L2 P1", "G10", "axis words"),
     ("G10 L2 P1 X1 R5", "R5", "no code of the line uses it"),
     ("G91 G53 G0 X1", "G53", "G90"),
     ("G53 G2 X1 R1 F1", "G53", "G0 or G1"),
     ("G53", "G53", "G0 or G1"),
-    ("G80 X1", "G80", "words of axes"),
-    ("G0 X1\nG80 G92 X0\nX2", "X2", "no motion"),
+    ("G80 X1", "G80", "axis words"),
+    ("G0 X1\nG80 G92 X0\nX2", "X2", "active motion mode"),
     ("G4", "G4", "time"),
     ("G4 P-1", "G4", "time"),
     ("G1 F1 X1 P3", "P3", "no code of the line uses it"),
@@ -317,7 +317,7 @@ REFUSED = [
     ("F1 G2 X1 Y0 I0.4", "G2", "ends of the arc are 0.4 and 0.6 from its centre"),
     ("F1 G3 X201 Y0 I100", "G3", "100 and 101 from its centre; they may differ by 0.101"),
     ("F1 G2 X1 I0", "G2", "centre of the arc is at one of its ends"),
-    ("F1 G2 X0 Y0 R1", "G2", "state it by I, J, K"),
+    ("F1 G2 X0 Y0 R1", "G2", "give I, J, K instead"),
     ("F1 G2 X2.1 Y0 R1", "G2", "2.1 apart, more than two radii of 1"),
     ("F1 G2 I1 P0", "P0", "number of turns"),
     ("F1 G2 I1 P1.5", "P1.5", "number of turns"),
@@ -328,16 +328,16 @@ REFUSED = [
     ("G28", "G28", "stored positions"),
     ("G38.2 Z-1", "G38.2", "probing"),
     ("G5 X1 P1", "G5", "splines"),
-    ("G12", "G12", "no such code"),
+    ("G12", "G12", "not supported"),
     ("M98 P100", "M98", "subroutines"),
-    ("M66 P1", "M66", "no such code"),
+    ("M66 P1", "M66", "not supported"),
     ("O100 sub", "O", "subroutines"),
     ("o<part> call", "O<PART>CALL", "subroutines"),
     ("G0 X[1+2]", "X[1+2]", "expressions"),
     ("#1=5", "#1=5", "variables"),
     ("G0 X#1", "X#1", "variables"),
-    ("G0 X1.2.3", "X1.2.3", "is no number"),
-    ("G0 X--1", "X--1", "is no number"),
+    ("G0 X1.2.3", "X1.2.3", "is not a number"),
+    ("G0 X--1", "X--1", "is not a number"),
     ("G0 X1e5", "E5", "exponents"),
     ("G0 X", "X", "has no number"),
     ("G0 U1", "U1", "axes U, V and W"),
@@ -345,9 +345,9 @@ REFUSED = [
     ("G0 (part", "(PART", "comment has no end"),
     ("G0 (a (b) c)", "(AC)", "comment has no end"),
     ("G0 @5 ^30", "@5^30", "polar"),
-    ("%", "%", "nowhere else"),
+    ("%", "%", "only allowed alone on a line"),
     ("G0 /X1", "/", "beginning of a line"),
-    ("\x00", "\\\\x00", "no word of a program"),
+    ("\x00", "\\\\x00", "not a word of G-code"),
 ]
 
 
@@ -366,14 +366,14 @@ def test_what_is_not_read_is_refused_with_its_line_and_word(lines: str, word: st
     [
         ("G0 X1", "line 1: the program has no end", AT_ZERO, "mm"),
         ("%\nG0 X1\n", "line 3: the program has no end", AT_ZERO, "mm"),
-        ("M2", "there is no path: the program moves nowhere", AT_ZERO, "mm"),
+        ("M2", "there is no path: the program makes no motion", AT_ZERO, "mm"),
         ("G0 X0\nX0 Y0\nM2", "there is no path: the start of Z is not known", PathOptions(), "mm"),
         ("G91 G0 X1\nM2", "line 1, G91: depends on X of the point", PathOptions(), "mm"),
         ("G92 Z1\nM2", "line 1, G92: depends on Z of the point", PathOptions(), "mm"),
         ("F1 G2 I1\nM2", "line 1, G2: depends on X of the point", PathOptions(), "mm"),
-        ("G0 X1\nM2", "line 1: the unit of lengths is not known", AT_ZERO, "m"),
+        ("G0 X1\nM2", "line 1: the unit of length is not known", AT_ZERO, "m"),
         ("G21 G0 X1\nM2", "unit of lengths, 'furlong', has no known length", AT_ZERO, "furlong"),
-        (f"G0 Y1\nX{'9' * 40}\nM2", "line 2: must be finite, of a size of at most 1e+30", AT_ZERO, "mm"),
+        (f"G0 Y1\nX{'9' * 40}\nM2", "line 2: must be finite and at most 1e+30 in size", AT_ZERO, "mm"),
     ],
 )
 def test_programs_without_a_path_are_refused(text: str, words: str, options: PathOptions, unit: str) -> None:
@@ -455,16 +455,16 @@ def test_quaternions_and_axes_are_the_rotations_of_their_angles(angles: list[tup
     ("text", "words"),
     [
         ("", "has no rows"),
-        ("x,y,t\n", "row 1: column z missing"),
+        ("x,y,t\n", "row 1: column z is missing"),
         ("x,y,z\n1,2,3\n", "fewer than two points"),
-        ("x,y,z\n1,2,3\n1,2,3\n", "all of its points are one pose"),
+        ("x,y,z\n1,2,3\n1,2,3\n", "all points are the same pose"),
         ("x,y,z,a\n", "row 1: no such column, 'a'"),
-        ("x,y,z,t,feed\n", "row 1: column 'feed' cannot stand beside 't'"),
+        ("x,y,z,t,feed\n", "row 1: column 'feed' conflicts with 't'"),
         ("x,y,z,t\n1,2,3,0\n1,2,4,0\n", "row 3, column t = 0.0: must be later"),
         ("x,y,z,feed\n1,2,3,1\n1,2,4,0\n", "row 3, column feed = 0.0: must be positive"),
         ("x,y,z\n1,2,3\n1,2,nan\n", "row 3, column z = nan: must be finite"),
         ("x,y,z\n1,2,3\n1,2\n", "row 3: must have 3 cells, got 2"),
-        ("x,y,z\n1,2,3\n1,,3\n", "row 3, column y: is empty; it must be a number"),
+        ("x,y,z\n1,2,3\n1,,3\n", "row 3, column y: must be a number, got an empty cell"),
         ("x,y,z,qw,qx,qy,qz\n1,2,3,1,0,0,0\n1,2,3,1,1,0,0\n", "row 3, columns qw, qx, qy, qz: must be a unit"),
         ("x,y,z,axis_x,axis_y,axis_z,angle\n1,2,3,0,0,1,5\n1,2,3,0,0,0,5\n", "row 3, columns axis_x, axis_y, axis_z"),
     ],
@@ -476,7 +476,7 @@ def test_faults_of_tables_are_told_with_row_and_column(text: str, words: str) ->
 
 def test_files_are_read_by_their_names(tmp_path: Path) -> None:
     (tmp_path / "way.CSV").write_text("\ufeffx,y,z,angle\n0,0,0,0\n1,0,0,180\n", encoding="utf-8")
-    with pytest.raises(InputError, match=r"way.CSV: line 3: turns by half a turn"):
+    with pytest.raises(InputError, match=r"way.CSV: line 3: rotates by half a turn"):
         read_path(tmp_path / "way.CSV", MM)
     with pytest.raises(InputError, match="linear angles need columns roll, pitch, yaw"):
         read_path(tmp_path / "way.CSV", MM, PathOptions(between=Between.ANGLES))

@@ -320,7 +320,7 @@ def test_the_command_writes_a_result_and_says_how_it_ended(cli: Run, tmp_path: P
     part, out = tmp_path / "part.ngc", tmp_path / "path.json"
     saved(part, f"G90 G0 X0 Y0 Z20 A0 B0 C0\n{TOUR}\n")
     shown = output_of(cli("path", "hexapod-linuxcnc", "--along", str(part), "--json", str(out)))
-    assert "everything is proved at every point" in shown
+    assert "PROVED at every point" in shown
     result = json.loads(out.read_text())
     assert result["proved"]
     assert len(result["path"]["claims"]) == 19
@@ -328,7 +328,7 @@ def test_the_command_writes_a_result_and_says_how_it_ended(cli: Run, tmp_path: P
         "path", "hexapod-linuxcnc", "--along", str(part), "--set", "limits.leg_length.max=31.5", "--json", str(out)
     )
     assert code == 1
-    assert "first fault line 3" in " ".join(shown.split())
+    assert "first violation line 3" in " ".join(shown.split())
     refuted = [each for each in json.loads(out.read_text())["path"]["claims"] if each["outcome"] == "refuted"]
     assert min(each["fault"]["line"] for each in refuted) == 3
     refusal_of(cli("path", "hexapod-linuxcnc", "--along", str(tmp_path / "none.ngc")), "none.ngc")

@@ -295,7 +295,7 @@ def test_a_bound_beyond_the_limit_is_rejected(proof: Proof) -> None:
         (b"", "ends before every box"),
         (bytes([Node.BOUNDED] * 2), "ends before every box"),
         (bytes([Node.BOUNDED] * 4), "goes on after every box"),
-        (bytes([Node.BOUNDED] * 2 + [Node.OUTSIDE]), "where a piece must be closed or cut"),
+        (bytes([Node.BOUNDED] * 2 + [Node.OUTSIDE]), "where a piece must be proved or cut"),
         (node_bytes(Node.HALF, 1) + bytes([Node.BOUNDED] * 4), "variable 1, which does not exist"),
         (node_bytes(Node.CUT, 0, value=1.5) + bytes([Node.BOUNDED] * 4), "cuts a box at 1.5, which is outside of it"),
         (node_bytes(Node.CUT, 0, value=math.nan) + bytes([Node.BOUNDED] * 4), "cuts a box at nan"),
@@ -323,7 +323,7 @@ def test_other_paths_are_rejected(proof: Proof) -> None:
     assert "segment 1 from" in rejected(carrying(speeds, text=swapped), machine())
     assert "goes on after every box" in rejected(carrying(lengths, text="\n".join(rows[:-1])), machine())
     assert "other joint centres" in rejected(carrying(lengths, legs=()), machine())
-    assert "another tolerance" in rejected(carrying(lengths, joint_centre=0.1), machine())
+    assert "another joint-centre tolerance" in rejected(carrying(lengths, joint_centre=0.1), machine())
     assert "cannot be read" in rejected(carrying(lengths, text="x,y\n1,2"), machine())
     assert "this case has none" in rejected(carrying(lengths, of_case=True), machine())
     slower = edited(TIMED, ("3,2\n", "3,1.5\n"))
@@ -333,8 +333,8 @@ def test_other_paths_are_rejected(proof: Proof) -> None:
 def test_claims_of_another_case_or_left_out_are_rejected(proof: Proof) -> None:
     fewer = hexapod(limits=LIMITS | {"leg_length": {"max": 43}}, load=LOAD)
     assert "does not keep" in rejected(proof, hexapod(limits=LIMITS | {"leg_length": {"max": 30}}, load=LOAD))
-    assert "not those of the case, each once" in rejected(proof, hexapod(limits=LIMITS))
-    assert "not those of the case, each once" in rejected(replace(proof, unproved=proof.unproved[1:]), machine())
+    assert "each claim of the case exactly once" in rejected(proof, hexapod(limits=LIMITS))
+    assert "each claim of the case exactly once" in rejected(replace(proof, unproved=proof.unproved[1:]), machine())
     assert verified(alone(proof, "leg_length limb 1-", "max"), fewer).claims
     assert "claims nothing" in rejected(replace(proof, claims=()), machine())
 
@@ -366,7 +366,7 @@ def test_whole_turns_that_the_robot_cannot_make_are_rejected(turns: int) -> None
     case = case_from(tables)
     text = f"G0 Z1080 A2 B-3\nG1 Z1100 A0 B-1\nG3 X0 Y0 I-50 J0 P{turns}\nG1 Z1120 A-2 B1\nM2"
     path = path_of_text(f"G90 G94 F600 G21\nG0 X0 Y0 C0\n{text}", "part.ngc", case.units, PathOptions())
-    with pytest.raises(ProofError, match="the path moves x and y, which this robot cannot choose"):
+    with pytest.raises(ProofError, match="the path moves x and y, which this robot cannot control"):
         PathRoot(case, path)
 
 
@@ -385,7 +385,7 @@ def test_a_singular_pose_of_a_path_is_proved_by_two_places() -> None:
         (((0.0,), (0.1,)), "opposite signs"),
         (((low,), (2.5,)), "not one of the workspace"),
         (((low,),), "no two poses"),
-        (((low,), (high, 0.0)), "about the exact machine"),
+        (((low,), (high, 0.0)), "about the exact robot"),
         (((low,), (1.5,)), "change continuously"),
     ):
         assert words in rejected(with_claim(given, "regular", "", sides=sides), case)
@@ -476,24 +476,28 @@ def test_the_commands_write_and_verify(cli: Run, tmp_path: Path) -> None:
     words = ["path", "hexapod-linuxcnc", "--along", str(part), "--unit", "in", "--gap", "0.05", "--proof", str(out)]
     output_of(cli(*words))
     shown = output_of(cli("verify-proof", str(out)))
-    assert "holds: 19 of 19 claims about the path" in shown
-    assert "the case and the path are those that the proof carries" in " ".join(shown.split())
+    assert "PROOF VALID: 19 of 19 claims about the path" in shown
+    assert "case and path read from the proof file" in " ".join(shown.split())
     untimed = "1 of 2 segments has no time: speeds and powers there count as 0"
     assert untimed in " ".join(shown.split())
     own = ["verify-proof", str(out), "hexapod-linuxcnc", "--along", str(part)]
     shown = output_of(cli(*own, "--unit", "in", "--all"))
-    assert "proof carries" not in shown
+    assert "from the proof file" not in shown
     assert "2 segments, 1 of them arc" in " ".join(shown.split())
     assert " ".join(shown.split()).count(untimed) == 1
-    assert "the path is the one that the proof carries" in " ".join(output_of(cli(*own[:3])).split())
+    assert "path read from the proof file" in " ".join(output_of(cli(*own[:3])).split())
     code, _, said = cli(*own)
     assert (code, "see --unit" in said) == (1, True)
     saved(part, "G90 G94\nF60\nG1 X0 Y0 Z20 A0 B0 C0\nX1.1\nM2")
     code, _, said = cli(*own, "--unit", "in")
     assert (code, "another path than that of" in said) == (1, True)
-    refusal_of(cli("verify-proof", str(out), "--unit", "in"), "--along: is needed")
-    refusal_of(cli("verify-proof", str(out), "--leg-error", "0.1"), "--leg-error", "means nothing for this proof")
-    refusal_of(cli("path", "hexapod-linuxcnc", "--range", "--proof", str(out)), "--proof", "is not for --range")
+    refusal_of(cli("verify-proof", str(out), "--unit", "in"), "--along: is missing")
+    refusal_of(
+        cli("verify-proof", str(out), "--leg-error", "0.1"), "--leg-error", "is no option for this kind of proof"
+    )
+    refusal_of(
+        cli("path", "hexapod-linuxcnc", "--range", "--proof", str(out)), "--proof", "cannot be used with --range"
+    )
 
 
 def test_a_path_of_a_case_is_held_to_its_file(cli: Run, tmp_path: Path) -> None:
@@ -506,8 +510,8 @@ def test_a_path_of_a_case_is_held_to_its_file(cli: Run, tmp_path: Path) -> None:
     out = tmp_path / "proof.json"
     output_of(cli("path", str(case), "--proof", str(out), "--gap", "0.05"))
     shown = output_of(cli("verify-proof", str(out), str(case), "--all"))
-    assert "in its place in the case" in " ".join(shown.split())
-    assert "proof carries" not in shown
+    assert "placed as in the case" in " ".join(shown.split())
+    assert "from the proof file" not in shown
     assert "speeds" not in shown
     output_of(cli("verify-proof", str(out)))
     code, _, said = cli("verify-proof", str(out), str(case), "--along", str(poses))

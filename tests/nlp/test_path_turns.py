@@ -366,7 +366,7 @@ def test_the_command_takes_motions_and_conventions(cli: Run, tmp_path: Path) -> 
     # The pose that refutes a limit is beyond it where it is evaluated.
     code, shown, _ = cli(*command, "--set", "limits.leg_length.max=33")
     assert code == 1
-    (words,) = commands_in(shown, "see it")
+    (words,) = commands_in(shown, "see it with")
     assert words[0] == "evaluate"
     assert "violated: leg_length limb" in cli(*words)[1]
     part = tmp_path / "part.ngc"

@@ -156,7 +156,7 @@ def test_the_command_line_writes_and_checks_proofs(cli: Run, tmp_path: Path) -> 
     assert (code, "proved" in out) == (0, True)
     for arguments in ((str(target),), (str(target), NAME)):
         code, out, _ = cli("verify-proof", *arguments)
-        assert (code, "holds: F is at most" in out) == (0, True), out
+        assert (code, "PROOF VALID: F is at most" in out) == (0, True), out
     code, _, err = cli("verify-proof", str(target), "paper-4.1-rotation-axis-z")
     assert (code, "other expressions" in err) == (1, True)
     # Of a search that ends before, there is none.
@@ -468,7 +468,7 @@ def test_what_a_case_does_not_claim_is_refused_packed(workspace: Proved, monkeyp
     with pytest.raises(AssertionError):
         check_workspace_proof(given, case)
     other = replace(given.claims[0], name="other")
-    with pytest.raises(ProofError, match="the claims are not those of the case, each once: see other"):
+    with pytest.raises(ProofError, match="the proof must have each claim of the case exactly once: see other"):
         check_workspace_proof(replace(given, claims=(*given.claims, other)), case)
     with pytest.raises(ProofError, match="no claim rests on the lemma other"):
         check_workspace_proof(replace(given, lemmas=(other,)), case)

@@ -35,9 +35,9 @@ from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.checker.premises import fingerprint
 from screwsynth.nlp.proof.checker.proof_file import ProofClaim
 from screwsynth.nlp.proof.checker.tree import Node
+from screwsynth.nlp.proof.statement.fixed_robot import Legs
 from screwsynth.nlp.proof.statement.form import without_ties
 from screwsynth.nlp.proof.statement.limb_separation import separate
-from screwsynth.nlp.proof.statement.machine import Legs
 from screwsynth.nlp.proof.statement.signs import is_nowhere_positive
 from screwsynth.nlp.proof.statement.standard_form import Condition, StandardForm, standard_form
 from screwsynth.nlp.proof.workspace.ranks import ranks
@@ -384,7 +384,7 @@ def test_an_interrupt_of_python_proves_no_regular_poses(place: str, monkeypatch:
     assert found.reason == "interrupted"
 
 
-SENTENCE = "nothing can be proved here: the C kernel was not built when the package was installed; install a C compiler"
+SENTENCE = "proofs are not available: the C kernel was not built when the package was installed; install a C compiler"
 HELICAL = "paper-4.1-helical-axis-z"
 GOALS = ("--goal", "max F:push along the normal", "--goal", "min F:turn about the normal")
 

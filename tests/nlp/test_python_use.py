@@ -361,7 +361,7 @@ def test_inverse_takes_roll_pitch_and_yaw(tmp_path: pytest.TempPathFactory) -> N
         ),
         (
             {"rotations": [[0, 0, 0.1]]},
-            "poses must be arrays (N, 3) and (N, 3, 3), got (1, 3) and (1, 3); rows of roll",
+            "poses: expected arrays (N, 3) and (N, 3, 3), got (1, 3) and (1, 3); rows of roll",
         ),
     ],
 )

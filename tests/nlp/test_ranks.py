@@ -29,7 +29,7 @@ from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.evidence.dependent import with_dependent
 from screwsynth.nlp.proof.enclosure.forms import ULP, Encloser, Forms
 from screwsynth.nlp.proof.enclosure.tape import compile_tape
-from screwsynth.nlp.proof.statement.machine import legs_of
+from screwsynth.nlp.proof.statement.fixed_robot import legs_of
 from screwsynth.nlp.proof.statement.tolerance import built_model
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal
 from screwsynth.nlp.proof.workspace.numbers.jacobian_numbers import SingularValues
@@ -476,7 +476,7 @@ def test_a_wrist_does_not_translate() -> None:
     tables = starter_tables("spherical-3-rrr")
     tables["robot"]["parameters"]["radius"] = 0.1
     tables["workspace"] = {"position": [{"min": -0.02, "max": 0.02}] * 3}
-    with pytest.raises(CaseError, match="this robot cannot choose x and y and z"):
+    with pytest.raises(CaseError, match="this robot cannot control x and y and z"):
         judge_workspace(case_from(tables | {"limits": {}}), time_limit=20)
 
 

@@ -373,14 +373,21 @@ def test_one_table_for_terminal_markdown_and_page() -> None:
     assert paragraphs([line]) == '<p><span class="label">F:</span> about 407 &lt;N&gt;</p>'
 
 
-def test_an_answer_begins_with_its_title_and_ends_with_the_rank() -> None:
+def test_an_answer_is_title_and_objective_then_its_evidence_then_the_design() -> None:
     case = load_case("paper-4.1-helical")
     items = list(case_summary(case, result_of(solve(case, starts=2))))
-    first, last = items[0], [item for item in items if not item.part][-1]
+    answer = [item for item in items if not item.part]
+    first, objective, optimality, rank, last = answer[0], *answer[-4:]
     assert isinstance(first, Line)
     assert (first.text, first.tone) == (case.title, Tone.TITLE)
-    assert isinstance(last, Line)
-    assert (last.label, last.text) == ("rank of J", "6")
+    assert isinstance(objective, Line)
+    assert (objective.before, objective.tone) == ("largest F = ", Tone.ANSWER)
+    assert isinstance(optimality, Line)
+    assert (optimality.label, optimality.text) == ("optimality", "strict local maximum")
+    assert isinstance(rank, Line)
+    assert (rank.label, rank.text) == ("rank of J", "6")
+    assert isinstance(last, TextTable)
+    assert last.name == "design"
     design, limbs = (item for item in items if isinstance(item, TextTable))
     assert [row[0] for row in design.rows] == ["p_x", "p_y", "p_z", "axis", "angle", "x1", "x2", "x3", "x4"]
     assert len(limbs.rows) == 6
@@ -393,7 +400,7 @@ DELTA = (Path(screwsynth.models.__file__).parent / "robots" / "delta.toml").read
 #: A value of the key as TOML and JSON write it, and words about it.
 OTHERS = [
     ("2", "schema = 2: this screwsynth reads {kind} of schema 1; a later version of it reads this one"),
-    ("0", "schema = 0: must be a version, which is a whole number from 1; this screwsynth reads {kind} of schema 1"),
+    ("0", "schema = 0: must be a version number, a whole number from 1; this screwsynth reads {kind} of schema 1"),
     ("true", "schema = true: must be a version"),
     ("1.0", "schema = 1.0: must be a version"),
     ('"1"', 'schema = "1": must be a version'),

@@ -64,7 +64,7 @@ LIMB = ROBOT[ROBOT.index("[[limb]]") :]
 JOINTS = ROBOT[ROBOT.index("joints = ") :]
 AXIS, SECOND, LAST = '"A - B"', "limb 1, joint 2 (P), axis: is", 'at = "A" }'
 GRAMMAR = "which may have only numbers, names, + - * / ^, brackets and functions"
-NOT_A_NAME = "is no name for a dimension: letters, digits and _ are allowed, a letter first"
+NOT_A_NAME = "is not a name for a dimension: letters, digits and _ are allowed, a letter first"
 DRIVEN = '{ type = "R", at = "B", axis = "y", actuated = true }'
 
 #: Text that is replaced, its replacement, and the sentence behind the name of the file.
@@ -79,9 +79,9 @@ FAULTS: list[tuple[str, str | bytes, str]] = [
     (AXIS, '"(rb - 1)*x"', "limb 1, joint 2 (P), axis: is '(rb - 1)*x', which is zero; a direction is needed, at the typ"),
     ('axis = "y"', 'axis = "cross(A, 2*A)"', "limb 1, joint 1 (R), axis: is 'cross(A, 2*A)', which is zero; a direction is ne"),
     ('"R", at = "B", axis = "y"', '"U", at = "B", axes = ["x", "-2*x"]', "limb 1, joint 1 (U), axes: are parallel; two different"),
-    ('"R"', '"Pa", to = "B"', "limb 1, joint 1 (Pa), to: is the same place as at; a rod needs a length"),
-    ('"R"', '"Pa", to = "B + y"', "limb 1, joint 1 (Pa), axis: is parallel to the rod from at to to; the axis of its hinges"),
-    (JOINTS, f'joints = [{DRIVEN}, {{ type = "S", at = "A" }}, {{ type = "S", at = "A" }}]', "limb 1, joint 3 (S), at: is the same place as that of the joint S before it"),
+    ('"R"', '"Pa", to = "B"', "limb 1, joint 1 (Pa), to: is the same point as at; a rod needs a nonzero length"),
+    ('"R"', '"Pa", to = "B + y"', "limb 1, joint 1 (Pa), axis: is parallel to the rod from at to to; give the axis of its hinges"),
+    (JOINTS, f'joints = [{DRIVEN}, {{ type = "S", at = "A" }}, {{ type = "S", at = "A" }}]', "limb 1, joint 3 (S), at: is the same point as that of the joint S before it"),
     (JOINTS, 'joints = [{ type = "S", at = "A" }, { type = "C", at = "B", axis = "x" }, { type = "P", at = "B", axis = "y" }]', "the robot: no limb resists the platform: each has six or more independent passive joints"),
     ("count = 1", "angles = [0, 120, 360]", "limb 1, repeat, angles: has 0 twice; each copy needs an angle of its own"),
     # A limb that ends nowhere, or has too much.
@@ -91,7 +91,7 @@ FAULTS: list[tuple[str, str | bytes, str]] = [
     (JOINTS, f'joints = [{DRIVEN}]\nbranch = [{{ joints = [{{ type = "S", at = "A" }}] }}]', "limb 1, branch: has one branch: write its joints"),
     (JOINTS, f"joints = [{DRIVEN}]\nbranch = [{{ joints = [] }}]", "limb 1, branch 1, joints: must have at least 1 entry, got 0"),
     (JOINTS, f"joints = [{DRIVEN}]\nbranch = [{', '.join(['{ joints = [' + DRIVEN + '] }'] * 7)}]", "limb 1, branch: has 7 branches; at most 6"),
-    (JOINTS, 'joints = [{ type = "R", at = "B", axis = "y" }]\nbranch = [{ joints = [{ type = "S", at = "A" }] }, { joints = [{ type = "S", at = "B" }] }]', "limb 1, joint 1 (R): is passive and before the branches of its limb; only actuated joints may stand there"),
+    (JOINTS, 'joints = [{ type = "R", at = "B", axis = "y" }]\nbranch = [{ joints = [{ type = "S", at = "A" }] }, { joints = [{ type = "S", at = "B" }] }]', "limb 1, joint 1 (R): is passive and before the branches of its limb; only actuated joints are allowed there"),
     (JOINTS, f'joints = [{DRIVEN}]\nbranch = [{{ joints = [{{ type = "S", at = "A" }}], branch = [] }}, {{ joints = [] }}]', "limb 1, branch 1, branch: is a branch of a branch; allowed are branches of a limb, each with joints up to"),
     (LIMB, "", "limb: is missing; it must be one or more tables [[limb]]"),
     (LIMB, "[limb]\njoints = []", "limb: must be a list of tables: write [[limb]], with two brackets"),
@@ -119,14 +119,14 @@ FAULTS: list[tuple[str, str | bytes, str]] = [
     ("[derived]", '"d\\u0001" = { typical = 1 }\n[derived]', f"d\\x01: {NOT_A_NAME}"),
     ("[derived]", '"a-b" = { typical = 1 }\n[derived]', f"a-b: {NOT_A_NAME}"),
     ("[derived]", '"\u03b1" = { typical = 1 }\n[derived]', f"\u03b1: {NOT_A_NAME}"),
-    ("[derived]", "sin = { typical = 1 }\n[derived]", "sin: is no name for a dimension: expressions use it for something else"),
+    ("[derived]", "sin = { typical = 1 }\n[derived]", "sin: is not a name for a dimension: expressions use it for something else"),
     ('name = "rps"', "name = 3", "name = 3: must be text in quotes"),
     ('name = "rps"', 'name = "  "', 'name = "  ": must not be empty'),
     ("rp = {", "rb = {", "the file: is not valid TOML: Cannot overwrite a value (at line 5, column 23)"),
     ("half =", "rb =", "rb: is given twice"),
     ("[[limb]]", '[[limb]]\nname = "111"\njoints = [{ type = "S", at = "x" }]\n[[limb]]\nname = "11"', "limb: has two limbs with the name '111'"),
     ("B = [", "h = [", "limb 1, point h: has the name of a dimension"),
-    ("B = [", "x = [", "limb 1, x: is no name for a point: expressions use it for something else"),
+    ("B = [", "x = [", "limb 1, x: is not a name for a point: expressions use it for something else"),
     ('half = "rb/2"', 'a = "b"\nb = "a"', "derived, a: is 'b', which needs 'b' before it is given; allowed are names given above"),
     ('half = "rb/2"', 'a = "a + 1"', "derived, a: is 'a + 1', which needs 'a' before it is given"),
     ("points = {", 'points = { D = "E", E = "D",', "limb 1, point D: is 'E', which needs 'E' before it is given"),
@@ -186,9 +186,9 @@ FAULTS: list[tuple[str, str | bytes, str]] = [
     (AXIS, '"A*\u0663"', GRAMMAR),
     (AXIS, '"\uff21 - B"', GRAMMAR),
     (AXIS, '"A**2"', "which has '**': a power is written '^'"),
-    (AXIS, '"A -"', "which is no expression of numbers, names, + - * / ^ and functions"),
-    (AXIS, f'"{"(" * 500}A{")" * 500}"', "which is no expression of numbers, names"),
-    (AXIS, f'"{"-" * 500}A"', "which has more than 60 operations in each other"),
+    (AXIS, '"A -"', "which is not an expression of numbers, names, + - * / ^ and functions"),
+    (AXIS, f'"{"(" * 500}A{")" * 500}"', "which is not an expression of numbers, names"),
+    (AXIS, f'"{"-" * 500}A"', "which has more than 60 nested operations"),
     (AXIS, f'"A{" + A" * 2000}"', "which is longer than 2000 letters"),
     (AXIS, '""', 'limb 1, joint 2, axis = "": must not be empty'),
     (AXIS, '"A*B"', "which multiplies two vectors: use dot or cross"),
@@ -213,15 +213,15 @@ FAULTS: list[tuple[str, str | bytes, str]] = [
 
 #: Of a robot of links and joints.
 LINK_FAULTS: list[tuple[str, str, str]] = [
-    ('links = ["base",', '[[limb]]\njoints = []\n#', "joint: cannot stand beside limb: give the robot by limbs, or by links and joints"),
+    ('links = ["base",', '[[limb]]\njoints = []\n#', "joint: conflicts with limb: give the robot by limbs, or by links and joints"),
     ('links = ["base", "crank", "coupler", "rocker", "rod", "bar", "platform"]', "", "links: is missing; it must be a list of the names of all links"),
-    ('"bar", "platform"]', '"bar"]', "platform: is 'platform', which is no link; links are base, crank, coupler, rocker, rod"),
-    ("points =", 'base = "ground"\npoints =', "base: is 'ground', which is no link"),
+    ('"bar", "platform"]', '"bar"]', "platform: is 'platform', which is not a link; links are base, crank, coupler, rocker, rod"),
+    ("points =", 'base = "ground"\npoints =', "base: is 'ground', which is not a link"),
     ("points =", 'platform = "base"\npoints =', "platform: is 'base', which is the base; two links are needed"),
     ('"bar", "platform"]', '"bar", "rod", "platform"]', "links, rod: is given twice"),
     ('"bar", "platform"]', '"bar", "9x", "platform"]', "links, 9x: is '9x'; letters, digits and _ are allowed, a letter first"),
     ('"bar", "platform"]', '"bar", "extra", "platform"]', "links, extra: has no joint"),
-    ('["base", "crank"]', '["base", "cranc"]', "joint motor, between: has 'cranc', which is no link"),
+    ('["base", "crank"]', '["base", "cranc"]', "joint motor, between: has 'cranc', which is not a link"),
     ('["base", "crank"]', '["crank", "crank"]', "joint motor, between: has the link 'crank' twice"),
     ('["base", "crank"]', '["crank"]', "joint motor, between: must have 2 entries, got 1"),
     ('between = ["base", "crank"]\n', "", "joint motor, between: is missing; it must be a list of two links, the base's side first"),
@@ -238,13 +238,13 @@ LINK_FAULTS: list[tuple[str, str, str]] = [
     ('axis = "z"', 'axis = "z"\npitch = 1', "joint motor (R), pitch: no such key"),
     ("actuated = true", "actuated = 1", "joint motor, actuated = 1: must be true or false"),
     ("points = {", "points = { s = [0, 0, 0],", "point s: has the name of a dimension"),
-    ("points = {", "points = { sin = [0, 0, 0],", "sin: is no name for a point: expressions use it for something else"),
+    ("points = {", "points = { sin = [0, 0, 0],", "sin: is not a name for a point: expressions use it for something else"),
     ("name = ", "colour = 1\nname = ", "colour: no such key; allowed: schema, name, description, length_unit, home"),
     (LINKS[LINKS.index("[[joint]]") :], "", "joint: is missing; it must be one or more tables [[joint]]"),
     (LINKS, LINKS.replace("actuated = true", ""), "actuated: is given at no joint of the robot; write actuated = true"),
-    (LINKS, LINKS + COUPLING.replace("pivot", "none"), "coupling 1, none: is no joint; joints are motor, knee"),
+    (LINKS, LINKS + COUPLING.replace("pivot", "none"), "coupling 1, none: is not a joint; joints are motor, knee"),
     (LINKS, LINKS + '[[coupling]]\nfactors = { motor = 1 }\n', "coupling 1, factors: has 1 joints; a coupling needs 2 or more"),
-    (LINKS, LINKS + COUPLING.replace('"-s"', "0"), "coupling 1, pivot: is 0; a coupled joint needs another factor"),
+    (LINKS, LINKS + COUPLING.replace('"-s"', "0"), "coupling 1, pivot: is 0; the factor of a coupled joint must not be 0"),
     (LINKS, LINKS + COUPLING.replace('"-s"', '"t"'), "coupling 1, pivot: is 't', which has the name 't', which is unknown"),
     (LINKS, LINKS + "[[coupling]]\n", "coupling 1, factors: is missing; it must be a table with a factor for each joint"),
     (LINKS[LINKS.index('[[joint]]\nname = "slide"') :], "", "links, rod: has no joint"),
@@ -294,23 +294,23 @@ def test_a_robot_file_that_cannot_be_read_is_refused_with_status_2(tmp_path: Pat
 
 #: Robots that may be a mistake: text that is replaced, its replacement, and the remark.
 REMARKS = [
-    ('"R", at = "B", axis = "y"', '"U", at = "B", axes = ["x", "x + 0.0003*y"]', "limb 1, joint 1 (U), axes: are parallel but for 0.0003;"),
-    (JOINTS, 'joints = [{ type = "R", at = "B", axis = [0.0003, 1, 0], actuated = true }, { type = "R", at = "A", axis = "y" }]', "limb 1, joint 2 (R), axis: and the axis of joint 1 (R) are parallel but for 0.0003; write both from the same numbers"),
+    ('"R", at = "B", axis = "y"', '"U", at = "B", axes = ["x", "x + 0.0003*y"]', "limb 1, joint 1 (U), axes: are almost parallel (sine 0.0003);"),
+    (JOINTS, 'joints = [{ type = "R", at = "B", axis = [0.0003, 1, 0], actuated = true }, { type = "R", at = "A", axis = "y" }]', "limb 1, joint 2 (R), axis: and the axis of joint 1 (R) are almost parallel (sine 0.0003); if they must be parallel, write both with the same numbers"),
     ('axis = "y" }', 'axis = "y" }, { type = "R", at = "B + 0.0003*z", axis = "x" }', "limb 1, joint 2 (R), axis: and the axis of joint 1 (R) are 0.0002 of the robot's size apart"),
-    ("[[limb]]", '[[limb]]\njoints = [{ type = "U", at = "0*x", axes = ["x", "y"] }, { type = "P", at = "z", axis = "z" }, { type = "S", at = "z" }]\n[[limb]]', "limb 1 carries nothing: its passive joints leave the platform free"),
+    ("[[limb]]", '[[limb]]\njoints = [{ type = "U", at = "0*x", axes = ["x", "y"] }, { type = "P", at = "z", axis = "z" }, { type = "S", at = "z" }]\n[[limb]]', "limb 1 carries no load: its passive joints leave the platform free"),
 ]  # fmt: skip
 
 
 def test_axes_that_are_almost_parallel_and_idle_limbs_are_remarked_on(tmp_path: Path, cli: Run) -> None:
     (alone,) = load_case(saved_with_robot(tmp_path, ROBOT, CASE)).model.remarks
-    assert alone.startswith("the robot has one member only, so F says little")
+    assert alone.startswith("the robot has one member only, so F is not informative")
     for old, new, remark in REMARKS:
         name = saved_with_robot(tmp_path, ROBOT.replace(old, new, 1), CASE)
         found, *others = load_case(name).model.remarks
         assert found.startswith(remark)
         assert others == [alone]
     out = output_of(cli("evaluate", name, "--set", "p_z=1.1"))
-    assert "note  limb 1 carries nothing" in out
+    assert "note  limb 1 carries no load" in out
 
 
 def test_nested_loops_are_evaluated_and_solved_and_c_is_refused(tmp_path: Path, cli: Run) -> None:
@@ -321,18 +321,18 @@ def test_nested_loops_are_evaluated_and_solved_and_c_is_refused(tmp_path: Path, 
     assert str(slides["2"]) == "@1=0, [@1, @1, 1]"
     assert slides["1"] is not None
     out = output_of(cli("evaluate", name))
-    assert "freedoms  2 with free actuators" in out
+    assert "degrees of freedom  2 with free actuators" in out
     assert "rates  1: " in out
     assert "motor: " in out
     refusal_of(
         cli("codegen", name, "--out", str(tmp_path / "c")),
-        "robot: has joints that are no limb with branches (motor, knee, wrist, pivot, hand)",
+        "robot: has joints outside limbs with branches (motor, knee, wrist, pivot, hand)",
     )
     assert not (tmp_path / "c").exists()
     # With a coupling the rest is one network too.
     coupled = LINKS + COUPLING.replace('pivot = "-s"', "slide = 2")
     out = output_of(cli("evaluate", saved_with_robot(tmp_path, coupled, LINKS_CASE)))
-    assert "freedoms  1 with free actuators" in out
+    assert "degrees of freedom  1 with free actuators" in out
 
 
 SHIPPED = Path(screwsynth.models.__file__).parent / "robots"
@@ -364,7 +364,7 @@ def test_a_robot_file_of_a_case_is_solved(tmp_path: Path, cli: Run, robot_text: 
     name = saved_with_robot(tmp_path, robot_text, case_text)
     result = tmp_path / "result.json"
     out = output_of(cli("solve", name, "--starts", "6", "--json", str(result)))
-    assert "freedoms  3 with free actuators" in out
+    assert "degrees of freedom  3 with free actuators" in out
     data = json.loads(result.read_text(encoding="utf-8"))
     assert data["F"] == pytest.approx(F, abs=1e-6)
     assert len(data["joints"]["actuators"]) == 3
@@ -424,7 +424,7 @@ def test_actuator_rates_are_those_of_finite_differences(tmp_path: Path) -> None:
     ("old", "new", "fault"),
     [
         ('file = "robot.toml"', "file = 3", "case.toml: robot.file: must be the name of a robot file"),
-        ('file = "robot.toml"', 'file = "robot.toml"\nmodel = "hexapod"', "robot.model: cannot stand beside file"),
+        ('file = "robot.toml"', 'file = "robot.toml"\nmodel = "hexapod"', "robot.model: conflicts with file"),
         ('file = "robot.toml"', 'file = "robot.toml"\naxes = "free"', "case.toml: robot.axes: no such key"),
         ('file = "robot.toml"', "", "case.toml: robot.model: is missing"),
         ('file = "robot.toml"', 'model = "3-rpz"', "did you mean '3-rps'?"),
@@ -522,7 +522,7 @@ def test_a_driven_limb_that_resists_nothing_is_refused_in_one_sentence(tmp_path:
             {"type": "S", "at": "A"},
         ],
     }
-    with pytest.raises(ValueError, match=r"^limb 2: has an actuated joint that drives nothing, .* remove actuated"):
+    with pytest.raises(ValueError, match=r"^limb 2: has an actuated joint without effect, .* remove actuated"):
         robot("idle", home=(0, 0, 1), limb=[leg, idle])
     # An open chain of links.
     chain = LINKS[: LINKS.index('[[joint]]\nname = "pivot"')].replace(', "rod", "bar"', "")

@@ -373,7 +373,7 @@ def test_a_design_that_is_refuted_at_the_end_is_no_answer(tmp_path: Path, cli: R
     result = json.loads(target.read_text(encoding="utf-8"))
     assert (code, result["status"], result["F"]) == (1, "not proved", None)
     assert result["workspace"]["proved"] is False
-    assert "not proved over the workspace: the best design found has F = " in unbroken(out)
+    assert "not proved over the workspace: the best design has F = " in unbroken(out)
     assert "(optimal" not in out
     row = row_of_solution(found, 0, 0.0)
     assert (row.status, row.F, row.note) == ("not proved", None, "not proved over the workspace")
@@ -420,7 +420,7 @@ def test_a_better_point_that_did_not_converge_is_a_note_and_the_optimum_stays(tm
     text = unbroken(found.table())
     for words in ("local maximum F = ", "(locally optimal", "1 of 2 searches converged, the best at F = "):
         assert words in text
-    assert "a search that did not converge reached" in text
+    assert "an unconverged search reached F = " in text
     assert "largest F" not in text
     path, target = saved(tmp_path / "case.toml", TWO_ENDS), tmp_path / "result.json"
     target.write_text(json.dumps(found.to_dict()), encoding="utf-8")

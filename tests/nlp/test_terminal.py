@@ -127,7 +127,7 @@ def test_proofs_that_hold_are_short_too(cli: Run, tmp_path: Path) -> None:
         proof = str(tmp_path / f"{command}.json")
         output_of(cli(command, name, *gap, "--proof", proof))
         out, every = output_of(cli("verify-proof", proof, name)), output_of(cli("verify-proof", proof, name, "--all"))
-        assert out.startswith("holds: ")
+        assert out.startswith("PROOF VALID: ")
         assert len(out.splitlines()) <= ROOM
         assert widest(out + every) <= PLAIN_WIDTH
 
@@ -146,12 +146,12 @@ def test_every_limit_is_counted_by_its_outcome(refuted: tuple[str, Path]) -> Non
     assert widest(out) <= PLAIN_WIDTH
     outcomes = [each["outcome"] for each in json.loads(target.read_text())["extremes"] if "limit" in each]
     assert len(outcomes) == 18
-    for outcome in ("refuted", "open", "proved"):
-        shown = re.search(rf"^{outcome}  (\d+) limits?: ", out, re.MULTILINE)
+    for outcome, word in {"refuted": "violated", "open": "undecided", "proved": "proved"}.items():
+        shown = re.search(rf"^{word}  (\d+) limits?: ", out, re.MULTILINE)
         assert (0 if shown is None else int(shown[1])) == outcomes.count(outcome)
     # The first ones are shown in full, and others are named.
     assert len(commands_in(out, "see it with")) == 2
-    assert re.search(r"^other refuted claims  \d+: --all, ", out, re.MULTILINE)
+    assert re.search(r"^other violated claims  \d+: --all, ", out, re.MULTILINE)
 
 
 def printed(items: Iterable[Line | TextTable], width: int, *, whole: bool = True) -> str:
@@ -180,7 +180,7 @@ def test_a_long_table_loses_columns_before_rows_and_a_curve_keeps_its_ends() -> 
     many = TextTable(("value",), tuple((str(k),) for k in range(101)), is_curve=True)
     shown = printed([many], 50, whole=False).splitlines()
     assert len(shown) == ROOM
-    assert (shown[1], shown[-2], shown[-1]) == ("0", "100", "23 of 101 rows: --all shows every one")
+    assert (shown[1], shown[-2], shown[-1]) == ("0", "100", "23 of 101 rows shown: --all shows all")
     steps = np.diff([int(each) for each in shown[1:-1]])
     assert set(steps) <= {4, 5}
     first = printed([TextTable(("value",), many.rows)], 50, whole=False).splitlines()
@@ -283,7 +283,7 @@ def test_a_command_has_no_more_digits_than_show_the_claim(cli: Run) -> None:
 def test_the_command_at_a_singular_pose_and_beyond_reach_shows_both(cli: Run, refuted: tuple[str, Path]) -> None:
     out, _ = refuted
     singular, beyond = commands_in(out, "see it with")
-    assert "refuted  regular: J is singular" in unbroken(out)
+    assert "violated  J is singular" in unbroken(out)
     assert any(each.startswith("rpy=") for each in singular)
     assert json.loads(cli(*singular, "--json", "-")[1])["rank"] < 6
     status, _, err = cli(*beyond)
@@ -546,7 +546,7 @@ def test_free_and_active_numbers_come_first_and_fixed_ones_are_folded() -> None:
     assert held == sorted(held, reverse=True)
     assert sum(ranges) == 3
     assert len(design.rows) - design.folded <= 10
-    assert f"and {design.folded} more fixed numbers" in printed([design], 80, whole=False)
+    assert f"and {design.folded} more fixed values" in printed([design], 80, whole=False)
 
 
 def test_a_table_as_csv_has_every_digit(tmp_path: Path, cli: Run) -> None:
@@ -562,7 +562,7 @@ def test_a_table_as_csv_has_every_digit(tmp_path: Path, cli: Run) -> None:
         "motions", "margins",
     ]  # fmt: skip
     assert cli("solve", "paper-4.2", "--starts", "2", "--csv", str(target), "--table", "tasks")[0] == 0
-    assert target.read_text(encoding="utf-8").startswith("task,sense,weight,F,best alone,loss,")
+    assert target.read_text(encoding="utf-8").startswith("task,sense,weight,F,separate optimum,loss,")
 
 
 @pytest.mark.parametrize("command", ["solve", "evaluate"])
@@ -627,16 +627,16 @@ def test_a_certificate_that_proves_only_the_obvious_says_so() -> None:
     assert early.incumbent > 0
     assert early.statement.startswith("nothing is proved: stopped after")
     early = replace(early, bound=0.0)
-    assert early.statement.startswith("nothing useful is proved yet (")
+    assert early.statement.startswith("only the trivial bound is proved (")
     assert "F is at least 0" in early.statement
     useful = replace(early, bound=0.5 * early.incumbent)
     assert useful.statement.startswith("incomplete")
     below = replace(early, above=-1.0, status=CertificateStatus.PROVED)
-    assert "says nothing useful: F is at least 0" in below.statement
+    assert "is trivial: F is at least 0" in below.statement
     assert "1 boxes" not in "".join(line.words for line in certificate_lines(certificate_data(replace(early, boxes=1))))
     fixed = certify_program(formulate(load_case("paper-4.4-snu")))
     assert 0 < fixed.bound < 1e-20
-    assert "has F smaller than 0; the best point known has 0" in fixed.statement
+    assert "has F smaller than 0; the best known point has 0" in fixed.statement
     # Where F reaches 0, the bound 0 is all there is to prove.
     reached = replace(early, status=CertificateStatus.PROVED, incumbent=0.0, bound=0.0)
     assert reached.statement.startswith("proved: no point of the box")

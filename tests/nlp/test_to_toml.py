@@ -202,7 +202,7 @@ def test_poses_are_written_as_they_were_stated_and_displacements_are_rotations()
     for old, new in (("[1, 0, 0]", "[1.1, 0, 0]"), ("[0, 0, 1]]", "[0, 0, -1]]")):
         with pytest.raises(sn.CaseError, match=r"pose.displacements\[1\].rotation: must be a rotation matrix"):
             with_displacements(line.replace(old, new))
-    with pytest.raises(sn.CaseError, match=r"pose\.displacements: cannot stand beside grid; write two poses"):
+    with pytest.raises(sn.CaseError, match=r"pose\.displacements: conflicts with grid; write two"):
         with_displacements(f"{line}\ngrid = {{ x = {{ min = 0, max = 1, count = 2 }} }}")
     text = sn.load_case("paper-4.1-helical").to_toml().replace("[[task]]", '[combine]\nover_poses = "mean"\n\n[[task]]')
     along = "along_task = { first = -15, last = 15, count = 5 }"
@@ -219,7 +219,7 @@ def test_what_no_case_file_can_state_is_refused() -> None:
     renamed = replace(case.model, **{key: getattr(case.model, key)[::-1] for key in ("wrenches", "legs", "built")})
     for wrong, fault in (
         (replace(case, model=model), "robot.model.*my-own.*cannot be written to a case file: no such robot"),
-        (replace(case, model=renamed), "the robot of this name, with these options, is another one"),
+        (replace(case, model=renamed), "this name with these options gives a different robot"),
         (replace(case, limits=sn.Limits(cone, other)), "limits.home: cannot be written to a case file"),
         (replace(case, units=sn.Units("")), "units.length.*cannot be written to a case file"),
     ):

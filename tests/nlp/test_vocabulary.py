@@ -19,7 +19,7 @@ from screwsynth.nlp.system.slips import hint_of, toml_slips
 #: What the same word may mean in one command only: the command exists to write it, or it is about another thing.
 FORMS = {
     "--set": "NAME=VALUE", "--of": "RESULT", "--starts": "N", "--seed": "N", "--jobs": "N", "--time": "SECONDS",
-    "--json": "FILE", "--csv": "FILE", "--html": "FILE", "--plot": "FILE", "--gap": "PART", "--pose": "N",
+    "--json": "FILE", "--csv": "FILE", "--html": "FILE", "--plot": "FILE", "--gap": "FRACTION", "--pose": "N",
 }  # fmt: skip
 #: Words that were, or might be, used for what another word stands for.
 BANNED = {
@@ -105,9 +105,9 @@ ROBOT = (ROBOTS / "reachy-mini-head.toml").read_text(encoding="utf-8")
         (("models", "none.toml"), "none.toml"),
         (("solve", "--hlep"), "--hlep: no such option of solve; did you mean '--help'?"),
         (("--hlep",), "--hlep: no such option of screwsynth; did you mean '--help'?"),
-        (("solve", "delta"), "delta: is a robot, not a case; screwsynth new delta > my-delta.toml writes a case of it"),
+        (("solve", "delta"), "delta: is a robot, not a case; screwsynth new delta > my-delta.toml writes a case"),
         (("workspace", "stewart-gough"), "is a robot, not a case"),
-        (("models", "paper-4.2"), 'robot.model = "paper-4.2": no such robot; this is a case'),
+        (("models", "paper-4.2"), "no such robot; 'paper-4.2' is a case"),
         (("compare", "paper-4.2", "case", "paper-4.3"), "and no such robot file; this is a case"),
         (("solve", "nowhere.toml"), "nowhere.toml: no such file"),
         (("solve", "paper-4.1-helical.toml"), "did you mean 'paper-4.1-helical'? this case comes with screwsynth"),
@@ -117,12 +117,12 @@ ROBOT = (ROBOTS / "reachy-mini-head.toml").read_text(encoding="utf-8")
         (("help",), "help: no such command; write screwsynth --help"),
         (("help", "solve"), "help: no such command; write screwsynth solve --help"),
         (("version",), "version: no such command; write screwsynth --version"),
-        (("my.toml",), "my.toml: no such command; a case stands behind a command, as in screwsynth solve my.toml"),
+        (("my.toml",), "my.toml: no such command; this is a case: write it after a command, as in screwsynth"),
         (("paper-4.2", "--all"), "as in screwsynth solve paper-4.2"),
-        (("delta",), "this is a robot: screwsynth models delta shows it, screwsynth new delta writes a case of it"),
+        (("delta",), "this is a robot: screwsynth models delta shows it, screwsynth new delta prints a case for it"),
         (("slove",), "did you mean 'solve'?"),
         (("solve", "paper-4.2", "--set", "x1=12,5"), "must be NAME=NUMBER, or axis=X,Y,Z; write 12.5: a decimal"),
-        (("solve", "paper-4.2", "--set", "x1=12 cm"), "; write 12: a number stands without its unit"),
+        (("solve", "paper-4.2", "--set", "x1=12 cm"), "; write 12: a number is written without its unit"),
         (("solve", "paper-4.2", "--time", "10s"), "--time 10s: must be a number; write 10: a number stands"),
     ],
     ids=lambda given: " ".join(given) if isinstance(given, tuple) else "",
@@ -133,12 +133,12 @@ def test_the_nearest_right_thing_is_named(arguments: tuple[str, ...], words: str
 
 def test_files_of_another_kind_are_named(tmp_path: Path, cli: Run) -> None:
     named = saved_with_robot(tmp_path, ROBOT, edited(starter_text("6-rus"), ('"6-rus"', '"robot.toml"')))
-    words = 'no such robot; a robot file is named by file = "robot.toml", in the place of model'
+    words = 'no such robot; for a robot file, write file = "robot.toml" instead of model'
     refusal_of(cli("solve", named), f'robot.model = "robot.toml": {words}')
     robot, case = str(tmp_path / "robot.toml"), str(saved(tmp_path / "mine.toml", CASE))
-    refusal_of(cli("solve", robot), 'is a robot file, and not a case; [robot] file = "robot.toml" in a case reads it')
+    refusal_of(cli("solve", robot), 'is a robot file, not a case; write [robot] file = "robot.toml" in a case')
     for arguments in (("models", case), ("new", case), ("compare", "paper-4.2", "case", case)):
-        refusal_of(cli(*arguments), "is a case, and not a robot file; screwsynth solve takes it")
+        refusal_of(cli(*arguments), "is a case, not a robot file; screwsynth solve takes it")
 
 
 def test_units_and_decimal_commas_in_toml_are_named_with_their_lines(tmp_path: Path, cli: Run) -> None:
@@ -155,7 +155,7 @@ def test_units_and_decimal_commas_in_toml_are_named_with_their_lines(tmp_path: P
     table = saved(tmp_path / "points.csv", "x1\n12\n13 mm\n")
     arguments = ("sweep", "paper-4.2", "--over", str(table), "--out", str(tmp_path / "out.csv"))
     refusal_of(
-        cli(*arguments), 'row 3, column x1 = "13 mm": must be a number; write 13: a number stands without its unit'
+        cli(*arguments), 'row 3, column x1 = "13 mm": must be a number; write 13: a number is written without its unit'
     )
     table = saved(tmp_path / "poses.csv", 'x,y,z\n1,2,"3,5"\n')
     fault = "must be a number; write 3.5: a decimal number has a point"

@@ -32,7 +32,7 @@ from screwsynth.models import FloatArray
 from screwsynth.nlp import Case, CaseError, Free, Limits, json_data, load_case, load_result, result_of, solve
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.proof.enclosure.forms import Encloser
-from screwsynth.nlp.proof.statement.machine import Legs, legs_of
+from screwsynth.nlp.proof.statement.fixed_robot import Legs, legs_of
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal, Number
 from screwsynth.nlp.proof.workspace.numbers.jacobian_numbers import WorstError
@@ -248,13 +248,13 @@ def test_the_command_proves_and_refutes(cli: Run, machine: Path, tmp_path: Path)
     command = ("workspace", str(machine), "--gap", "0.01")
     out = output_of(cli(*command, "--json", str(target)))
     assert "J has full rank at every pose" in out
-    assert "everything is proved" in out
+    assert "PROVED at every pose" in out
     result = load_result(target)
     assert isinstance(result, WorkspaceResult)
     assert result.proved
     jsonschema.validate(json.loads(target.read_text(encoding="utf-8")), result_schema())
     code, out, _ = cli(*command, "--set", "limits.leg_length.max=40")
-    assert (code, "refuted" in out) == (1, True)
+    assert (code, "NOT PROVED" in out) == (1, True)
 
 
 @pytest.mark.parametrize(
@@ -353,7 +353,7 @@ def test_the_shipped_design_violates_nothing_at_many_poses_and_its_proof_is_acce
     solution = solve(load_case("hexapod-workspace"), starts=4)
     saved(result, json.dumps(solution.to_dict()))
     output_of(cli("workspace", "hexapod-workspace", "--of", str(result), "--gap", "2e-4", "--proof", target))
-    assert output_of(cli("verify-proof", target)).startswith("holds: 58 of 58 claims")
+    assert output_of(cli("verify-proof", target)).startswith("PROOF VALID: 58 of 58 claims")
     proof = solution.workspace
     assert proof.is_proved
     robot, box = legs_of(proof.judgement.case), pose_box(proof.judgement.workspace)

@@ -25,13 +25,13 @@ from screwsynth.models.joints.model.closedform import closed_form
 from screwsynth.nlp import Case, CaseError, Outcome, Sense, build_model, json_data, judge_workspace
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.enclosure.forms import Forms
-from screwsynth.nlp.proof.statement.machine import Legs, joint_centres
+from screwsynth.nlp.proof.statement.fixed_robot import Legs, joint_centres
 from screwsynth.nlp.proof.statement.tolerance import built_model, is_smooth
 from screwsynth.nlp.proof.workspace.numbers import expressions
-from screwsynth.nlp.proof.workspace.numbers import machines as tolerance
+from screwsynth.nlp.proof.workspace.numbers import within_tolerance as tolerance
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal, smallest_values
 from screwsynth.nlp.proof.workspace.numbers.extremes import NumberSearch
-from screwsynth.nlp.proof.workspace.numbers.machines import Machines
+from screwsynth.nlp.proof.workspace.numbers.within_tolerance import RobotsWithinTolerance
 from screwsynth.nlp.proof.workspace.ranks import rank_rule as rank
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularPose
@@ -44,9 +44,9 @@ TWIST_AXIS, TWIST_POINT, PITCH = np.array([1.0, 2.0, 6.0]), np.array([0.3, 0.1, 
 COUNT, STEEP = 20_000, 256
 
 
-def machines(case: Case) -> Machines:
+def machines(case: Case) -> RobotsWithinTolerance:
     closed = closed_form(case.model)
-    return Machines(case, closed, problem_of(case))
+    return RobotsWithinTolerance(case, closed, problem_of(case))
 
 
 def turned(a: FloatArray, angles: FloatArray) -> FloatArray:
@@ -328,7 +328,7 @@ def test_ranks_and_numbers_of_machines_are_on_paper() -> None:
         assert judged.is_proved
         checked = check_workspace_proof(proof, case)
         assert len(checked.claims) == count, [each.name for each in checked.claims]
-        assert {"all machines together" in each.reason for each in proof.unproved} <= {True}
+        assert {"all robots within the tolerance" in each.reason for each in proof.unproved} <= {True}
         extremes = {(each.name, each.sense.value): each for each in judged.extremes}
         for each in checked.claims:
             if each.bound is not None:
@@ -411,18 +411,18 @@ def test_what_is_not_covered_is_open_with_the_reason() -> None:
     tables["workspace"]["position"] = [0, 0, 0]
     judged = judge_workspace(case_from(tables, "spherical"), with_objective=False)
     assert judged.regularity.outcome is Outcome.OPEN
-    assert "take freedoms" in judged.regularity.reason
+    assert "remove degrees of freedom" in judged.regularity.reason
     assert judged.extremes
     assert all(each.outcome is Outcome.OPEN for each in judged.extremes)
-    assert all("take freedoms" in each.reason for each in judged.extremes)
+    assert all("remove degrees of freedom" in each.reason for each in judged.extremes)
     # With errors a Delta that is held without rotation would have to turn.
     delta = tables_of("3-rps", turn=0, robot=typical("delta"), height=build_model("delta").home[2])
     delta["workspace"]["position"][2] = build_model("delta").home[2]
     found = judge_workspace(case_from(delta, "delta"), with_limits=False).regularity
     assert found.outcome is Outcome.OPEN
-    assert "does not have the poses" in found.reason
+    assert "does not reach the poses" in found.reason
     del tables["workspace"]
-    with pytest.raises(CaseError, match=r"tolerance.joint_centre: is not computed for 'spherical-3-rrr'"):
+    with pytest.raises(CaseError, match=r"tolerance.joint_centre: is not supported for the robot 'spherical-3-rrr'"):
         case_from(tables, "spherical")
 
 

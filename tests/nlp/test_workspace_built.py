@@ -22,14 +22,14 @@ from screwsynth.nlp.case.limits.legs import Actuator, LegLength
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.interruption import within
 from screwsynth.nlp.proof.statement.claims import claims_of
-from screwsynth.nlp.proof.statement.machine import Legs, legs_of, workspace_of_case
+from screwsynth.nlp.proof.statement.fixed_robot import Legs, legs_of, workspace_of_case
 from screwsynth.nlp.proof.statement.posed_layout import posed_layout
 from screwsynth.nlp.proof.statement.tolerance import built_model
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal, Number
 from screwsynth.nlp.proof.workspace.numbers.extremes import NumberSearch, prove_extreme
-from screwsynth.nlp.proof.workspace.numbers.machines import Machines as EveryMachine
 from screwsynth.nlp.proof.workspace.numbers.pose_error import pose_errors
 from screwsynth.nlp.proof.workspace.numbers.strokes import _better
+from screwsynth.nlp.proof.workspace.numbers.within_tolerance import RobotsWithinTolerance
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examined, Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.rank_rule import RankTest
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
@@ -151,7 +151,7 @@ def machines(case: Case) -> Machines:
 
 def test_no_machine_within_the_tolerance_is_outside_of_a_proven_bound(case: Case, machines: Machines) -> None:
     sampled, seen = dict(numbers(case, legs_of(case), machines)), set()
-    every = EveryMachine(case, closed_form(case.model), problem_of(case))
+    every = RobotsWithinTolerance(case, closed_form(case.model), problem_of(case))
     picked = [name for name in sampled if " 1-" in name or " 2+" in name or " " not in name]
     claims = [each for each in every.symbols.claims(["base_joint_angle"])[1] if each.name in picked]
     for each in (every.extreme(claim, NumberSearch(jobs=1)) for claim in claims):
@@ -380,9 +380,10 @@ def test_the_command_shows_the_machine_that_refutes(cli: Run, tmp_path: Path) ->
     assert refuted
     for each in refuted:
         assert max(np.linalg.norm(each.machine.base, axis=1)) == pytest.approx(TOLERANCE)
-    assert shown.index("verdict") < shown.index("tightest limits") < shown.index("limits over every pose")
-    assert "every one whose joint centres are off by at most 0.02 in" in shown
-    assert f"the machine that refutes: {refuted[0].name}" in shown
+    places = [shown.index(each) for each in ("verdict", "limits with the smallest margin", "limits over all poses")]
+    assert places == sorted(places)
+    assert "covers every robot whose joint centres are off by at most 0.02 in" in shown
+    assert f"robot within the tolerance that violates: {refuted[0].name}" in shown
     assert "see it with" in shown
 
 
@@ -416,7 +417,7 @@ def test_what_takes_the_limits_at_the_stated_pose_says_so(cli: Run, tmp_path: Pa
     code, out, err = cli("certify", "hexapod-workspace", "--time", "1", "--starts", "1", "--json", str(target))
     assert code in (0, 1)
     result = json.loads(target.read_text(encoding="utf-8"))
-    notice = "the limits are taken at the stated pose alone, not over the workspace"
+    notice = "the limits are evaluated only at the stated pose, not over the workspace"
     assert result["notice"] == notice
     jsonschema.validate(result, result_schema())
     assert notice in " ".join((out + err).split())

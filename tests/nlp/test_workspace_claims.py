@@ -23,7 +23,7 @@ from screwsynth.nlp.case.limits.singular_values import SmallestSingularValue
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.output.pictures.workspaces import drawing_at, slices_legend
-from screwsynth.nlp.proof.statement.machine import legs_of
+from screwsynth.nlp.proof.statement.fixed_robot import legs_of
 from screwsynth.nlp.proof.workspace import judge
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.judgement import Judgement
@@ -37,7 +37,7 @@ from screwsynth.nlp.proof.workspace.slices.slices import slices_of
 from screwsynth.nlp.proof.workspace.verdict import Verdict
 from screwsynth.nlp.results.claims import refuted_claims, worst_claim
 from screwsynth.nlp.results.workspace import WorkspaceResult, workspace_of
-from screwsynth.nlp.words.claims import claim_words, seeing_lines
+from screwsynth.nlp.words.claims import claim_words, violation_lines
 from screwsynth.nlp.words.workspace import verdict_words
 
 Value = TypeVar("Value")
@@ -90,10 +90,11 @@ def test_numbers_that_are_only_shown_decide_nothing(monkeypatch: pytest.MonkeyPa
     assert {each.name for each in found.extremes if each.outcome is Outcome.OPEN} == {"F"}
     assert found.is_proved
     assert verdict_words(workspace_of(found)) == (
-        "everything is proved for every pose; 2 numbers without a limit stay open"
+        "PROVED at every pose: no singularity, 12 limits satisfied "
+        "(2 quantities without a limit undecided, for information)"
     )
     half = judged("leg_length = { min = 15 }")
-    assert verdict_words(workspace_of(half)).endswith("; 8 numbers without a limit stay open")
+    assert verdict_words(workspace_of(half)).endswith(" (8 quantities without a limit undecided, for information)")
     assert half.is_proved
 
 
@@ -109,7 +110,7 @@ def test_the_exit_status_is_that_of_ranks_and_limits(cli: Run, monkeypatch: pyte
     monkeypatch.setattr(judge, "prove_extreme", opened)
     for text, status in (("leg_length = { min = 15, max = 60 }", 0), ("leg_length = { min = 15, max = 20 }", 1)):
         code, out, _ = cli("workspace", str(saved(tmp_path / "case.toml", SMALL + text)))
-        assert (code, "not everything is proved" in out) == (status, bool(status))
+        assert (code, "NOT PROVED" in out) == (status, bool(status))
 
 
 @pytest.mark.parametrize(
@@ -146,14 +147,14 @@ def changed(value: Value, **parts: object) -> Value:
 
 def counted(result: WorkspaceResult) -> tuple[int, int]:
     """Refuted claims of the verdict's words, and those of the list of commands."""
-    lines = list(seeing_lines(result, lambda _: "command"))
+    lines = list(violation_lines(result, lambda _: "command"))
     shown = {
         each.words.partition(":")[0] + each.words.partition("limit ")[2].partition(";")[0]
         for each in lines
-        if each.label == "refuted"
+        if each.label == "violated"
     }
-    others = sum(int(each.words.partition(":")[0]) for each in lines if each.label == "other refuted claims")
-    counts = re.search(r"(\d+) refuted", verdict_words(result))
+    others = sum(int(each.words.partition(":")[0]) for each in lines if each.label == "other violated claims")
+    counts = re.search(r"(\d+) limits? violated", verdict_words(result))
     return int(counts[1]), len(shown) + others
 
 
@@ -175,7 +176,7 @@ def test_the_rank_of_constraints_is_counted() -> None:
     assert result.constraints is not None
     refuted = changed(result.constraints, outcome=Outcome.REFUTED)
     lost = changed(result, proved=False, constraints=refuted)
-    assert verdict_words(lost) == "not everything is proved: 1 refuted, 0 open, 1 proved"
+    assert verdict_words(lost) == "NOT PROVED: a singularity, 0 limits violated, 0 undecided, 1 proved"
 
 
 def test_actuators_keep_the_limit_on_their_rates() -> None:
@@ -246,8 +247,8 @@ def test_no_time_and_no_box_are_no_number(tmp_path: Path, cli: Run) -> None:
     assert not nowhere.reason
     path, target, page = tmp_path / "c.toml", tmp_path / "r.json", tmp_path / "p.html"
     for text, time, words, reason in (
-        (HORNS, "1e-6", "largest proved box: none found within the time", "the time is over"),
-        (edited(HORNS, IMPOSSIBLE), "0.4", "not even the smallest", None),
+        (HORNS, "1e-6", "largest proved box  none found within the time limit", "the time is over"),
+        (edited(HORNS, IMPOSSIBLE), "0.4", "even the smallest box tried is not proved", None),
     ):
         pages = ("--html", str(page)) if reason else ()
         found = cli("workspace", str(saved(path, text)), "--scale", "--time", time, "--json", str(target), *pages)
@@ -405,7 +406,7 @@ def test_each_command_shows_what_it_is_printed_for(refuted: tuple[str, Workspace
     assert len(commands) == len(keys) + 1
     page = Reader((folder / "page.html").read_text(encoding="utf-8")).words
     assert all(shlex.join(["screwsynth", *each]) in page for each in commands)
-    words = [line.removeprefix("refuted  ") for line in unbroken(out).splitlines() if line.startswith("refuted  ")]
+    words = [line.removeprefix("violated  ") for line in unbroken(out).splitlines() if line.startswith("violated  ")]
     words = [each for each in words if ": smallest " in each or ": largest " in each]
     for claim, arguments in zip(words, commands, strict=True):
         status, shown, _ = cli(*arguments, "--json", "-")
@@ -443,7 +444,7 @@ def test_a_singular_pose_is_seen_with_its_command(cli: Run, tmp_path: Path) -> N
     path = saved(tmp_path / "turned.toml", hexapod_text(5, 9) + place)
     status, out, _ = cli("workspace", str(path), "--gap", "0.5", "--time", "0.1")
     assert status == 1
-    assert "refuted  regular: J is singular" in out
+    assert "violated  J is singular" in out
     _, shown, _ = cli(*commands_in(out, "see it with")[0], "--json", "-")
     assert json.loads(shown)["rank"] < 6
 
@@ -487,7 +488,7 @@ def test_the_page_has_verdicts_poses_and_slices(refuted: tuple[str, WorkspaceRes
 
 
 def test_the_shipped_hexapod_is_proved(cli: Run) -> None:
-    assert "everything is proved for every pose" in output_of(cli("workspace", "hexapod-linuxcnc"))
+    assert "PROVED at every pose" in output_of(cli("workspace", "hexapod-linuxcnc"))
     assert load_case("hexapod-linuxcnc").position[2] == pytest.approx(20)
 
 

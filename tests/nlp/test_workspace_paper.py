@@ -44,7 +44,7 @@ from screwsynth.nlp.proof.checker.workspace.number_claims import (
 )
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import BoxClaim, PoseRoot, pose_root
 from screwsynth.nlp.proof.checker.workspace.ranks import RankClaim, rank_claim
-from screwsynth.nlp.proof.statement.machine import Legs, legs_of
+from screwsynth.nlp.proof.statement.fixed_robot import Legs, legs_of
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Number
 from screwsynth.nlp.proof.workspace.numbers.jacobian_numbers import WorstError
 from screwsynth.nlp.proof.workspace.numbers.pose_error import PoseErrors, with_rest
@@ -178,7 +178,7 @@ def test_a_proof_is_for_its_case_only(proof: Proof) -> None:
     assert "other joint centres" in refused(proof, ("11.543", "11.544"))
     assert "other expressions" in refused(alone(proof, "F"), ("axis = [0, 0, 1]", "axis = [0, 1, 1]"))
     assert "see regular" in refused(replace(proof, claims=proof.claims[1:]))
-    assert "each once" in refused(replace(proof, claims=(*proof.claims, proof.claims[0])))
+    assert "exactly once" in refused(replace(proof, claims=(*proof.claims, proof.claims[0])))
     assert "leg_clearance" in refused(proof, ("leg_clearance = { min = 0.5 }", ""))
     assert "no reason" in refused(changed(alone(proof, "condition_number"), "condition_number", reason="lengths"))
     assert "measure" in refused(stating(proof, quantities=("none",)))
@@ -211,7 +211,7 @@ def test_a_refuted_workspace_carries_two_poses(tolerance: str) -> None:
     given = on_paper(case, text, with_limits=False)[1]
     (found,) = check.check_workspace_proof(given, case).claims
     assert found.is_refuted
-    missing = {"it was not judged", "the lengths of legs that it needs have no proof"}
+    missing = {"it was not judged", "it requires leg lengths, which have no proof"}
     assert {each.reason for each in given.unproved} <= missing
     first, second = claim(given, "regular").sides
     for sides, fault in (
@@ -231,11 +231,11 @@ def test_the_commands_write_and_check_proofs(cli: Run, tmp_path: Path) -> None:
     file = saved(tmp_path / "machine.toml", text)
     code, _, err = cli("workspace", str(file), "--gap", "0.1", "--proof", str(target))
     assert code == 1
-    missing = "not on paper: actuator.stroke_max limb 1- max: refuted"
+    missing = "no proof: actuator.stroke_max limb 1- max: refuted"
     assert missing in err
     for arguments in ((str(target),), (str(target), str(file))):
         out = unbroken(output_of(cli("verify-proof", *arguments, "--all")))
-        assert out.startswith("holds: ")
+        assert out.startswith("PROOF VALID: ")
         assert "regular: J has full rank at every pose" in out
         assert missing in out
     saved(file, edited(text, ("min = -2, max = 2", "min = -2, max = 3")))

@@ -37,9 +37,9 @@ from screwsynth.nlp.proof.checker.workspace.motion_matrix import PosedRobot
 from screwsynth.nlp.proof.checker.workspace.number_claims import SecondOrderClaim, SingularClaim, change_of_jacobian
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import PoseRoot, pose_root
 from screwsynth.nlp.proof.checker.workspace.ranks import RankClaim, rank_claim
-from screwsynth.nlp.proof.checker.workspace.statement import Machines
-from screwsynth.nlp.proof.statement.machine import Legs
-from screwsynth.nlp.proof.statement.tolerance import Directions, length_of_one_machine, second_order_name
+from screwsynth.nlp.proof.checker.workspace.statement import RobotsWithinTolerance
+from screwsynth.nlp.proof.statement.fixed_robot import Legs
+from screwsynth.nlp.proof.statement.tolerance import Directions, length_of_one_robot, second_order_name
 from screwsynth.nlp.proof.workspace.numbers.extremes import NumberSearch
 from screwsynth.nlp.proof.workspace.numbers.searched import Subject, searched_extremes
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
@@ -126,7 +126,7 @@ def test_another_tolerance_is_rejected(proof: Proof) -> None:
     larger = TEXT.replace("joint_centre = 0.02", "joint_centre = 0.06")
     without = TEXT.replace("[tolerance]\njoint_centre = 0.02\n", "")
     for text in (larger, TEXT.replace("joint_centre = 0.02", "joint_centre = 0.01"), without):
-        assert "within another tolerance" in rejected(proof, case_of(text))
+        assert "another joint-centre tolerance" in rejected(proof, case_of(text))
     # Another number in the file is no way around: bounds are those of the machines of the case.
     longest = claim(proof, "leg_length limb 2-", "max").bound
     reject = rejections(stating(proof, joint_centre=0.06), larger)
@@ -137,7 +137,7 @@ def test_another_tolerance_is_rejected(proof: Proof) -> None:
     assert "does not keep" in rejections(proof, smaller)("leg_length limb 2-", "max")
     reject = rejections(stating(proof, joint_centre=0.0), without)
     assert "other expressions" in reject("F", "max")
-    assert "about the exact machine" in reject("actuator.stroke_max limb 2+", "max")
+    assert "about the exact robot" in reject("actuator.stroke_max limb 2+", "max")
 
 
 def value_of(name: str, sense: str, number: float) -> float:
@@ -186,8 +186,8 @@ def test_other_lemmas_and_directions_are_rejected(proof: Proof) -> None:
     assert "have no proof" in reject("smallest_singular_value", "min")
 
 
-def machines_of(case: Case) -> tuple[Machines, PoseRoot]:
-    return Machines(case, closed_form(case.model).model, root_of(case)), root_of(case)
+def machines_of(case: Case) -> tuple[RobotsWithinTolerance, PoseRoot]:
+    return RobotsWithinTolerance(case, closed_form(case.model).model, root_of(case)), root_of(case)
 
 
 @pytest.mark.parametrize("robot", soaked(["hexapod", "6-rus"], ["hexapod"]))
@@ -257,7 +257,7 @@ def test_lengths_of_one_machine_hold_at_two_poses() -> None:
         about = Directions("stroke", base, base)
         bounds = []
         for sense, pose in zip((Sense.MAX, Sense.MIN), poses, strict=True):
-            one = length_of_one_machine(symbols, i, sense, about)
+            one = length_of_one_robot(symbols, i, sense, about)
             rest = 4 * t**2 / min(length)
             assert SecondOrderClaim(found, one.expression, rest).attempt(root.lower[None], root.upper[None]).holds[0]
             value = ca.Function("value", [found.design.table.variables_vector], [found.number(one, rest)])
@@ -372,7 +372,7 @@ def test_a_singular_machine_within_the_tolerance_is_on_paper() -> None:
     assert judged.regularity.errors is not None
     (found,) = check.check_workspace_proof(given, case_of(text)).claims
     assert found.is_refuted
-    assert found.by_machine
+    assert found.is_within_tolerance
     design, machine = claim(given, "regular").sides
     assert design == (*machine[:6], *[0.0] * 36)
     for sides, fault in (
@@ -398,7 +398,7 @@ def test_the_commands_say_which_machines_a_proof_is_about(cli: Run, tmp_path: Pa
     content["case"] = edited(content["case"], ("joint_centre = 0.02", "joint_centre = 0.002"))
     code, _, err = cli("verify-proof", str(saved(target, json.dumps(content))))
     assert code == 1
-    assert err.startswith("rejected: the proof is for machines within another tolerance")
+    assert err.startswith("rejected: the proof is for another joint-centre tolerance")
 
 
 def test_asked_singular_values_of_the_exact_machine_are_on_paper() -> None:
@@ -425,4 +425,4 @@ def test_the_shipped_machine_as_it_is_built_is_accepted(cli: Run, tmp_path: Path
     case = case_file(tmp_path, case_tables("hexapod-linuxcnc", tolerance={"joint_centre": 0.002}))
     target = tmp_path / "proof.json"
     output_of(cli("workspace", str(case), "--gap", "0.2", "--time", "200", "--proof", str(target)))
-    assert "not on paper" not in output_of(cli("verify-proof", str(target)))
+    assert "no proof" not in output_of(cli("verify-proof", str(target)))

@@ -28,16 +28,16 @@ from screwsynth.models import FloatArray
 from screwsynth.models.joints.model.closedform import closed_form
 from screwsynth.nlp import Case, Judgement, Loading, Motion, Outcome, Verdict
 from screwsynth.nlp.case.source import find_case
-from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, read_proof, workspace_numbers
+from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, read_proof, workspace_premise
 from screwsynth.nlp.proof.checker.tree import Node, node_bytes
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.checker.workspace.closed_loops import Assembly
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import _PoseRule
 from screwsynth.nlp.proof.checker.workspace.statement import robot_claims
 from screwsynth.nlp.proof.statement.claims import REGULAR
-from screwsynth.nlp.proof.statement.machine import workspace_of_case
-from screwsynth.nlp.proof.workspace.numbers.machines import Machines
+from screwsynth.nlp.proof.statement.fixed_robot import workspace_of_case
 from screwsynth.nlp.proof.workspace.numbers.searched import Subject, motor_extremes
+from screwsynth.nlp.proof.workspace.numbers.within_tolerance import RobotsWithinTolerance
 from screwsynth.nlp.proof.workspace.proof_record import ProofRecord
 from screwsynth.nlp.proof.workspace.proof_writer import proof_of as written
 from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularPose
@@ -191,7 +191,7 @@ def test_the_tree_of_another_workspace_does_not_hide_a_singular_pose(
     _, proof = reachy
     case = reachy_case(1.0)
     monkeypatch.setattr(_PoseRule, "most_pieces", 100)
-    other = stating(only(proof, "regular"), workspace=workspace_numbers(case.workspace))
+    other = stating(only(proof, "regular"), workspace=workspace_premise(case.workspace))
     # All claims about limits are named, and none is proved.
     assert "could not be shown" in rejected(other, case)
 
@@ -221,7 +221,7 @@ def test_a_singular_pose_of_a_robot_without_loops_is_on_paper() -> None:
     assert "opposite signs" in rejected(only(proof, "regular", sides=(first, first)), case)
     assert "not one of the workspace" in rejected(only(proof, "regular", sides=(first, (99.0, *second[1:]))), case)
     small = gallery_case("6-ups", 0.02, 5, 1)
-    other = stating(proof, workspace=workspace_numbers(small.workspace))
+    other = stating(proof, workspace=workspace_premise(small.workspace))
     assert "not one of the workspace" in rejected(other, small)
 
 
@@ -229,10 +229,10 @@ def test_a_singular_pose_of_a_robot_without_loops_is_on_paper() -> None:
     ("name", "reached", "words"),
     [
         ("6-sps", True, ""),
-        ("6-rus", True, "the assembly of home"),
-        ("6-rus", False, "every assembly"),
-        ("planar-3-prr", True, "every assembly in which limbs in closed form are as at home"),
-        ("3-rps", True, "every assembly"),
+        ("6-rus", True, "the home assembly mode"),
+        ("6-rus", False, "every assembly mode"),
+        ("planar-3-prr", True, "every assembly mode in which limbs in closed form are as at home"),
+        ("3-rps", True, "every assembly mode"),
     ],
 )
 def test_claims_name_the_assemblies_of_their_numbers(name: str, reached: bool, words: str) -> None:
@@ -256,7 +256,7 @@ def motors_on_paper(case: Case) -> tuple[dict[tuple[str, str], Verdict], Proof]:
     box = box_of(case)
     meant = build_problem(case, closed.model, box)
     if case.joint_centre_tolerance:
-        meant = Machines(case, closed, meant).family
+        meant = RobotsWithinTolerance(case, closed, meant).family
     found = tuple(motor_extremes(Subject(case, closed.model, meant), record=record))
     judged = Judgement(case, workspace_of_case(case), (not_judged(REGULAR, "not requested"), *found))
     proof = read_proof(written(judged, record, "").as_text(), "again")

@@ -51,7 +51,7 @@ from screwsynth.nlp.proof.workspace.slices.slice_limits import KEPT, UNDECIDED
 from screwsynth.nlp.proof.workspace.slices.slices import Region, Slice, slices_of
 from screwsynth.nlp.solver.solve import solve
 
-NOTICE = "the limits are taken at the stated pose alone, not over the workspace"
+NOTICE = "the limits are evaluated only at the stated pose, not over the workspace"
 
 
 def delta(arm: float, rod: object, **limits: object) -> Case:
@@ -228,7 +228,7 @@ def test_a_slice_is_drawn_where_no_loops_close_at_its_ends() -> None:
 def test_slices_need_two_numbers_that_the_robot_can_choose() -> None:
     turns = {"pitch": ends(10), "yaw": ends(5)}
     case = tripod_case(workspace={"position": [ends(0.2), ends(0.2), 1.1], "rotation": turns})
-    with pytest.raises(CaseError, match="two numbers of the pose"):
+    with pytest.raises(CaseError, match="two independent coordinates of the pose"):
         slices_of(case)
 
 
@@ -500,7 +500,7 @@ def test_the_check_begins_in_the_working_mode_of_home() -> None:
         try:
             problem_of(case)
         except NotJudgedError:
-            with pytest.raises(ProofError, match="in the assembly of home"):
+            with pytest.raises(ProofError, match="in the home assembly mode"):
                 start_of(robot)
             tried += 1
         else:

@@ -1,8 +1,8 @@
 """Joints and limbs at home, as expressions of the robot's dimensions.
 
-A limb is one path of joints from base to platform, or several that share the joints of a stem. The copies of a limb
-that is repeated are its rotations about the axis of repetition. A robot of links and joints has limbs where its graph
-has them; other parts of it are left over as networks.
+A limb is one path of joints from base to platform, or several that share the joints of a stem. The copies of a repeated
+limb are its rotations about the axis of repetition. A robot given by links and joints has limbs where its graph has
+such paths; the remaining joints form networks.
 """
 
 from __future__ import annotations
@@ -26,25 +26,25 @@ from ..written.forms import RobotError, UndefinedError, VectorExpression
 from ..written.words import GraphWords, JointWords, LimbWords, RepeatWords, RobotWords
 from .motion import UNIT_VECTORS, AxisKind, JointAxis
 
-#: Entries of a rotation of repetition this near to -1, -1/2, 0, 1/2 or 1 are these numbers: a turn by 120 degrees then
-#: leaves no entries of rounding error in the expressions.
+#: Tolerance for rounding an entry of the rotation of a copy to -1, -1/2, 0, 1/2 or 1: a rotation by 120 degrees then
+#: leaves no rounding errors in the expressions.
 _EXACT = 1e-15
-#: Letters of an expression that a message shows.
+#: Largest number of characters of an expression in a message.
 _LONGEST_SHOWN = 60
 
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """A joint at home.
+    """Joint at home.
 
     Attributes:
         place: limb and joint, for messages.
-        type: its letter, ``R, P, H, C, U, S`` or ``Pa``.
-        point: (3, 1) its centre or a point of its axis, length.
-        axes: its axes, each with one variable, the base side first; those of a spherical joint are along x, y and z.
-        actuated: whether an actuator drives it.
-        name: that the user gives it; empty for none.
-        parts: the joints as they are written that this one stands for; empty for a joint as it is written.
+        type: letter of the joint type: ``R, P, H, C, U, S`` or ``Pa``.
+        point: (3, 1) centre of the joint or point of its axis, length.
+        axes: axes with one coordinate each, from the base side on; those of a spherical joint are along x, y and z.
+        actuated: True if an actuator drives the joint.
+        name: name of the joint in the robot file; empty for none.
+        parts: written joints that this joint replaces; empty for a joint as it is written.
     """
 
     place: str
@@ -58,16 +58,16 @@ class Joint:
 
 @dataclass(frozen=True, eq=False)
 class Limb:
-    """A limb at home.
+    """Limb at home.
 
     Attributes:
-        name: of the limb.
-        place: for messages.
-        group: index of the written limb that it is a copy of.
-        stem: joints that all paths share, from the base on.
-        branches: joints of each path behind the stem; one empty path for a limb without branches.
-        centre: (3, 1) the centre that the user gives, length; None for that of the rule.
-        turn: (3, 3) rotation of a copy from the limb as it is written.
+        name: name of the limb.
+        place: place of the limb in the robot file, for messages.
+        group: index of the limb in the robot file of which this limb is a copy.
+        stem: joints from the base on that all paths share.
+        branches: joints of each path after the stem; one empty path for a limb without branches.
+        centre: (3, 1) centre given by the user, length; None for the centre by rule.
+        turn: (3, 3) rotation of this copy relative to the limb in the robot file.
     """
 
     name: str
@@ -79,11 +79,11 @@ class Limb:
     turn: FloatArray
 
     def member(self, path: int) -> str:
-        """Return the name of a path, by its index: that of the limb, with a number where there are several."""
+        """Return the name of a path by its index: the limb's name, with a number if the limb has several paths."""
         return f"{self.name}.{path + 1}" if len(self.branches) > 1 else self.name
 
     def label(self, path: int, joint: int) -> str:
-        """Return the label of a joint of a path, such as ``2:3``, or ``2.1:3`` on a branch, by their indices."""
+        """Return the label of a joint of a path by their indices, such as ``2:3``, or ``2.1:3`` on a branch."""
         return f"{self.name if joint < len(self.stem) else self.member(path)}:{joint + 1}"
 
     @property
@@ -94,7 +94,7 @@ class Limb:
 
 @dataclass(frozen=True, eq=False)
 class LinkJoint:
-    """A joint between two links at home: the names of the joint and of its links; None for the joint of a weld."""
+    """Joint between two links at home: names of joint and links; ``joint`` is None for a weld."""
 
     name: str
     inner: str
@@ -104,14 +104,15 @@ class LinkJoint:
 
 @dataclass(frozen=True, eq=False)
 class HomeGraph:
-    """Links and joints at home.
+    """Links and joints of a robot at home.
 
     Attributes:
-        links: names.
-        base, platform: names of two of them.
-        joints: between them.
-        couplings: each as indices of joints, with a factor (1, 1) each; radians and lengths.
-        networks: indices of the joints of each part that no limb has.
+        links: names of the links.
+        base, platform: names of the links that are base and platform.
+        joints: joints between the links.
+        couplings: linear relations of joint coordinates (radians and lengths): index of each joint, with a factor (1,
+            1).
+        networks: joint indices of each part that belongs to no limb.
     """
 
     links: tuple[str, ...]
@@ -124,16 +125,16 @@ class HomeGraph:
 
 @dataclass(frozen=True, eq=False)
 class HomeRobot:
-    """A robot at home.
+    """Robot at home.
 
     Attributes:
-        words: as it is written.
-        symbols: (d, 1) symbols of its dimensions, in order; radians for angles.
-        typical: (d,) their typical values.
+        words: robot as it is written.
+        symbols: (d, 1) symbols of the dimensions, in order; radians for angles.
+        typical: (d,) typical values of the dimensions.
         home: (3, 1) origin of the platform frame, length.
-        size: (1, 1) a length of the order of the robot's own, by which lengths become plain numbers.
-        limbs: its limbs.
-        graph: its links and joints where it is given by these; None for a robot given limb by limb.
+        size: (1, 1) characteristic size of the robot, by which lengths become dimensionless.
+        limbs: limbs of the robot.
+        graph: links and joints, for a robot given by these; None for a robot given limb by limb.
     """
 
     words: RobotWords
@@ -146,22 +147,22 @@ class HomeRobot:
 
     @property
     def joints(self) -> list[Joint]:
-        """All joints: those of the graph, or of all paths of all limbs."""
+        """All joints, of the graph or of all paths of all limbs."""
         if self.graph is not None:
             return [each.joint for each in self.graph.joints if each.joint is not None]
         return [joint for limb in self.limbs for path in limb.paths for joint in path]
 
 
 def home_of(words: RobotWords, values: Mapping[str, float] = MappingProxyType({})) -> HomeRobot:
-    """Return a robot at home, given by limbs or by links and joints.
+    """Return a robot at home, from limbs or from links and joints.
 
     Args:
-        words: the robot as it is written.
-        values: of dimensions that are numbers, radians for angles; the others are symbols.
+        words: robot as it is written.
+        values: values of dimensions that are numbers, radians for angles; the other dimensions are symbols.
 
     Raises:
         UndefinedError: an expression has no finite value with these dimensions.
-        RobotError: an expression has another fault, or the graph is no robot.
+        RobotError: an expression has another fault, or the graph is not a parallel robot.
     """
     dimensions = words.dimensions.items()
     symbols = {name: SX(values[name]) if name in values else SX.sym(name) for name in words.dimensions}
@@ -183,8 +184,8 @@ def home_of(words: RobotWords, values: Mapping[str, float] = MappingProxyType({}
 def _size(lengths: Sequence[SX], robot: HomeRobot) -> SX:
     """Return the characteristic size of a robot (1, 1), length: smooth, and positive for nonzero dimensions.
 
-    The size is the norm of all dimensions that are lengths and of the largest literal coordinate in the robot's file.
-    A robot without any of these has size 1.
+    The size is the norm of all dimensions that are lengths and of the largest literal coordinate in the robot file. A
+    robot without any of these has size 1.
     """
     points = ca.veccat(SX(0), *[joint.point for joint in robot.joints])
     is_length = np.array([item.kind is Dimension.LENGTH for item in robot.words.dimensions.values()], dtype=bool)
@@ -197,7 +198,6 @@ def _size(lengths: Sequence[SX], robot: HomeRobot) -> SX:
 
 
 def _limbs(group: int, words: LimbWords, names: Mapping[str, SX]) -> list[Limb]:
-    """Return the copies of a limb."""
     known = _with_points(f"{words.place}, ", words.points, names)
     stem = tuple(_joint_at_home(joint, known) for joint in words.stem)
     branches = tuple(tuple(_joint_at_home(joint, known) for joint in branch) for branch in words.branches) or ((),)
@@ -208,12 +208,12 @@ def _limbs(group: int, words: LimbWords, names: Mapping[str, SX]) -> list[Limb]:
 
 
 def _with_points(place: str, points: Mapping[str, VectorExpression], names: Mapping[str, SX]) -> dict[str, SX]:
-    """Return the values of names with those of points, (3, 1) each.
+    """Return the values of names and points, (3, 1) for each point.
 
     Args:
-        place: words before the point in messages.
-        points: by name.
-        names: values that are known before.
+        place: text before the point in messages.
+        points: points by name.
+        names: values of the names before.
     """
     known = dict(names)
     for name, written in points.items():
@@ -239,7 +239,6 @@ def _turns(repeat: RepeatWords) -> list[Displacement]:
 
 
 def _turned(limb: Limb, name: str, turn: Displacement | None) -> Limb:
-    """Return a copy of a limb after a displacement."""
     if turn is None or turn.is_identity:
         return replace(limb, name=name)
     Q, t = SX(turn.rotation.tolist()), SX(turn.translation.tolist())
@@ -260,7 +259,6 @@ def _turned(limb: Limb, name: str, turn: Displacement | None) -> Limb:
 
 
 def _joint_at_home(words: JointWords, names: Mapping[str, SX]) -> Joint:
-    """Return a joint at home."""
     point = _vector(f"{words.place}, at", words.at, names)
     given = [_direction(f"{words.place}, axis", each, names) for each in words.axes]
 
@@ -286,7 +284,6 @@ def _joint_at_home(words: JointWords, names: Mapping[str, SX]) -> Joint:
 
 
 def _direction(place: str, written: VectorExpression, names: Mapping[str, SX]) -> SX:
-    """Return a unit vector (3, 1)."""
     vector = _vector(place, written, names)
     if vector.is_constant():
         numbers = np.array(ca.DM(vector)).ravel()
@@ -297,7 +294,7 @@ def _direction(place: str, written: VectorExpression, names: Mapping[str, SX]) -
 
 
 def _vector(place: str, written: VectorExpression, names: Mapping[str, SX], later: Collection[str] = ()) -> SX:
-    """Return the value of a vector expression, (3, 1); the last argument are names that are not given yet."""
+    """Return the value of a vector expression, (3, 1); ``later`` are names that are defined below."""
     if not isinstance(written, str):
         return ca.vertcat(*[scalar_value(place, each, names, later) for each in written])
     value = _evaluated(place, written, names, later)
@@ -307,7 +304,7 @@ def _vector(place: str, written: VectorExpression, names: Mapping[str, SX], late
 
 
 def scalar_value(place: str, written: str | float, names: Mapping[str, SX], later: Collection[str] = ()) -> SX:
-    """Return the value of a scalar expression, (1, 1); the last argument are names that are not given yet."""
+    """Return the value of a scalar expression, (1, 1); ``later`` are names that are defined below."""
     value = _evaluated(place, written, names, later)
     if not value.is_scalar():
         raise RobotError(place, f"is {written!r}, which is a vector; a number is needed")
@@ -329,13 +326,13 @@ def _evaluated(place: str, written: str | float, names: Mapping[str, SX], later:
 
 
 def _shown(written: str | float) -> str:
-    """Return an expression for a message, cut to a length that is read."""
+    """Return an expression for a message, shortened to a readable length."""
     text = repr(written)
     return text if len(text) <= _LONGEST_SHOWN else f"{text[: _LONGEST_SHOWN - 3]}..."
 
 
 def _linked(words: GraphWords, names: Mapping[str, SX]) -> tuple[HomeGraph, list[Limb]]:
-    """Return links and joints at home, and the limbs that they have."""
+    """Return links and joints at home, and the limbs that they form."""
     _check_graph(words)
     known = _with_points("", words.points, names)
     joints = tuple(
@@ -350,7 +347,9 @@ def _linked(words: GraphWords, names: Mapping[str, SX]) -> tuple[HomeGraph, list
             factors.append((index[name], scalar_value(f"{coupling.place}, {name}", text, known)))
         for k, factor in factors:
             if factor.is_zero():
-                raise RobotError(f"{coupling.place}, {joints[k].name}", "is 0; a coupled joint needs another factor")
+                raise RobotError(
+                    f"{coupling.place}, {joints[k].name}", "is 0; the factor of a coupled joint must not be 0"
+                )
         couplings.append(tuple(factors))
     edges = [
         GraphJoint(*each.between, each.joint is not None and each.joint.actuated, each.joint is None)
@@ -358,19 +357,19 @@ def _linked(words: GraphWords, names: Mapping[str, SX]) -> tuple[HomeGraph, list
     ]
     found = decompose(words.base, words.platform, edges, [[k for k, _ in each] for each in couplings])
     if not (found.limbs or found.networks):
-        raise RobotError("platform", "is joined to the base by no joint that moves")
+        raise RobotError("platform", "is welded to the base; at least one movable joint between them is needed")
     networks = tuple(each.joints for each in found.networks)
     graph = HomeGraph(words.links, words.base, words.platform, joints, tuple(couplings), networks)
     return graph, [_limb(k, limb, joints) for k, limb in enumerate(found.limbs)]
 
 
 def _check_graph(graph: GraphWords) -> None:
-    """Refuse links that nothing joins to the base, and a platform on an open chain."""
+    """Refuse links without a connection to the base, and a platform on an open chain."""
     edges = [each.between for each in graph.joints]
     joined = reached(graph.base, edges)
     for link in graph.links:
         if link not in joined:
-            raise RobotError(f"links, {link}", "is joined to the base by no joint, directly or through other links")
+            raise RobotError(f"links, {link}", "is not connected to the base, neither directly nor through other links")
     path = bridges_between(graph.base, graph.platform, edges)
     coupled = {name for coupling in graph.couplings for name in coupling.factors}
     if path.is_open and not any(graph.joints[k].name in coupled for k in path.bridges):
@@ -379,7 +378,6 @@ def _check_graph(graph: GraphWords) -> None:
 
 
 def _limb(number: int, limb: LimbPaths, joints: Sequence[LinkJoint]) -> Limb:
-    """Return a limb of the graph."""
     stem = _chain(limb.stem, joints)
     branches = tuple(_chain(branch, joints) for branch in limb.branches)
     if len(branches) == 1:
@@ -388,7 +386,7 @@ def _limb(number: int, limb: LimbPaths, joints: Sequence[LinkJoint]) -> Limb:
 
 
 def _chain(steps: Sequence[Step], joints: Sequence[LinkJoint]) -> tuple[Joint, ...]:
-    """Return the joints of a chain from the base's side on."""
+    """Return the joints of a chain, from the base side on."""
     found = []
     for step in steps:
         joint = joints[step.joint].joint
@@ -398,7 +396,7 @@ def _chain(steps: Sequence[Step], joints: Sequence[LinkJoint]) -> tuple[Joint, .
 
 
 def _outward(joint: Joint) -> Joint:
-    """Return a joint with its links exchanged: the axes turn over, and the coordinates keep their signs."""
+    """Return a joint with exchanged links: reversed axes, and coordinates with the same signs."""
     if joint.type == "S":
         return joint
     if joint.type == "Pa":

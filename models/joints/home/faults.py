@@ -1,7 +1,7 @@
-"""Faults and doubtful places of a robot's geometry: coinciding axes and joints, and axes that are almost parallel.
+"""Faults of a robot's geometry and remarks on it: coinciding axes and joints, and almost parallel axes.
 
-The wrenches of a limb depend on axes that are exactly parallel or meet exactly. Typed decimals such as 0.866 break
-this, and almost parallel axes get a remark.
+The wrenches of a limb depend on axes that are exactly parallel or intersect exactly. Rounded decimals such as 0.866
+break this, so almost parallel axes get a remark.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from .chain import HomeRobot, Joint, Limb
 from .generic import INCIDENT, PathFrame
 from .motion import AxisKind
 
-#: Axes are almost parallel, or almost meet, where the sine of their angle, or their distance in parts of the robot's
-#: size, is below this: decimals that are typed with three digits or more are nearer.
+#: Sine of the angle below which two axes are almost parallel, and distance, relative to the robot's size, below which
+#: they almost intersect: decimals with three or more digits are nearer.
 _ALMOST = 1e-3
 
 
 class _Pair(NamedTuple):
-    """A measure (1, 1) of two axes or joints that is zero where they coincide.
+    """Measure (1, 1) of two axes or joints, zero where they coincide.
 
     Attributes:
-        place: limb and joint.
-        measure: sine or length in parts of the robot's size.
-        fault: clause where the measure is zero for all dimensions; empty where this is no fault.
-        remark: clause where the measure is almost zero; empty where this is no matter.
+        place: limb and joint, for messages.
+        measure: sine of an angle, or length relative to the robot's size.
+        fault: clause for a measure that is zero for all dimensions; empty if this is allowed.
+        remark: clause for a measure that is almost zero; empty if this needs no remark.
     """
 
     place: str
@@ -41,7 +41,7 @@ class _Pair(NamedTuple):
 
 
 def examine_geometry(frame: PathFrame) -> list[str]:
-    """Return remarks on axes that are almost parallel or almost meet; refuse joints that contradict themselves.
+    """Return remarks on axes that are almost parallel or almost intersect; refuse degenerate joints.
 
     Raises:
         RobotError: the axes of a universal joint are parallel, a parallelogram is flat, or a rod has no length.
@@ -76,31 +76,35 @@ def _joint_faults(robot: HomeRobot, path: Sequence[Joint]) -> list[_Pair]:
             first, second = (each.axis for each in joint.axes)
             sine = ca.norm_2(ca.cross(first, second))
             fault = "are parallel; two different directions are needed"
-            remark = "are parallel but for {}; were they meant to be perpendicular?"
+            remark = "are almost parallel (sine {}); give perpendicular axes if a usual universal joint is intended"
             found.append(_Pair(f"{joint.place}, axes", sine, fault, remark))
         if joint.type == "Pa":
             (axis,) = joint.axes
             rod = axis.rod / robot.size
-            found.append(_Pair(f"{joint.place}, to", ca.norm_2(rod), "is the same place as at; a rod needs a length"))
+            found.append(
+                _Pair(f"{joint.place}, to", ca.norm_2(rod), "is the same point as at; a rod needs a nonzero length")
+            )
             across = ca.norm_2(ca.cross(rod, axis.axis))
-            fault = "is parallel to the rod from at to to; the axis of its hinges is needed, across the rod"
+            fault = (
+                "is parallel to the rod from at to to; give the axis of its hinges, which is perpendicular to the rod"
+            )
             found.append(_Pair(f"{joint.place}, axis", across, fault))
     return found
 
 
 def _rods(robot: HomeRobot, path: Sequence[Joint]) -> list[_Pair]:
-    """Return the lengths of a path's rods between spherical, or spherical and universal joints."""
+    """Return the lengths of a path's rods: between two spherical joints, or a spherical and a universal joint."""
     found = []
     for one, other in pairwise(path):
         if {one.type, other.type} in ({"S"}, {"S", "U"}):
             length = ca.norm_2(one.point - other.point) / robot.size
-            fault = f"is the same place as that of the joint {one.type} before it; a rod between them needs a length"
+            fault = f"is the same point as that of the joint {one.type} before it; a rod between them needs a length"
             found.append(_Pair(f"{other.place}, at", length, fault))
     return found
 
 
 def _axes(robot: HomeRobot, path: Sequence[Joint]) -> list[_Pair]:
-    """Return the angles of all pairs of a path's axes of rotation, and the distances of those of joints that follow."""
+    """Return the angles between all rotation axes of a path, and the distances of successive ones."""
     axes = [
         (joint, axis) for joint in path for axis in joint.axes if joint.type != "S" and axis.kind is AxisKind.ROTATION
     ]
@@ -111,14 +115,14 @@ def _axes(robot: HomeRobot, path: Sequence[Joint]) -> list[_Pair]:
                 continue
             normal = ca.cross(a.axis, b.axis)
             whose = f"and the axis of {_short(one)} are"
-            words = f"{whose} parallel but for {{}}; write both from the same numbers where they are to be parallel"
+            words = f"{whose} almost parallel (sine {{}}); if they must be parallel, write both with the same numbers"
             found.append(_Pair(f"{other.place}, axis", ca.norm_2(normal), remark=words))
             if m == k + 1:
-                # Where the axes are parallel the distance has no meaning, and is of the order of 1.
+                # For parallel axes this distance has no meaning, and is of the order of 1.
                 apart = ca.dot(b.point - a.point, normal) / (robot.size * ca.norm_2(normal))
                 meeting = ca.if_else(ca.norm_2(normal) < _ALMOST, 1, apart)
                 words = (
-                    f"{whose} {{}} of the robot's size apart; write both from the same numbers where they are to meet"
+                    f"{whose} {{}} of the robot's size apart; if they must intersect, write both with the same numbers"
                 )
                 found.append(_Pair(f"{other.place}, axis", meeting, remark=words))
     return found

@@ -1,6 +1,6 @@
-"""Ranks and incidences of a limb that hold for almost all dimensions, found at random numbers.
+"""Ranks and incidences of a limb at almost all dimensions, measured at random values.
 
-One limb alone needs no closed loop: any values of its joints' variables are possible.
+A single limb needs no closed loop: its joint coordinates may have any values.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ from .motion import AxisKind, Motion
 
 #: Number of random points at which ranks are measured; the largest rank counts.
 SAMPLES = 6
-#: Part of a typical dimension by which the samples vary; halved while a sample has no finite value.
+#: Relative variation of the samples around a typical dimension; halved while a sample has no finite value.
 _SPREAD = 0.2
 _HALVINGS = 8
-#: Columns shorter than this part of the longest are zero, as the velocity of a rod's end by its spin is: rounding
-#: leaves 1e-16, and a slide's column is as short as the robot is large.
+#: Relative length below which a column is zero, such as the velocity of a rod's end by its spin: rounding leaves 1e-16,
+#: and the column of a prismatic joint is short if the robot is large.
 _ZERO_COLUMN = 1e-12
-#: Axes are parallel or meet where their cross product, or their distance in parts of the robot's size, is below this.
+#: Cross product of parallel axes, and distance of intersecting axes relative to the robot's size: rounding leaves less.
 INCIDENT = 1e-9
 
 
 def sampled_dimensions(robot: HomeRobot) -> FloatArray:
-    """Return values (SAMPLES, d) of the dimensions around the typical ones, at which the robot's home is finite.
+    """Return values (SAMPLES, d) of the dimensions around the typical ones, for which the robot at home is finite.
 
     Raises:
         UndefinedError: an expression of the robot has no finite value at the typical dimensions.
-        RobotError: the home has none.
+        RobotError: the home position has no finite value.
     """
     try:
         home_of(robot.words, dict(zip(robot.words.dimensions, robot.typical.tolist(), strict=False)))
@@ -69,11 +69,11 @@ def sampled_dimensions(robot: HomeRobot) -> FloatArray:
 
 
 class PathFrame:
-    """What all paths of a robot share: the robot at home, the platform's displacement, and numbers of its dimensions.
+    """Common data of all paths of a robot: robot at home, platform displacement, and sampled dimensions.
 
     Args:
-        robot: at home.
-        samples: (s, d) values of its dimensions around the typical ones.
+        robot: robot at home.
+        samples: (s, d) values of the robot's dimensions around the typical ones.
         platform: displacement of the platform from home.
     """
 
@@ -86,7 +86,7 @@ class PathFrame:
         return np.asarray(found.full(), dtype=np.float64)
 
     def value_at_home(self, expression: SX, unknowns: SX) -> float:
-        """Return the value of a scalar expression at home with typical dimensions, where the unknowns (u, 1) are 0."""
+        """Return the value of a scalar expression at home, with typical dimensions and unknowns (u, 1) of 0."""
         place, symbols = self.platform, [self.robot.symbols, unknowns, self.platform.rotation, self.platform.image]
         function = ca.Function("home", symbols, [ca.densify(expression)])
         return float(function(self.robot.typical, 0, np.eye(3), self.typical_value(place.origin)))
@@ -97,24 +97,24 @@ class PathFrame:
         return np.array([function(each).full().ravel() for each in self.samples])
 
     def is_zero(self, expression: SX) -> bool:
-        """Return whether an expression (k, 1) of the dimensions, of order 1, is zero for all of them."""
+        """Return True if an expression (k, 1) of the dimensions, of order 1, is zero for all of them."""
         return bool(np.all(np.abs(self.sampled(expression)) < INCIDENT))
 
     def coincide(self, one: SX, other: SX) -> bool:
-        """Return whether two places (3, 1) at home are one for all dimensions."""
+        """Return True if two points (3, 1) at home coincide for all dimensions."""
         return self.is_zero(ca.norm_2(one - other) / self.size)
 
     def are_parallel(self, one: SX, other: SX) -> bool:
-        """Return whether two unit vectors (3, 1) at home are parallel for all dimensions."""
+        """Return True if two unit vectors (3, 1) at home are parallel for all dimensions."""
         return self.is_zero(ca.norm_2(ca.cross(one, other)))
 
 
 def free_screws(joints: Sequence[Joint], values: SX) -> list[list[SX]]:
-    """Return the current screws (6, 1) of each joint's axes for any values of their variables, from the base on.
+    """Return the current screws (6, 1) of each joint's axes, from the base on, for any joint coordinates.
 
     Args:
-        joints: from base to platform.
-        values: (n, 1) a variable for each axis in order.
+        joints: joints from base to platform.
+        values: (n, 1) coordinate of each axis, in order.
     """
     at, k, found = Motion.none(), 0, []
     for joint in joints:
@@ -128,9 +128,9 @@ def free_screws(joints: Sequence[Joint], values: SX) -> list[list[SX]]:
 
 
 def _rank(columns: FloatArray) -> int:
-    """Return the rank of columns, each taken with unit length.
+    """Return the rank of columns, each scaled to unit length.
 
-    Rounding leaves 1e-15, and a limb that is near to a lower rank at every one of several random points has it.
+    Rounding leaves 1e-15. A limb close to a lower rank at each of several random points has this lower rank.
     """
     lengths = np.linalg.norm(columns, axis=0)
     nonzero = lengths > _ZERO_COLUMN * lengths.max(initial=0.0)
@@ -138,7 +138,7 @@ def _rank(columns: FloatArray) -> int:
 
 
 def random_values(joints: Sequence[Joint], size: float, seed: int) -> FloatArray:
-    """Return random values of the variables of joints: angles in radians, and lengths of the robot's size."""
+    """Return random joint coordinates: angles in radians, and lengths of the robot's size."""
     rng = np.random.default_rng(seed)
     axes = [axis for joint in joints for axis in joint.axes]
     unit = np.array([size if axis.kind is AxisKind.TRANSLATION else 1.0 for axis in axes])
@@ -146,13 +146,13 @@ def random_values(joints: Sequence[Joint], size: float, seed: int) -> FloatArray
 
 
 def generic_rank(frame: PathFrame, joints: Sequence[Joint], columns: SX, values: SX) -> int:
-    """Return the largest rank of columns of a limb's screws at random dimensions and joint variables.
+    """Return the largest rank of columns of a limb's screws at random dimensions and joint coordinates.
 
     Args:
-        frame: values that all paths of the robot share.
-        joints: of the limb.
-        columns: (k, n) expressions of the dimensions and of the values.
-        values: (v, 1) symbols of the joints' variables.
+        frame: common data of all paths of the robot.
+        joints: joints of the limb.
+        columns: (k, n) expressions of the dimensions and of the joint coordinates.
+        values: (v, 1) symbols of the joint coordinates.
     """
     if columns.shape[1] == 0:
         return 0
@@ -168,11 +168,11 @@ def generic_rank(frame: PathFrame, joints: Sequence[Joint], columns: SX, values:
 
 
 def meeting_point(frame: PathFrame, lines: Sequence[tuple[SX, SX]]) -> SX | None:
-    """Return the point (3, 1) through which lines pass for all dimensions; None where they do not meet in one point.
+    """Return the common point (3, 1) of lines for all dimensions; None if they do not intersect in one point.
 
     Args:
-        frame: values that all paths of the robot share.
-        lines: two or more, each a point (3, 1) and a unit direction (3, 1); the first two must not be parallel.
+        frame: common data of all paths of the robot.
+        lines: two or more lines, each a point (3, 1) and a unit direction (3, 1); the first two must not be parallel.
     """
     (p1, a1), (p2, a2), *_ = lines
     normal = ca.cross(a1, a2)

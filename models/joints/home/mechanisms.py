@@ -1,7 +1,7 @@
-"""Mechanisms from the tables of robot files: symbolic joints in numbers, and each joint as elementary ones.
+"""Mechanisms in numbers from the tables of robot files, with each joint split into elementary joints.
 
 A universal joint becomes two hinges, a cylindrical joint a hinge and a slide, and a parallelogram four hinges with two
-rods, which are a nested loop.
+rods, which form a nested loop.
 """
 
 from __future__ import annotations
@@ -20,26 +20,26 @@ from ...parts import Dimension
 from ..written.words import read_robot
 from .chain import HomeGraph, HomeRobot, Joint, home_of
 
-#: Distance of a parallelogram's rods from its middle line, in parts of their length.
+#: Distance of a parallelogram's rods from its middle line, relative to their length.
 _APART = 0.1
-#: Returns the numbers of a vector (3, 1) of expressions.
+#: Function that returns the values of a vector (3, 1) of expressions.
 Values = Callable[[SX], FloatArray]
 
 
 def mechanism_of(tables: Mapping[str, object], dimensions: Mapping[str, float] | None = None) -> Mechanism:
     """Return the mechanism of a robot file at home.
 
-    Joints are called by limb and place, such as ``2:3``, and the hinges of one joint ``2:3.1``, ``2:3.2`` and so on.
-    An actuated parallelogram is driven at its first hinge: the rate is an angle's, and not the length per unit of time
-    that the robot file means.
+    Joint names are limb and place, such as ``2:3``; the hinges of one joint are ``2:3.1``, ``2:3.2`` and so on. An
+    actuated parallelogram is driven at its first hinge: its rate is that of an angle, not the length per unit of time
+    of the robot file.
 
     Args:
-        tables: of the robot file.
-        dimensions: values in the place of typical ones, degrees for angles.
+        tables: tables of the robot file.
+        dimensions: values that replace the typical ones, degrees for angles.
 
     Raises:
         RobotError: the tables have a fault.
-        MechanismError: a dimension is unknown, or a place has no finite value.
+        MechanismError: a dimension is unknown, or a point or axis has no finite value.
     """
     return mechanism_at_home(home_of(read_robot(tables)), dimensions)
 
@@ -68,7 +68,7 @@ def mechanism_at_home(robot: HomeRobot, dimensions: Mapping[str, float] | None =
 
 
 def _mechanism_of_graph(robot: HomeRobot, graph: HomeGraph, values: Values) -> Mechanism:
-    """Return the mechanism of a robot that is given by links and joints, which keep their names."""
+    """Return the mechanism of a robot given by links and joints, which keep their names."""
     parts = Parts(list(graph.links), values)
     for each in graph.joints:
         if each.joint is None:
@@ -87,7 +87,7 @@ def _mechanism_of_graph(robot: HomeRobot, graph: HomeGraph, values: Values) -> M
 
 
 def _values(robot: HomeRobot, dimensions: Mapping[str, float]) -> Values:
-    """Return the function that gives vectors their numbers at some dimensions."""
+    """Return the function that evaluates vectors at given dimensions."""
     numbers = robot.typical.copy()
     names = list(robot.words.dimensions)
     for name, value in dimensions.items():
@@ -100,7 +100,7 @@ def _values(robot: HomeRobot, dimensions: Mapping[str, float]) -> Values:
         function = ca.Function("values", [robot.symbols], [ca.densify(expression)])
         found = np.asarray(function(numbers).full(), dtype=np.float64).ravel()
         if not np.isfinite(found).all():
-            raise MechanismError("", "has a place or axis without a finite value at these dimensions")
+            raise MechanismError("", "has a point or axis without a finite value at these dimensions")
         return found
 
     return values
@@ -108,12 +108,12 @@ def _values(robot: HomeRobot, dimensions: Mapping[str, float]) -> Values:
 
 @dataclass(eq=False)
 class Parts:
-    """Links and joints of a mechanism while joints of a robot file are added.
+    """Links and joints of a mechanism under construction.
 
     Attributes:
-        links: names.
-        values: numbers of vectors.
-        joints: elementary ones.
+        links: names of the links.
+        values: function that returns the values of vectors.
+        joints: elementary joints.
     """
 
     links: list[str]
@@ -121,7 +121,7 @@ class Parts:
     joints: list[MechanismJoint] = field(default_factory=list)
 
     def add(self, name: str, joint: Joint, inner: str, outer: str) -> None:
-        """Add a joint between two links as elementary ones."""
+        """Add a joint between two links as elementary joints."""
         point = self.values(joint.point)
         axes = [self.values(axis.axis) for axis in joint.axes]
         driven = joint.actuated
@@ -145,7 +145,7 @@ class Parts:
     def _add_parallelogram(
         self, name: str, point: FloatArray, axis: FloatArray, rod: FloatArray, ends: tuple[str, str], driven: bool
     ) -> None:
-        """Add four hinges and two rods."""
+        """Add a parallelogram as four hinges and two rods."""
         aside = _APART * np.cross(axis, rod)
         rods = [(f"{name} rod {k + 1}", 2 * k + 1, side) for k, side in enumerate((aside, -aside))]
         self.links += [link for link, _, _ in rods]
@@ -158,7 +158,7 @@ class Parts:
             self.joints.append(MechanismJoint(f"{name}.{number + 1}", "R", link, ends[1], point + rod + side, axis))
 
     def mechanism(self, name: str, home: FloatArray, ends: Sequence[str] = ("base", "platform")) -> Mechanism:
-        """Return the mechanism of the parts; the platform's frame is at home, parallel to the world's."""
+        """Return the mechanism of these parts; the platform frame is at home, parallel to the world frame."""
         base, platform = ends
         links = [MechanismLink(each, home) if each == platform else MechanismLink(each) for each in self.links]
         return Mechanism(name, tuple(links), tuple(self.joints), base, platform)

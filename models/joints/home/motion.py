@@ -1,7 +1,7 @@
 """Displacements of bodies and screws of joints as symbols.
 
-A twist has its angular velocity first, then the velocity at the world origin. A joint's variable is 0 at home, where
-the robot is described.
+A twist is the angular velocity, then the velocity at the world origin. Joint coordinates are 0 at home, where the robot
+is described.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ UNIT_VECTORS = (SX([1, 0, 0]), SX([0, 1, 0]), SX([0, 0, 1]))
 
 
 class Motion(NamedTuple):
-    """A displacement of a body in the world frame: a point ``x`` goes to ``R (x - origin) + image``.
+    """Displacement of a body in the world frame: a point ``x`` goes to ``R (x - origin) + image``.
 
-    With the centre of a turn as origin, differences of points appear in which coordinates cancel: expressions of such
-    displacements one after the other are much shorter than with a translation of the world's origin.
+    With the centre of rotation as origin, coordinates cancel in differences of points: products of such displacements
+    are much shorter expressions than with a translation of the world's origin.
 
     Attributes:
         rotation: (3, 3) ``R``.
-        origin: (3, 1) a point, length.
-        image: (3, 1) where this point goes, length.
+        origin: (3, 1) reference point, length.
+        image: (3, 1) displaced reference point, length.
     """
 
     rotation: SX
@@ -37,27 +37,27 @@ class Motion(NamedTuple):
 
     @classmethod
     def none(cls) -> Motion:
-        """Return the displacement that leaves every point in its place."""
+        """Return the identity displacement."""
         return cls(SX.eye(3), SX.zeros(3), SX.zeros(3))
 
     def after(self, first: Motion) -> Motion:
-        """Return this displacement after another one, which comes first."""
+        """Return the product of displacements: first ``first``, then this one."""
         if first.rotation.is_eye():
-            # A translation moves the origin alone: this rotation then turns one sum of vectors, and not two vectors.
+            # A translation moves only the origin: the product then rotates one sum of vectors, not two vectors.
             return Motion(self.rotation, self.origin - (first.image - first.origin), self.image)
         return Motion(self.rotation @ first.rotation, first.origin, self.point(first.image))
 
     def inverse(self) -> Motion:
-        """Return the displacement back."""
+        """Return the inverse displacement."""
         return Motion(self.rotation.T, self.image, self.origin)
 
     def point(self, point: SX) -> SX:
-        """Return where a point (3, 1) goes."""
+        """Return the displaced point (3, 1)."""
         return self.rotation @ (point - self.origin) + self.image
 
 
 class AxisKind(enum.Enum):
-    """Kind of a joint with one variable."""
+    """Kind of a joint axis with one coordinate."""
 
     ROTATION = "rotation"
     TRANSLATION = "translation"
@@ -66,15 +66,15 @@ class AxisKind(enum.Enum):
 
 @dataclass(frozen=True, eq=False)
 class JointAxis:
-    """A joint with one variable, at home.
+    """Joint axis with one coordinate, at home.
 
     Attributes:
-        kind: rotation (with a pitch, for a helical joint), translation, or the translation of a parallelogram.
-        axis: (3, 1) unit vector.
-        point: (3, 1) a point of the axis, length.
-        actuated: whether an actuator drives it.
+        kind: rotation (with a pitch for a helical joint), translation, or translation of a parallelogram.
+        axis: (3, 1) unit vector along the axis.
+        point: (3, 1) point of the axis, length.
+        actuated: True if an actuator drives the joint.
         pitch: (1, 1) translation along the axis per radian, length.
-        rod: (3, 1) a parallelogram's rod, from its base side to its platform side, length.
+        rod: (3, 1) rod of a parallelogram, from its base side to its platform side, length.
     """
 
     kind: AxisKind
@@ -86,11 +86,11 @@ class JointAxis:
 
     @property
     def dimension(self) -> Dimension:
-        """Dimension of its way from home: angle, or length of a slide or a parallelogram."""
+        """Dimension of the travel: angle, or length for a slide or a parallelogram."""
         return Dimension.ANGLE if self.kind is AxisKind.ROTATION else Dimension.LENGTH
 
     def motion(self, value: SX) -> Motion:
-        """Return the displacement at a value of the variable: an angle in radians, or a length."""
+        """Return the displacement for a coordinate: an angle in radians, or a length."""
         if self.kind is AxisKind.TRANSLATION:
             return Motion(SX.eye(3), SX.zeros(3), value * self.axis)
         turn = rotation_about(self.axis, value)
@@ -98,20 +98,21 @@ class JointAxis:
             return Motion(SX.eye(3), SX.zeros(3), turn @ self.rod - self.rod)
         return Motion(turn, self.point, self.point + self.pitch * value * self.axis)
 
-    def way(self, value: SX) -> SX:
-        """Return the way (1, 1) from home whose rate goes with the unit screw: an angle in radians, or a length.
+    def travel(self, value: SX) -> SX:
+        """Return the travel (1, 1) from home, whose rate belongs to the unit screw: angle in radians, or length.
 
-        A parallelogram's variable is the angle of its rods; its way is that of its platform side along the circle.
+        The coordinate of a parallelogram is the angle of its rods; its travel is that of its platform side along the
+        circle.
         """
         return value * ca.norm_2(self.rod) if self.kind is AxisKind.PARALLELOGRAM else value
 
     def screw(self, value: SX, at: Motion) -> SX:
         """Return the current unit screw (6, 1).
 
-        A parallelogram's is the translation of its platform side, of length 1.
+        For a parallelogram, the translation of its platform side, with a velocity of 1.
 
         Args:
-            value: of the variable.
+            value: coordinate of the joint.
             at: displacement of the body on either side of the joint.
         """
         if self.kind is AxisKind.TRANSLATION:
@@ -123,12 +124,12 @@ class JointAxis:
         return ca.vertcat(direction, ca.cross(at.point(self.point), direction) + self.pitch * direction)
 
     def direction(self, screw: SX) -> SX:
-        """Return its current direction (3, 1) from its current screw (6, 1): that of the motion for a parallelogram."""
+        """Return the current direction (3, 1) from the current screw (6, 1); for a parallelogram that of the motion."""
         return screw[:3] if self.kind is AxisKind.ROTATION else screw[3:]
 
     @property
     def is_hinge(self) -> bool:
-        """Whether it is a rotation without a pitch."""
+        """True for a rotation without a pitch."""
         return self.kind is AxisKind.ROTATION and bool(self.pitch.is_zero())
 
 

@@ -1,9 +1,9 @@
-"""A robot given joint by joint with errors of its joint centres: a machine as it is built.
+"""Robot given joint by joint with joint-centre errors: a robot as it is built.
 
-The robot is assembled at home with each joint's centre off by a vector, and with the directions of all axes of the
-design. The coordinates of all joints count from there. Joints of a limb that have one centre at home, as the hinges of
-a spherical joint, have one error. The centre of a slide has no effect, nor has an error along parallel axes of a joint:
-both are left out. A parallelogram has two centres, at the ends of its rods, which are equal in the machine too.
+The robot is assembled at home with an error of each joint centre and the nominal directions of all axes; joint
+coordinates count from there. Joints of a limb with a common centre at home, such as the hinges of a spherical joint,
+share one error. The centre of a slide, and an error along the parallel axes of a joint, have no effect and are left
+out. A parallelogram has two centres, at the ends of its rods, which stay equal.
 """
 
 from __future__ import annotations
@@ -25,27 +25,31 @@ from ..written.forms import RobotError
 from ..written.words import read_robot
 from .robot import joint_labels, model_of_home
 
-#: Part of the robot's size by which joint centres are off where ranks are measured: small enough for loops to close.
+#: Joint-centre errors at which ranks are measured, relative to the robot's size: small enough for loops to close.
 _OFF = 0.01
 _SEED = 0
 
 
 def displaced_robot(model: Model, definition: Mapping[str, object]) -> DisplacedRobot:
-    """Return a robot given joint by joint with errors of its joint centres.
+    """Return a robot given joint by joint with joint-centre errors.
 
     Args:
         model: the robot.
-        definition: the tables of its file; none where they are not known.
+        definition: tables of the robot file; empty if they are not known.
 
     Raises:
-        RobotError: the robot is not known by such tables, is given by links and joints, or cannot be assembled near
-            home with such errors.
+        RobotError: the robot has no such tables, is given by links and joints, or cannot be assembled near home with
+            joint-centre errors.
     """
     if not definition:
-        raise RobotError("joint", "is known as a row alone")
+        raise RobotError(
+            "joint", "is known only as a row of the Jacobian: joint-centre errors need a robot given joint by joint"
+        )
     robot = home_of(read_robot(definition))
     if robot.graph is not None:
-        raise RobotError("joint", "is one of links and joints, whose centres are not known as those of limbs")
+        raise RobotError(
+            "joint", "belongs to a robot of links and joints: joint-centre errors need a robot given by limbs"
+        )
     exact = sampled_dimensions(robot)
     displaced = _Displaced(PathFrame(robot, exact, Motion.none()))
     limbs = tuple(displaced.limb(limb) for limb in robot.limbs)
@@ -63,19 +67,19 @@ def displaced_robot(model: Model, definition: Mapping[str, object]) -> Displaced
     parameters = [error_parameter(each) for each in displaced.centres]
     legs = _displaced_legs(model, robot.symbols, displaced.centres)
     found = model_of_home(with_errors, np.hstack([exact, off]), definition, parameters, legs)
-    # Of equations that depend on each other those of the design are kept, also where others would be as good.
+    # Of dependent equations those of the nominal robot are kept, even if others would be as good.
     every = {each.name: each for each in found.loops}
     closure = tuple(replace(every[f"{each.name} in full"], name=each.name) for each in model.closure)
     return DisplacedRobot(replace(found, closure=closure), tuple(displaced.centres))
 
 
 def _displaced_legs(model: Model, dimensions: SX, centres: Sequence[Centre]) -> tuple[Leg, ...]:
-    """Return the straight legs of a robot between centres with their errors.
+    """Return the straight legs of a robot with joint-centre errors.
 
     Args:
         model: the robot.
-        dimensions: (d, 1) symbols in the place of its dimensions.
-        centres: those with an error; of a hinge the whole error, also the part that its motion does not depend on.
+        dimensions: (d, 1) symbols that replace the dimensions.
+        centres: joint centres with an error; for a hinge the full error, including its part along the axis.
     """
     errors, found = {each.name: each.error for each in centres}, []
     for leg in model.legs:
@@ -86,13 +90,13 @@ def _displaced_legs(model: Model, dimensions: SX, centres: Sequence[Centre]) -> 
 
 
 class _Displaced:
-    """Joints with errors of their centres.
+    """Joints with joint-centre errors.
 
     Args:
-        frame: of the robot at home.
+        frame: common data of all paths of the robot.
 
     Attributes:
-        centres: those that have an error so far.
+        centres: joint centres with an error so far.
     """
 
     def __init__(self, frame: PathFrame) -> None:
@@ -102,7 +106,7 @@ class _Displaced:
         self._joints: dict[int, Joint] = {}
 
     def limb(self, limb: Limb) -> Limb:
-        """Return a limb with errors of its joint centres."""
+        """Return a limb with joint-centre errors."""
         labels: dict[int, str] = {}
         joints: list[Joint] = []
         for index, path in enumerate(limb.paths):
@@ -119,7 +123,7 @@ class _Displaced:
         )
 
     def _groups(self, joints: list[Joint]) -> list[list[Joint]]:
-        """Return the joints of a limb that have one centre."""
+        """Return groups of a limb's joints with a common centre."""
         groups: list[list[Joint]] = []
         for joint in joints:
             for group in groups:
@@ -131,7 +135,7 @@ class _Displaced:
         return groups
 
     def _error(self, name: str, group: list[Joint]) -> SX:
-        """Return the error (3, 1) of a centre as far as it matters."""
+        """Return the error (3, 1) of a centre without components that have no effect."""
         axes = [axis for joint in group for axis in joint.axes if axis.kind is not AxisKind.TRANSLATION]
         if not axes:
             return SX.zeros(3)
@@ -148,7 +152,7 @@ class _Displaced:
         return self.centres[-1].error
 
     def _moved(self, joint: Joint, name: str, error: SX) -> Joint:
-        """Return a joint whose centre is off."""
+        """Return a joint with a joint-centre error."""
         axes = []
         for axis in joint.axes:
             rod = axis.rod

@@ -2,16 +2,16 @@
 
 The loop of such a limb has one equation with one unknown:
 
-* a crank or a rocker, ``A cos t + B sin t = D``, is closed where ``A^2 + B^2 >= D^2``;
-* a slide, ``c0 + c1 q + c2 q^2 = 0``, is closed where ``c1^2 >= 4 c0 c2``.
+* a crank or a rocker, ``A cos t + B sin t = D``, with solutions if ``A^2 + B^2 >= D^2``;
+* a slide, ``c0 + c1 q + c2 q^2 = 0``, with solutions if ``c1^2 >= 4 c0 c2``.
 
-Of the two solutions that of home's working mode is taken: the derivative of the equation by the unknown has the sign
-that it has at home, and is 0 where both solutions meet, at the edge of the limb's reach. The unknown then is an
-expression of dimensions and pose, and the edge a claim of its own.
+The solution is that of the home working mode: the derivative of the equation with respect to the unknown has the same
+sign as at home, and is 0 at the edge of the reach, where both solutions coincide. The unknown becomes an expression of
+dimensions and pose, and the edge of the reach a separate claim.
 
-Coefficients are derivatives of the equation by the unknown, or by its sine and cosine, at 0. Differences of its values
-would leave terms that cancel, and so wide bounds over boxes. Random values of all symbols test that the equation has no
-further terms: another analytic expression would differ there.
+Coefficients are derivatives of the equation with respect to the unknown, or its sine and cosine, at 0: differences of
+values would leave terms that cancel, and so wide bounds over boxes. Random values of all symbols test that the
+equation, which is analytic, has no further terms.
 """
 
 from __future__ import annotations
@@ -31,16 +31,17 @@ from ...whole import expressions_of, with_expressions
 from .elimination import limb_of
 from .replacing import Solved, at_turn, with_replaced
 
-#: Largest difference of two sides of an identity at random values, in parts of the sizes of its terms: rounding.
+#: Largest relative difference of both sides of an identity at random values: rounding.
 _SAME = 1e-9
-#: Random values of the symbols at which an identity is tested.
+#: Number of random points at which an identity is tested.
 _TESTS = 4
-#: Smallest derivative of an equation, of order 1, by its unknown at home: below, home is on the edge of reach.
+#: Smallest derivative of an equation of order 1 with respect to its unknown at home: below it, home is on the edge of
+#: the reach.
 _EDGE = 1e-9
 _SEED = 0
-#: Part of the squared sine or cosine of a reach below which an extended square root is continued by its tangent.
+#: Squared sine or cosine of a reach below which an extended square root continues along its tangent.
 _EXTENDED = 1e-4
-#: Fields of a model whose expressions may depend on its unknowns, but the drawing.
+#: Fields of a model, except the drawing, with expressions that may depend on its unknowns.
 _REWRITTEN = (
     "wrenches", "members", "closure", "loops", "distances", "signs", "quantities", "actuators", "joint_screws",
     "joints", "links",
@@ -48,12 +49,12 @@ _REWRITTEN = (
 
 
 class Reach(NamedTuple):
-    """The edge of a limb's reach.
+    """Edge of a limb's reach.
 
     Attributes:
         limb: name of the limb.
-        value: (1, 1) squared sine of the angle between crank and rod, seen along the crank's axis, or squared cosine of
-            that between slide and rod: not negative where the limb reaches the pose, and 0 at the edge of its reach.
+        value: (1, 1) squared sine of the angle between crank and rod, projected along the crank's axis, or squared
+            cosine of the angle between slide and rod; not negative where the limb reaches the pose, and 0 at the edge.
     """
 
     limb: str
@@ -62,12 +63,12 @@ class Reach(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ClosedForm:
-    """A robot without the unknowns that follow in closed form.
+    """Robot without the unknowns that have a closed form.
 
     Attributes:
-        model: the robot; its drawing is left out.
-        reaches: one for each unknown that has a closed form.
-        has_angles: whether angles are replaced by their closed forms too, which jump after half a turn.
+        model: the robot, without its drawing.
+        reaches: edge of the reach for each unknown with a closed form.
+        has_angles: True if angles are replaced too; their closed forms jump after half a turn.
     """
 
     model: Model
@@ -76,15 +77,15 @@ class ClosedForm:
 
 
 def closed_form(model: Model, *, extended: bool = False, with_angles: bool = True) -> ClosedForm:
-    """Return a robot without those of its unknowns that follow from dimensions and pose in closed form.
+    """Return a robot without the unknowns that have a closed form in dimensions and pose.
 
-    Free positions of driven joints stay unknowns, from which others may follow too.
+    Free actuator coordinates stay unknowns; closed forms may depend on them.
 
     Args:
         model: the robot.
-        extended: whether the expressions have values out of reach too, for searches that pass through it: the square
-            root goes on along its tangent from where the squared sine or cosine of the reach is 1e-4.
-        with_angles: whether angles are replaced too. As unknowns, they have no jump where a joint turns all round.
+        extended: If true, the expressions also have values out of reach, for searches that pass through it: the square
+            root continues along its tangent where the squared sine or cosine of the reach is below 1e-4.
+        with_angles: If true, angles are replaced too. As unknowns they have no jump for a full rotation of a joint.
     """
     depends = [
         [
@@ -118,7 +119,7 @@ def closed_form(model: Model, *, extended: bool = False, with_angles: bool = Tru
 
 
 def with_joints_at_home(model: Model) -> Model:
-    """Return a robot whose driven joints that the pose does not determine are held at home; its drawing is left out."""
+    """Return a robot with its free actuator coordinates fixed at home, without its drawing."""
     held = {
         k: Solved.angle(SX(0), SX(1), SX(0)) if each.dimension is Dimension.ANGLE else Solved(SX(0), None, None, SX(0))
         for k, each in enumerate(model.unknowns)
@@ -128,7 +129,7 @@ def with_joints_at_home(model: Model) -> Model:
 
 
 def _solved(model: Model, unknown: Unknown, equation: Closure, extended: bool) -> Solved | None:
-    """Return an unknown that an equation determines in closed form; None where the equation has another form."""
+    """Return the closed form of an unknown from an equation; None if the equation has another form."""
     q = unknown.symbol
     expression = equation.expression / equation.size
 
@@ -140,7 +141,7 @@ def _solved(model: Model, unknown: Unknown, equation: Closure, extended: bool) -
         sine, cosine = SX.sym("sine"), SX.sym("cosine")
         turned = at_turn(expression, q, sine, cosine)
         value, B, A, twice = _at_zero(turned, ca.vertcat(sine, cosine), [sine, cosine, (cosine, cosine)])
-        # With the squares of sine and cosine as one term, which is 1.
+        # The sum of the squares of sine and cosine is one term, equal to 1.
         middle = value + twice / 2
         if not _is_same(model, expression, middle + A * ca.cos(q) + B * ca.sin(q)):
             return None
@@ -153,12 +154,12 @@ def _solved(model: Model, unknown: Unknown, equation: Closure, extended: bool) -
     if _is_same(model, c2 * unknown.size**2, SX(0)) or not _is_same(model, expression, c0 + c1 * q + c2 * q * q):
         return None
     square = c1 * c1 - 4 * c0 * c2
-    # With an equation in parts of twice the rod's squared length, 2 c2 square is the squared cosine.
+    # For an equation divided by twice the squared rod length, 2 c2 square is the squared cosine.
     return Solved((sign * _root(square, 2 * c2, extended) - c1) / (2 * c2), None, None, square / (2 * c2))
 
 
 def _root(value: SX, size: SX, extended: bool) -> SX:
-    """Return the square root of a number, where wanted along its tangent below a part of a size."""
+    """Return the square root of a value; if extended, its tangent below a fraction of a size."""
     if not extended:
         return ca.sqrt(value)
     least = ca.fmax(value, _EXTENDED * size)
@@ -167,12 +168,12 @@ def _root(value: SX, size: SX, extended: bool) -> SX:
 
 
 def _at_zero(expression: SX, unknowns: SX, by: Sequence[SX | tuple[SX, SX]]) -> list[SX]:
-    """Return the value of an expression, and derivatives of it, where unknowns (k, 1) are 0.
+    """Return the value of an expression and its derivatives where unknowns (k, 1) are 0.
 
     Args:
-        expression: (1, 1).
-        unknowns: symbols.
-        by: those of first derivatives, and pairs for second derivatives.
+        expression: (1, 1) expression of the unknowns.
+        unknowns: (k, 1) symbols.
+        by: symbols of first derivatives, and pairs of symbols for second derivatives.
     """
     own = {each.element_hash() for each in ca.vertsplit(unknowns)}
     rest = ca.vertcat(SX(0, 1), *[each for each in ca.symvar(expression) if each.element_hash() not in own])
@@ -192,7 +193,7 @@ def _slope_at_home(model: Model, expression: SX) -> float:
 
 
 def _is_same(model: Model, one: SX, other: SX) -> bool:
-    """Return whether two expressions agree at random values of all symbols."""
+    """Return True if two expressions agree at random values of all symbols."""
     symbols = Substitution.identity(model).all
     function = ca.Function("two", symbols, [ca.densify(one), ca.densify(other)])
     rng = np.random.default_rng(_SEED)
@@ -214,8 +215,8 @@ def _rewritten(model: Model, solved: dict[int, Solved], closure: tuple[Closure, 
 
     Args:
         model: the model.
-        solved: by the index of the unknown.
-        closure: equations that are left.
+        solved: closed forms by the index of the unknown.
+        closure: remaining closure equations.
     """
     given: dict[str, Any] = {name: getattr(model, name) for name in _REWRITTEN} | {
         "closure": closure,

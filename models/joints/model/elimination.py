@@ -1,18 +1,18 @@
-"""Elimination of a robot's unknowns: those that its loop equations give in closed form, one after the other.
+"""Elimination of unknowns: closed forms from a robot's loop equations, one after the other.
 
-The equations of a limb are those of its loop, its distances, and its loop's gap along the axis of each of its joints.
-A joint's own rotation changes neither a distance from its axis nor a gap along it, so that many of these equations
-have one unknown less than the gap itself. An unknown follows from one equation, or from the three of the gap:
+The equations of a limb are those of its loop, its distances, and the component of its loop's gap along each joint axis.
+A rotation changes neither a distance from its axis nor a gap along it, so many of these equations have one unknown less
+than the gap. An unknown follows from one equation, or from the three of the gap:
 
-* an angle from ``A cos t + B sin t = D``, a slide from ``c0 + c1 q + c2 q^2 = 0``: one of two solutions, that of home,
-  at which the derivative of the equation has the same sign; in limbs alone that have a sign of their working mode;
-* an angle from ``a cos t + b sin t + c = 0`` with perpendicular vectors a and b of one length, ``cos t = -a.c / a.a``
+* an angle from ``A cos t + B sin t = D``, a slide from ``c0 + c1 q + c2 q^2 = 0``: of two solutions that of home, where
+  the derivative of the equation has the same sign; only for limbs with a known sign of the working mode;
+* an angle from ``a cos t + b sin t + c = 0`` with perpendicular vectors a and b of equal length, ``cos t = -a.c / a.a``
   and ``sin t = -b.c / b.b``; a slide from ``a q + c = 0``: one solution.
 
-The expression of an unknown depends on dimensions, pose and free positions of driven joints, and on no other unknown.
-Each form is read off an equation at a few values of the unknown, and tested at random dimensions and poses near home;
-of these expressions, which are analytic, one that agrees there agrees everywhere. A root is written ``sqrt(max(v,
-0))``, so that it has a value beyond the edge of reach too; a search excludes such points by ``v >= 0``.
+A closed form depends on dimensions, pose and free actuator coordinates, and on no other unknown. It is identified from
+an equation at a few values of the unknown, and tested at random dimensions and poses near home: analytic expressions
+that agree there agree everywhere. Roots are written ``sqrt(max(v, 0))``, so that they have values beyond the edge of
+the reach; a search excludes such points by ``v >= 0``.
 """
 
 from __future__ import annotations
@@ -31,28 +31,28 @@ from ... import Dimension, FloatArray, Model, Substitution, Unknown
 from ...instance import length_of
 from .replacing import Solved, at_turn, with_replaced
 
-#: Largest difference of two sides of an identity at random values, in parts of the sizes of its terms: rounding.
+#: Largest relative difference of both sides of an identity at random values: rounding.
 _SAME = 1e-9
-#: Points at which identities are tested, and how far they are from home, in parts of the dimensions, of the robot's
-#: size and in radians: far enough for other expressions to differ, near enough for limbs to reach them.
+#: Number of points at which identities are tested, and their distance from home, relative to the dimensions and the
+#: robot's size and in radians: far enough for other expressions to differ, near enough for limbs to reach them.
 _TESTS, _SPREAD = 4, 0.02
-#: Part of its size below which a coefficient or a slope is 0 at home: home is on the edge of reach there.
+#: Relative size below which a coefficient or a slope is 0 at home: home is on the edge of the reach there.
 _EDGE = 1e-6
 _SEED = 0
-#: Number of results that are kept: a certificate needs those of one robot several times.
+#: Number of cached results: a certificate needs those of one robot several times.
 _CACHED = 16
-#: Name of one of the equations of a path's loop.
+#: Pattern of the names of loop equations of a path.
 _LOOP = re.compile(r"(?:loop|distance) (\S+) \((\d+)\)")
 
 
 class Root(NamedTuple):
-    """The choice of one of two solutions of an equation.
+    """Choice of one of two solutions of an equation.
 
     Attributes:
-        equation: name of the equation in the model; empty for one that follows from several.
-        value: (1, 1) its left side, of order 1.
-        slope: (1, 1) the derivative by the unknown with the sign that makes it positive at home.
-        reach: (1, 1) not negative where there are solutions, and 1 at home.
+        equation: name of the equation in the model; empty for an equation that follows from several.
+        value: (1, 1) left side of the equation, of order 1.
+        slope: (1, 1) derivative with respect to the unknown, with the sign that makes it positive at home.
+        reach: (1, 1) discriminant: not negative where there are solutions, and 1 at home.
     """
 
     equation: str
@@ -62,12 +62,12 @@ class Root(NamedTuple):
 
 
 class Eliminated(NamedTuple):
-    """An unknown that follows from dimensions, pose, and the unknowns that are held as variables.
+    """Unknown that follows from dimensions, pose, and the unknowns that stay variables.
 
     Attributes:
         place: index of the unknown in the model.
-        solved: what replaces it; None for one that is held as a variable.
-        root: of the equation that determines it; None where there is one solution.
+        solved: closed form of the unknown; None for an unknown that stays a variable.
+        root: choice of the solution; None for an equation with one solution.
     """
 
     place: int
@@ -77,16 +77,16 @@ class Eliminated(NamedTuple):
 
 @dataclass(eq=False)
 class _Elimination:
-    """The state of an elimination.
+    """State of an elimination.
 
     Attributes:
         model: the robot.
-        symbols: its symbols: parameters, unknowns, rotation, position.
-        solved: what replaces the unknowns found by now.
-        found: these unknowns, in the order in which they were found.
-        points: arguments of functions of the symbols: home, then those of the tests.
-        held: indices of unknowns that stay variables where they have two solutions.
-        failed: attempts without success: number of the attempt, and the unknowns that were open.
+        symbols: symbols of the robot: parameters, unknowns, rotation, position.
+        solved: closed forms of the eliminated unknowns, by index.
+        eliminated: eliminated unknowns, in order.
+        points: arguments of functions of the symbols: home, then the test points.
+        held: indices of unknowns that stay variables if they have two solutions.
+        failed: unsuccessful attempts: number of the attempt, and the open unknowns.
     """
 
     model: Model
@@ -94,43 +94,43 @@ class _Elimination:
     points: list[list[FloatArray]]
     held: frozenset[int]
     solved: dict[int, Solved] = field(default_factory=dict)
-    found: list[Eliminated] = field(default_factory=list)
+    eliminated: list[Eliminated] = field(default_factory=list)
     failed: set[tuple[int, ...]] = field(default_factory=set)
 
     def turned(self, equation: Equation, rotation: FloatArray | None) -> Equation:
-        """Return an equation with numbers in the place of the platform's rotation, where it is given."""
+        """Return an equation with a numerical platform rotation, if one is given."""
         if rotation is None:
             return equation
         expression = ca.substitute(equation.expression, self.symbols[2], SX(rotation.tolist()))
         return equation._replace(expression=expression)
 
     def open_unknowns(self, expression: SX) -> list[int]:
-        """Return the indices of the unknowns that an expression depends on, and that are not determined by now.
+        """Return the indices of the unknowns in an expression that are not determined yet.
 
-        Free positions of driven joints are given, as dimensions and pose are.
+        Free actuator coordinates count as given, like dimensions and pose.
         """
-        known = {each.place for each in self.found}
+        known = {each.place for each in self.eliminated}
         known |= {k for k, each in enumerate(self.model.unknowns) if each.is_free}
         every = enumerate(ca.vertsplit(self.symbols[1]))
         names = {each.element_hash(): k for k, each in every if k not in known}
         return sorted(names[h] for h in (s.element_hash() for s in ca.symvar(expression)) if h in names)
 
     def replaced(self, expression: SX) -> SX:
-        """Return an expression without the unknowns found by now."""
+        """Return an expression without the eliminated unknowns."""
         return with_replaced(self.symbols, [expression], 1, self.solved)[0] if self.solved else expression
 
     def values(self, expression: SX) -> FloatArray:
-        """Return the values (t, k) of an expression (k, 1) at home and at the points of the tests."""
+        """Return the values (t, k) of an expression (k, 1) at home and at the test points."""
         function = ca.Function("values", self.symbols, [ca.densify(expression)])
         return np.array([function(*each).full().ravel() for each in self.points])
 
     def is_zero(self, expression: SX, size: SX | float = 1.0) -> bool:
-        """Return whether an expression is 0 at all points of the tests, in parts of a size and of 1."""
+        """Return True if an expression is 0 at all test points, relative to a size and to 1."""
         found = self.values(ca.vertcat(ca.vec(expression), SX(size)))
         return bool(np.all(np.abs(found[:, :-1]) <= _SAME * (1 + np.abs(found[:, -1:]))))
 
     def without_absent(self, equation: Equation) -> Equation:
-        """Return an equation with zeros in the place of unknowns on which its value does not depend."""
+        """Return an equation with 0 for the unknowns on which its value does not depend."""
         expression = equation.expression
         for k in self.open_unknowns(expression):
             q, size = self.model.unknowns[k].symbol, equation.size / self.model.unknowns[k].size
@@ -139,24 +139,25 @@ class _Elimination:
         return equation._replace(expression=expression)
 
     def add(self, index: int, solved: Solved, root: Root | None = None) -> None:
-        """Add an unknown in closed form."""
+        """Add the closed form of an unknown."""
         if root is not None and index in self.held:
-            self.found.append(Eliminated(index, None, root))
+            self.eliminated.append(Eliminated(index, None, root))
             return
         self.solved[index] = solved
-        self.found.append(Eliminated(index, solved, root))
+        self.eliminated.append(Eliminated(index, solved, root))
 
 
 @lru_cache(maxsize=_CACHED)
 def eliminated(
     model: Model, rotation: tuple[float, ...] | None = None, held: frozenset[int] = frozenset()
 ) -> tuple[Eliminated, ...]:
-    """Return the unknowns of a robot that follow from dimensions and pose in closed form, each in home's solution.
+    """Return the unknowns of a robot with a closed form in dimensions and pose, in the solution of home.
 
     Args:
         model: the robot.
-        rotation: nine numbers, column by column, of a rotation that is fixed: more unknowns may follow then.
-        held: indices of unknowns that stay variables where they have two solutions; others follow from them.
+        rotation: nine numbers, column by column, of a fixed platform rotation, with which more unknowns may follow;
+            None for a variable one.
+        held: indices of unknowns that stay variables if they have two solutions; other unknowns follow from them.
     """
     if not model.unknowns:
         return ()
@@ -174,11 +175,11 @@ def eliminated(
     single = [work.without_absent(work.turned(each, turn)) for each in single]
     while _eliminate_one(work, list(gaps.values()), single):
         pass
-    return tuple(work.found)
+    return tuple(work.eliminated)
 
 
 def _eliminate_one(work: _Elimination, gaps: Sequence[Equation], single: Sequence[Equation]) -> bool:
-    """Eliminate one unknown, from a gap where possible, else from a single equation; return whether there is one."""
+    """Eliminate one unknown, from a gap if possible, else from a single equation; return False if there is none."""
     attempts = [
         (solve, each) for solve, own in ((_from_gap, gaps), (_from_linear, single), (_from_one, single)) for each in own
     ]
@@ -186,7 +187,7 @@ def _eliminate_one(work: _Elimination, gaps: Sequence[Equation], single: Sequenc
         left = work.open_unknowns(given.expression)
         if not left or (attempt, *left) in work.failed:
             continue
-        # Repeated only where another unknown is determined by then.
+        # Repeated only after another unknown has been determined.
         work.failed.add((attempt, *left))
         equation = given._replace(expression=work.replaced(given.expression))
         if len(left) > 1:
@@ -198,7 +199,7 @@ def _eliminate_one(work: _Elimination, gaps: Sequence[Equation], single: Sequenc
 
 
 def _from_gap(work: _Elimination, k: int, gap: Equation) -> bool:
-    """Eliminate an unknown on which a gap (3, 1) depends linearly, by its sine and cosine or by itself."""
+    """Eliminate an unknown that enters a gap (3, 1) linearly, or by its sine and cosine."""
     q, e = work.model.unknowns[k].symbol, gap.expression / gap.size
     slope = ca.jacobian(e, q)
     if work.model.unknowns[k].dimension is not Dimension.ANGLE:
@@ -221,7 +222,7 @@ def _from_one(work: _Elimination, k: int, equation: Equation) -> bool:
     """Eliminate an unknown that one equation (1, 1) determines, in the solution of home."""
     unknown = work.model.unknowns[k]
     if all(each.limb != equation.limb for each in work.model.signs if each.is_mode):
-        # A limb without a sign of its mode is covered in every mode.
+        # A limb without a sign of its working mode is covered in all modes.
         return False
     q, e = unknown.symbol, equation.expression / equation.size
     slope = ca.jacobian(e, q) * unknown.size
@@ -238,7 +239,7 @@ def _from_one(work: _Elimination, k: int, equation: Equation) -> bool:
 
 
 def _angle_of(work: _Elimination, unknown: Unknown, e: SX, sign: float) -> tuple[Solved | None, SX]:
-    """Return the angle with ``A cos q + B sin q + C = 0`` and a slope of a sign, and its reach; None without one."""
+    """Return the angle with ``A cos q + B sin q + C = 0`` and a given sign of the slope, and its reach, or None."""
     q = unknown.symbol
     A, B, C = _harmonics(work, e, q)
     if not work.is_zero(A * ca.cos(q) + B * ca.sin(q) + C - e):
@@ -251,7 +252,7 @@ def _angle_of(work: _Elimination, unknown: Unknown, e: SX, sign: float) -> tuple
 
 
 def _slide_of(work: _Elimination, unknown: Unknown, e: SX, sign: float) -> tuple[Solved | None, SX]:
-    """Return the slide with ``c0 + c1 q + c2 q^2 = 0`` and a slope of a sign, and its reach; None without one."""
+    """Return the travel with ``c0 + c1 q + c2 q^2 = 0`` and a slope of given sign, and its reach; None without one."""
     q = unknown.symbol
     c0, c1, c2 = _coefficients(e, q)
     if not work.is_zero(c0 + c1 * q + c2 * q * q - e):
@@ -263,7 +264,7 @@ def _slide_of(work: _Elimination, unknown: Unknown, e: SX, sign: float) -> tuple
 
 
 def _from_linear(work: _Elimination, k: int, equation: Equation) -> bool:
-    """Eliminate a slide on which one equation (1, 1) depends linearly."""
+    """Eliminate a slide that enters one equation (1, 1) linearly."""
     unknown = work.model.unknowns[k]
     if unknown.dimension is Dimension.ANGLE:
         return False
@@ -276,16 +277,16 @@ def _from_linear(work: _Elimination, k: int, equation: Equation) -> bool:
 
 
 def _coefficients(e: SX, q: SX) -> tuple[SX, SX, SX]:
-    """Return c0, c1 and c2 of ``e = c0 + c1 q + c2 q^2``, whatever the form of e is."""
+    """Return c0, c1 and c2 of ``e = c0 + c1 q + c2 q^2``, for any form of the expression e."""
     slope = ca.jacobian(e, q)
     at_zero = ca.substitute(ca.vertcat(e, slope, ca.jacobian(slope, q) / 2), q, SX(0))
     return at_zero[0], at_zero[1], at_zero[2]
 
 
 def _harmonics(work: _Elimination, e: SX, q: SX) -> tuple[SX, SX, SX]:
-    """Return a, b and c of ``e = a cos q + b sin q + c``, whatever the form of e is.
+    """Return a, b and c of ``e = a cos q + b sin q + c``, for any form of the expression e.
 
-    a and b are those of the derivative, in which terms that do not depend on q cancel.
+    The values a and b come from the derivative, in which terms without q cancel.
     """
     slope = ca.jacobian(e, q)
     a, b = at_turn(slope, q, -1.0, 0.0), at_turn(slope, q, 0.0, 1.0)
@@ -296,12 +297,12 @@ def _harmonics(work: _Elimination, e: SX, q: SX) -> tuple[SX, SX, SX]:
 
 
 def _is_positive(work: _Elimination, value: SX) -> bool:
-    """Return whether a coefficient (1, 1) of order 1 is positive at home."""
+    """Return True if a coefficient (1, 1) of order 1 is positive at home."""
     return bool(float(work.values(value)[0, 0]) > _EDGE)
 
 
 def _points(model: Model, rotation: FloatArray | None) -> list[list[FloatArray]]:
-    """Return home and points near it: values of parameters, unknowns, rotation and position."""
+    """Return home and test points near it: values of parameters, unknowns, rotation and position."""
     rng = np.random.default_rng(_SEED)
     typical = model.typical
     home = np.array(model.home)
@@ -319,9 +320,13 @@ def _points(model: Model, rotation: FloatArray | None) -> list[list[FloatArray]]
 
 
 class Equation(NamedTuple):
-    """Left sides of equations (k, 1), the length or number by which they are of order 1, and the name of one.
+    """Equations of a loop.
 
-    ``limb`` is the limb whose joints they close; empty for none.
+    Attributes:
+        expression: (k, 1) left sides.
+        size: (1, 1) length or number that scales the left sides to order 1.
+        limb: name of the limb with the loop; empty for none.
+        name: name of a single equation.
     """
 
     expression: SX
@@ -333,7 +338,7 @@ class Equation(NamedTuple):
 def gaps_of(model: Model) -> dict[str, Equation]:
     """Return the gap (3, 1) of each path that is opened at the centre of a joint, by the path's name.
 
-    Any three equations of a path would do, as its gap is read off by its form alone: others have another one.
+    Any three equations of a path would do, because a gap is identified by its form.
     """
     parts: dict[str, dict[int, Equation]] = {}
     for each in (*model.loops, *model.closure):
@@ -351,7 +356,7 @@ def gaps_of(model: Model) -> dict[str, Equation]:
 
 
 def limb_of(name: str) -> str:
-    """Return the limb of an equation from its name, such as 1 of ``loop 1.2 (3)``; empty where it has another form."""
+    """Return the limb of an equation from its name, such as 1 of ``loop 1.2 (3)``; empty for a name of another form."""
     match = _LOOP.match(name)
     return "" if match is None else match[1].partition(".")[0]
 

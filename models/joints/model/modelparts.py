@@ -1,6 +1,6 @@
-"""Parts of a robot's model: measured at closed configurations, or listed from dimensions, paths and actuators.
+"""Parts of a robot's model that are measured at closed configurations, or listed from paths and actuators.
 
-The structure of a path is for people: its joints, the place where its loop is opened, and its numbers.
+The structure of a path is for people: its joints, the place where its loop is opened, and dimensions of its spaces.
 """
 
 from __future__ import annotations
@@ -36,19 +36,19 @@ from ..posed.loops import ClosedPoint
 from ..posed.opened import OpenedPath
 from ..posed.resistance import Ranks
 
-#: A member with so many wrenches resists nearly every motion alike.
+#: Number of wrenches from which on a member resists nearly all motions alike.
 _MANY_WRENCHES = 5
-#: Components of orthonormal motions below this are none.
+#: Magnitude below which components of orthonormal motions are zero.
 _ROUNDING = 1e-9
 
 
 def generic_ranks(model: Model, robot: HomeRobot, points: Sequence[ClosedPoint]) -> GenericRanks:
-    """Return the largest ranks of a robot's rows and constraints over closed configurations, and what it can do there.
+    """Return the generic ranks of a robot's rows and constraints, and its mobility, over closed configurations.
 
     Args:
         model: the robot.
-        robot: at home.
-        points: the configurations.
+        robot: robot at home.
+        points: closed configurations.
     """
     own = Substitution.identity(model)
     size = ca.Function("size", [robot.symbols], [robot.size])
@@ -80,11 +80,11 @@ def generic_ranks(model: Model, robot: HomeRobot, points: Sequence[ClosedPoint])
 
 
 def _platform_motions(constraints: FloatArray, rank: int, point: ClosedPoint, reach: float) -> PlatformMotions:
-    """Return the motions in which constraints (k, 6) do no work."""
+    """Return the platform motions in which the constraints (k, 6) do no work."""
     moments = constraints[:, 3:] - np.cross(point.position, constraints[:, :3])
     _, _, right = np.linalg.svd(np.hstack([moments / reach, constraints[:, :3]]))
     twists = right[rank:].T
-    # Rounding is no motion: a robot whose platform cannot turn has no angular velocities.
+    # Rounding errors are not motions: a platform without rotations has angular velocities of exactly 0.
     twists = np.where(np.abs(twists) > _ROUNDING, twists, 0.0)
     return PlatformMotions(point.rotation, np.vstack([twists[:3] / reach, twists[3:]]))
 
@@ -92,7 +92,7 @@ def _platform_motions(constraints: FloatArray, rank: int, point: ClosedPoint, re
 def _is_determined(
     model: Model, velocities: Velocities, drives: Sequence[LimbDrive], point: ClosedPoint, reach: float
 ) -> bool:
-    """Return whether statics determines the constraints of a limb."""
+    """Return True if statics determines the constraints of a limb."""
     J, names = velocities.jacobian, np.array([row.limb for row in model.frame_rows])
     for limb, (rows, _, drive) in zip(model.limbs, drives, strict=True):
         constraints = drive.constraints @ J[rows]
@@ -102,13 +102,13 @@ def _is_determined(
 
 
 def actuator_name(robot: HomeRobot, limb: Limb, joint: Joint, number: int) -> str:
-    """Return the name of one of a limb's several actuators: its joint's, unless another limb or actuator has it.
+    """Return the name of an actuator in a limb with several: its joint's name, if this is unique.
 
     Args:
-        robot: at home.
+        robot: robot at home.
         limb: the limb.
-        joint: the actuated joint.
-        number: of the actuator in the limb, from 1 on.
+        joint: actuated joint.
+        number: number of the actuator in the limb, from 1 on.
     """
     taken = {each.name for each in robot.limbs if each is not limb}
     taken |= {each.name for each in robot.joints if each.actuated and each is not joint}
@@ -122,10 +122,10 @@ def with_kinds(
 
     Args:
         member: the member.
-        actuators: of all limbs.
-        size: (1, 1) the robot's size, length.
+        actuators: actuators of all limbs.
+        size: (1, 1) size of the robot, length.
         numbers: symbols of dimensions, unknowns, rotation and position.
-        points: the configurations; the kinds are those of the first one.
+        points: closed configurations; the first one determines the kinds.
     """
     columns = scaled_twists(member.screws, member.centre, size, member.size)
     if member.rank < columns.shape[1]:
@@ -150,7 +150,7 @@ def parameters(robot: HomeRobot) -> tuple[Parameter, ...]:
 
 
 def quantities(actuators: Sequence[Actuator], positions: Sequence[SX]) -> tuple[Quantity, ...]:
-    """Return the positions (1, 1) of the actuators from home, angles and lengths apart."""
+    """Return the actuator coordinates as quantities, angles and lengths separately."""
     found = []
     for dimension, name in ((Dimension.ANGLE, "actuator_angle"), (Dimension.LENGTH, "actuator_length")):
         own = [
@@ -160,13 +160,13 @@ def quantities(actuators: Sequence[Actuator], positions: Sequence[SX]) -> tuple[
         ]
         if own:
             owners, values = zip(*own, strict=True)
-            words = f"{dimension.value} by which an actuator is away from home"
+            words = f"{dimension.value} of an actuator from home"
             found.append(Quantity(name, owners, ca.vertcat(*values), dimension, words))
     return tuple(found)
 
 
 def with_all_relations(actuators: Sequence[Actuator]) -> tuple[Actuator, ...]:
-    """Return actuators with factors in the relations of all limbs: 0 in those of other limbs than their own."""
+    """Return actuators with coefficients in the relations of all limbs: 0 for relations of other limbs."""
     counts = {each.limb: each.relations.shape[0] for each in actuators}
     found = []
     for each in actuators:
@@ -176,14 +176,14 @@ def with_all_relations(actuators: Sequence[Actuator]) -> tuple[Actuator, ...]:
 
 
 def structure_of(limb: str, name: str, path: OpenedPath, ranks: Ranks, unknowns: int) -> PathStructure:
-    """Return the structure of a path, whose loop equations count as kept.
+    """Return the structure of a path with all its loop equations counted as kept.
 
     Args:
         limb: name of the limb.
-        name: of the path: that of the limb, with the number of the branch where there are several.
+        name: name of the path: that of the limb, with the number of the branch if there are several.
         path: the path.
-        ranks: of its screws.
-        unknowns: number of its joint variables that are unknowns and that no path before it has.
+        ranks: ranks of the path's screws.
+        unknowns: number of joint coordinates that are unknowns and belong to no earlier path.
     """
     written = [part for joint in path.joints for part in (joint.parts or (joint,))]
     count = len(path.equations)
@@ -201,13 +201,13 @@ def structure_of(limb: str, name: str, path: OpenedPath, ranks: Ranks, unknowns:
 
 
 def joint_screws(limb: str, path: OpenedPath, ranks: Ranks, labels: Mapping[int, str]) -> JointScrews | None:
-    """Return the current screws of a path's joints; None where those of a joint are not known.
+    """Return the current screws of a path's joints; None if a joint has unknown screws.
 
     Args:
         limb: name of the limb.
         path: the path.
-        ranks: of its screws.
-        labels: of the joints as they are written, by identity.
+        ranks: ranks of the path's screws.
+        labels: labels of the written joints, by identity.
     """
     if any(len(own) != len(joint.axes) for joint, own in zip(path.joints, path.screws, strict=True)):
         return None
@@ -219,7 +219,7 @@ def joint_screws(limb: str, path: OpenedPath, ranks: Ranks, labels: Mapping[int,
 
 
 def _column_labels(joint: Joint, labels: Mapping[int, str]) -> list[str]:
-    """Return the label of the joint of each axis; the three axes of a ball joint are along those of the world."""
+    """Return the label of the joint of each axis; the axes of a spherical joint are along the world axes."""
     written = joint.parts or (joint,)
     if joint.type == "S" and len(written) > 1:
         return [f"{labels[id(written[0])]} to {labels[id(written[-1])]}"] * len(joint.axes)
@@ -227,7 +227,7 @@ def _column_labels(joint: Joint, labels: Mapping[int, str]) -> list[str]:
 
 
 def with_kept(structures: Iterable[PathStructure], kept: Collection[Closure]) -> tuple[PathStructure, ...]:
-    """Return structures with the numbers of their loop equations among those that a program keeps."""
+    """Return structures with the number of their loop equations that a program keeps."""
     names = {each.name for each in kept}
     return tuple(
         replace(each, kept=sum(f"loop {each.name} ({k + 1})" in names for k in range(each.equations)))
@@ -236,33 +236,31 @@ def with_kept(structures: Iterable[PathStructure], kept: Collection[Closure]) ->
 
 
 def member_remarks(structures: Sequence[PathStructure]) -> list[str]:
-    """Return remarks on members of so many wrenches, or so few members, that F says little about the robot.
+    """Return remarks on members with many wrenches, and on a robot with one member, for which F is not informative.
 
-    F is a sum over members of orthonormal wrenches: within one member it has no conditioning.
+    F is a sum over orthonormal wrenches of members: within one member it weighs all directions alike.
     """
     members = [each for each in structures if each.wrenches > 0]
     if len(members) == 1:
-        text = (
-            "the robot has one member only, so F says little: within a member F does not tell good directions from bad"
-        )
+        text = "the robot has one member only, so F is not informative: within a member F weighs all directions alike"
         return [text]
     names = [each.name for each in members if each.wrenches >= _MANY_WRENCHES]
     if not names:
         return []
     who = f"member {names[0]} resists" if len(names) == 1 else f"members {', '.join(names)} resist"
-    words = f"{who} with {_MANY_WRENCHES} wrenches or more, so that part of F says little"
-    return [f"{words}: within a member F does not tell good directions from bad"]
+    words = f"{who} with {_MANY_WRENCHES} wrenches or more, so their part of F is not informative"
+    return [f"{words}: within a member F weighs all directions alike"]
 
 
 def _opened(path: OpenedPath) -> str:
-    """Return the place at which a path is opened, in words, with the numbers of its joints as they are written."""
+    """Return the place at which a path is opened, in words, with the numbers of its written joints."""
     first: list[int] = [1]
     for joint in path.joints:
         first.append(first[-1] + (len(joint.parts) or 1))
     cut = path.cut
     if cut.far is not None:
         start, end = sorted((cut.far, cut.joint))
-        words = "driven rod" if cut.slide is not None else "rod"
+        words = "actuated rod" if cut.slide is not None else "rod"
         return f"{words} between joints {first[start]} and {first[end]}"
     if not cut.type:
         return f"behind joint {first[cut.first] - 1}"

@@ -1,6 +1,6 @@
-"""The drawing of a robot given joint by joint: links as bars and rods, rails, symbols of joints, base and platform.
+"""Drawing of a robot given joint by joint: links as bars and rods, rails, joint symbols, base and platform.
 
-Of a network of links and joints, each link is drawn as lines between its joints, in the order of their names.
+Each link of a network is drawn as lines between its joints, in the order of their names.
 """
 
 from __future__ import annotations
@@ -23,22 +23,23 @@ from ..posed.network import OpenNetwork
 from ..posed.opened import OpenedPath
 from ..posed.placed import SLIDING, Place, PlacedJoint, arc_between, placed_joints
 
-#: Half of the length of a rail, in parts of the robot's size: it is no dimension of the robot.
+#: Half length of a rail relative to the robot's size; it is not a dimension of the robot.
 _RAIL = 0.2
-#: Sine of an angle, and distance in parts of the robot's size, below which a slide is along a link and points are one.
+#: Sine of the angle below which a slide is along a link, and distance, relative to the robot's size, below which points
+#: coincide.
 _SAME = 1e-9
-#: Joints whose link between them can only push and pull.
+#: Types of joints whose link transmits only tension and compression.
 _ROD_ENDS = (JointKind.UNIVERSAL, JointKind.SPHERICAL)
 
 
 class DrawnPath(NamedTuple):
-    """A path of a limb to be drawn.
+    """Path of a limb to be drawn.
 
     Attributes:
         limb: the limb.
-        number: index of the path among those of its limb.
+        number: index of the path in the limb.
         path: the path.
-        row: index of its row among those of the limb, where it has one only and the limb has others.
+        row: index of the path's row among those of the limb, if the path has one row and the limb several.
     """
 
     limb: Limb
@@ -49,7 +50,7 @@ class DrawnPath(NamedTuple):
 
 @dataclass(eq=False)
 class _Node:
-    """A point of the drawing with its place (3,) at home, and the kind of the joint there."""
+    """Point of the drawing with its position (3,) at home and the kind of the joint there."""
 
     name: str
     at_home: FloatArray
@@ -58,7 +59,7 @@ class _Node:
 
 @dataclass(eq=False)
 class _Sketch:
-    """The drawing while its paths are added one after the other."""
+    """Drawing under construction."""
 
     frame: PathFrame
     size: float
@@ -71,14 +72,14 @@ class _Sketch:
     nodes: dict[str, _Node] = field(default_factory=dict)
 
     def node(self, name: str, place: Place, body: Body, kind: JointKind | None = None) -> _Node:
-        """Add a point, unless it has been drawn with another path, and return it."""
+        """Return a point, added unless it exists from another path."""
         if name not in self.nodes:
             self.points[name] = Point(name, place.now, body)
             self.nodes[name] = _Node(name, self.frame.typical_value(place.home).ravel(), kind)
         return self.nodes[name]
 
     def link(self, start: _Node | None, end: _Node, drawn: DrawnPath | None, kind: LinkKind, body: Body) -> None:
-        """Add a line, unless it has no length or has been drawn with another path."""
+        """Add a line, unless it has zero length or exists from another path."""
         if start is None or np.linalg.norm(end.at_home - start.at_home) <= _SAME * self.size:
             return
         if any((each.start, each.end) == (start.name, end.name) for each in self.links):
@@ -88,12 +89,12 @@ class _Sketch:
         self.links.append(Link(start.name, end.name, body, limb, kind, row))
 
     def symbol(self, name: str, joint: PlacedJoint, place: Place, body: Body, limb: Limb) -> None:
-        """Add the symbol of a joint, unless it has been drawn with another path."""
+        """Add the symbol of a joint, unless it exists from another path."""
         axes, owner = tuple(axis.now for axis in joint.axes), limb.name if limb.name in self.carrying else None
         self.joints.setdefault(name, JointSymbol(name, joint.kind, place.now, axes, body, owner, joint.is_actuated))
 
     def is_along(self, start: Place, end: Place, axes: Sequence[Place]) -> bool:
-        """Return whether two places are apart from each other along the first of some axes at home."""
+        """Return True if two places differ and their line is along the first of some axes at home."""
         if not axes:
             return False
         way, direction = (self.frame.typical_value(each.home).ravel() for each in (end - start, axes[0]))
@@ -101,7 +102,7 @@ class _Sketch:
         return apart > _SAME * self.size and float(np.linalg.norm(np.cross(way, direction))) <= _SAME * apart
 
     def is_same(self, one: Place, other: Place) -> bool:
-        """Return whether two places are one at home."""
+        """Return True if two places coincide at home."""
         return float(np.abs(self.frame.typical_value((one - other).home)).max()) <= _SAME * self.size
 
 
@@ -116,11 +117,11 @@ def scene_of(
     """Return the drawing of paths and networks at a pose.
 
     Args:
-        paths: of all limbs.
+        paths: paths of all limbs.
         pose: symbols of the pose.
         origin: (3, 1) origin of the platform frame at home, length.
-        frame: values that all paths share.
-        carrying: names of the limbs that have a wrench.
+        frame: common data of all paths of the robot.
+        carrying: names of the limbs with a wrench.
         networks: limbs that are networks.
     """
     sketch = _Sketch(frame, float(frame.typical_value(frame.size).item()), origin, carrying)
@@ -134,15 +135,15 @@ def scene_of(
     return Scene(tuple(sketch.points.values()), tuple(sketch.links), joints=tuple(sketch.joints.values()))
 
 
-def _add_path(sketch: _Sketch, drawn: DrawnPath, own: Sequence[DrawnPath]) -> None:
-    """Add a path of a limb, whose paths are ``own``."""
+def _add_path(sketch: _Sketch, drawn: DrawnPath, siblings: Sequence[DrawnPath]) -> None:
+    """Add a path of a limb with the paths ``siblings``."""
     joints = placed_joints(drawn.path, sketch.frame)
     stem = len(drawn.limb.stem) if len(drawn.limb.branches) > 1 else 0
     previous: _Node | None = None
     for k, joint in enumerate(joints):
         name = drawn.limb.label(drawn.number, joint.number - 1)
         if joint.number > stem and previous is not None and joints[k - 1].number <= stem:
-            previous = _fork(sketch, drawn, own, previous, k)
+            previous = _fork(sketch, drawn, siblings, previous, k)
         previous = _add_joint(sketch, drawn, joints, k, name, previous)
         if k == 0:
             base = sketch.nodes.get(f"{name} foot", previous)
@@ -151,9 +152,9 @@ def _add_path(sketch: _Sketch, drawn: DrawnPath, own: Sequence[DrawnPath]) -> No
         sketch.outlines[Body.PLATFORM].append(previous)
 
 
-def _fork(sketch: _Sketch, drawn: DrawnPath, own: Sequence[DrawnPath], stem: _Node, k: int) -> _Node:
+def _fork(sketch: _Sketch, drawn: DrawnPath, siblings: Sequence[DrawnPath], stem: _Node, k: int) -> _Node:
     """Return the middle of the first joints of a limb's branches, at the end of a bar from the stem."""
-    firsts = [placed_joints(each.path, sketch.frame)[k].foot for each in own]
+    firsts = [placed_joints(each.path, sketch.frame)[k].foot for each in siblings]
     middle = sum(firsts, Place(SX.zeros(3), SX.zeros(3))) / len(firsts)
     fork = sketch.node(f"{drawn.limb.name}:fork", middle, Body.LIMB)
     sketch.link(stem, fork, drawn._replace(row=None), LinkKind.BAR, Body.LIMB)
@@ -163,7 +164,7 @@ def _fork(sketch: _Sketch, drawn: DrawnPath, own: Sequence[DrawnPath], stem: _No
 def _add_joint(
     sketch: _Sketch, drawn: DrawnPath, joints: Sequence[PlacedJoint], k: int, name: str, previous: _Node | None
 ) -> _Node:
-    """Add a joint with the link before it, and return the point from which the next link goes on."""
+    """Add a joint with the link before it, and return the point where the next link starts."""
     joint = joints[k]
     is_last = k == len(joints) - 1
     body = Body.PLATFORM if is_last else Body.BASE if k == 0 else Body.LIMB
@@ -211,7 +212,7 @@ def _add_parallelogram(
 def _add_slide(
     sketch: _Sketch, drawn: DrawnPath, joints: Sequence[PlacedJoint], k: int, name: str, previous: _Node | None
 ) -> _Node:
-    """Add a slide: in the middle of a leg that it lengthens, or on a rail."""
+    """Add a slide, in the middle of a telescopic leg or on a rail."""
     joint, is_last = joints[k], k == len(joints) - 1
     leg = _leg_of(sketch, joints, k)
     if leg is not None:
@@ -237,10 +238,10 @@ def _add_slide(
 
 
 def _leg_of(sketch: _Sketch, joints: Sequence[PlacedJoint], k: int) -> Place | None:
-    """Return the middle of the leg that a slide lengthens; None where it is on a rail.
+    """Return the middle of the telescopic leg of a slide; None for a slide on a rail.
 
-    A slide lengthens a leg where it is at one of the joints beside it and slides towards the other one. A last slide
-    lengthens a leg that ends where its axis is nearest to the platform's origin.
+    A slide belongs to a leg if it is at one of its neighbouring joints and slides towards the other. The leg of a last
+    slide ends where the axis is nearest to the platform's origin.
     """
     joint = joints[k]
     if joint.is_in_rod:
@@ -259,7 +260,7 @@ def _leg_of(sketch: _Sketch, joints: Sequence[PlacedJoint], k: int) -> Place | N
 
 
 def _tip(sketch: _Sketch, joint: PlacedJoint) -> Place:
-    """Return the point of a slide's axis, on the body behind it, that is nearest to the platform's origin at home."""
+    """Return the point of a slide's axis, on the body after it, that is nearest to the platform's origin at home."""
     if not joint.axes:
         return joint.place
     way = ca.dot(sketch.origin - joint.place.home, joint.axes[0].home)
@@ -267,19 +268,19 @@ def _tip(sketch: _Sketch, joint: PlacedJoint) -> Place:
 
 
 def _rail_end(sketch: _Sketch, name: str) -> _Node | None:
-    """Return the end of a rail that is farther from the platform at home; None where a slide has no rail."""
+    """Return the end of a rail that is farther from the platform at home; None for a slide without a rail."""
     origin = sketch.frame.typical_value(sketch.origin).ravel()
     ends = [sketch.nodes[end] for end in (f"{name} rail start", f"{name} rail end") if end in sketch.nodes]
     return max(ends, key=lambda each: float(np.linalg.norm(each.at_home - origin)), default=None)
 
 
 def _add_outline(sketch: _Sketch, body: Body, nodes: Sequence[_Node], centre: _Node | None) -> None:
-    """Add the outline of base or platform; where it is no area, a line to the platform's origin too.
+    """Add the outline of base or platform, with a line to the platform's origin if the outline has no area.
 
     Args:
         sketch: the drawing.
         body: base or platform.
-        nodes: points of the joints on it.
+        nodes: points of the joints on this body.
         centre: origin of the platform frame; None for the base.
     """
     corners = [nodes[k] for k in outline(np.array([node.at_home for node in nodes]))]

@@ -1,4 +1,4 @@
-"""Replacement of unknowns in expressions: a sine or cosine of an unknown angle is replaced as a whole."""
+"""Replacement of unknowns in expressions, with sine and cosine of an unknown angle replaced as a whole."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from casadi import SX
 
 
 class Solved(NamedTuple):
-    """An unknown in closed form: itself, its sine and cosine where it is an angle, and the edge of its reach."""
+    """Closed form of an unknown: value, sine and cosine for an angle, and edge of the reach."""
 
     value: SX
     sine: SX | None
@@ -19,22 +19,22 @@ class Solved(NamedTuple):
 
     @classmethod
     def angle(cls, sine: SX, cosine: SX, reach: SX) -> Solved:
-        """Return an angle from its sine and cosine (1, 1), without a value at half a turn."""
+        """Return an angle from its sine and cosine (1, 1), undefined at half a turn."""
         return cls(2 * ca.atan(sine / (1 + cosine)), sine, cosine, reach)
 
 
 def with_replaced(symbols: Sequence[SX], outputs: Sequence[SX], argument: int, solved: dict[int, Solved]) -> list[SX]:
-    """Return expressions with unknowns replaced; sines and cosines of theirs are replaced as a whole.
+    """Return expressions with unknowns replaced, and their sines and cosines replaced as a whole.
 
     Args:
         symbols: arguments of the expressions.
         outputs: the expressions.
-        argument: index of the argument whose elements are the unknowns.
-        solved: what replaces an element of it, by its index.
+        argument: index of the argument with the unknowns.
+        solved: closed forms by the index of the unknown.
     """
     function = ca.Function("outputs", list(symbols), [ca.densify(each) for each in outputs])
     work: list[SX] = [SX(0)] * function.sz_w()
-    # The unknown that a register holds, and its sign.
+    # Unknown in each register, with its sign.
     held: list[tuple[int, float] | None] = [None] * function.sz_w()
     results = [[SX(0)] * function.numel_out(i) for i in range(function.n_out())]
     for k in range(function.n_instructions()):
@@ -59,7 +59,7 @@ def with_replaced(symbols: Sequence[SX], outputs: Sequence[SX], argument: int, s
 def _applied(
     op: int, operands: list[SX], held: tuple[int, float] | None, solved: dict[int, Solved]
 ) -> tuple[SX, tuple[int, float] | None]:
-    """Return the result of an operation, and the unknown that it is, with its sign."""
+    """Return the result of an operation and, if the result is an unknown, its index and sign."""
     if held is not None and op in (ca.OP_SIN, ca.OP_COS, ca.OP_NEG):
         index, sign = held
         own = solved[index]
@@ -71,7 +71,7 @@ def _applied(
 
 
 def at_turn(expression: SX, q: SX, sine: SX | float, cosine: SX | float) -> SX:
-    """Return an expression with others in the place of sine and cosine of an angle; 0 in that of the angle itself."""
+    """Return an expression with sine and cosine of an angle replaced, and the angle itself set to 0."""
     others = ca.symvar(expression)
     rest = ca.vertcat(*[each for each in others if each.element_hash() != q.element_hash()])
     turned = Solved(SX(0), SX(sine), SX(cosine), SX(0))

@@ -1,4 +1,4 @@
-"""A robot given joint by joint as a :class:`~screwsynth.models.model.Model`."""
+"""Model of a robot given joint by joint."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ from .modelparts import (
 )
 from .pictures import DrawnPath, scene_of
 
-#: Range of an unknown from home: half a turn for an angle; for a slide, four times the robot's size.
+#: Range of an unknown from home: half a turn for an angle, four times the robot's size for a slide.
 _TURN = float(np.pi)
 _WAY = 4.0
 
@@ -76,25 +76,25 @@ def robot(
     coupling: Sequence[Mapping[str, object]] | None = None,
     schema: int = 1,
 ) -> Model:
-    """Return a robot that is given joint by joint, at home; the arguments are the keys of a robot file.
+    """Return the model of a robot given joint by joint, at home; the arguments are the keys of a robot file.
 
     Args:
-        name: the robot's name.
-        limb: its limbs, each a mapping with ``joints`` from base to platform, and optionally ``name``, ``repeat``,
+        name: name of the robot.
+        limb: limbs, each a mapping with ``joints`` from base to platform, and optionally ``name``, ``repeat``,
             ``points``, ``branch`` and ``centre``.
-        home: origin of the platform frame at home, where its axes are parallel to those of the world.
-        dimensions: its dimensions by name, each a mapping with ``typical`` and optionally ``kind`` (``"length"``,
+        home: origin of the platform frame at home, where its axes are parallel to the world axes.
+        dimensions: dimensions by name, each a mapping with ``typical`` and optionally ``kind`` (``"length"``,
             ``"angle"`` or ``"number"``) and ``description``. The typical value of an angle is in degrees.
-        derived: further numbers by name, as expressions of the dimensions and of earlier ones.
+        derived: derived quantities by name, as expressions of the dimensions and of earlier ones.
         description: one sentence for people.
         length_unit: unit of the typical dimensions, such as ``"m"``; empty for proportions in any unit.
-        links: names of all links of a robot that is given without limbs, by links and joints.
-        base: name of the link that is the base; ``"base"`` if left out.
-        platform: name of the link that is the platform; ``"platform"`` if left out.
+        links: names of all links, for a robot given by links and joints instead of limbs.
+        base: name of the base link; ``"base"`` by default.
+        platform: name of the platform link; ``"platform"`` by default.
         points: points by name, at home.
-        joint: its joints, each a mapping with ``name``, ``type``, ``between`` (two links, the base's side first) and
-            the keys of a limb's joint; a joint of type ``"weld"`` has no other.
-        coupling: linear relations of joints' coordinates, each a mapping with ``factors`` by joint.
+        joint: joints, each a mapping with ``name``, ``type``, ``between`` (two links, the base side first) and the keys
+            of a limb's joint; a joint of type ``"weld"`` has no other keys.
+        coupling: linear relations of joint coordinates, each a mapping with ``factors`` by joint.
         schema: version of these keys.
 
     Raises:
@@ -121,13 +121,13 @@ def robot(
 
 
 class _LimbModes(NamedTuple):
-    """What the sign of a limb's working mode is made from.
+    """Data of the sign of a limb's working mode.
 
     Attributes:
         place: index of the sign among all signs.
         limb: name of the limb.
-        paths: of the limb.
-        unknowns: places of its unknowns.
+        paths: opened paths of the limb.
+        unknowns: range of the limb's unknowns in the model.
     """
 
     place: int
@@ -138,7 +138,7 @@ class _LimbModes(NamedTuple):
 
 @dataclass(eq=False)
 class _Builder(ResistingParts):
-    """The parts of a robot's model while its limbs are added one after the other."""
+    """Parts of a robot's model under construction."""
 
     frame: PathFrame
     wrenches: list[Wrench] = field(default_factory=list)
@@ -162,7 +162,7 @@ class _Builder(ResistingParts):
         return self.frame.robot
 
     def add_network(self, joints: Sequence[int]) -> None:
-        """Add joints that are no limb with branches: their unknowns and equations; members follow from closed loops."""
+        """Add a network of joints: its unknowns and equations; its members follow from closed loops."""
         name = str(len(self.robot.limbs) + len(self.networks) + 1)
         count = len(self.unknowns)
         network = open_network(name, joints, self._variables(name, {}), self.frame)
@@ -178,7 +178,7 @@ class _Builder(ResistingParts):
         """Add a limb: its unknowns, equations, rows, members and actuators."""
         passive = [joint for joint in limb.stem if not joint.actuated]
         if len(limb.branches) > 1 and passive:
-            fault = "is passive and before the branches of its limb; only actuated joints may stand there"
+            fault = "is passive and before the branches of its limb; only actuated joints are allowed there"
             raise RobotError(passive[0].place, fault)
         known: dict[tuple[Joint, int], SX] = {}
         driven: dict[int, list[tuple[Joint, OpenedPath, int, str]]] = {}
@@ -206,7 +206,7 @@ class _Builder(ResistingParts):
         carrying = {row.label.member for row in self.wrenches} | {member.label for member in self.members}
         if any(carrying.isdisjoint(member for *_, member in each) for each in driven.values()):
             fault = (
-                "has an actuated joint that drives nothing, because its passive joints alone leave the platform free; "
+                "has an actuated joint without effect, because its passive joints leave the platform free; "
                 "remove actuated = true or a passive joint"
             )
             raise RobotError(limb.place, fault)
@@ -220,11 +220,11 @@ class _Builder(ResistingParts):
             label = labels[id(joint)]
             self.actuators.append(Actuator(name, limb.name, members, screws, axis.dimension, joint=label))
             self.driven += [(known[joint, 0], label)] if (joint, 0) in known else []
-            way = slide_length(path, self.frame) if j == path.cut.slide else axis.way(known[joint, 0])
+            way = slide_length(path, self.frame) if j == path.cut.slide else axis.travel(known[joint, 0])
             self.positions.append(SX(0) if way is None else way)
 
     def add_modes(self) -> None:
-        """Add the signs of working modes, each behind those of its limb's joints, where free positions are known."""
+        """Add each limb's sign of the working mode after its joint signs, once free actuator coordinates are known."""
         for each in reversed(self.modes):
             own = self.unknowns[each.unknowns]
             self.signs[each.place : each.place] = mode_signs(each.limb, each.paths, own, self.frame)
@@ -235,15 +235,15 @@ class _Builder(ResistingParts):
         return {row.limb for row in self.wrenches} | {member.limb for member in self.members}
 
     def _remark_idle(self, limb: Limb) -> None:
-        """Add the remark that a limb carries nothing, once for all copies."""
-        remark = f"{limb.place} carries nothing: its passive joints leave the platform free"
+        """Add the remark that a limb carries no load, once for all copies."""
+        remark = f"{limb.place} carries no load: its passive joints leave the platform free"
         if remark not in self.remarks:
             self.remarks.append(remark)
 
     def _path(
         self, limb: Limb, index: int, joints: Sequence[Joint], variables: Variables, labels: Mapping[int, str]
     ) -> OpenedPath | None:
-        """Add one path of a limb, and return it; None for a path that constrains nothing and drives nothing."""
+        """Add one path of a limb and return it; None for a path that neither constrains nor drives the platform."""
         joints = simplified(self.frame, joints)
         cut = choose_cut(joints, len(limb.stem) if len(limb.branches) > 1 else 0, with_rods=limb.centre is None)
         key = limb.group, index
@@ -271,7 +271,7 @@ class _Builder(ResistingParts):
         return path
 
     def _variables(self, limb: str, known: dict[tuple[Joint, int], SX]) -> Variables:
-        """Return the function that gives the variable of a joint's axis, as a new unknown at its first use."""
+        """Return the function that returns the coordinate of a joint's axis, as a new unknown at first use."""
 
         def variable(joint: Joint, axis: int) -> SX:
             key = joint, axis
@@ -281,7 +281,7 @@ class _Builder(ResistingParts):
                 slides = joint.axes[axis].kind is AxisKind.TRANSLATION
                 reach, size = (_WAY, self.robot.size) if slides else (_TURN, SX(1))
                 dimension = Dimension.LENGTH if slides else Dimension.ANGLE
-                words = "way of a slide" if slides else "angle of a joint"
+                words = "travel of a slide" if slides else "angle of a joint"
                 self.unknowns.append(Unknown(name, symbol, dimension, f"{words}, from home", -reach, reach, size))
                 known[key] = symbol
             return known[key]
@@ -290,12 +290,12 @@ class _Builder(ResistingParts):
 
 
 def joint_labels(limb: Limb, index: int, joints: Sequence[Joint], known: Mapping[int, str]) -> dict[int, str]:
-    """Return the label of each joint of a path that has none yet, such as ``2:3``, by the joint's identity.
+    """Return a label, such as ``2:3``, for each unlabelled joint of a path, by the joint's identity.
 
     Args:
         limb: the limb.
-        index: of the path among those of the limb.
-        joints: of the path.
+        index: index of the path in the limb.
+        joints: joints of the path.
         known: labels of joints of other paths, which share the joints of the stem.
     """
     return {id(joint): limb.label(index, j) for j, joint in enumerate(joints) if id(joint) not in known}
@@ -312,10 +312,10 @@ def model_of_home(
 
     Args:
         at_home: the robot.
-        samples: (s, d) values of its dimensions at which ranks are measured.
-        definition: the tables that state it.
-        more: parameters that are among its symbols, beside its dimensions.
-        legs: its straight legs, where they are known.
+        samples: (s, d) values of the dimensions at which ranks are measured.
+        definition: tables of the robot file.
+        more: further parameters in its symbols, in addition to the dimensions.
+        legs: straight legs of the robot; None to derive them.
 
     Raises:
         RobotError: the robot cannot be assembled near home.
@@ -379,7 +379,7 @@ def model_of_home(
 
 
 def _check_carrying(builder: _Builder) -> None:
-    """Refuse a robot whose limbs do not resist the platform, or that has no actuated joint."""
+    """Refuse a robot without limbs that resist the platform, or without actuated joints."""
     if not (builder.wrenches or builder.members):
         raise RobotError("", "no limb resists the platform: each has six or more independent passive joints")
     if not builder.actuators:

@@ -1,7 +1,7 @@
-"""The joint at which a limb's loop is opened, so that few variables of joints become unknowns.
+"""Joint at which a limb's loop is opened, chosen so that few joint coordinates become unknowns.
 
-The variables of the joint at the cut, and of the joints of a rod, never become unknowns. A rod is a passive spherical
-joint next to a passive universal or spherical joint, or with one actuated slide between: its length is then given by
+The coordinates of the joint at the cut, and of the joints of a rod, never become unknowns. A rod is a passive spherical
+joint next to a passive universal or spherical joint, or with one actuated slide between them: its length follows from
 the two points, or is driven by the actuator.
 """
 
@@ -19,13 +19,13 @@ from ..home.motion import UNIT_VECTORS, AxisKind, JointAxis
 
 
 class Cut(NamedTuple):
-    """The place at which a path of joints is opened: joints ``first`` to ``last`` are left out of both sides.
+    """Place at which a path of joints is opened: joints ``first`` to ``last`` belong to neither side.
 
     Attributes:
-        type: letter of the joint at the cut; empty where no joint is cut.
+        type: letter of the joint at the cut; empty if no joint is cut.
         joint: index of the joint at the cut.
-        first, last: first and last joint between the two sides; ``last`` is below ``first`` where no joint is cut.
-        far: index of the joint at the rod's other end; None without a rod.
+        first, last: first and last joint between the two sides; ``last`` is below ``first`` if no joint is cut.
+        far: index of the joint at the other end of the rod; None without a rod.
         slide: index of the actuated slide of the rod; None for a rod of constant length.
     """
 
@@ -38,9 +38,9 @@ class Cut(NamedTuple):
 
 
 def simplified(frame: PathFrame, joints: Sequence[Joint]) -> list[Joint]:
-    """Return joints with three passive rotations through one point as a spherical joint, and two as a universal one.
+    """Return joints with concurrent passive rotations merged: three into a spherical joint, two into a universal one.
 
-    Rotations count where they follow each other, and where no two that follow each other are parallel.
+    Rotations are merged if they follow each other directly and successive axes are not parallel.
     """
     found = list(joints)
     for count, kind in ((3, "S"), (2, "U")):
@@ -58,7 +58,7 @@ def simplified(frame: PathFrame, joints: Sequence[Joint]) -> list[Joint]:
 
 
 def _window(joints: Sequence[Joint], end: int, count: int) -> int | None:
-    """Return the first of the joints before ``end`` whose axes are so many passive rotations; None without such."""
+    """Return the first of the joints before ``end`` with ``count`` passive rotations; None without such joints."""
     start, left = end, count
     while start > 0 and left > 0:
         joint = joints[start - 1]
@@ -85,13 +85,13 @@ def _merged(joints: Sequence[Joint], kind: str, point: SX) -> Joint:
 def choose_cut(joints: Sequence[Joint], stem: int, *, with_rods: bool = True) -> Cut:
     """Return the place at which a path is opened.
 
-    The cut is at the passive spherical joint nearest the platform; without one at a universal joint, else at a joint R,
-    of several the one that leaves sides with equal numbers of variables.
+    The cut is at the passive spherical joint nearest the platform; else at a universal joint; else at the revolute
+    joint with the most equal numbers of coordinates on both sides.
 
     Args:
-        joints: from base to platform.
-        stem: number of joints at the base that are shared with other paths, and must stay on the base's side.
-        with_rods: whether a rod may be left out as a whole.
+        joints: joints from base to platform.
+        stem: number of joints from the base on that are shared with other paths, and stay on the base side.
+        with_rods: If true, a rod may be left out as a whole.
     """
     spherical = [j for j in range(stem, len(joints)) if joints[j].type == "S"]
     if spherical:
@@ -108,13 +108,13 @@ def choose_cut(joints: Sequence[Joint], stem: int, *, with_rods: bool = True) ->
 
 
 def _imbalance(joints: Sequence[Joint], first: int, behind: int) -> int:
-    """Return the difference of the numbers of variables before ``first`` and from ``behind`` on."""
+    """Return the difference between the numbers of coordinates before ``first`` and from ``behind`` on."""
     before, after = (sum(len(joint.axes) for joint in part) for part in (joints[:first], joints[behind:]))
     return abs(before - after)
 
 
 def _rod(joints: Sequence[Joint], stem: int, j: int) -> Cut | None:
-    """Return the cut at a rod that ends at a spherical joint; None where there is no rod."""
+    """Return the cut at a rod that ends at a spherical joint; None without a rod."""
     for step in (-1, 1):
         far, slide = j + step, None
         if stem <= far < len(joints) and joints[far].type == "P" and joints[far].actuated:

@@ -1,8 +1,8 @@
-"""Independent loop equations, which alone enter a program, and the driven joints whose positions they leave free.
+"""Independent loop equations, which enter a program, and the free actuator coordinates.
 
-Equations of an overconstrained robot depend on each other, and a robot with more actuators than degrees of freedom can
-move some of its joints while the platform stands still. Both are measured at random closed configurations: random
-dimensions, and a pose near home from which Newton's method with least-norm steps closes all loops.
+The equations of an overconstrained robot are dependent, and a robot with more actuators than degrees of freedom can
+move joints while the platform stands still. Both are measured at random closed configurations: random dimensions, and a
+pose near home from which Newton's method with least-norm steps closes all loops.
 """
 
 from __future__ import annotations
@@ -23,25 +23,25 @@ from ..home.chain import HomeRobot
 from ..home.generic import PathFrame
 from ..written.forms import RobotError
 
-#: Closed configurations that are tried; the largest rank among them counts.
+#: Number of closed configurations; the largest rank among them counts.
 _POINTS = 5
-#: Newton steps to a closed configuration, and the residual that ends them: equations are of order 1.
+#: Largest number of Newton steps to a closed configuration, and the residual that ends them: equations are of order 1.
 _STEPS = 40
 _CLOSED = 1e-12
-#: Largest random change of the pose's coordinates and of the unknowns, in the robot's size and radians.
+#: Largest random change of pose coordinates and unknowns, relative to the robot's size and in radians.
 _CHANGES = (0.15, 0.05)
-#: Part of a joint's rate, in a self-motion of unit size, that is independent of joints before: rounding leaves less.
+#: Joint rate in a self-motion of unit size, independent of earlier joints, below which it is 0: rounding leaves less.
 _INDEPENDENT = 1e-6
 
 
 class ClosedPoint(NamedTuple):
-    """A closed configuration.
+    """Closed configuration of a robot.
 
     Attributes:
-        dimensions: (d,) values.
-        unknowns: (u,) values.
-        rotation: (3, 3) of the platform.
-        position: (3,) of the platform's origin, length.
+        dimensions: (d,) values of the dimensions.
+        unknowns: (u,) values of the unknowns.
+        rotation: (3, 3) rotation of the platform.
+        position: (3,) position of the platform's origin, length.
     """
 
     dimensions: FloatArray
@@ -51,12 +51,12 @@ class ClosedPoint(NamedTuple):
 
 
 class Loops(NamedTuple):
-    """Closed configurations of a robot, and what its loop equations determine there.
+    """Closed configurations of a robot, with independent equations and free coordinates.
 
     Attributes:
-        points: the configurations.
+        points: closed configurations.
         independent: indices of the independent loop equations.
-        free: indices of driven unknowns that the pose leaves free, as many as are independent of each other.
+        free: indices of the free actuator coordinates among the unknowns, a largest independent set.
     """
 
     points: tuple[ClosedPoint, ...]
@@ -67,16 +67,16 @@ class Loops(NamedTuple):
 def examine_loops(
     frame: PathFrame, equations: Sequence[Closure], unknowns: Sequence[Unknown], driven: Sequence[int]
 ) -> Loops:
-    """Return closed configurations near home, which of the loop equations are independent there, and what they leave.
+    """Return closed configurations near home, with the independent loop equations and the free coordinates there.
 
     Args:
-        frame: values that all paths of the robot share.
-        equations: of dimensions, pose and unknowns.
-        unknowns: their symbols, and the sizes by which they become numbers of order 1.
-        driven: indices of the unknowns that are positions of driven joints.
+        frame: common data of all paths of the robot.
+        equations: loop equations in dimensions, pose and unknowns.
+        unknowns: unknowns with their symbols and scales.
+        driven: indices of the unknowns that are actuator coordinates.
 
     Raises:
-        RobotError: no closed configuration was found near home.
+        RobotError: there is no closed configuration near home.
     """
     robot, pose = frame.robot, frame.platform
     c, shift = SX.sym("c", 3), SX.sym("shift", 3)
@@ -107,17 +107,17 @@ def examine_loops(
                 points.append(ClosedPoint(sample, values.ravel(), R, p.ravel()))
                 jacobians.append(found.slopes)
     if not points:
-        raise RobotError("", "its loops could not be closed at any configuration near home: is it movable?")
+        raise RobotError("", "no closed configuration near home: check that the mechanism is mobile")
     own_slopes = [each[:, 6 : 6 + len(unknowns)] for each in jacobians]
     return Loops(tuple(points), independent_rows(jacobians), _free(own_slopes, driven))
 
 
 def _free(slopes: Sequence[FloatArray], driven: Sequence[int]) -> tuple[int, ...]:
-    """Return the driven unknowns that the pose leaves free, the first ones that are independent of each other.
+    """Return the first independent actuator coordinates that the pose does not determine.
 
     Args:
-        slopes: (c, u) derivatives of the loop equations by the unknowns at each closed configuration.
-        driven: indices of the driven unknowns.
+        slopes: (c, u) derivatives of the loop equations with respect to the unknowns, at each closed configuration.
+        driven: indices of the unknowns that are actuator coordinates.
     """
     motions = [_self_motions(each) for each in slopes]
     fewest = min(each.shape[1] for each in motions)
@@ -130,13 +130,13 @@ def _free(slopes: Sequence[FloatArray], driven: Sequence[int]) -> tuple[int, ...
 
 
 def _self_motions(slopes: FloatArray) -> FloatArray:
-    """Return an orthonormal basis (u, n) of the rates of unknowns with which the platform stands still."""
+    """Return an orthonormal basis (u, n) of the self-motions: rates of unknowns with the platform at rest."""
     _, values, right = np.linalg.svd(slopes)
     return np.asarray(right[rank_of(values) :].T)
 
 
 def _is_independent(rows: FloatArray) -> bool:
-    """Return whether the last row (n,) is independent of those before it."""
+    """Return True if the last row (n,) is independent of the rows before it."""
     *others, last = rows
     if others:
         basis = np.linalg.svd(np.array(others), full_matrices=False)[2]
@@ -145,7 +145,7 @@ def _is_independent(rows: FloatArray) -> bool:
 
 
 def _slopes(residual: SX, moving: SX, robot: HomeRobot) -> SX:
-    """Return the Jacobian by pose, unknowns and dimensions, lengths in parts of the robot's size."""
+    """Return the Jacobian with respect to pose, unknowns and dimensions, lengths relative to the robot's size."""
     own = ca.jacobian(residual, robot.symbols)
     scales = [robot.size if item.kind.value == "length" else SX(1) for item in robot.words.dimensions.values()]
     scaled = [own[:, k] * scale for k, scale in enumerate(scales)]
@@ -153,6 +153,6 @@ def _slopes(residual: SX, moving: SX, robot: HomeRobot) -> SX:
 
 
 def _closed(function: ca.Function, z: FloatArray, sample: FloatArray) -> Point:
-    """Return pose and unknowns (n,) at which Newton's method ends, for some dimensions (d,)."""
+    """Return pose and unknowns (n,) after Newton's method, for given dimensions (d,)."""
     equations = VectorEquations(lambda at: [each.full() for each in function(at, sample)], _CLOSED)
     return newton(equations, equations.at(z), steps=_STEPS, zeros=[DEPENDENT])

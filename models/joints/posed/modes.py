@@ -1,15 +1,15 @@
-"""Signs that distinguish the assemblies of a limb: of joints that hold together, and of home's working mode.
+"""Signs that distinguish the assembly modes of a limb: of joints that hold together, and of the home working mode.
 
-The equations of a closed loop also hold for some joints that do not hold together, such as a hinge whose axes point
-against each other. Of the positions of a limb's joints at which it does hold together, those of one *working mode* are
-connected without a singularity of the limb: an elbow bent to one side. A mode's sign is that of the determinant of the
-derivatives of the equations by the limb's unknowns, which is zero at such singularities alone:
+Loop equations also have solutions in which joints do not hold together, such as a hinge with opposite axes. Of the
+solutions in which they do, those of one *working mode* are connected without a singularity of the limb: an elbow bent
+to one side. The sign of a mode is that of the determinant of the equations' derivatives with respect to the limb's
+unknowns, which is zero only at such singularities:
 
-* one unknown, on which one equation of each path depends, such as that of a rod: the sum of the derivatives;
-* two unknowns of a limb that moves in a plane: the derivatives of the point at the cut, and the plane's normal;
+* one unknown and one equation of each path that depends on it, such as that of a rod: the sum of the derivatives;
+* two unknowns of a planar limb: the derivatives of the point at the cut, and the plane's normal;
 * three unknowns: the derivatives of the point at the cut.
 
-Other limbs have no sign here.
+Other limbs have no sign.
 """
 
 from __future__ import annotations
@@ -24,27 +24,27 @@ from ..home.generic import PathFrame
 from ..home.motion import AxisKind
 from .opened import OpenedPath
 
-#: Part of its largest possible size below which a mode's sign at home is zero: home is singular. Rounding leaves 1e-16.
+#: Relative size of a mode's sign at home below which home is singular: rounding leaves 1e-16.
 _SINGULAR = 1e-6
 
 
 def joint_signs(limb: str, name: str, path: OpenedPath) -> list[AssemblySign]:
-    """Return the signs of a path's joints that its equations leave open, each 1 where the joints hold together."""
+    """Return the signs of a path's joints that the equations leave open, each 1 where the joints hold together."""
     return [AssemblySign(f"sign {name} ({k + 1})", limb, 1 - each, is_mode=False) for k, each in enumerate(path.checks)]
 
 
 def mode_signs(
     limb: str, paths: Sequence[OpenedPath], unknowns: Sequence[Unknown], frame: PathFrame
 ) -> list[AssemblySign]:
-    """Return the sign of home's working mode of a limb; none where it has no unknowns, or no sign here.
+    """Return the sign of the home working mode of a limb; empty without unknowns or a known sign.
 
-    Free positions of driven joints count as given.
+    Free actuator coordinates count as given.
 
     Args:
         limb: name of the limb.
-        paths: its paths.
-        unknowns: its unknowns.
-        frame: values that all paths of the robot share.
+        paths: opened paths of the limb.
+        unknowns: unknowns of the limb.
+        frame: common data of all paths of the robot.
     """
     every = ca.vertcat(SX(0, 1), *[item.symbol for item in unknowns])
     unknowns = [item for item in unknowns if not item.is_free]
@@ -73,9 +73,9 @@ def mode_signs(
 
 
 def _normal(path: OpenedPath, frame: PathFrame) -> SX | None:
-    """Return the current axis (3, 1) to which all motions of a path's unknowns are perpendicular; None without one.
+    """Return the current axis (3, 1) normal to all motions of a path's unknowns; None if there is none.
 
-    The path moves in a plane where all its rotations have one direction, and its slides are across it.
+    The path is planar if all rotations have one direction, and its slides are perpendicular to it.
     """
     cut = range(path.cut.first, path.cut.last + 1)
     pairs = [

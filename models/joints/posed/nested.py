@@ -1,11 +1,10 @@
-"""A network as a limb of a model: its members, actuators and joints, with screws that nested loops and couplings allow.
+"""Network as a limb of a model: members, actuators and joints, with the screws that nested loops allow.
 
-With the rates ``q`` of a member's passive joints along a spanning tree from the base, its loops demand ``L q = 0``, and
-the platform's twist is ``S q``. The member allows the twists ``S N`` with the projector ``N`` on the null space of
+Let ``q`` be the rates of a member's passive joints along a spanning tree from the base, with the loop equations ``L q =
+0`` and the platform twist ``S q``. The member allows the twists ``S N``, with the projector ``N`` on the null space of
 ``L``, and the twist ``s - S L^+ l`` for a unit rate of an actuator with the columns ``s`` and ``l``. Projector and
-pseudo-inverse follow from the ranks of the loops for almost all configurations, without a choice of columns. Loops are
-taken one after the other, and equations of a loop that are independent too: a recursion for all at once would lose half
-of the digits.
+pseudo-inverse follow from generic ranks without a choice of columns. Loops are processed one after the other, as are
+independent equations of a loop: a recursion for all at once would lose half of the digits.
 """
 
 from __future__ import annotations
@@ -40,14 +39,14 @@ _CUT = "it is part of nested loops, which give it no coordinate of its own"
 
 @dataclass(frozen=True)
 class NestedMember:
-    """A member of a network by its joints in the robot's graph.
+    """Member of a network, by joints of the robot's graph.
 
     Attributes:
-        passive: indices of the joints that move while actuators are locked.
-        joints: of these and of all others that it depends on.
-        still: indices of those among them that locked actuators and couplings hold.
-        centre: indices of the joints whose mean is its centre, or whose axes meet there.
-        is_meeting: whether axes meet at the centre.
+        passive: indices of the joints that move with locked actuators.
+        joints: indices of these joints and of all joints on which they depend.
+        still: indices of joints among these that locked actuators and couplings fix.
+        centre: indices of the joints that determine the centre: their mean, or the intersection of their axes.
+        is_meeting: True if the centre is the intersection of axes.
     """
 
     passive: tuple[int, ...]
@@ -58,11 +57,11 @@ class NestedMember:
 
 
 class Motions(NamedTuple):
-    """Motions of a member with some of its joints free.
+    """Motions of a member with some free joints.
 
     Attributes:
-        loops: (m, n) each, the rows of ``L`` for each loop or coupling, in angles and parts of the robot's size.
-        platform: (6, n) ``S``, the platform's twists for the same rates.
+        loops: (m, n) for each loop or coupling, rows of ``L`` in angles and relative to the robot's size.
+        platform: (6, n) ``S``, platform twists for the same rates.
         columns: index of the joint of each column.
     """
 
@@ -72,7 +71,7 @@ class Motions(NamedTuple):
 
 
 class MotionRanks(NamedTuple):
-    """Ranks of each loop among the rates that close those before it, and of the twists that all leave the platform."""
+    """Rank of each loop in the null space of those before it, and rank of the platform twists that all loops allow."""
 
     loops: tuple[int, ...]
     twists: int
@@ -99,16 +98,16 @@ def nested_members(robot: HomeRobot, network: OpenNetwork) -> list[NestedMember]
 
 
 def motions_of(network: OpenNetwork, frame: PathFrame, member: NestedMember, free: Collection[int]) -> Motions:
-    """Return loops and platform's twists of a member of a network, some of whose joints are free.
+    """Return loops and platform twists of a member of a network with some free joints.
 
-    The tree has the joints that stand still with locked actuators, and then the shortest paths from the base. So a loop
-    beside such a joint has no part in the platform's twists: at a dead centre the rates of its joints have no value.
+    The tree contains the joints that locked actuators fix, then the shortest paths from the base. A loop beside such a
+    joint then has no part in the platform twists: at a dead centre its joint rates are undefined.
 
     Args:
         network: the network.
-        frame: values that all parts of the robot share.
+        frame: common data of all parts of the robot.
         member: the member.
-        free: indices of the joints that move; the tree is the same for all of them.
+        free: indices of the free joints; the tree is the same for all of them.
     """
     own = [k for k in network.joints if k in member.joints]
     moving = [k for k in own if k in free]
@@ -119,7 +118,7 @@ def motions_of(network: OpenNetwork, frame: PathFrame, member: NestedMember, fre
     columns = tuple(k for k in moving for _ in network.screws[k])
 
     def block(k: int) -> SX:
-        """Return the twists (6, n) of a joint for rates of order 1, among those of all free joints."""
+        """Return the twists (6, n) of a joint for rates of order 1, in the columns of all free joints."""
         found = SX(6, count)
         if k in start:
             screws = ca.horzcat(*network.screws[k])
@@ -144,17 +143,17 @@ def motions_of(network: OpenNetwork, frame: PathFrame, member: NestedMember, fre
 
 
 def is_slide(network: OpenNetwork, k: int) -> bool:
-    """Return whether a joint's first unit screw is a translation, so that its rate is a length per unit of time."""
+    """Return True if a joint's first unit screw is a translation, with a rate in length per unit of time."""
     return network.joint(k).axes[0].kind is not AxisKind.ROTATION
 
 
 def _coupling_rows(
-    network: OpenNetwork, frame: PathFrame, own: Sequence[int], start: dict[int, int], count: int
+    network: OpenNetwork, frame: PathFrame, used: Sequence[int], start: dict[int, int], count: int
 ) -> list[SX]:
-    """Return the equation (1, n) of each coupling all of whose joints are among some."""
+    """Return the equation (1, n) of each coupling with all joints in a given set."""
     rows = []
     for coupling in network.graph.couplings:
-        if all(k in own for k, _ in coupling):
+        if all(k in used for k, _ in coupling):
             row = SX(1, count)
             first, scale = coupling[0]
             scale = scale * frame.size if is_slide(network, first) else scale
@@ -166,11 +165,11 @@ def _coupling_rows(
 
 
 class MeasuredMotions(NamedTuple):
-    """Numbers of motions at a closed configuration.
+    """Values of motions at a closed configuration.
 
     Attributes:
-        loops: (m, n) each, the rows of ``L`` for each loop or coupling.
-        platform: (6, n) ``S``, with velocities of the platform's origin in parts of the robot's size.
+        loops: (m, n) for each loop or coupling, rows of ``L``.
+        platform: (6, n) ``S``, with velocities of the platform's origin relative to the robot's size.
     """
 
     loops: tuple[FloatArray, ...]
@@ -180,13 +179,13 @@ class MeasuredMotions(NamedTuple):
 def measured(
     motions: Motions, symbols: Sequence[SX], points: Sequence[ClosedPoint], size: SX
 ) -> tuple[MeasuredMotions, ...]:
-    """Return motions at closed configurations, those where all numbers are finite.
+    """Return the values of motions at the closed configurations where all of them are finite.
 
     Args:
-        motions: loops and platform's twists.
-        symbols: of dimensions, unknowns, rotation and position.
+        motions: loops and platform twists.
+        symbols: symbols of dimensions, unknowns, rotation and position.
         points: closed configurations.
-        size: (1, 1) the robot's size.
+        size: (1, 1) size of the robot, length.
     """
     outputs = [motions.platform, size, *[ca.densify(loop) for loop in motions.loops]]
     function = ca.Function("nested", list(symbols), outputs)
@@ -203,15 +202,15 @@ def ranks_of(points: Sequence[MeasuredMotions], loops: Sequence[int]) -> MotionR
     """Return the most frequent ranks at closed configurations.
 
     Args:
-        points: the configurations.
-        loops: indices of the loops that count.
+        points: values of the motions at closed configurations.
+        loops: indices of the loops in use.
     """
     found: Counter[MotionRanks] = Counter()
     for point in points:
         ranks, null = [], np.eye(point.platform.shape[1])
         for k in loops:
             _, singular, right = np.linalg.svd(point.loops[k] @ null)
-            # A loop that others close already leaves rounding errors alone.
+            # A loop that others close already leaves only rounding errors.
             ranks.append(rank_of(singular, 1.0))
             null = null @ right[ranks[-1] :].T
         twists = rank_of(np.linalg.svd(point.platform @ null)[1], 1.0) if null.size else 0
@@ -220,9 +219,9 @@ def ranks_of(points: Sequence[MeasuredMotions], loops: Sequence[int]) -> MotionR
 
 
 def platform_loops(points: Sequence[MeasuredMotions]) -> list[int]:
-    """Return the indices of the loops on which the platform's twists depend, the shortest that suffice.
+    """Return the indices of the loops that determine the platform twists, the shortest sufficient ones.
 
-    The other loops may lose their rank, as at a dead centre, where the platform's twists keep theirs.
+    The other loops may lose rank, as at a dead centre, where the platform twists keep theirs.
     """
     kept = list(range(len(points[0].loops)))
     twists = ranks_of(points, kept).twists
@@ -235,13 +234,13 @@ def platform_loops(points: Sequence[MeasuredMotions]) -> list[int]:
 
 @dataclass(frozen=True, eq=False)
 class NullSpace:
-    """The null space of a member's loops, loop after loop: a loop with the rates that all before it leave free.
+    """Null space of a member's loops, each loop restricted to the null space of those before it.
 
     Attributes:
-        projector: (n, n) on the rates that close all loops.
-        equations: (m, n) those of each loop; of a loop whose equations are independent, each one alone.
-        inverses: pseudo-inverse (n, m) of each of these, among the rates that keep those before it.
-        platform: (6, n) the platform's twists.
+        projector: (n, n) projector on the rates that close all loops.
+        equations: (m, n) equations of each loop; for independent equations, each one separately.
+        inverses: (n, m) pseudo-inverse of each of these, within the rates that satisfy those before it.
+        platform: (6, n) platform twists for unit rates.
     """
 
     projector: SX
@@ -251,19 +250,19 @@ class NullSpace:
 
     @property
     def screws(self) -> SX:
-        """Twists (6, n) of the platform that free joints allow, as many as there are rates."""
+        """Platform twists (6, n) that free joints allow, one for each rate."""
         return self.platform @ self.projector
 
     def driven(self, screw: SX, loops: SX) -> tuple[SX, SX]:
-        """Return the motion for a unit rate of an actuated joint, the other actuators at rest.
+        """Return the motion for a unit rate of an actuated joint with the other actuators at rest.
 
         Args:
-            screw: (6, 1) of the joint in the platform's twist.
-            loops: (m, 1) of the joint in all loops, one below the other.
+            screw: (6, 1) platform twist of the joint.
+            loops: (m, 1) coefficients of the joint in all loops, one below the other.
 
         Returns:
-            The platform's twist (6, 1), up to those that the member allows, and what passive joints cannot close of all
-            loops (m, 1): 0 where the actuator can move alone.
+            Platform twist (6, 1), up to those that the member allows, and the residual (m, 1) that passive joints
+            cannot close: 0 if the actuator can move by itself.
         """
         rates = SX(self.projector.shape[0], 1)
         open_loops = [SX(0, 1)]
@@ -278,8 +277,8 @@ def null_space(motions: Motions, loops: Sequence[int], ranks: MotionRanks) -> Nu
     """Return the null space of a member's loops.
 
     Args:
-        motions: loops and platform's twists.
-        loops: indices of the loops that count.
+        motions: loops and platform twists.
+        loops: indices of the loops in use.
         ranks: ranks of these loops.
     """
     projector = SX.eye(motions.platform.shape[1])
@@ -297,7 +296,7 @@ def null_space(motions: Motions, loops: Sequence[int], ranks: MotionRanks) -> Nu
 
 
 def _slide(network: OpenNetwork, member: NestedMember) -> SX | None:
-    """Return the current unit axis (3, 1) along which the centre could lie elsewhere; None where it is determined."""
+    """Return the current unit axis (3, 1) along which the centre is arbitrary; None if the centre is determined."""
     if member.is_meeting or len(member.centre) != 1 or network.joint(member.centre[0]).type in ("S", "U", "Pa"):
         return None
     (k,) = member.centre
@@ -305,9 +304,9 @@ def _slide(network: OpenNetwork, member: NestedMember) -> SX | None:
 
 
 def _centre(network: OpenNetwork, member: NestedMember) -> SX:
-    """Return the centre (3, 1) of a member in the world frame, length; joints ride on their second link."""
+    """Return the centre (3, 1) of a member in the world frame, length; joints move with their second link."""
     if member.is_meeting:
-        # Both hinges of a universal joint are one joint here.
+        # Both hinges of a universal joint count as one joint.
         if len(member.centre) == 1:
             return network.points[member.centre[0]]
         one, other = member.centre
@@ -321,14 +320,14 @@ def _centre(network: OpenNetwork, member: NestedMember) -> SX:
 
 @dataclass(eq=False, kw_only=True)
 class ResistingParts:
-    """Members and actuators of limbs, while these are added one after the other.
+    """Members and actuators of limbs under construction.
 
     Attributes:
-        members: that resist the platform.
+        members: members that resist the platform.
         actuators: all actuated joints.
-        positions: of the actuators from home, (1, 1) each.
-        screws: of the joints of paths, and of each member of networks.
-        structure: of the same.
+        positions: (1, 1) coordinate of each actuator from home.
+        screws: screws of the joints of paths, and of each member of networks.
+        structure: structure of these paths and members.
     """
 
     members: list[Member] = field(default_factory=list)
@@ -339,7 +338,7 @@ class ResistingParts:
 
 
 def add_resisting(
-    found: ResistingParts,
+    parts: ResistingParts,
     network: OpenNetwork,
     frame: PathFrame,
     symbols: Sequence[SX],
@@ -348,10 +347,10 @@ def add_resisting(
     """Add members and actuators of a network, with ranks measured at closed configurations.
 
     Args:
-        found: to which they are added.
-        network: at any pose.
-        frame: values that all parts of the robot share.
-        symbols: of dimensions, unknowns, rotation and position.
+        parts: members and actuators to extend.
+        network: network at any pose.
+        frame: common data of all parts of the robot.
+        symbols: symbols of dimensions, unknowns, rotation and position.
         points: closed configurations.
     """
     robot, limb = frame.robot, network.name
@@ -381,29 +380,29 @@ def add_resisting(
         if ranks.twists < 6:
             slide, needed = _slide(network, each), platform_loops(at_points)
             allowed = null_space(locked, needed, ranks_of(at_points, needed)).screws
-            found.members.append(Member(limb, place, allowed, ranks.twists, (), slide=slide, name=label))
+            parts.members.append(Member(limb, place, allowed, ranks.twists, (), slide=slide, name=label))
         labels = tuple(f"{limb}:{network.graph.joints[k].name}" for k in free.columns)
         driving = tuple(i for i, k in enumerate(free.columns) if k in actuated)
         sizes = ca.horzcat(*[rate_sizes.get(k, SX(1)) for k in free.columns])
         motions, loops = (part / ca.repmat(sizes, part.shape[0], 1) for part in (free.platform, free_loops))
         ends = ranks.twists, free_ranks.twists
         names = limb, labels, motions, driving, *ends, label or limb
-        found.screws.append(JointScrews(*names, loops, sum(ranks.loops), place))
-        found.structure.append(_structure(network, each, number, 6 - ranks.twists, 6 - free_ranks.twists))
+        parts.screws.append(JointScrews(*names, loops, sum(ranks.loops), place))
+        parts.structure.append(_structure(network, each, number, 6 - ranks.twists, 6 - free_ranks.twists))
     relations = _relations(ca.vertcat(*open_loops), symbols, points)
     for column, k in enumerate(actuated):
         name = network.graph.joints[k].name
         (axis,) = network.joint(k).axes
         twists, factors = ca.horzcat(SX(6, 0), *screws[k].values()), relations[:, column] / rate_sizes[k]
         label = f"{limb}:{name}"
-        found.actuators.append(Actuator(name, limb, tuple(screws[k]), twists, axis.dimension, factors, label))
-        found.positions.append(axis.way(network.values[k, 0]))
+        parts.actuators.append(Actuator(name, limb, tuple(screws[k]), twists, axis.dimension, factors, label))
+        parts.positions.append(axis.travel(network.values[k, 0]))
 
 
 def _relations(open_loops: SX, symbols: Sequence[SX], points: Sequence[ClosedPoint]) -> SX:
-    """Return independent rows (r, a) of what passive joints cannot close of loops for actuators' rates of order 1.
+    """Return independent relations (r, a) of actuator rates of order 1, which passive joints cannot satisfy for them.
 
-    Rows that are zero at almost all configurations say nothing, and are left out.
+    Rows that are zero at almost all configurations are left out.
     """
     function = ca.Function("relations", list(symbols), [ca.densify(open_loops)])
     values = [function(*each).full() for each in points]
@@ -415,14 +414,14 @@ def _relations(open_loops: SX, symbols: Sequence[SX], points: Sequence[ClosedPoi
 
 
 def _member_name(network: OpenNetwork, number: int) -> str:
-    """Return the name of a member: the first one has the limb's."""
+    """Return the name of a member; the first member has the name of the limb."""
     return network.name if number == 0 else f"{network.name}.{number + 1}"
 
 
 def _structure(
     network: OpenNetwork, member: NestedMember, number: int, wrenches: int, constraints: int
 ) -> PathStructure:
-    """Return the structure of a member; the first one has the loops of all."""
+    """Return the structure of a member; the first one counts all loops."""
     letters = (
         f"{network.joint(k).type}*" if network.joint(k).actuated else network.joint(k).type for k in member.joints
     )
@@ -443,7 +442,7 @@ def _structure(
 
 
 def nested_joints(network: OpenNetwork) -> list[LimbJoint]:
-    """Return the joints of a network as limits read them; a joint at which a loop is opened may have no coordinate."""
+    """Return the joints of a network for limits; a joint at which a loop is opened may have no coordinate."""
     limb, found = network.name, []
     for k in network.joints:
         joint, name = network.joint(k), network.graph.joints[k].name
@@ -451,7 +450,7 @@ def nested_joints(network: OpenNetwork) -> list[LimbJoint]:
         coordinates: list[JointCoordinate] = []
         if own:
             for value, axis, part in zip(own, joint.axes, COORDINATE_PARTS.get(joint.type, ("",)), strict=True):
-                coordinates.append(JointCoordinate(part, axis.dimension, axis.way(value)))
+                coordinates.append(JointCoordinate(part, axis.dimension, axis.travel(value)))
         elif joint.type == "R":
             base, other = (network.motions[body] for body in network.ends(k))
             angle = rotation_angle(joint.axes[0].axis, base.rotation.T @ other.rotation)

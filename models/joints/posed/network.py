@@ -1,9 +1,9 @@
-"""A network of links and joints between base and platform at any pose: nested loops, which no limb with branches has.
+"""Network of links and joints between base and platform at any pose, for nested loops.
 
-Base and platform have known displacements. Every other link is displaced along a spanning tree from one of the two; the
-variables of the tree's joints are unknowns. A joint that is not in the tree closes a loop: a spherical, universal or
-hinge joint by the equations of a cut, another one by a variable of its own and six equations. A link between two
-spherical joints turns freely about itself, so that only the two other rotations of its joint are unknowns.
+Base and platform have known displacements. Other links are displaced along a spanning tree from one of the two; the
+coordinates of the tree's joints are unknowns. A joint outside the tree closes a loop: a spherical, universal or hinge
+joint by the equations of a cut, any other by a coordinate of its own and six equations. A link between two spherical
+joints spins freely, so that only two rotations of its joint are unknowns.
 """
 
 from __future__ import annotations
@@ -30,26 +30,26 @@ from .opened import (
     rotations_about,
 )
 
-#: Preference of joints for the tree, small numbers first: those that an equation of a cut replaces come last.
+#: Order of joint types for the tree: those that a cut can replace come last.
 _RELUCTANCE = {"P": 1, "H": 1, "Pa": 1, "C": 1, "R": 2, "U": 3, "S": 9}
 
 
 @dataclass(eq=False)
 class OpenNetwork(Opened):
-    """A network at any pose.
+    """Network at any pose.
 
     Attributes:
-        name: of the limb that it is.
-        graph: of the robot.
-        joints: indices of its joints.
-        bodies: name that stands for each link and those that are welded to it.
-        motions: displacement from home of each body, by that name.
-        screws: current screws (6, 1) of each joint's axes, by the joint's index; those of a spherical joint are three
-            rotations about its centre.
-        values: variable (1, 1) of each axis whose variable is an unknown, by joint and number of the axis.
-        points: current place (3, 1) of each joint on its first link, length.
+        name: name of the limb.
+        graph: graph of the robot.
+        joints: indices of the network's joints.
+        bodies: name of the rigid body of each link, common to welded links.
+        motions: displacement from home of each body, by name.
+        screws: current screws (6, 1) of each joint's axes, by the joint's index; three rotations about its centre for a
+            spherical joint.
+        values: coordinate (1, 1) of each axis that is an unknown, by joint and number of the axis.
+        points: current position (3, 1) of each joint on its first link, length.
         opened: indices of the joints that close loops.
-        unknowns: number of its joint variables that are unknowns.
+        unknowns: number of joint coordinates that are unknowns.
     """
 
     name: str
@@ -71,17 +71,17 @@ class OpenNetwork(Opened):
         return found
 
     def ends(self, k: int) -> tuple[str, str]:
-        """Return the bodies that a joint is between."""
+        """Return the two bodies that a joint connects."""
         return self.bodies[self.graph.joints[k].inner], self.bodies[self.graph.joints[k].outer]
 
     @property
     def base(self) -> str:
-        """The base's body."""
+        """Name of the base's body."""
         return self.bodies[self.graph.base]
 
     @property
     def platform(self) -> str:
-        """The platform's body."""
+        """Name of the platform's body."""
         return self.bodies[self.graph.platform]
 
 
@@ -89,10 +89,10 @@ def open_network(name: str, joints: Sequence[int], variables: Variables, frame: 
     """Return a network at any pose.
 
     Args:
-        name: of the limb that it is.
+        name: name of the limb.
         joints: indices of the network's joints in the robot's graph.
-        variables: of the axes of joints in the spanning tree.
-        frame: values that all parts of the robot share.
+        variables: function that returns the coordinates of the axes in the spanning tree.
+        frame: common data of all parts of the robot.
     """
     graph = frame.robot.graph
     if graph is None:
@@ -120,7 +120,7 @@ def open_network(name: str, joints: Sequence[int], variables: Variables, frame: 
 
 
 def _add_to_tree(network: OpenNetwork, k: int, parent: str, child: str, variables: Variables, frame: PathFrame) -> None:
-    """Add a joint of the spanning tree, and the displacement of the link behind it."""
+    """Add a joint of the spanning tree, and the displacement of the link after it."""
     joint, at = network.joint(k), network.motions[parent]
     outward = network.ends(k)[0] == parent
     axes = _spanning_axes(network, k, child, frame) if joint.type == "S" else joint.axes
@@ -141,13 +141,13 @@ def _add_to_tree(network: OpenNetwork, k: int, parent: str, child: str, variable
 
 
 def _spanning_axes(network: OpenNetwork, k: int, child: str, frame: PathFrame) -> tuple[JointAxis, ...]:
-    """Return the axes of a spherical joint in the tree: two across a rod that ends at two spherical joints, else three.
+    """Return the axes of a spherical joint in the tree: two normal to a rod between spherical joints, else three.
 
     Args:
         network: the network.
         k: index of the joint.
-        child: the body behind it.
-        frame: values that all parts of the robot share.
+        child: body after the joint.
+        frame: common data of all parts of the robot.
     """
     joint = network.joint(k)
     others = [j for j in network.joints if child in network.ends(j)]
@@ -181,7 +181,7 @@ def _close(network: OpenNetwork, k: int, variables: Variables, frame: PathFrame,
 
 
 def _coupling_equation(network: OpenNetwork, coupling: Sequence[tuple[int, SX]], frame: PathFrame) -> LoopEquation:
-    """Return the equation of a coupling, in parts of its first term's factor."""
+    """Return the equation of a coupling, divided by its first factor."""
     first, factor = coupling[0]
     slides = network.joint(first).axes[0].kind is AxisKind.TRANSLATION
     total = sum((each * network.values[k, 0] for k, each in coupling), SX(0))

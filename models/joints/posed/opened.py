@@ -1,20 +1,20 @@
-"""A path of joints whose loop through base and platform is opened: its current screws, and the equations that close it.
+"""Opened path of joints: current screws, and the equations that close its loop through base and platform.
 
-From the base on, a body is displaced by the joints before it; from the platform on, by the pose and the joints behind
-it. The two sides meet at the cut, where equations say that the joint there holds together:
+Bodies on the base side are displaced by the joints before them; those on the platform side by the pose and the joints
+after them. At the cut, equations state that the joint there holds together:
 
-* spherical: its two centres coincide (3 equations);
-* universal: the same, and the angle between its axes is that at home (4);
-* R: its two centres coincide, and its two axes are parallel (5);
-* a rod of constant length: the distance of its ends is that at home (1); of a rod that is driven: none;
-* no joint: the two bodies coincide (6).
+* spherical: both centres coincide (3 equations);
+* universal: both centres coincide, and the angle between the axes is that at home (4);
+* revolute: both centres coincide, and both axes are parallel (5);
+* rod of constant length: the distance of its ends is that at home (1); for an actuated rod: none;
+* no joint: both bodies coincide (6).
 
-Each equation has a size, by which it becomes a number of order 1: for lengths the robot's.
+Each equation has a size that scales it to order 1: for lengths that of the robot.
 
-Distances follow from these equations, each without the variables of one joint: a hinge or universal joint and the joint
-at the cut are at a distance that the joint's own rotation does not change. The two places, one on each side of the cut,
-have the distance that the joints between give them. Such an equation lacks one or two of the unknowns, so that a search
-of a whole box finds where the others cannot be.
+Distance equations follow from these, each without the coordinates of one joint: the distance between a hinge or
+universal joint and the joint at the cut does not change with the joint's own rotation. It equals the distance on the
+other side of the cut. Such an equation lacks one or two unknowns, so that a search over boxes can exclude ranges of the
+others.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ from ..home.generic import INCIDENT, PathFrame
 from ..home.motion import UNIT_VECTORS, Motion
 from .cut import Cut
 
-#: Squared sine of the angle between a slide and its rod below which they are parallel: rounding leaves 1e-16.
+#: Squared sine of the angle below which a slide and its rod are parallel: rounding leaves 1e-16.
 _STRAIGHT = 1e-14
-#: Returns the variable of one axis of a joint, a symbol.
+#: Function that returns the coordinate of one axis of a joint, a symbol.
 Variables = Callable[[Joint, int], SX]
 
 
 class LoopEquation(NamedTuple):
-    """An expression (1, 1) that is zero where a loop is closed, and its size, an expression of the dimensions."""
+    """Expression (1, 1) that is zero in a closed loop, and its size, an expression of the dimensions."""
 
     expression: SX
     size: SX
@@ -48,11 +48,11 @@ class LoopEquation(NamedTuple):
 
 @dataclass(eq=False, kw_only=True)
 class Opened:
-    """What is opened, a path or a network.
+    """Path or network with opened loops.
 
     Attributes:
-        equations: that hold where its loops are closed.
-        checks: further expressions that are zero there: signs that the equations leave open.
+        equations: equations of the closed loops.
+        checks: further expressions that are zero in closed loops: signs that the equations leave open.
     """
 
     equations: list[LoopEquation] = field(default_factory=list)
@@ -61,15 +61,15 @@ class Opened:
 
 @dataclass(eq=False)
 class OpenedPath(Opened):
-    """A path of joints at any pose.
+    """Path of joints at any pose.
 
     Attributes:
-        joints: from base to platform.
-        cut: where it is opened.
-        screws: current screws (6, 1) of the axes of each joint; none for a joint of a rod whose axes are not known.
-        behind: displacement of the body behind each joint, on the platform's side; none for joints between two sides.
-        points: (3, 1) current place of each joint on the body before it, on the base's side, length.
-        sides: displacement of the bodies on the base's and on the platform's side of the cut.
+        joints: joints from base to platform.
+        cut: place at which the path is opened.
+        screws: current screws (6, 1) of the axes of each joint; empty for a joint of a rod with unknown axes.
+        behind: displacement of the body on the platform side of each joint; None for joints between the two sides.
+        points: (3, 1) current position of each joint on the body on its base side, length.
+        sides: displacements of the bodies on the base side and on the platform side of the cut.
         rod: (3, 1) vector along the rod, to the joint at the cut; None without a rod.
     """
 
@@ -82,24 +82,24 @@ class OpenedPath(Opened):
     rod: SX | None = None
 
     def body_before(self, j: int) -> Motion | None:
-        """Return the displacement of the body on the base's side of a joint; None for a rod."""
+        """Return the displacement of the body on the base side of a joint; None for a rod."""
         if j in (self.cut.first, self.cut.last + 1):
             return self.sides[0 if j <= self.cut.last else 1]
         return self.behind[j - 1] if j else Motion.none()
 
     def body_behind(self, j: int) -> Motion | None:
-        """Return the displacement of the body on the platform's side of a joint; None for a rod."""
+        """Return the displacement of the body on the platform side of a joint; None for a rod."""
         return self.behind[j] or (self.sides[1] if j == self.cut.last else None)
 
 
 def open_path(joints: Sequence[Joint], cut: Cut, variables: Variables, frame: PathFrame) -> OpenedPath:
-    """Return a path that is opened at a cut.
+    """Return a path opened at a cut.
 
     Args:
-        joints: from base to platform.
-        cut: where it is opened.
-        variables: of the axes of all joints that are not between the two sides.
-        frame: values that all paths of the robot share.
+        joints: joints from base to platform.
+        cut: place at which the path is opened.
+        variables: function that returns the coordinates of the axes outside the cut.
+        frame: common data of all paths of the robot.
     """
     count = len(joints)
     ends = Motion.none(), frame.platform
@@ -131,23 +131,23 @@ def open_path(joints: Sequence[Joint], cut: Cut, variables: Variables, frame: Pa
 
 
 def closures(kind: str, name: str, sides: Iterable[tuple[SX, ...]]) -> list[Closure]:
-    """Return equations with the name of their limb or path, such as ``loop 1.2 (3)``.
+    """Return equations named by their limb or path, such as ``loop 1.2 (3)``.
 
     Args:
         kind: first word of the names.
-        name: of the limb or path.
-        sides: left side of each, and its size where it is not 1.
+        name: name of the limb or path.
+        sides: left side of each equation, and its size unless this is 1.
     """
     return [Closure(f"{kind} {name} ({k + 1})", *each) for k, each in enumerate(sides)]
 
 
 def loop_equations(expressions: SX, size: SX | None = None) -> list[LoopEquation]:
-    """Return equations from their left sides (k, 1) and a common size; without one they are of order 1."""
+    """Return equations from left sides (k, 1) and a common size; without a size they are of order 1."""
     return [LoopEquation(each, SX(1) if size is None else size) for each in ca.vertsplit(expressions)]
 
 
 def join_rigidly(path: Opened, one: Motion, other: Motion, place: SX, frame: PathFrame) -> None:
-    """Add the equations by which two bodies coincide: their rotations, and a place (3, 1) at home on both, length."""
+    """Add the equations of coinciding bodies: equal rotations, and a common point (3, 1) at home, length."""
     turn = one.rotation.T @ other.rotation
     apart = one.rotation.T @ (other.point(place) - one.point(place))
     path.equations += loop_equations(ca.inv_skew(turn - turn.T) / 2) + loop_equations(apart, frame.size)
@@ -155,7 +155,7 @@ def join_rigidly(path: Opened, one: Motion, other: Motion, place: SX, frame: Pat
 
 
 def join_joint(path: OpenedPath, base: Motion, platform: Motion, frame: PathFrame) -> None:
-    """Add screws and equations of a joint at the cut, between displacements of its two sides."""
+    """Add screws and equations of a joint at the cut, from the displacements of its two sides."""
     joints, j = path.joints, path.cut.joint
     joint = joints[j]
     ends = base.point(joint.point), platform.point(joint.point)
@@ -169,7 +169,7 @@ def join_joint(path: OpenedPath, base: Motion, platform: Motion, frame: PathFram
     if joint.type == "U":
         first, second = joint.axes
         directions = base.rotation @ first.axis, platform.rotation @ second.axis
-        # Both axes pass through one point where the loop is closed: the expressions of the point are the same then.
+        # In a closed loop both axes pass through one point, so one expression of the point serves both.
         path.screws[j] = [ca.vertcat(each, ca.cross(path.points[j], each)) for each in directions]
         angle = ca.dot(first.axis, second.axis)
         path.equations += loop_equations(ca.dot(*directions) - angle)
@@ -182,7 +182,7 @@ def join_joint(path: OpenedPath, base: Motion, platform: Motion, frame: PathFram
 
 
 def _join_rod(path: OpenedPath, base: Motion, platform: Motion, frame: PathFrame) -> None:
-    """Add screws, and the equation of a constant length, of a rod between the two sides."""
+    """Add the screws of a rod between the two sides, and its equation of constant length."""
     joints, cut = path.joints, path.cut
     j, far, slide = cut.joint, cut.far, cut.slide
     if far is None:
@@ -206,7 +206,7 @@ def _join_rod(path: OpenedPath, base: Motion, platform: Motion, frame: PathFrame
     if slide is None:
         path.equations += loop_equations(ca.sumsqr(path.rod) - square, 2 * square)
         return
-    # The slide's own direction is not known where it is not along the rod: only its part along the rod does work.
+    # A slide that is not along the rod has an unknown direction: only its component along the rod does work.
     current = ca.sumsqr(path.rod)
     part = 1 / ca.sqrt(current) if is_straight else ca.sqrt(current - offset) / current
     path.screws[slide] = [ca.vertcat(SX.zeros(3), path.rod * part * _slide_sign(path, frame))]
@@ -214,17 +214,17 @@ def _join_rod(path: OpenedPath, base: Motion, platform: Motion, frame: PathFrame
 
 
 def directions_at_rod(path: OpenedPath, side: Motion, frame: PathFrame, *, is_bounded: bool = False) -> tuple[SX, SX]:
-    """Return the current axes (3, 1) of the universal joint at the far end of a rod, whose direction it follows.
+    """Return the current axes (3, 1) of the universal joint at the far end of a rod, from the rod's direction.
 
-    One axis moves with the known body. The other keeps its angles against the first axis and against the rod. With the
+    The first axis moves with the known body. The second keeps its angles with the first axis and with the rod. With the
     first axis ``u`` and the rod's direction ``d`` it is ``a u + b d + g u x d``, where ``g`` has the sign of home. The
-    expressions have no value where the rod is along the first axis, or would have to be bent beyond its reach.
+    expressions are undefined where the rod is along the first axis, or beyond the reach.
 
     Args:
         path: the path, with its rod.
-        side: displacement of the body that the first axis moves with.
-        frame: values that all paths of the robot share.
-        is_bounded: whether the axes have a value beyond the reach too.
+        side: displacement of the body with the first axis.
+        frame: common data of all paths of the robot.
+        is_bounded: If true, the axes are also defined beyond the reach.
     """
     j, far, rod = path.cut.joint, path.cut.far, path.rod
     if far is None or rod is None:
@@ -243,7 +243,7 @@ def directions_at_rod(path: OpenedPath, side: Motion, frame: PathFrame, *, is_bo
 
 
 def slide_length(path: OpenedPath, frame: PathFrame) -> SX | None:
-    """Return the way (1, 1) of the actuated slide of a path's rod from home, length; None without such a slide."""
+    """Return the travel (1, 1) from home of the actuated slide of a path's rod, length; None without such a slide."""
     cut = path.cut
     if path.rod is None or cut.slide is None or cut.far is None:
         return None
@@ -254,7 +254,7 @@ def slide_length(path: OpenedPath, frame: PathFrame) -> SX | None:
 
 
 def _slide_sign(path: OpenedPath, frame: PathFrame) -> float:
-    """Return whether the slide of a path's rod points along the rod (1) or against it (-1)."""
+    """Return 1 if the slide of a path's rod points along the rod, -1 if against it."""
     cut = path.cut
     if cut.slide is None or cut.far is None:
         return 1.0
@@ -264,24 +264,24 @@ def _slide_sign(path: OpenedPath, frame: PathFrame) -> float:
 
 
 def rotations_about(point: SX) -> list[SX]:
-    """Return three rotations (6, 1) about a point."""
+    """Return three rotations (6, 1) about a point, along x, y and z."""
     return [ca.vertcat(each, ca.cross(point, each)) for each in UNIT_VECTORS]
 
 
 def normals_of(axis: SX, frame: PathFrame) -> list[SX]:
-    """Return two vectors (3, 1) across an axis, along those coordinates that are farthest from it typically."""
+    """Return two vectors (3, 1) normal to an axis, from the coordinate axes that are typically farthest from it."""
     order = np.argsort(np.abs(frame.typical_value(axis)).ravel(), kind="stable")
     first = ca.cross(axis, UNIT_VECTORS[int(order[0])])
     return [first, ca.cross(axis, first)]
 
 
 def distance_equations(path: OpenedPath, variables: Variables, frame: PathFrame) -> list[LoopEquation]:
-    """Return the equations of a path that is opened at a joint; none of a path with a rod, or opened at no joint.
+    """Return the distance equations of a path opened at a joint; none for a path with a rod, or opened at no joint.
 
     Args:
         path: the path.
-        variables: of the axes of its joints that are not between the two sides.
-        frame: values that all paths of the robot share.
+        variables: function that returns the coordinates of the axes outside the cut.
+        frame: common data of all paths of the robot.
     """
     cut = path.cut
     if cut.far is not None or not cut.type:

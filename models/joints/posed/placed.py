@@ -1,4 +1,4 @@
-"""The joints of a path as a drawing shows them: places and axes at any pose, for the joints as they are written."""
+"""Joints of a path for drawings: positions and axes, at any pose, of the joints as they are written."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from ..home.generic import PathFrame
 from ..home.motion import Motion
 from .opened import OpenedPath, directions_at_rod
 
-#: Distance of a parallelogram's rods from its middle, in parts of the rod: it is no dimension of the robot.
+#: Distance of a parallelogram's rods from its middle, relative to the rod length; it is not a dimension of the robot.
 _APART = 0.05
-#: Number of bends of an arc, squared sine of the angle between two axes below which they are parallel, and distance
-#: below which they meet, in parts of the distance between their hinges.
+#: Number of bends of an arc; squared sine of the angle below which axes are parallel; distance below which they
+#: intersect, relative to the distance between their hinges.
 _BENDS, _PARALLEL, _MEET = 8, 1e-6, 1e-9
-#: Distances of the first and the last hinge of a spherical limb from its centre, in parts of the robot's size.
+#: Distances of the first and the last hinge of a spherical limb from its centre, relative to the robot's size.
 _REACHES = (1.3, 0.7)
-#: Kinds of joints that move their point.
+#: Types of joints that move their point.
 SLIDING = (JointKind.PRISMATIC, JointKind.HELICAL, JointKind.CYLINDRICAL, JointKind.PARALLELOGRAM)
 
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """A place or a direction, (3, 1) in world coordinates each: at any pose, and at home.
+    """Place or direction, (3, 1) in world coordinates: at any pose, and at home.
 
-    What is drawn depends on the places at home, and moves with those at any pose: both are calculated alike.
+    The drawing is chosen by the places at home, and moves with those at any pose: both are computed alike.
     """
 
     now: SX
@@ -43,7 +43,7 @@ class Place:
 
     @classmethod
     def along(cls, body: Motion, direction: SX) -> Place:
-        """Return a direction (3, 1) at home that turns with a body."""
+        """Return a direction (3, 1) at home that rotates with a body."""
         return cls(body.rotation @ direction, direction)
 
     def __add__(self, other: Place) -> Place:
@@ -61,17 +61,17 @@ class Place:
 
 @dataclass(frozen=True, eq=False)
 class PlacedJoint:
-    """A joint of a path at any pose.
+    """Joint of a path at any pose.
 
     Attributes:
-        number: of the joint among those written, 1 at the base.
-        kind: of the joint.
-        foot, place: its point on the body before it and on the body behind it; they differ where it slides, and for a
-            parallelogram, whose rod is between them.
-        axes: its axes; none for a spherical joint.
-        is_actuated: whether an actuator drives it.
-        is_in_rod: whether it is the slide of a rod, whose place is the rod's middle.
-        side: half of a short side of a parallelogram; None for another joint.
+        number: number of the written joint, 1 at the base.
+        kind: kind of the joint.
+        foot, place: point of the joint on the body before it and on the body after it; they differ for a slide and for
+            a parallelogram, whose rod is between them.
+        axes: axes of the joint; empty for a spherical joint.
+        is_actuated: True if an actuator drives the joint.
+        is_in_rod: True for the slide of a rod, placed at the rod's middle.
+        side: half of a short side of a parallelogram; None for other joints.
     """
 
     number: int
@@ -87,8 +87,8 @@ class PlacedJoint:
 def placed_joints(path: OpenedPath, frame: PathFrame) -> list[PlacedJoint]:
     """Return the joints of a path from base to platform.
 
-    Two hinges that were taken together as a universal joint are shown as they are written. Three of them, taken
-    together as a spherical joint, are shown as that joint: the middle axis is on neither side of the cut.
+    Two hinges merged into a universal joint are shown as they are written. Three hinges merged into a spherical joint
+    are shown as that joint, because the middle axis is on neither side of the cut.
     """
     found: list[PlacedJoint] = []
     number = 1
@@ -103,7 +103,7 @@ def placed_joints(path: OpenedPath, frame: PathFrame) -> list[PlacedJoint]:
 
 
 def _spread(joints: list[PlacedJoint], frame: PathFrame) -> list[PlacedJoint]:
-    """Return the hinges of a spherical limb, all at one point, apart from each other along their axes."""
+    """Return the concurrent hinges of a spherical limb, spread along their axes."""
     homes = [frame.typical_value(each.place.home).ravel() for each in joints]
     size = frame.typical_value(frame.size).item()
     if len(joints) < 2 or any(each.kind is not JointKind.REVOLUTE for each in joints):
@@ -118,7 +118,7 @@ def _spread(joints: list[PlacedJoint], frame: PathFrame) -> list[PlacedJoint]:
 
 
 def _hinges(parts: Sequence[Joint], before: Motion, behind: Motion, number: int) -> list[PlacedJoint]:
-    """Return two hinges whose axes meet: each lies on an axis that the body beside it carries."""
+    """Return two hinges with intersecting axes, each on the axis carried by the adjacent body."""
     found = []
     for k, (part, body) in enumerate(zip(parts, (before, behind), strict=True)):
         place, axes = Place.on(body, part.point), (Place.along(body, part.axes[0].axis),)
@@ -127,7 +127,6 @@ def _hinges(parts: Sequence[Joint], before: Motion, behind: Motion, number: int)
 
 
 def _placed(path: OpenedPath, j: int, frame: PathFrame, number: int) -> PlacedJoint:
-    """Return one joint."""
     joint, kind = path.joints[j], JointKind(path.joints[j].type)
     before, behind = path.body_before(j), path.body_behind(j)
     foot = place = Place(path.points[j], joint.point)
@@ -146,7 +145,6 @@ def _placed(path: OpenedPath, j: int, frame: PathFrame, number: int) -> PlacedJo
 
 
 def _axes(path: OpenedPath, j: int, frame: PathFrame) -> tuple[Place, ...]:
-    """Return the current axes of a joint."""
     joint, before, behind = path.joints[j], path.body_before(j), path.body_behind(j)
     if joint.type == "S":
         return ()
@@ -166,9 +164,9 @@ def _axes(path: OpenedPath, j: int, frame: PathFrame) -> tuple[Place, ...]:
 
 
 def arc_between(one: PlacedJoint, other: PlacedJoint, frame: PathFrame) -> list[Place]:
-    """Return places between two hinges whose axes meet, on an arc about their common point, as spherical links are.
+    """Return places on an arc between two hinges with intersecting axes, for a spherical link.
 
-    There are none where the axes do not meet, or meet at one of the hinges.
+    The list is empty if the axes do not intersect, or intersect at one of the hinges.
     """
     if {one.kind, other.kind} != {JointKind.REVOLUTE}:
         return []

@@ -1,4 +1,4 @@
-"""The rows and members of a path of joints: the wrenches with which it resists the platform, actuators locked."""
+"""Rows and members of a path of joints: its wrenches on the platform with locked actuators."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from .opened import OpenedPath
 
 
 class Ranks(NamedTuple):
-    """Ranks of a path at almost all dimensions and joint variables.
+    """Ranks of a path at almost all dimensions and joint coordinates.
 
     Attributes:
-        passive: of the screws of its passive joints.
-        all: of the screws of all its joints.
-        pinned: of the velocities that the passive joints but the one at the cut give to the centre of the spherical
-            joint there; None without such a joint.
+        passive: rank of the screws of the passive joints.
+        all: rank of the screws of all joints.
+        pinned: rank of the velocities of the centre of the spherical joint at the cut by the other passive joints; None
+            without such a joint.
     """
 
     passive: int
@@ -33,7 +33,7 @@ class Ranks(NamedTuple):
 
 
 class Centre(NamedTuple):
-    """A path's centre: a place at home (3, 1) on the body behind a joint, and whether it is any point of its axis."""
+    """Centre of a path: point (3, 1) at home on the body after a joint; ``slides`` if arbitrary along its axis."""
 
     point: SX
     behind: int
@@ -67,13 +67,13 @@ def path_ranks(frame: PathFrame, joints: Sequence[Joint], cut: Cut) -> Ranks:
 
 
 def resistance(limb: str, path: OpenedPath, ranks: Ranks, given: SX | None) -> tuple[list[Wrench], Member | None]:
-    """Return the rows of a path, and its member where its wrenches are no few rows.
+    """Return the rows of a path, and its member unless its wrenches are a few single rows.
 
     Args:
         limb: name of the limb.
         path: the path.
-        ranks: of the path.
-        given: (3, 1) the centre that the user gives at home, length; None for that of the rule.
+        ranks: ranks of the path.
+        given: (3, 1) centre given by the user at home, length; None for the centre by rule.
     """
     if ranks.pinned is not None and given is None:
         return _pinned(limb, path, ranks.pinned)
@@ -84,7 +84,7 @@ def resistance(limb: str, path: OpenedPath, ranks: Ranks, given: SX | None) -> t
     body = path.behind[centre.behind]
     joint = path.joints[centre.behind]
     is_cut = centre.behind == path.cut.joint and centre.point is joint.point and joint.type in ("R", "U")
-    # The point of the joint at the cut is the same on both sides where the loop is closed: one is shorter.
+    # In a closed loop the point of the joint at the cut is the same on both sides: the shorter expression is used.
     place = path.points[centre.behind] if body is None or is_cut else body.point(centre.point)
     axis = joint.axes[-1]
     slides = centre.slides and axis.kind is not AxisKind.PARALLELOGRAM  # whose point is that of its rods
@@ -122,12 +122,12 @@ def _pinned(limb: str, path: OpenedPath, rank: int) -> tuple[list[Wrench], Membe
 def _centre_of(joints: Sequence[Joint], given: SX | None) -> Centre:
     """Return the centre of a path without a spherical joint at the cut.
 
-    In this order: the one that the user gives; the meeting point of two passive rotations that follow each other,
-    nearest the platform; the point of the last passive joint.
+    In this order: the user's centre; the intersection of two successive passive rotations nearest the platform; the
+    point of the last passive joint.
 
     Args:
-        joints: from base to platform, two rotations that meet as a universal joint.
-        given: (3, 1) the user's centre at home, length.
+        joints: joints from base to platform, with two intersecting rotations merged into a universal joint.
+        given: (3, 1) centre given by the user at home, length; None for the centre by rule.
     """
     passive = [j for j, joint in enumerate(joints) if not joint.actuated]
     last = passive[-1] if passive else len(joints) - 1

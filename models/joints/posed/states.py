@@ -1,9 +1,9 @@
-"""The joints and links of a path as limits read them: coordinates from home, directions of cones, and segments.
+"""Joints and links of a path for limits: coordinates from home, cone directions, and segments.
 
-A joint whose variables are unknowns has these as coordinates. A joint at which the path is opened, and rotations that
-are taken as one spherical joint, have coordinates from the displacements of the bodies on both sides: sine and cosine
-in closed form, each times one positive number. A universal joint at the end of a rod has them from the rod's direction.
-A rod between two spherical joints turns freely about itself. Links are segments between the centres of joints.
+Unknowns are coordinates of their joint. A joint at which the path is opened, and rotations merged into a spherical
+joint, have coordinates from the displacements of both adjacent bodies: sine and cosine in closed form, each times one
+positive factor. For a universal joint at the end of a rod they follow from the rod's direction. A rod between two
+spherical joints spins freely. Links are segments between joint centres.
 """
 
 from __future__ import annotations
@@ -24,38 +24,38 @@ from ..home.generic import PathFrame
 from ..home.motion import AxisKind, JointAxis, Motion
 from .opened import OpenedPath, slide_length
 
-#: Names of the coordinates of a joint that has two.
+#: Names of the two coordinates of a joint with two axes.
 COORDINATE_PARTS: Mapping[str, tuple[str, ...]] = {"U": ("first", "second"), "C": ("angle", "stroke")}
-#: The solution of an angle that is 0 at home differs from the other one where ``a1 . (a2 x d)`` is above this at home:
+#: Value of ``a1 . (a2 x d)`` at home above which the solution of an angle that is 0 at home differs from the other one:
 #: rounding leaves 1e-16.
 _DISTINCT = 1e-6
-_ROD = "it ends a rod between two spherical joints, which turns freely about itself"
+_ROD = "it ends a rod between two spherical joints, which spins freely"
 _PLANE = "its axes are in one plane at home, where the angles of three rotations are not determined"
 
 
 class Angle(NamedTuple):
-    """An angle by its sine and cosine (1, 1), both times the same positive number."""
+    """Angle given by its sine and cosine (1, 1), both times the same positive factor."""
 
     sine: SX
     cosine: SX
 
     @property
     def reversed(self) -> Angle:
-        """The angle with the other sign."""
+        """Angle with the opposite sign."""
         return Angle(-self.sine, self.cosine)
 
 
 def angle_about(axis: SX, before: SX, after: SX) -> Angle:
-    """Return the angle by which a rotation about a unit axis (3, 1) takes one vector (3, 1) to another.
+    """Return the angle of the rotation about a unit axis (3, 1) that takes one vector (3, 1) to another.
 
-    The vectors have equal parts along the axis, and parts across it that are not zero.
+    The vectors have equal components along the axis, and nonzero components normal to it.
     """
     across, turned = before - axis * ca.dot(axis, before), after - axis * ca.dot(axis, after)
     return Angle(ca.dot(axis, ca.cross(across, turned)), ca.dot(across, turned))
 
 
 def rotation_angle(axis: SX, rotation: SX) -> Angle:
-    """Return the angle of a rotation (3, 3) about a unit axis (3, 1) of it: ``sin`` and ``cos`` times 2."""
+    """Return the angle of a rotation (3, 3) about its unit axis (3, 1): ``sin`` and ``cos`` times 2."""
     return Angle(ca.dot(axis, ca.inv_skew(rotation - rotation.T)), ca.trace(rotation) - 1)
 
 
@@ -66,7 +66,7 @@ def two_angles(axes: tuple[SX, SX], before: SX, after: SX, sign: float) -> tuple
     ``after = before``, one of them is 0. The solutions coincide where a1 lies in the plane of a2 and the vector.
 
     Args:
-        axes: unit axes a1 and a2, (3, 1) each, at home.
+        axes: (3, 1) unit axes a1 and a2 at home.
         before: (3, 1) unit vector at home.
         after: (3, 1) current unit vector.
         sign: sign of ``C = a1 . (a2 x before)`` at home.
@@ -84,27 +84,27 @@ def two_angles(axes: tuple[SX, SX], before: SX, after: SX, sign: float) -> tuple
 
 
 class _Coordinates(NamedTuple):
-    """Coordinates of all axes of a joint in order; none where the reason says why they are not known."""
+    """Coordinates of all axes of a joint in order; empty with a reason if they are not known."""
 
     values: Sequence[JointCoordinate]
     unknown: str = ""
 
 
 class PathJoints:
-    """The joints of an opened path.
+    """Joints of an opened path.
 
     Args:
         limb: the limb.
         path: the path.
-        known: variables that are unknowns, by joint's identity and number of the axis.
-        frame: values that all paths of the robot share.
+        known: coordinates that are unknowns, by the joint's identity and the number of the axis.
+        frame: common data of all paths of the robot.
     """
 
     def __init__(self, limb: Limb, path: OpenedPath, known: Mapping[tuple[Joint, int], SX], frame: PathFrame) -> None:
         self._limb, self._path, self._known, self._frame = limb, path, known, frame
 
     def states(self, labels: Mapping[int, str]) -> list[LimbJoint]:
-        """Return the path's joints as the robot file writes them, by the label of each one's identity."""
+        """Return the path's written joints, with labels by identity."""
         found = []
         for j, joint in enumerate(self._path.joints):
             coordinates = self._coordinates(j)
@@ -123,7 +123,7 @@ class PathJoints:
                 cone = self._cone(j) if each.type in ("U", "S") and len(written) == 1 else None
                 unknown = coordinates.unknown if each.type != "S" else ""
                 if each.type in ("U", "S") and cone is None:
-                    unknown = unknown or "it has no link that is longer than zero"
+                    unknown = unknown or "it has no link of nonzero length"
                 label = labels[id(each)]
                 found.append(LimbJoint(label, each.name, self._limb.name, each.type, tuple(named), cone, unknown))
         return found
@@ -145,7 +145,7 @@ class PathJoints:
         return self._between(axes, self._before(j).rotation.T @ self._behind(j).rotation)
 
     def _between(self, axes: Sequence[JointAxis], turn: SX) -> _Coordinates:
-        """Return the angles of one, two or three rotations from the rotation (3, 3) of the body behind them."""
+        """Return the angles of one, two or three rotations from the rotation (3, 3) of the body after them."""
         a = [axis.axis for axis in axes]
         if len(a) == 1:
             return _Coordinates([_angle(rotation_angle(a[0], turn))])
@@ -182,17 +182,17 @@ class PathJoints:
         first, second = two_angles((a1, a2), home / ca.norm_2(home), body.rotation.T @ now / ca.norm_2(now), sign)
         if is_base_side:
             return _Coordinates([_angle(first), _angle(second)])
-        # From the platform, the rotations come in the other order and have the other sign.
+        # Seen from the platform, the rotations have the reverse order and opposite signs.
         return _Coordinates([_angle(second.reversed), _angle(first.reversed)])
 
     def _sign(self, a1: SX, a2: SX, vector: SX) -> float:
-        """Return the sign of ``a1 . (a2 x vector)`` at the typical dimensions; 0 where it is not distinct."""
+        """Return the sign of ``a1 . (a2 x vector)`` at the typical dimensions; 0 if it is too small."""
         unit = vector / ca.norm_2(vector)
         value = self._frame.typical_value(ca.dot(a1, ca.cross(a2, unit))).item()
         return 0.0 if abs(value) < _DISTINCT else float(np.sign(value))
 
     def _cone(self, j: int) -> JointCone | None:
-        """Return the directions of the cone of a universal or spherical joint; those of links point to the platform."""
+        """Return the cone directions of a universal or spherical joint; links point to the platform."""
         path, place = self._path, self._path.joints[j].point
         turn = self._limb.turn
         if path.cut.far is not None and path.rod is not None and j in (path.cut.joint, path.cut.far):
@@ -209,7 +209,7 @@ class PathJoints:
                 home = sign * (path.joints[k].point - place)
                 if not self._frame.is_zero(ca.norm_2(home) / self._frame.size):
                     return _cone(link(j).rotation @ home, home, opposite(j), turn)
-        # All joints have one centre at home: a slide next to the joint has the direction of its link.
+        # All joints share one centre at home: a slide next to the joint has the direction of its link.
         for k, link, opposite in ((j + 1, self._behind, self._before), (j - 1, self._before, self._behind)):
             if 0 <= k < len(path.joints) and path.joints[k].type == "P":
                 axis = path.joints[k].axes[0].axis
@@ -217,41 +217,40 @@ class PathJoints:
         return None
 
     def _before(self, j: int) -> Motion:
-        """Return the displacement of the body on the base's side of a joint, which is no rod."""
+        """Return the displacement of the body on the base side of a joint outside a rod."""
         return self._path.body_before(j) or Motion.none()
 
     def _behind(self, j: int) -> Motion:
-        """Return the displacement of the body on the platform's side of a joint, which is no rod."""
+        """Return the displacement of the body on the platform side of a joint outside a rod."""
         return self._path.body_behind(j) or self._path.sides[1]
 
 
 def _cone(link: SX, home: SX, other: Motion, turn: FloatArray) -> JointCone:
-    """Return the directions of a cone from vectors along a link, now and at home."""
+    """Return the cone directions from vectors along a link, now and at home."""
     return JointCone(link / ca.norm_2(link), home / ca.norm_2(home), other.rotation, turn)
 
 
 def _angle(angle: Angle) -> JointCoordinate:
-    """Return an angle as a coordinate."""
     return JointCoordinate("", Dimension.ANGLE, angle.sine, angle.cosine)
 
 
 def _coordinate(axis: JointAxis, value: SX) -> JointCoordinate:
-    """Return the coordinate of an axis: of a parallelogram the angle of its rods, or where it is driven its way."""
+    """Return the coordinate of an axis; for a parallelogram the angle of its rods, or its travel if it is actuated."""
     if axis.kind is AxisKind.PARALLELOGRAM and axis.actuated:
-        return JointCoordinate("", Dimension.LENGTH, axis.way(value))
+        return JointCoordinate("", Dimension.LENGTH, axis.travel(value))
     return JointCoordinate("", Dimension.LENGTH if axis.kind is AxisKind.TRANSLATION else Dimension.ANGLE, value)
 
 
 def limb_links(path: OpenedPath, labels: Mapping[int, str], frame: PathFrame) -> list[LimbLink]:
     """Return the links of a path, from the base on.
 
-    Of joints that have one centre at home, the one nearest the base is an end of links. A slide along the line between
-    its neighbours is no end: the link is then as long as the slide makes it.
+    Of joints with a common centre at home, the one nearest the base is the end of links. A slide along the line between
+    its neighbours is not an end: the link includes its travel.
 
     Args:
         path: the path.
-        labels: of the joints, by identity.
-        frame: values that all paths of the robot share.
+        labels: labels of the joints, by identity.
+        frame: common data of all paths of the robot.
     """
     ends: list[int] = []
     for j, joint in enumerate(path.joints):
@@ -269,13 +268,13 @@ def limb_links(path: OpenedPath, labels: Mapping[int, str], frame: PathFrame) ->
 
 
 def _place(path: OpenedPath, j: int) -> SX:
-    """Return the current place (3, 1) of a joint on the body behind it: that of a slide moves."""
+    """Return the current position (3, 1) of a joint on the body after it, which includes the travel of a slide."""
     behind = path.behind[j]
     return path.points[j] if behind is None else behind.point(path.joints[j].point)
 
 
 def _is_along(path: OpenedPath, joints: Sequence[int], frame: PathFrame) -> bool:
-    """Return whether the second of three joints is a slide along the line between the others."""
+    """Return True if the second of three joints is a slide along the line between the others."""
     before, slide, behind = (path.joints[j] for j in joints)
     if slide.type != "P":
         return False
@@ -285,11 +284,11 @@ def _is_along(path: OpenedPath, joints: Sequence[int], frame: PathFrame) -> bool
 
 
 def with_shared_places(paths: Sequence[tuple[OpenedPath, list[LimbLink]]], frame: PathFrame) -> tuple[LimbLink, ...]:
-    """Return the links of all paths, with one name for joints of the base, or of the platform, that have one centre.
+    """Return the links of all paths, with one name for joints of the base, or of the platform, with a common centre.
 
     Args:
         paths: each path with its links.
-        frame: values that all paths of the robot share.
+        frame: common data of all paths of the robot.
     """
     found = [link for _, links in paths for link in links]
     names: dict[str, str] = {}

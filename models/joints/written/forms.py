@@ -1,4 +1,4 @@
-"""Forms of the values of a robot as it is written, each refused with its place where it has another form."""
+"""Form checks of the values in a robot file; a fault is refused with its place."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Expression: TypeAlias = str | float
 #: A vector expression: a text, or three scalar expressions.
 VectorExpression: TypeAlias = str | Sequence[Expression]
 
-#: Names of dimensions, points and joints.
+#: Allowed names of dimensions, points and joints.
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
@@ -24,7 +24,7 @@ class RobotError(ModelError):
 
     Attributes:
         place: limb, joint and key, such as ``limb 2, joint 1 (R), axis``; empty for the whole robot.
-        fault: the fault, with the value and with what is allowed.
+        fault: description of the fault, with the value read and the values allowed.
     """
 
     def __init__(self, place: str, fault: str) -> None:
@@ -33,10 +33,10 @@ class RobotError(ModelError):
 
 
 class UndefinedError(RobotError):
-    """Error of a place that has no finite value, or of a direction that is zero, with these dimensions.
+    """Error of a point without a finite value, or of a direction that is zero, at these dimensions.
 
     Attributes:
-        values: values of the names in the operation that has none, one number or three each.
+        values: values of the names in the failing operation, one or three numbers each.
     """
 
     def __init__(self, place: str, fault: str, values: Mapping[str, tuple[float, ...]]) -> None:
@@ -45,7 +45,7 @@ class UndefinedError(RobotError):
 
 
 def plain(value: object) -> object:
-    """Return a value with lists and dicts in the place of other sequences and mappings, as TOML has them."""
+    """Return a value with lists and dicts, as in TOML, in place of other sequences and mappings."""
     if isinstance(value, Mapping):
         return {key: plain(each) for key, each in value.items()}
     if isinstance(value, Sequence) and not isinstance(value, str):
@@ -54,13 +54,13 @@ def plain(value: object) -> object:
 
 
 def check_names(names: Sequence[str] | Mapping[str, object], what: str, place: str = "") -> None:
-    """Refuse names that are no words, or that expressions use for something else."""
+    """Refuse names that are not identifiers, or that expressions use for something else."""
     for name in names:
         where = f"{place}, {name}" if place else name
         if not NAME.fullmatch(name):
-            raise RobotError(where, f"is no name for {what}: letters, digits and _ are allowed, a letter first")
+            raise RobotError(where, f"is not a name for {what}: letters, digits and _ are allowed, a letter first")
         if name in CONSTANTS or name in FUNCTIONS:
-            raise RobotError(where, f"is no name for {what}: expressions use it for something else")
+            raise RobotError(where, f"is not a name for {what}: expressions use it for something else")
         if list(names).count(name) > 1:
             raise RobotError(where, "is given twice")
 

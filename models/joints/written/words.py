@@ -1,7 +1,7 @@
-"""A robot as it is written, with its form checked: dimensions and points; limbs and joints, or links and joints.
+"""Contents of a robot file, with checked form: dimensions and points; limbs and joints, or links and joints.
 
-The tables of a robot file and the arguments of :func:`~screwsynth.models.joints.model.robot.robot` have the same words.
-Links and joints are for shapes that limbs with branches do not have. :mod:`.chain` gives the expressions their values.
+The tables of a robot file and the arguments of :func:`~screwsynth.models.joints.model.robot.robot` have the same keys.
+Links and joints describe shapes that limbs with branches cannot. :mod:`.chain` evaluates the expressions.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from .forms import (
     vector_of,
 )
 
-#: The joints by name, with their own keys beside ``type`` and ``at``.
+#: Joint types with their keys in addition to ``type`` and ``at``.
 _JOINT_KEYS: Mapping[str, tuple[str, ...]] = {
     "R": ("axis", "actuated"),
     "P": ("axis", "actuated"),
@@ -39,29 +39,29 @@ _JOINT_KEYS: Mapping[str, tuple[str, ...]] = {
     "S": (),
     "Pa": ("axis", "to", "actuated"),
 }
-#: Keys of every robot file beside those of its limbs, or of its links and joints.
+#: Common keys of robot files, besides those of limbs, or of links and joints.
 _HEAD_KEYS = (VERSION_KEY, "name", "description", "length_unit", "home", "dimensions", "derived")
-#: Most limbs of a robot, with all copies.
+#: Largest number of limbs of a robot, with all copies.
 MOST_LIMBS = 24
-#: Most joints from base to platform, and most branches of a limb: no limb of a known robot has more than half of them.
+#: Largest number of joints from base to platform, and of branches of a limb: known robots have at most half of them.
 _MOST_JOINTS = 12
 _MOST_BRANCHES = 6
-#: Most joints of a robot with all copies. So many took 4 s to read; 288 did not end within 200 s.
+#: Largest number of joints of a robot with all copies. So many took 4 s to read; 288 did not end within 200 s.
 _MOST_IN_ALL = 120
-#: Fault of a branch with branches of its own.
+#: Fault message for a branch with branches of its own.
 NESTED_BRANCH = "is a branch of a branch; allowed are branches of a limb, each with joints up to the platform"
-#: Copies of a limb nearer than this coincide, degrees.
+#: Angle below which two copies of a limb coincide, degrees.
 _SAME_ANGLE = 1e-6
-#: Keys of a robot file with links and joints beside those of every robot file.
+#: Keys of a robot file for links and joints, in addition to the common keys.
 GRAPH_KEYS = ("links", "base", "platform", "points", "joint", "coupling")
 _MOST_COUPLINGS = 40
-#: Joints with one coordinate, which a coupling relates and an actuator drives.
+#: Types of joints with one coordinate, which may be coupled and actuated.
 _COUPLED = ("R", "P", "H")
 
 
 @dataclass(frozen=True)
 class DimensionWords:
-    """A dimension: its typical value (degrees for an angle), kind and description."""
+    """Dimension: typical value (degrees for an angle), kind and description."""
 
     typical: float
     kind: Dimension
@@ -70,7 +70,7 @@ class DimensionWords:
 
 @dataclass(frozen=True)
 class JointWords:
-    """A joint: its type, place, axes and further numbers, as expressions; None for what its type does not have."""
+    """Joint: type, place, axes and further values, as expressions; None for keys that its type does not have."""
 
     place: str
     type: str
@@ -93,7 +93,7 @@ class RepeatWords:
 
 @dataclass(frozen=True)
 class LimbWords:
-    """A limb: names of its copies, how it is repeated, points, joints of the stem, and of each branch."""
+    """Limb: names and arrangement of its copies, points, joints of the stem and of each branch."""
 
     place: str
     names: tuple[str, ...]
@@ -106,7 +106,7 @@ class LimbWords:
 
 @dataclass(frozen=True)
 class LinkJointWords:
-    """A joint between two links, by their names; a weld has no words of a joint."""
+    """Joint between two links, by their names; ``joint`` is None for a weld."""
 
     place: str
     name: str
@@ -116,7 +116,7 @@ class LinkJointWords:
 
 @dataclass(frozen=True)
 class CouplingWords:
-    """A linear relation of joints' coordinates: place, and a factor by the name of each joint."""
+    """Linear relation of joint coordinates: place, and factors by joint name."""
 
     place: str
     factors: Mapping[str, Expression]
@@ -124,7 +124,7 @@ class CouplingWords:
 
 @dataclass(frozen=True)
 class GraphWords:
-    """A robot as links and joints: names of links, base and platform, points, joints and couplings."""
+    """Robot as links and joints: names of links, base and platform, points, joints and couplings."""
 
     links: tuple[str, ...]
     base: str
@@ -136,7 +136,7 @@ class GraphWords:
 
 @dataclass(frozen=True)
 class RobotWords:
-    """A robot as it is written."""
+    """Robot as it is written."""
 
     name: str
     description: str
@@ -149,10 +149,10 @@ class RobotWords:
 
 
 def read_robot(tables: Mapping[str, object]) -> RobotWords:
-    """Return a robot from its tables, which have limbs, or links and joints.
+    """Return a robot from tables with limbs, or with links and joints.
 
     Args:
-        tables: as ``tomllib`` returns those of a robot file.
+        tables: tables of a robot file, as ``tomllib`` returns them.
 
     Raises:
         RobotError: a key is unknown or missing, or a value has a form that is not allowed.
@@ -161,14 +161,13 @@ def read_robot(tables: Mapping[str, object]) -> RobotWords:
         raise RobotError(f"{VERSION_KEY} = {tables[VERSION_KEY]!r}", fault)
     given = [key for key in GRAPH_KEYS if tables.get(key) is not None]
     if given and tables.get("limb") is not None:
-        raise RobotError(given[0], "cannot stand beside limb: give the robot by limbs, or by links and joints")
+        raise RobotError(given[0], "conflicts with limb: give the robot by limbs, or by links and joints")
     refuse_other_keys("", tables, (*_HEAD_KEYS, *(GRAPH_KEYS if given else ()), "limb"))
     head = _head(tables)
     return replace(head, graph=_graph(tables)) if given else replace(head, limbs=_limbs(tables.get("limb")))
 
 
 def _limbs(limbs: object) -> tuple[LimbWords, ...]:
-    """Return the limbs of a robot."""
     if not isinstance(limbs, Sequence) or isinstance(limbs, str) or not limbs:
         raise RobotError("limb", "is missing: a robot needs at least one [[limb]]")
     read: list[LimbWords] = []
@@ -189,7 +188,7 @@ def _limbs(limbs: object) -> tuple[LimbWords, ...]:
 
 
 def _head(tables: Mapping[str, object]) -> RobotWords:
-    """Return a robot without limbs: its name, home, dimensions and derived numbers."""
+    """Return a robot without limbs: name, home, dimensions and derived quantities."""
     name = tables.get("name")
     if not isinstance(name, str) or not name.strip():
         raise RobotError("name", "is missing: give the robot's name as a text")
@@ -216,8 +215,8 @@ def _limb(place: str, table: Mapping[str, object], before: int) -> LimbWords:
     """Return a limb.
 
     Args:
-        place: of the limb, for messages.
-        table: the limb's keys.
+        place: place of the limb, for messages.
+        table: keys of the limb.
         before: number of limbs before it, with all copies.
     """
     refuse_other_keys(place, table, ("name", "repeat", "points", "joints", "branch", "centre"))
@@ -251,7 +250,7 @@ def _limb(place: str, table: Mapping[str, object], before: int) -> LimbWords:
 
 
 def _check_path(place: str, joints: Sequence[JointWords]) -> None:
-    """Refuse too many joints of one path, and names of theirs that are no words, or are given twice."""
+    """Refuse too many joints of one path, invalid joint names, and repeated ones."""
     if len(joints) > _MOST_JOINTS:
         raise RobotError(f"{place}, joints", f"has {len(joints)} joints; at most {_MOST_JOINTS} are allowed")
     names = [joint.name for joint in joints if joint.name]
@@ -274,7 +273,6 @@ def _only_joints(place: str, branch: object) -> object:
 
 
 def _joints(place: str, value: object) -> tuple[JointWords, ...]:
-    """Return the joints of a limb or of a branch."""
     return tuple(
         _joint_words(f"{place}, joint {k + 1}", table_of(f"{place}, joint {k + 1}", each))
         for k, each in enumerate(list_of(f"{place}, joints", value))
@@ -282,7 +280,6 @@ def _joints(place: str, value: object) -> tuple[JointWords, ...]:
 
 
 def _joint_words(place: str, table: Mapping[str, object]) -> JointWords:
-    """Return a joint."""
     kind = table.get("type")
     if not isinstance(kind, str) or kind not in _JOINT_KEYS:
         raise RobotError(f"{place}, type", f"is {kind!r}; allowed are {', '.join(_JOINT_KEYS)}")
@@ -318,7 +315,7 @@ def _joint_words(place: str, table: Mapping[str, object]) -> JointWords:
 
 
 def _repeat(place: str, value: object) -> RepeatWords:
-    """Return how a limb is repeated: evenly by a count, or at angles."""
+    """Return the copies of a limb: evenly spaced by a count, or at angles."""
     table = table_of(place, value)
     refuse_other_keys(place, table, ("count", "angles", "axis", "through"))
     if ("count" in table) == ("angles" in table):
@@ -342,7 +339,6 @@ def _repeat(place: str, value: object) -> RepeatWords:
 
 
 def _dimension(name: str, value: object) -> DimensionWords:
-    """Return a dimension."""
     place = f"dimensions.{name}"
     table = table_of(place, value)
     refuse_other_keys(place, table, ("typical", "kind", "description"))
@@ -357,7 +353,6 @@ def _dimension(name: str, value: object) -> DimensionWords:
 
 
 def _graph(tables: Mapping[str, object]) -> GraphWords:
-    """Return links, joints and couplings."""
     links = _links(tables)
     base, platform = (_end(tables, role, links) for role in ("base", "platform"))
     if base == platform:
@@ -391,7 +386,6 @@ def _graph(tables: Mapping[str, object]) -> GraphWords:
 
 
 def _links(tables: Mapping[str, object]) -> list[str]:
-    """Return the names of the links."""
     links = [text_of("links", each) for each in list_of("links", tables.get("links") or ())]
     if not links:
         raise RobotError("links", 'is missing: give the names of all links, such as ["base", "arm", "platform"]')
@@ -403,21 +397,20 @@ def _links(tables: Mapping[str, object]) -> list[str]:
 
 
 def _end(tables: Mapping[str, object], role: str, links: Sequence[str]) -> str:
-    """Return the link that is the base or the platform: the one of this name, where the file names none."""
+    """Return the link that is the base or the platform, by default the link of this name."""
     name = text_of(role, tables.get(role, role))
     if name not in links:
-        raise RobotError(role, f"is {name!r}, which is no link; links are {', '.join(links)}")
+        raise RobotError(role, f"is {name!r}, which is not a link; links are {', '.join(links)}")
     return name
 
 
 def _check_name(place: str, name: str) -> None:
-    """Refuse a name that is no word."""
+    """Refuse a name that is not an identifier."""
     if not NAME.fullmatch(name):
         raise RobotError(place, f"is {name!r}; letters, digits and _ are allowed, a letter first")
 
 
 def _joint(number: int, table: Mapping[str, object], links: Sequence[str]) -> LinkJointWords:
-    """Return a joint between two links."""
     name = text_of(f"joint {number}, name", table.get("name", f"joint_{number}"))
     _check_name(f"joint {number}, name", name)
     place = f"joint {name}"
@@ -426,7 +419,7 @@ def _joint(number: int, table: Mapping[str, object], links: Sequence[str]) -> Li
         raise RobotError(f"{place}, between", f"has {len(between)} links; a joint is between 2, the base's side first")
     for link in between:
         if link not in links:
-            raise RobotError(f"{place}, between", f"has {link!r}, which is no link; links are {', '.join(links)}")
+            raise RobotError(f"{place}, between", f"has {link!r}, which is not a link; links are {', '.join(links)}")
     if between[0] == between[1]:
         raise RobotError(f"{place}, between", f"has the link {link!r} twice; two different links are needed")
     rest = {key: value for key, value in table.items() if key != "between"}
@@ -447,7 +440,7 @@ def _coupling(number: int, value: object, joints: Sequence[LinkJointWords]) -> C
     factors = {name: expression_of(f"{place}, {name}", factor) for name, factor in written.items()}
     for name in factors:
         if name not in types:
-            raise RobotError(f"{place}, {name}", f"is no joint; joints are {', '.join(types)}")
+            raise RobotError(f"{place}, {name}", f"is not a joint; joints are {', '.join(types)}")
         if types[name] not in _COUPLED:
             raise RobotError(f"{place}, {name}", f"is a joint {types[name]}; only R, P and H have one coordinate")
     if len(factors) < 2:

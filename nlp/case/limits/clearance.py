@@ -1,4 +1,4 @@
-"""Limits on the distance between legs, and between links of limbs, as line segments between centres of joints.
+"""Limits on the distance between legs, and between links of limbs, as line segments between joint centres.
 
 The squared distance ``d^2`` of the points ``p + s d`` and ``q + t e`` is a convex quadratic in s and t, and its minimum
 over ``0 <= s, t <= 1`` is found in closed form by three clampings: the best s for the lines, the best t for this s, the
@@ -30,25 +30,24 @@ from .constraint import BoundedConstraint, Call, Form, Reading, between
 from .interval import LowerLimit
 from .limit import PosedRobot
 
-#: Largest distance that a constraint can be for, in parts of the distance D beyond which it is 1: closer to D its slope
-#: falls below an eighth of the slope at the limit that it was made for.
+#: Largest limit to which a constraint can be changed, in parts of the distance D beyond which it is 1: closer to D, the
+#: slope falls below an eighth of the slope at the original limit.
 _MOST = 0.9
-#: Keeps the division defined for parallel lines, in parts of the squared lengths; the sine of the lines' angle counts
-#: squared beside it. Whatever s it gives there, t and s are improved once more; the squared distance is then too large
-#: by a quarter of this part of a leg's squared length at most.
+#: Regularisation of the division for parallel lines, relative to the squared lengths. The next two clampings correct
+#: the error in s: the squared distance is too large by at most a quarter of this part of a leg's squared length.
 _PARALLEL = 1e-10
 
 
 @dataclass(frozen=True)
 class LegClearance(LowerLimit):
-    """Smallest distance between two legs, as line segments between their joints."""
+    """Smallest distance between two legs, as line segments between their joint centres."""
 
     key: ClassVar[str] = "leg_clearance"
-    description: ClassVar[str] = "between legs as line segments"
+    description: ClassVar[str] = "smallest distance between two legs, as line segments between joint centres"
     needs_legs: ClassVar[bool] = True
 
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
-        """Return a smooth function of the distance of each pair of legs, with the distance itself."""
+        """Return the constraint on the distance of each pair of legs."""
         for one, other in itertools.combinations(pose.robot.legs, 2):
             name = f"leg_clearance limbs {one.name} and {other.name}{pose.where}"
             yield _apart(name, (one.base, one.span), (other.base, other.span), self.key, self.min)
@@ -56,14 +55,14 @@ class LegClearance(LowerLimit):
 
 @dataclass(frozen=True)
 class LinkClearance(LowerLimit):
-    """Smallest distance between two links of limbs that share no joint, as segments between centres of joints."""
+    """Smallest distance between two links of limbs without a common joint, as line segments between joint centres."""
 
     key: ClassVar[str] = "link_clearance"
-    description: ClassVar[str] = "between links of limbs that share no joint, as line segments"
+    description: ClassVar[str] = "smallest distance between two links of limbs without a common joint, as line segments"
     needs_joints: ClassVar[bool] = True
 
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
-        """Return a smooth function of the distance of each pair of links."""
+        """Return the constraint on the distance of each pair of links."""
         for one, other in itertools.combinations(pose.robot.links, 2):
             if not one.ends & other.ends:
                 name = f"{self.key} links {one.name} and {other.name}{pose.where}"
@@ -74,11 +73,11 @@ def _apart(name: str, one: tuple[SX, SX], other: tuple[SX, SX], key: str, least:
     """Return the constraint on the distance of two segments.
 
     Args:
-        name: of the constraint.
+        name: name of the constraint.
         one: start and span (3, 1) of the first segment, length.
-        other: of the second.
-        key: of the limit.
-        least: smallest distance.
+        other: start and span (3, 1) of the second segment, length.
+        key: key of the limit.
+        least: smallest allowed distance, length.
     """
     far, ends = 4 * least**2, ca.vertcat(*one, *other)
     near = Call(Form(_near_of_segments, (far,)), ends)
@@ -132,9 +131,9 @@ def squared_distance(p: SX, d: SX, q: SX, e: SX) -> SX:
 
     Args:
         p: (3, 1) start of the first segment, length.
-        d: (3, 1) its span, not 0.
+        d: (3, 1) vector from start to end of the first segment, not 0.
         q: (3, 1) start of the second segment.
-        e: (3, 1) its span, not 0.
+        e: (3, 1) vector from start to end of the second segment, not 0.
     """
     r = p - q
     a, b, c = ca.sumsqr(d), ca.dot(d, e), ca.sumsqr(e)

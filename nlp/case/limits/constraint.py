@@ -1,8 +1,7 @@
-"""Named smooth constraints, readings of their numbers in the words of a case, and forms of expressions that repeat.
+"""Named smooth constraints of the nonlinear program, and readings that convert their bounds to quantities of the case.
 
-A form is one function of a few numbers, called for every leg, pair of legs, joint, task or pose. A program needs the
-expressions alone. Generated C also uses that they are calls of one function: it has the function once, and calls it in
-a loop.
+A form is a function that is called for every leg, pair of legs, joint, task or pose. Generated C contains the function
+once and calls it in a loop.
 """
 
 from __future__ import annotations
@@ -24,11 +23,11 @@ from ....models.values import dataclass
 
 @dataclass(frozen=True)
 class Form:
-    """A function of a vector; two forms are equal where they are the same function with the same numbers.
+    """Function of a vector, with constant parameters; forms with equal function and parameters are equal.
 
     Attributes:
-        build: function at the top of a module, from a vector (k, 1) and the numbers to the value (r, 1).
-        numbers: further arguments of the function, the same in each of its calls.
+        build: function at the top of a module, from a vector (k, 1) and the parameters to a value (r, 1).
+        numbers: constant parameters of the function.
     """
 
     build: Callable[..., SX]
@@ -41,11 +40,11 @@ class Form:
 
 @dataclass(frozen=True, eq=False)
 class Call:
-    """A call of a form.
+    """Call of a form.
 
     Attributes:
-        form: the function.
-        inputs: (k, 1) expressions.
+        form: called function.
+        inputs: (k, 1) arguments.
     """
 
     form: Form
@@ -53,13 +52,13 @@ class Call:
 
     @cached_property
     def value(self) -> SX:
-        """(r, 1) value."""
+        """Value (r, 1) of the function."""
         return self.form(self.inputs)
 
 
 _T = TypeVar("_T")
 
-#: A measured number from the Jacobian (m, 6) and the position (3,) of the platform at a pose.
+#: Function of the Jacobian (m, 6) and the platform position (3,) at a pose, with a measured quantity as value.
 JacobianMeasure: TypeAlias = Callable[[FloatArray, FloatArray], float]
 
 
@@ -73,18 +72,18 @@ def _one(value: float) -> float:  # noqa: ARG001 - a slope is a function of the 
 
 @dataclass(frozen=True)
 class Reading:
-    """Conversion between a constraint's bound and the number that a case states for it.
+    """Conversion between the bound of a constraint and the limit in the case.
 
-    A limit on an angle may be a bound on a smoother function of it in the program. The three functions have names, or
-    are a ``partial`` of functions that have: a solution that holds a ``lambda`` cannot be pickled.
+    The program may bound a smoother function of the limited quantity, such as the cosine of an angle. The three
+    functions are module-level functions or ``partial`` of these, because solutions with a ``lambda`` cannot be pickled.
 
     Attributes:
-        dimension: of the number that a case states.
-        from_value: the number for people (radians for angles) from the program's bound.
-        slope: derivative of the program's bound with respect to the number for people, at the program's bound.
-        to_value: the program's bound from the number for people, as an expression; it never falls where that grows.
-        above: the number for people must be larger than this.
-        most: the number for people may be at most this.
+        dimension: physical dimension of the limited quantity.
+        from_value: function from the program's bound to the limit, radians for angles.
+        slope: derivative of the program's bound with respect to the limit, as a function of the program's bound.
+        to_value: function from the limit to the program's bound, as an expression; monotonically increasing.
+        above: exclusive lower end of the allowed limits.
+        most: upper end of the allowed limits.
     """
 
     dimension: Dimension
@@ -96,12 +95,12 @@ class Reading:
 
     @property
     def power(self) -> int:
-        """Power of the number's unit that the bound has: 0 where it is a plain number, as a cosine is."""
+        """Power of the limit's unit in the program's bound; 0 for a plain number, such as a cosine."""
         return {_unchanged: 1, _square: 2}.get(self.to_value, 0)
 
 
 def squared(dimension: Dimension) -> Reading:
-    """Return the reading of a square as the number itself, which is positive."""
+    """Return the reading of a square as its positive root."""
     return Reading(dimension, from_value=_root, slope=_slope_of_square, to_value=_square, above=0.0)
 
 
@@ -118,7 +117,7 @@ def _square(number: SX) -> SX:
 
 
 def in_parts(part: float) -> Reading:
-    """Return the reading of a part of a plain number as the number itself."""
+    """Return the reading of ``part`` times a plain number as the number."""
     return Reading(
         Dimension.NUMBER, from_value=partial(mul, 1 / part), slope=partial(_slope, part), to_value=partial(mul, part)
     )
@@ -133,14 +132,14 @@ def _at_least_zero(value: float) -> float:
 
 
 LENGTH, NUMBER = Reading(Dimension.LENGTH), Reading(Dimension.NUMBER)
-#: A sum of squares: a bound below 0 that a search of boxes has says no more than 0 does.
+#: Reading of a sum of squares: a proved bound below 0 is shown as 0.
 NOT_NEGATIVE = Reading(Dimension.NUMBER, from_value=_at_least_zero)
 POSITIVE_LENGTH = Reading(Dimension.LENGTH, above=0.0)
 SQUARED_LENGTH, SQUARED_NUMBER = squared(Dimension.LENGTH), squared(Dimension.NUMBER)
 
 
 class End(enum.Enum):
-    """Estimate of eigenvalues of ``A = J'J`` that a constraint is on."""
+    """Kinds of estimates of eigenvalues of ``A = J'J``: smallest eigenvalue, or minus ratio of smallest to largest."""
 
     SMALLEST = 0
     MINUS_RATIO = 1
@@ -148,12 +147,12 @@ class End(enum.Enum):
 
 @dataclass(frozen=True, eq=False)
 class Spectral:
-    """A constraint's expression as an estimate of eigenvalues, for those who compute the estimate themselves.
+    """Matrix behind an estimate of eigenvalues, for modules that bound or measure the eigenvalues themselves.
 
     Attributes:
-        end: the smallest eigenvalue, or minus the ratio of the smallest to the largest.
-        matrix: (m, 6) rows force, then moment about the platform's origin.
-        length: by which moments are divided.
+        end: estimated quantity: smallest eigenvalue, or minus the ratio of smallest to largest.
+        matrix: (m, 6) Jacobian with rows of force, then moment about the platform origin.
+        length: length by which moments are divided.
     """
 
     end: End
@@ -163,22 +162,22 @@ class Spectral:
 
 @dataclass(frozen=True, eq=False)
 class Constraint:
-    """A named smooth constraint ``lower <= expression <= upper``.
+    """Named smooth constraint ``lower <= expression <= upper``.
 
-    Its bounds are numbers of the :class:`~screwsynth.nlp.program.nlp.Nlp`.
+    The bounds are in the :class:`~screwsynth.nlp.program.nlp.Nlp`.
 
     Attributes:
-        name: in the words of a case.
-        expression: (1, 1).
-        reading: how its bounds read.
-        keys: dotted keys below ``limits`` of the case's numbers that are its lower and its upper bound; empty for a
-            bound that is none of the case's limits.
-        pose: index of the pose that it is at.
-        exact: (1, 1) the measured number itself, where the expression gives it near the limit only.
-        measure: the measured number itself, where the expression only estimates it.
-        spectral: the matrix that the expression is made from, where it estimates eigenvalues.
-        call: the call whose value the expression is, where it repeats for several legs, joints, tasks or poses.
-        stated: lower and upper bound as the case states them, where those of the program are tighter; else None.
+        name: name of the constraint, in the words of a case.
+        expression: (1, 1) constrained function.
+        reading: conversion between bounds and limits.
+        keys: dotted keys below ``limits`` of the lower and the upper limit; empty for a bound that is not a limit of
+            the case.
+        pose: index of the pose.
+        exact: (1, 1) limited quantity, if the expression follows it only near the limit; else None.
+        measure: function that computes the limited quantity, if the expression is an estimate of it; else None.
+        spectral: matrix of the estimate, if the expression estimates eigenvalues; else None.
+        call: call with the expression as value, if the function is called for several legs, joints, tasks or poses.
+        stated: lower and upper bound of the case, if the program's bounds are tighter; else None.
     """
 
     name: str
@@ -193,11 +192,11 @@ class Constraint:
     stated: tuple[float, float] | None = None
 
     def measured_at(self, symbols: Sequence[SX], point: Sequence[FloatArray | Sequence[float] | float]) -> float:
-        """Return the measured number of a constraint with ``measure`` and ``spectral``; NaN for another constraint.
+        """Return the limited quantity of a constraint with ``measure`` and ``spectral``; NaN for other constraints.
 
         Args:
             symbols: variables and arguments of the program.
-            point: their values.
+            point: values of the symbols.
         """
         if self.measure is None or self.spectral is None:
             return math.nan
@@ -207,7 +206,7 @@ class Constraint:
 
 @dataclass(frozen=True, eq=False)
 class BoundedConstraint:
-    """A constraint with its bounds."""
+    """Constraint with its lower and upper bound."""
 
     constraint: Constraint
     lower: float
@@ -226,19 +225,19 @@ def between(
     measure: JacobianMeasure | None = None,
     spectral: Spectral | None = None,
 ) -> BoundedConstraint:
-    """Return a constraint from the numbers of its limit as people write them.
+    """Return the constraint of a limit.
 
     Args:
-        name: in the words of a case.
-        expression: (1, 1), or the call whose value it is; it grows with the measured number.
-        reading: how its bounds read.
-        key: dotted key below ``limits`` of the table whose ``min`` and ``max`` the numbers are; or the dotted keys of
-            the lower and of the upper number, empty where there is none.
-        lower: the lower number, radians for an angle; None where there is none.
-        upper: likewise.
-        exact: (1, 1) the measured number itself, where the expression gives it near the limit only.
-        measure: the measured number itself, where the expression only estimates it.
-        spectral: the matrix that the expression is made from, where it estimates eigenvalues.
+        name: name of the constraint, in the words of a case.
+        expression: (1, 1) constrained function, or a call with this value; it increases with the limited quantity.
+        reading: conversion between bounds and limits.
+        key: dotted key below ``limits`` of a table with ``min`` and ``max``; or the dotted keys of the lower and the
+            upper limit, empty for a missing one.
+        lower: lower limit, radians for an angle; None for no lower limit.
+        upper: upper limit, radians for an angle; None for no upper limit.
+        exact: (1, 1) limited quantity, if the expression follows it only near the limit.
+        measure: function that computes the limited quantity, if the expression is an estimate of it.
+        spectral: matrix of the estimate, if the expression estimates eigenvalues.
     """
     if isinstance(key, str):
         key = ("" if lower is None else f"{key}.min", "" if upper is None else f"{key}.max")
@@ -252,16 +251,16 @@ def between(
 
 @dataclass(frozen=True, eq=False)
 class PairFamily:
-    """Constraints of one form on every ordered pair of N values, such as the lengths of a leg at several poses.
+    """Constraints on all ordered pairs of N values, such as the lengths of a leg at several poses.
 
-    There are as many pairs as the square of N, and few of them can bind. A program starts with none of many pairs, and
-    gets a pair where a point would violate it: :mod:`screwsynth.nlp.program.pairs`.
+    Few of the N^2 pairs can be active. With many pairs, a program starts without them and adds a pair when a point
+    violates it: :mod:`screwsynth.nlp.program.pairs`.
 
     Attributes:
-        values: (N, 1) the values, N >= 2.
-        pair: the constraints on two values, by their indices. They are the tightest where the first value is the
-            smallest and the second the largest of all.
-        slack: least distance to a limit, as a number, of a first and a second value; negative where it is violated.
+        values: (N, 1) values, N >= 2.
+        pair: function from two indices to the constraints on these values; they are tightest for the smallest value
+            as the first one and the largest as the second one.
+        slack: function from two values to their smallest margin; negative for a violated limit.
     """
 
     values: SX

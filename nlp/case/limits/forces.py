@@ -1,6 +1,7 @@
-"""Limits on forces, speeds and powers of actuators, for the loads on the platform and its fastest motions.
+"""Limits on forces, speeds and powers of actuators, and on the deflection of the platform.
 
-:mod:`..forces` has the expressions. A limit is on all actuators, or on one by its name.
+They hold under the loads and at the largest speeds of the platform, whose expressions are in :mod:`..forces`. A limit
+is on all actuators, or on one by its name.
 """
 
 from __future__ import annotations
@@ -28,15 +29,15 @@ from .limit import Limit, LimitedCase, NumberRange, PosedRobot, Ranges, TableT, 
 
 
 def _kind(value: object) -> str:
-    """Return the branch of a union for a table of numbers, or for one such table for each of several actuators."""
+    """Return the branch of a union for one table for all actuators, or for a table for each actuator by name."""
     is_each = isinstance(value, dict) and any(isinstance(part, dict | Table) for part in value.values())
     return "<list>" if is_each else "<range>"
 
 
 def _unmixed(value: object) -> object:
-    """Return the value at a limit's key, or refuse numbers for all actuators beside tables of single ones."""
+    """Return the value of a limit, or refuse numbers for all actuators together with tables for single ones."""
     if isinstance(value, dict) and len({isinstance(part, dict | Table) for part in value.values()}) > 1:
-        raise fault_of("", "has numbers for all actuators beside a table for one; write one table for each actuator")
+        raise fault_of("", "has both numbers for all actuators and a table for one; write a table for each actuator")
     return value
 
 
@@ -48,37 +49,37 @@ _Largest = Annotated[Annotated[AtMost, Tag("<range>")] | Annotated[dict[str, AtM
 
 
 class LoadedLimit(Limit[TableT], abc.ABC):
-    """A limit on what loads on the platform or its fastest motions demand of actuators.
+    """Limit on a quantity that depends on the loads or on the largest speeds of the platform.
 
     Attributes:
-        needs_loads: whether the numbers depend on loads.
+        needs_loads: If true, the limited quantity depends on loads.
     """
 
     needs_loads: ClassVar[bool] = True
 
     @classmethod
     def is_for(cls, model: Model) -> bool:
-        """Return whether a robot's actuators are known."""
+        """Return whether the actuators of a robot are known."""
         return bool(driven_joints(model))
 
     def check(self, case: LimitedCase) -> None:
-        """Refuse a number out of its range, and a case without the loads that the limit needs.
+        """Check the values of the limit, and that the case has loads if the limit needs them.
 
         Raises:
-            CaseError: in the words of a case file.
+            CaseError: a value is outside of its range, or loads are missing.
         """
         super().check(case)
         if self.needs_loads and not case.loading.loads:
-            raise CaseError(f"limits.{self.name}", "means nothing without [[load]]")
+            raise CaseError(f"limits.{self.name}", "needs a table [[load]] with a load on the platform")
 
 
 @dataclass(frozen=True)
 class ActuatorLimit(LoadedLimit[Table], abc.ABC):
-    """A limit on a number of all actuators, or of one.
+    """Limit on a quantity of all actuators, or of a single actuator.
 
     Attributes:
-        actuator: name of the one; empty for all.
-        max: largest number, in radians of an actuator that turns; None where there is none.
+        actuator: name of the actuator; empty for all actuators.
+        max: largest allowed value, with radians for revolute actuators; None for no upper limit.
     """
 
     actuator: str = ""
@@ -89,11 +90,7 @@ class ActuatorLimit(LoadedLimit[Table], abc.ABC):
 
     @classmethod
     def read(cls, limits: Table, model: Model, units: Units) -> Iterator[Self]:
-        """Yield the limits of this type that a case file states.
-
-        Raises:
-            CaseError: a table is neither numbers nor one table of numbers by actuator.
-        """
+        """Yield the limits of this type in a case file."""
         given = getattr(limits, cls.key)
         if given is None:
             return
@@ -104,7 +101,7 @@ class ActuatorLimit(LoadedLimit[Table], abc.ABC):
 
     @classmethod
     def from_table(cls, written: Written[Table]) -> Self:
-        """Return the limit that a case file writes."""
+        """Return the limit of a case file."""
         name = written.key.removeprefix(cls.key).removeprefix(".")
         return cls(name, **written.numbers(cls(name).ranges(written.model)))
 
@@ -119,37 +116,38 @@ class ActuatorLimit(LoadedLimit[Table], abc.ABC):
         return f"{self.key}.{self.actuator}" if self.actuator else self.key
 
     def limited(self, model: Model) -> list[tuple[int, DrivenJoint]]:
-        """Return the actuators that are limited, with their indices."""
+        """Return index and joint of each limited actuator."""
         return [pair for pair in enumerate(driven_joints(model)) if self.actuator in ("", pair[1].name)]
 
     @classmethod
     @abc.abstractmethod
     def dimension(cls, joint: DrivenJoint) -> Dimension:
-        """Return the dimension of the number of an actuator."""
+        """Return the dimension of the limited quantity of an actuator."""
 
     def ranges(self, model: Model) -> Ranges:
-        """Return the range of the largest number."""
+        """Return the allowed range of the largest value."""
         joint = next((joint for _, joint in self.limited(model)), None)
         return {"max": NumberRange(Dimension.NUMBER if joint is None else self.dimension(joint))}
 
     def check(self, case: LimitedCase) -> None:
-        """Refuse an unknown actuator, actuators of two kinds, numbers out of their range, and what is not known.
+        """Check the actuator and the values of the limit.
 
         Raises:
-            CaseError: in the words of a case file.
+            CaseError: there is no such actuator, revolute and prismatic actuators have the same limit, a value is
+                outside of its range, or the loads do not determine the actuator forces of the robot.
         """
         check_statics(case.model, f"limits.{self.name}")
         every = [joint.name for joint in driven_joints(case.model)]
         if self.actuator and self.actuator not in every:
-            fault = f"is no actuator of {case.model.name!r}; {nearest(self.actuator, every)}"
+            fault = f"no such actuator of {case.model.name!r}; {nearest(self.actuator, every)}"
             raise CaseError(f"limits.{self.name}", fault)
         if len({self.dimension(joint) for _, joint in self.limited(case.model)}) > 1:
-            fault = "means actuators that turn and actuators that slide; give one table for each, by its name"
+            fault = "matches both revolute and prismatic actuators; give one table for each, by name"
             raise CaseError(f"limits.{self.name}", f"{fault}: {', '.join(every)}")
         super().check(case)
 
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
-        """Return the number of each actuator, and under each load case where it depends on loads."""
+        """Return the constraints on the quantity of each actuator, for each load case if it depends on loads."""
         for k, joint in self.limited(pose.model):
             name = f"{self.key} actuator {joint.name}"
             reading = Reading(self.dimension(joint), above=self.ranges(pose.model)["max"].above)
@@ -162,29 +160,36 @@ class ActuatorLimit(LoadedLimit[Table], abc.ABC):
         """Return the constraints of one actuator.
 
         Args:
-            forces: of all actuators at the pose.
+            forces: forces and speeds of all actuators at the pose.
             k: index of the actuator.
-            name: beginning of the names of its constraints.
-            where: their end.
-            reading: how the number reads.
+            name: prefix of the names of the constraints.
+            where: suffix of the names of the constraints.
+            reading: conversion between bounds and limits.
         """
 
     def at_most(self, name: str, number: SX, reading: Reading, largest: float) -> BoundedConstraint:
-        """Return the constraint that a number is at most the limit's."""
+        """Return the constraint for an upper limit.
+
+        Args:
+            name: name of the constraint.
+            number: (1, 1) limited quantity.
+            reading: conversion between bounds and limits.
+            largest: upper limit.
+        """
         return between(name, number, reading, ("", f"{self.name}.max"), upper=largest)
 
 
 @dataclass(frozen=True)
 class ActuatorForce(ActuatorLimit):
-    """Largest and smallest force of actuators, or torque of those that turn, under every load at every pose.
+    """Largest and smallest actuator force, or torque of revolute actuators, under every load at every pose.
 
-    A force is positive in the sense of the actuator's rate: a leg that pushes. Without a smallest force the largest one
-    bounds the size of both senses.
+    A force is positive in the sense of the actuator's rate: a pushing leg. Without ``min``, ``max`` limits the
+    magnitude of the force in both senses.
 
     Attributes:
-        actuator: name of the actuator; empty for all.
-        max: largest force; None where there is none.
-        min: smallest force, signed; None where there is none.
+        actuator: name of the actuator; empty for all actuators.
+        max: largest allowed force; None for no upper limit.
+        min: smallest allowed force, signed; None for no lower limit.
     """
 
     _: KW_ONLY
@@ -192,7 +197,10 @@ class ActuatorForce(ActuatorLimit):
 
     key: ClassVar[str] = "actuator_force"
     table: ClassVar[Any] = _Intervals
-    description: ClassVar[str] = "force or torque of actuators under the loads, of all or by actuator; max bounds sizes"
+    description: ClassVar[str] = (
+        "largest and smallest force or torque of actuators under the loads, for all actuators or by name; without min, "
+        "max limits the magnitude"
+    )
 
     @classmethod
     def dimension(cls, joint: DrivenJoint) -> Dimension:
@@ -200,16 +208,16 @@ class ActuatorForce(ActuatorLimit):
         return dimension_of_force(joint)
 
     def ranges(self, model: Model) -> Ranges:
-        """Return the ranges of both numbers."""
+        """Return the allowed ranges of both values."""
         size = super().ranges(model)["max"]
         signed = size._replace(above=-math.inf)
-        # A largest number alone bounds a size.
+        # Without min, max limits the magnitude.
         return {"min": signed, "max": size if self.min is None else signed}
 
     def of_actuator(
         self, forces: PosedForces, k: int, name: str, where: str, reading: Reading
     ) -> Iterator[BoundedConstraint]:
-        """Return its largest force in both senses, or its largest and its smallest one, under each load case."""
+        """Return the constraints on an actuator's force in both senses, or on largest and smallest, by load case."""
         for case in forces.cases:
             at = f"load {case.case.name}{where}"
             if self.max is not None:
@@ -223,10 +231,12 @@ class ActuatorForce(ActuatorLimit):
 
 @dataclass(frozen=True)
 class ActuatorSpeed(ActuatorLimit):
-    """Largest speed of actuators in the platform's fastest motions, at every pose."""
+    """Largest speed of actuators at the largest speeds of the platform, at every pose."""
 
     key: ClassVar[str] = "actuator_speed"
-    description: ClassVar[str] = "speed of actuators in the fastest motions, of all or by actuator"
+    description: ClassVar[str] = (
+        "largest speed of actuators at the largest speeds of the platform ([motion]), for all actuators or by name"
+    )
     needs_loads: ClassVar[bool] = False
     needs_motion: ClassVar[bool] = True
 
@@ -238,17 +248,19 @@ class ActuatorSpeed(ActuatorLimit):
     def of_actuator(
         self, forces: PosedForces, k: int, name: str, where: str, reading: Reading
     ) -> Iterator[BoundedConstraint]:
-        """Return its largest speed."""
+        """Return the constraint on an actuator's largest speed."""
         if self.max is not None:
             yield self.at_most(f"{name}{where}", forces.speeds[k], reading, self.max)
 
 
 @dataclass(frozen=True)
 class ActuatorPower(ActuatorLimit):
-    """Largest power of actuators: their largest force times their largest speed, at every pose."""
+    """Largest power of actuators: largest force times largest speed of each actuator, at every pose."""
 
     key: ClassVar[str] = "actuator_power"
-    description: ClassVar[str] = "largest force times largest speed of actuators, of all or by actuator"
+    description: ClassVar[str] = (
+        "largest power of actuators, as largest force times largest speed, for all actuators or by name"
+    )
     needs_motion: ClassVar[bool] = True
 
     @classmethod
@@ -259,7 +271,7 @@ class ActuatorPower(ActuatorLimit):
     def of_actuator(
         self, forces: PosedForces, k: int, name: str, where: str, reading: Reading
     ) -> Iterator[BoundedConstraint]:
-        """Return its largest power in both senses under each load case."""
+        """Return the constraints on an actuator's power in both senses, for each load case."""
         for case in forces.cases:
             at = f"load {case.case.name}{where}"
             if self.max is not None:
@@ -269,32 +281,35 @@ class ActuatorPower(ActuatorLimit):
 
 @dataclass(frozen=True)
 class Deflection(LoadedLimit[AtMost]):
-    """Largest displacement of the platform's origin under every load, at every pose, as the actuators give way.
+    """Largest displacement of the platform origin under every load, at every pose, by the actuators' compliance.
 
     Attributes:
-        max: largest displacement, length.
+        max: largest allowed displacement, length.
     """
 
     max: float
 
     key: ClassVar[str] = "deflection"
     table: ClassVar[Any] = AtMost
-    description: ClassVar[str] = "of the platform's origin under the loads, as actuators give way"
+    description: ClassVar[str] = (
+        "largest displacement of the platform origin under the loads, by the compliance of the actuators "
+        "(robot.actuator_stiffness)"
+    )
     numbers: ClassVar[Ranges] = {"max": NumberRange(Dimension.LENGTH)}
     order: ClassVar[int] = 1
 
     def check(self, case: LimitedCase) -> None:
-        """Refuse a number out of its range, and a case without loads or without stiffness.
+        """Check the limit against the case.
 
         Raises:
-            CaseError: in the words of a case file.
+            CaseError: the value is outside of its range, or loads or actuator stiffness are missing.
         """
         super().check(case)
         if case.loading.stiffness is None:
-            raise CaseError(f"limits.{self.key}", "needs robot.actuator_stiffness")
+            raise CaseError(f"limits.{self.key}", "needs robot.actuator_stiffness, force per displacement")
 
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
-        """Return the displacement under each load case."""
+        """Return the constraint on the displacement for each load case."""
         for case in pose.forces.cases:
             name = f"{self.key} load {case.case.name}{pose.where}"
             number = pose.forces.deflection(case)

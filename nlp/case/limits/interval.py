@@ -1,4 +1,4 @@
-"""Limits with one side or two: their tables in a case file, their checks, and limits on any measure of a robot."""
+"""Limits with a smallest or a largest value: tables, base classes, and limits on quantities that a robot defines."""
 
 from __future__ import annotations
 
@@ -18,30 +18,30 @@ from .limit import Limit, NumberRange, PosedRobot, Ranges, TableField, Written
 
 
 class IntervalTable(Table):
-    """A limit with one side or two."""
+    """Limit with a smallest value, a largest value, or both."""
 
-    min: FiniteFloat | None = Field(default=None, description="smallest value")
-    max: FiniteFloat | None = Field(default=None, description="largest value")
+    min: FiniteFloat | None = Field(default=None, description="smallest allowed value")
+    max: FiniteFloat | None = Field(default=None, description="largest allowed value")
 
 
 class AtLeast(Table):
-    """A limit from below."""
+    """Limit with a smallest value."""
 
-    min: FiniteFloat = Field(description="smallest value")
+    min: FiniteFloat = Field(description="smallest allowed value")
 
 
 class AtMost(Table):
-    """A limit from above."""
+    """Limit with a largest value."""
 
-    max: FiniteFloat = Field(description="largest value")
+    max: FiniteFloat = Field(description="largest allowed value")
 
 
 @dataclass(frozen=True)
 class LowerLimit(Limit[AtLeast], abc.ABC):
-    """A positive limit from below on a length.
+    """Limit with a smallest length.
 
     Attributes:
-        min: smallest value, length.
+        min: smallest allowed length, above 0.
     """
 
     min: float
@@ -51,17 +51,17 @@ class LowerLimit(Limit[AtLeast], abc.ABC):
 
 
 def two_sided(allowed: NumberRange) -> Ranges:
-    """Return the ranges of the numbers of an interval, both the same."""
+    """Return the allowed ranges of ``min`` and ``max``, both equal."""
     return {"min": allowed, "max": allowed}
 
 
 @dataclass(frozen=True)
 class IntervalLimit(Limit[IntervalTable], abc.ABC):
-    """A limit with one side or two.
+    """Limit with a smallest value, a largest value, or both.
 
     Attributes:
-        min: smallest value; None where there is none.
-        max: largest value; None where there is none.
+        min: smallest allowed value; None for no lower limit.
+        max: largest allowed value; None for no upper limit.
     """
 
     _: KW_ONLY
@@ -73,16 +73,16 @@ class IntervalLimit(Limit[IntervalTable], abc.ABC):
 
 
 def quantity_named(name: str, model: Model) -> Quantity | None:
-    """Return the measure of a robot that has a name, or None where there is none."""
+    """Return the quantity of a robot with a name; None if the robot has no such quantity."""
     return next((quantity for quantity in model.quantities if quantity.name == name), None)
 
 
 @dataclass(frozen=True)
 class QuantityLimit(IntervalLimit):
-    """Smallest and largest value of one of the robot's own measures, at every owner and every pose.
+    """Smallest and largest value of a quantity that the robot defines, for every limb and every pose.
 
     Attributes:
-        measure: name of the measure.
+        measure: name of the quantity.
     """
 
     measure: str
@@ -92,12 +92,12 @@ class QuantityLimit(IntervalLimit):
 
     @classmethod
     def fields(cls) -> dict[str, TableField]:
-        """Return nothing: every key of ``[limits]`` that belongs to no type is the name of a measure."""
+        """Return no key: every key of ``[limits]`` that is not of another type is the name of a quantity."""
         return {}
 
     @classmethod
     def read(cls, limits: Table, model: Model, units: Units) -> Iterator[Self]:
-        """Yield a limit for each key of ``[limits]`` that belongs to no type, in the order of the robot's measures."""
+        """Yield a limit for each key of ``[limits]`` that is not of another type, in the order of the quantities."""
         stated = limits.__pydantic_extra__ or {}
         names = [quantity.name for quantity in model.quantities if quantity.name in stated]
         for key in dict.fromkeys([*names, *stated]):
@@ -105,25 +105,25 @@ class QuantityLimit(IntervalLimit):
 
     @classmethod
     def from_table(cls, written: Written[IntervalTable]) -> Self:
-        """Return the limit that a case file writes."""
+        """Return the limit of a case file."""
         return cls(written.key, **written.numbers(cls(written.key).ranges(written.model)))
 
     @property
     def name(self) -> str:
-        """Name of the measure."""
+        """Name of the quantity, which is the key of this limit."""
         return self.measure
 
     def ranges(self, model: Model) -> Ranges:
-        """Return the range of both numbers; that of pure numbers where the robot lacks the measure."""
+        """Return the allowed range of both values; of plain numbers if the robot has no such quantity."""
         quantity = quantity_named(self.measure, model)
         return two_sided(NumberRange(Dimension.NUMBER if quantity is None else quantity.dimension, above=-math.inf))
 
     def exists_for(self, model: Model) -> bool:
-        """Return whether the robot has the measure."""
+        """Return whether the robot has the quantity."""
         return quantity_named(self.measure, model) is not None
 
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
-        """Return the measure of each of its owners."""
+        """Return the quantity of each limb."""
         for quantity, values in zip(pose.model.quantities, pose.robot.quantities, strict=True):
             if quantity.name == self.measure:
                 for i, owner in enumerate(quantity.owners):

@@ -1,15 +1,13 @@
-"""Limits on the motion of any joint of a robot given joint by joint: ranges from home, and cones.
+"""Limits on joint coordinates and on cones of joints, for robots given joint by joint.
 
-An angle is measured from home, within half a turn to either side. Where it is an unknown ``q`` of the program, the
-limit is on ``q``. Otherwise its sine s and cosine c, times one positive number r, follow from the displacements of the
-two bodies of the joint. The constraint is then on
+Angles are measured from home, up to half a turn to either side. If the angle is a variable ``q`` of the program, the
+limit is a bound on ``q``. Otherwise the poses of the two links give its sine s and cosine c, both times a positive
+factor, and the constraint is on a function that increases with the angle from -1 to 1, smooth below half a turn:
 
     sin(q/2) = s / sqrt(2 r (r + c)),    r = sqrt(s^2 + c^2)
 
-which grows with the angle from -1 to 1. It is smooth except at half a turn, where the angle itself jumps.
-
-A cone of a universal or spherical joint is limited by the cosine of the angle between a link that ends at the joint and
-an axis that is fixed in the body on the other side of the joint.
+A cone of a universal or spherical joint is limited by the cosine of the angle between a link at the joint and an axis
+in the link on the other side.
 """
 
 from __future__ import annotations
@@ -37,27 +35,37 @@ from .interval import IntervalTable, two_sided
 from .joints import COSINE_OF_ANGLE, HALF_ANGLE, Triple, check_axis, triple, unit_axes
 from .limit import Limit, LimitedCase, NumberRange, PosedRobot, Ranges, TableField, Written
 
-#: Keys of a table that limit one of several coordinates of a joint.
+#: Keys for one of several coordinates of a joint.
 PARTS = ("first", "second", "angle", "stroke")
-#: So many joints are listed in a message.
+#: Largest number of joints listed in a message.
 _LISTED = 12
 
 
 class JointTable(IntervalTable):
-    """The motion of a joint from home."""
+    """Range of a joint coordinate from home, or cone of a joint."""
 
-    first: IntervalTable | None = Field(default=None, description="angle of a universal joint's first axis")
-    second: IntervalTable | None = Field(default=None, description="angle of its second axis")
-    angle: IntervalTable | None = Field(default=None, description="angle of a cylindrical joint")
-    stroke: IntervalTable | None = Field(default=None, description="displacement of a cylindrical joint")
+    first: IntervalTable | None = Field(
+        default=None, description="range of the angle about the first axis of a universal joint, from home"
+    )
+    second: IntervalTable | None = Field(
+        default=None, description="range of the angle about the second axis of a universal joint, from home"
+    )
+    angle: IntervalTable | None = Field(
+        default=None, description="range of the angle of a cylindrical joint, from home"
+    )
+    stroke: IntervalTable | None = Field(
+        default=None, description="range of the displacement of a cylindrical joint, from home"
+    )
     cone: FiniteFloat | None = Field(
         default=None, description="half angle of the cone of a universal or spherical joint"
     )
-    axis: Vector | None = Field(default=None, description="axis of the cone at home; the link's direction if left out")
+    axis: Vector | None = Field(
+        default=None, description="axis of the cone, in the home configuration; the direction of the link if left out"
+    )
 
 
 class StatedMotion(NamedTuple):
-    """A range or a cone as a case file states it: the joint, the part of its table, and the table."""
+    """Range or cone in a case file: name of the joint, key within its table (empty for min and max), and the table."""
 
     joint: str
     part: str
@@ -65,17 +73,21 @@ class StatedMotion(NamedTuple):
 
 
 class LimitOnJoint(Limit[StatedMotion], abc.ABC):
-    """A limit on all joints that one text names."""
+    """Limit on all joints that a name refers to.
+
+    Attributes:
+        joint: name of a joint, see :class:`JointMotion`.
+    """
 
     joint: str
     needs_joints: ClassVar[bool] = True
 
     @classmethod
     def read(cls, limits: Table, model: Model, units: Units) -> Iterator[Self]:
-        """Yield the limits of this type that a case file states.
+        """Yield the limits of this type in a case file.
 
         Raises:
-            CaseError: a table of a joint contradicts itself.
+            CaseError: the table of a joint contradicts itself.
         """
         for joint, table in (getattr(limits, "joint", None) or {}).items():
             for part in cls.stated(joint, table):
@@ -84,26 +96,27 @@ class LimitOnJoint(Limit[StatedMotion], abc.ABC):
     @classmethod
     @abc.abstractmethod
     def stated(cls, joint: str, table: JointTable) -> list[str]:
-        """Return the parts of a joint's table that are limits of this type.
+        """Return the keys within a joint's table that are limits of this type; empty for its min and max.
 
         Raises:
             CaseError: the table contradicts itself.
         """
 
     def joints(self, model: Model) -> list[LimbJoint]:
-        """Return the joints that are meant.
+        """Return the joints to which the name refers.
 
         Raises:
             CaseError: the robot has no such joint.
         """
         found = [each for each in model.joints if each.is_called(self.joint)]
         if not found:
-            raise CaseError(f"limits.joint.{self.joint}", f"is no joint of {model.name!r}; it has {_known(model)}")
+            fault = f"no such joint of {model.name!r}; allowed: {_known(model)}"
+            raise CaseError(f"limits.joint.{self.joint}", fault)
         return found
 
 
 def _known(model: Model) -> str:
-    """Return the names and labels of a robot's joints for a sentence."""
+    """Return the names and labels of a robot's joints for a message."""
     names = list(dict.fromkeys(each.name for each in model.joints if each.name))
     labels = [each.label for each in model.joints]
     several = [f"and {len(labels) - _LISTED} more"] if len(labels) > _LISTED else []
@@ -111,17 +124,17 @@ def _known(model: Model) -> str:
 
 
 def _angle_from_half_sine(value: float) -> float:
-    """Return the angle whose half has a sine."""
+    """Return the angle from the sine of its half."""
     return 2 * math.asin(min(max(value, -1.0), 1.0))
 
 
 def _slope_of_half_sine(value: float) -> float:
-    """Return the derivative of ``sin(angle/2)`` at a value of it."""
+    """Return the derivative of ``sin(angle/2)`` with respect to the angle, at a value of ``sin(angle/2)``."""
     return math.sqrt(max(1 - value * value, 0.0)) / 2
 
 
 def _half_sine(angle: SX) -> SX:
-    """Return ``sin(angle/2)``, which does not fall beyond half a turn."""
+    """Return ``sin(angle/2)``, constant beyond half a turn."""
     return ca.sin(ca.fmin(ca.fmax(angle, -ca.pi), ca.pi) / 2)
 
 
@@ -138,15 +151,15 @@ _ANGLE = Reading(Dimension.ANGLE, above=-math.pi, most=math.pi)
 
 @dataclass(frozen=True)
 class JointMotion(LimitOnJoint):
-    """Smallest and largest coordinate of a joint from home, at every pose: its angle, or the displacement of a slide.
+    """Smallest and largest joint coordinate from home, at every pose: angle or displacement.
 
     Attributes:
-        joint: name of the joint in the robot file, which means that joint of every limb; limb and name, ``"2:slide"``;
-            or limb and place from the base on, ``"2:3"``.
-        part: the coordinate of a joint that has two: ``"first"`` or ``"second"`` of a universal joint, ``"angle"`` or
-            ``"stroke"`` of a cylindrical joint; empty for other joints.
-        min: smallest value, radians or length; None where there is none.
-        max: largest value; None where there is none.
+        joint: name of the joint in the robot file, for this joint of every limb; or limb and name, such as
+            ``"2:slide"``; or limb and number of the joint from the base on, such as ``"2:3"``.
+        part: coordinate of a joint with two coordinates: ``"first"`` or ``"second"`` for a universal joint, ``"angle"``
+            or ``"stroke"`` for a cylindrical joint; empty for other joints.
+        min: smallest allowed coordinate, radians or length; None for no lower limit.
+        max: largest allowed coordinate, radians or length; None for no upper limit.
     """
 
     joint: str
@@ -157,11 +170,13 @@ class JointMotion(LimitOnJoint):
 
     key: ClassVar[str] = "joint"
     table: ClassVar[Any] = dict[str, JointTable]
-    description: ClassVar[str] = "motion of joints from home, by name, or by limb and place as in 2:3"
+    description: ClassVar[str] = (
+        "ranges and cones of joints: by joint name, for this joint of every limb, or by limb and number, such as 2:3"
+    )
 
     @classmethod
     def stated(cls, joint: str, table: JointTable) -> list[str]:
-        """Return the parts of a joint's table that state ranges.
+        """Return the keys within a joint's table with a range; empty for its min and max.
 
         Raises:
             CaseError: the table has neither a range nor a cone.
@@ -169,14 +184,14 @@ class JointMotion(LimitOnJoint):
         parts = [part for part in PARTS if getattr(table, part) is not None]
         whole = [""] if table.min is not None or table.max is not None else []
         if not parts and not whole and table.cone is None:
-            raise CaseError(f"limits.joint.{joint}", f"must have min, max, {', '.join(PARTS)} or cone")
+            raise CaseError(f"limits.joint.{joint}", f"is empty: it must have min, max, {', '.join(PARTS)} or cone")
         return [*whole, *parts]
 
     @classmethod
     def from_table(cls, written: Written[StatedMotion]) -> Self:
-        """Return the limit that a case file writes."""
+        """Return the limit of a case file."""
         joint, part, table = written.value
-        # An unknown joint has no dimension, and is refused when the case is checked.
+        # The check of the case refuses an unknown joint later.
         known = [each for each in written.model.joints if each.is_called(joint)]
         dimensions = (one.dimension for each in known for one in each.coordinates if one.part == part)
         allowed = NumberRange(next(dimensions, Dimension.LENGTH))
@@ -189,16 +204,18 @@ class JointMotion(LimitOnJoint):
         return {self.key: {self.joint: {self.part: interval} if self.part else interval}}
 
     def ranges(self, model: Model) -> Ranges:
-        """Return the range of both numbers.
+        """Return the allowed range of both values.
 
         Raises:
-            CaseError: there is no such joint, a joint lacks the coordinate, or it is an angle of one joint and a length
-                of another.
+            CaseError: there is no such joint, a joint does not have the coordinate, or the coordinate is an angle for
+                one joint and a length for another.
         """
         key = f"limits.{self.name}"
         found = {_coordinate(each, self.part, key).dimension for each in self.joints(model)}
         if len(found) > 1:
-            raise CaseError(key, "means joints that turn and joints that slide; name one of them by limb and place")
+            labels = [each.label for each in self.joints(model)]
+            fault = "matches both revolute and prismatic joints; name one, such as"
+            raise CaseError(key, f'{fault} "{labels[0]}"')
         dimension = found.pop()
         largest = math.pi if dimension is Dimension.ANGLE else math.inf
         return two_sided(NumberRange(dimension, above=-math.inf, most=largest, least=-largest))
@@ -209,7 +226,7 @@ class JointMotion(LimitOnJoint):
         return f"joint.{self.joint}{f'.{self.part}' if self.part else ''}"
 
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
-        """Return the coordinate of each joint, or the sine of half of its angle."""
+        """Return the constraint on the coordinate of each joint, or on the sine of half its angle."""
         for joint in pose.robot.joints:
             if joint.is_called(self.joint):
                 coordinate = _coordinate(joint, self.part, f"limits.{self.name}")
@@ -235,19 +252,19 @@ def _coordinate(joint: LimbJoint, part: str, key: str) -> JointCoordinate:
 
     Args:
         joint: the joint.
-        part: name of the coordinate; empty for the only one.
+        part: name of the coordinate; empty for a joint with one coordinate.
         key: dotted key of the limit, for messages.
 
     Raises:
-        CaseError: the joint has no such coordinate, or it is not known.
+        CaseError: the joint has no such coordinate, or the coordinate cannot be computed.
     """
     names = _names(joint)
     if part not in names:
-        whose = f"joint {joint.label} is of type {joint.type}"
+        kind = f"joint {joint.label} is of type {joint.type}"
         if not names:
-            raise CaseError(key, f"{whose}, which may have only cone")
+            raise CaseError(key, f"{kind}; allowed is only cone")
         allowed = "min and max" if names == ("",) else f"{names[0]} and {names[1]}, each with min and max"
-        raise CaseError(key, f"{whose}, which may have {allowed}{', and cone' if joint.type == 'U' else ''}")
+        raise CaseError(key, f"{kind}; allowed are {allowed}{', and cone' if joint.type == 'U' else ''}")
     for each in joint.coordinates:
         if each.part == part:
             return each
@@ -255,19 +272,19 @@ def _coordinate(joint: LimbJoint, part: str, key: str) -> JointCoordinate:
 
 
 def _names(joint: LimbJoint) -> Sequence[str]:
-    """Return the names of a joint's coordinates, which follow from its type."""
+    """Return the names of a joint's coordinates, from its type."""
     return {"U": ("first", "second"), "C": ("angle", "stroke"), "S": ()}.get(joint.type, ("",))
 
 
 @dataclass(frozen=True)
 class JointCone(LimitOnJoint):
-    """Largest angle between a link and an axis on the other side of its universal or spherical joint, at every pose.
+    """Cone of a universal or spherical joint: largest angle between a link and an axis in the link on the other side.
 
     Attributes:
-        joint: as for :class:`JointMotion`.
+        joint: name of the joint, see :class:`JointMotion`.
         max: half angle of the cone, radians, above 0 and at most half a turn.
-        axis: direction of the axis at home, for the limb that the robot file writes: it turns with the copies of the
-            limb. None for the direction of the link at home.
+        axis: (3,) direction of the cone's axis in the home configuration, for the limb in the robot file; it is rotated
+            with the copies of the limb. None for the direction of the link at home.
     """
 
     joint: str
@@ -275,27 +292,27 @@ class JointCone(LimitOnJoint):
     axis: Triple | None = None
 
     key: ClassVar[str] = "joint.cone"
-    description: ClassVar[str] = "cones of universal and spherical joints"
+    description: ClassVar[str] = "half angle of the cone of universal and spherical joints"
 
     @classmethod
     def fields(cls) -> dict[str, TableField]:
-        """Return nothing: the key is that of :class:`JointMotion`."""
+        """Return no key: cones are in the tables of :class:`JointMotion`."""
         return {}
 
     @classmethod
     def stated(cls, joint: str, table: JointTable) -> list[str]:
-        """Return the part of a joint's table that states a cone.
+        """Return the key of the cone if a joint's table has one.
 
         Raises:
             CaseError: the table has an axis without a cone.
         """
         if table.axis is not None and table.cone is None:
-            raise CaseError(f"limits.joint.{joint}.axis", "means nothing without cone")
+            raise CaseError(f"limits.joint.{joint}.axis", "has no effect without cone; give its half angle too")
         return [] if table.cone is None else ["cone"]
 
     @classmethod
     def from_table(cls, written: Written[StatedMotion]) -> Self:
-        """Return the limit that a case file writes."""
+        """Return the limit of a case file."""
         joint, _, table = written.value
         largest = written.internal(table.cone or 0.0, Dimension.ANGLE)
         if table.axis is None:
@@ -303,7 +320,7 @@ class JointCone(LimitOnJoint):
         return cls(joint, largest, triple(table.axis))
 
     def angles(self, model: Model) -> Mapping[str, float | None]:  # noqa: ARG002 - angles need no robot
-        """Return the cone's half angle."""
+        """Return the half angle of the cone."""
         return {self.name: self.max}
 
     def to_keys(self, model: Model, units: Units) -> Mapping[str, TomlValue]:  # noqa: ARG002 - angles need no robot
@@ -317,21 +334,21 @@ class JointCone(LimitOnJoint):
         return f"joint.{self.joint}.cone"
 
     def check(self, case: LimitedCase) -> None:
-        """Refuse an unknown joint, one without a cone, an angle out of its range, and an axis without direction.
+        """Check joint, half angle and axis.
 
         Raises:
-            CaseError: in the words of a case file.
+            CaseError: a joint is unknown or cannot have a cone, the angle is outside of its range, or the axis is zero.
         """
         for joint in self.joints(case.model):
             if joint.cone is None:
-                reason = joint.unknown if joint.type in ("U", "S") else "a cone is for joints U and S"
-                raise CaseError(f"limits.{self.name}", f"joint {joint.label} ({joint.type}) has none: {reason}")
+                reason = joint.unknown if joint.type in ("U", "S") else "cone is allowed only for joints U and S"
+                raise CaseError(f"limits.{self.name}", f"joint {joint.label} ({joint.type}) has no cone: {reason}")
         case.check_number(self.name, self.max, HALF_ANGLE)
         if self.axis is not None:
             check_axis(f"limits.joint.{self.joint}.axis", self.axis)
 
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
-        """Return minus the cosine of the angle of each joint."""
+        """Return the constraint on minus the cosine of the angle of each joint."""
         for joint in pose.robot.joints:
             if joint.is_called(self.joint) and joint.cone is not None:
                 axis, link = self._axis(joint.cone), joint.cone.link
@@ -345,7 +362,7 @@ class JointCone(LimitOnJoint):
                 )
 
     def _axis(self, cone: Cone) -> SX:
-        """Return the current unit axis (3, 1) of a joint's cone."""
+        """Return the unit axis (3, 1) of a joint's cone at the pose."""
         if self.axis is None:
             return cone.other @ cone.home
         (unit,) = unit_axes((self.axis,), 1)

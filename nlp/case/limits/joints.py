@@ -1,4 +1,4 @@
-"""Limits on the angles of passive joints: a cone about each joint's mounting axis.
+"""Limits on the angles of passive joints of legs: cones about mounting axes.
 
 With the unit mounting axis ``n`` and the leg ``d`` from its base joint to its platform joint, both in the world frame,
 the angle between them is limited by its cosine, ``-n . d / |d| <= -cos(max)``.
@@ -35,17 +35,17 @@ from .limit import Limit, LimitedCase, Measures, NumberRange, PosedRobot, TableF
 
 #: Three numbers.
 Triple: TypeAlias = tuple[float, float, float]
-#: Range of the half angle of a cone.
+#: Allowed range of the half angle of a cone.
 HALF_ANGLE = NumberRange(Dimension.ANGLE, most=math.pi)
 
 
 def _angle(value: float) -> float:
-    """Return the angle whose cosine is minus a value."""
+    """Return the angle from minus its cosine."""
     return math.acos(min(max(-value, -1.0), 1.0))
 
 
 def _slope(value: float) -> float:
-    """Return the derivative of ``-cos(angle)`` at a value of it."""
+    """Return the derivative of ``-cos(angle)`` with respect to the angle, at a value of ``-cos(angle)``."""
     return math.sqrt(max(1 - value * value, 0.0))
 
 
@@ -54,22 +54,23 @@ def _minus_cosine(angle: SX) -> SX:
 
 
 def _minus_cosine_of_leg(axis_and_span: SX) -> SX:
-    """Return minus the cosine, (1, 1), of the angle between a unit axis and a leg's span, (6, 1) together."""
+    """Return minus the cosine (1, 1) of the angle between a unit axis and the span of a leg, stacked (6, 1)."""
     axis, span = axis_and_span[:3], axis_and_span[3:]
     return -(ca.dot(axis, span) / ca.norm_2(span))
 
 
 def _turned(direction: SX, rotation: SX, plate: str) -> SX:
-    """Return a direction (3, 1), rotated (3, 3) for the platform alone: the base's frame is the world's."""
+    """Return a direction (3, 1) of a plate's frame in the world frame: rotated (3, 3) only for the platform."""
     return rotation @ direction if plate == "platform" else direction
 
 
 def _minus_cosine_from_home(inputs: SX, plate: str) -> SX:
-    """Return minus the cosine, (1, 1), of the angle between a leg and its joint's axis, which is the leg's at home.
+    """Return minus the cosine (1, 1) of the angle between a leg and its direction at the mounting pose.
 
     Args:
-        inputs: rotation column after column and position at home, platform joint, base joint, rotation, span, (30, 1).
-        plate: of the joint.
+        inputs: (30, 1) rotation by columns and position at the mounting pose, platform joint, base joint, rotation by
+            columns and span at the pose.
+        plate: plate of the joint, ``base`` or ``platform``.
     """
     R, p, platform, base = ca.reshape(inputs[:9], 3, 3), inputs[9:12], inputs[12:15], inputs[15:18]
     span = p + R @ platform - base
@@ -77,14 +78,14 @@ def _minus_cosine_from_home(inputs: SX, plate: str) -> SX:
     return _minus_cosine_of_leg(ca.vertcat(axis, inputs[27:]))
 
 
-#: ``-cos(angle)`` read as the angle.
+#: Reading of ``-cos(angle)`` as the angle.
 COSINE_OF_ANGLE = Reading(
     Dimension.ANGLE, from_value=_angle, slope=_slope, to_value=_minus_cosine, above=0.0, most=math.pi
 )
 
 
 def _word(value: object, handler: ValidatorFunctionWrapHandler) -> object:
-    """Return one of the words for mounting axes; raise an error that names the other allowed values."""
+    """Return a word for mounting axes; for other texts, raise an error with all allowed forms."""
     try:
         return handler(value)
     except ValidationError:
@@ -106,19 +107,25 @@ Axes = Annotated[
 
 
 class ConeTable(Table):
-    """The cone of a passive joint."""
+    """Cone of a passive joint."""
 
-    max: FiniteFloat = Field(description="half angle")
+    max: FiniteFloat = Field(description="largest angle between leg and mounting axis: the half angle of the cone")
     about: Axes = Field(
         default="normal",
-        description="mounting axes: the plate's normal, the leg's direction at limits.home, a direction in the "
-        "plate's frame, or a list with one for each leg",
+        description="mounting axes: normal (z axis of base or platform), home (direction of the leg at limits.home), "
+        "a direction in the frame of base or platform, or a list with one direction for each leg",
     )
 
 
 @dataclass(frozen=True)
 class MountingPose:
-    """The pose at which passive joints are mounted straight: position, and ``exp(angle [axis]x)``."""
+    """Mounting pose, at which each leg is on the axis of its joint cones.
+
+    Attributes:
+        position: (3,) origin of the platform frame in the world frame, length.
+        axis: (3,) axis of rotation, of any length but zero.
+        angle: angle of rotation, radians.
+    """
 
     position: Triple
     axis: Triple = (0.0, 0.0, 1.0)
@@ -126,11 +133,11 @@ class MountingPose:
 
 
 class HomeTable(Table):
-    """The pose at which joints are mounted straight."""
+    """Mounting pose, at which each leg is on the axis of its joint cones."""
 
-    position: Vector = Field(description="origin of the platform frame")
-    axis: Vector = Field(default=list(MountingPose.axis), description="axis of rotation")
-    angle: FiniteFloat = Field(default=MountingPose.angle, description="angle of rotation")
+    position: Vector = Field(description="origin of the platform frame in the world frame")
+    axis: Vector = Field(default=list(MountingPose.axis), description="axis of rotation in the world frame")
+    angle: FiniteFloat = Field(default=MountingPose.angle, description="angle of rotation about the axis")
 
 
 NumberOrCone = Annotated[
@@ -141,13 +148,14 @@ NumberOrCone = Annotated[
 
 @dataclass(frozen=True)
 class JointAngle(Limit[float | ConeTable], abc.ABC):
-    """The cone of the passive joints of one plate: the largest angle of a leg to its joint's mounting axis.
+    """Cones of the passive joints of base or platform: largest angle between a leg and its mounting axis.
 
     Attributes:
-        max: half angle, radians, above 0 and at most half a turn.
-        about: the mounting axes, pointing the way from base to platform: the plate's normal when None, the leg's own
-            direction at a :class:`MountingPose`, one direction in the plate's frame for all joints, or one for each.
-        plate: the plate of the joints.
+        max: half angle of the cone, radians, above 0 and at most half a turn.
+        about: mounting axes, pointing from base to platform: None for the z axis of base or platform; a
+            :class:`MountingPose` for the direction of each leg at this pose; or one direction in the frame of base or
+            platform for all joints, or one for each.
+        plate: plate of the joints, ``base`` or ``platform``.
     """
 
     max: float
@@ -159,10 +167,10 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
 
     @classmethod
     def from_table(cls, written: Written[float | ConeTable]) -> Self:
-        """Return the limit that a case file writes.
+        """Return the limit of a case file.
 
         Raises:
-            CaseError: its cones are about a home pose that is not stated.
+            CaseError: the cones are about ``limits.home``, which is missing.
         """
         if not isinstance(written.value, ConeTable):
             return cls(written.internal(written.value, Dimension.ANGLE))
@@ -173,7 +181,7 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
             case "home":
                 home = _home(written.limits)
                 if home is None:
-                    raise CaseError("limits.home", f'is missing: limits.{cls.key} has about = "home"')
+                    raise CaseError("limits.home", f'is missing: limits.{cls.key} with about = "home" needs it')
                 angle = written.internal(home.angle, Dimension.ANGLE)
                 return cls(largest, MountingPose(triple(home.position), triple(home.axis), angle))
             case axes:
@@ -182,12 +190,12 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
                 return cls(largest, tuple(triple(row) for row in rows or [flat]))
 
     def angles(self, model: Model) -> Mapping[str, float | None]:  # noqa: ARG002 - angles need no robot
-        """Return the cones' half angle, and the angle of the pose that they are about."""
+        """Return the half angle of the cones, and the angle of the mounting pose."""
         found: dict[str, float | None] = {f"{self.key}.max": self.max}
         return {**found, "home.angle": self.about.angle} if isinstance(self.about, MountingPose) else found
 
     def to_keys(self, model: Model, units: Units) -> Mapping[str, TomlValue]:  # noqa: ARG002 - angles need no robot
-        """Return the keys of ``[limits]`` that state this limit, with the home pose that its cones are about."""
+        """Return the keys of ``[limits]`` that state this limit, with the mounting pose."""
         largest = units.written(self.max, Dimension.ANGLE)
         if self.about is None:
             return {self.key: largest}
@@ -199,10 +207,10 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
         return {self.key: {"max": largest, "about": self.about[0] if len(self.about) == 1 else self.about}}
 
     def check(self, case: LimitedCase) -> None:
-        """Refuse an angle out of its range, and axes that give no direction or are not as many as the legs.
+        """Check half angle and mounting axes.
 
         Raises:
-            CaseError: in the words of a case file.
+            CaseError: the angle is outside of its range, an axis is zero, or there is not one axis for each leg.
         """
         case.check_number(f"{self.key}.max", self.max, HALF_ANGLE)
         if self.about is None:
@@ -215,22 +223,22 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
             check_axis(key, axis)
         home = self.about
         if isinstance(home, MountingPose) and not all(map(math.isfinite, (*home.position, home.angle))):
-            raise CaseError(key, "must be a pose of finite numbers")
+            raise CaseError(key, "must be a mounting pose of finite numbers")
 
     @classmethod
     def is_for(cls, model: Model) -> bool:
-        """Return whether a robot has legs, and is not given joint by joint: then its joints have cones of their own."""
+        """Return whether a robot has legs and is not given joint by joint; the latter use ``limits.joint``."""
         return super().is_for(model) and not model.joints
 
     @property
     def reference(self) -> str:
-        """Word for the mounting axes."""
+        """Name of the mounting axes."""
         if self.about is None:
             return "normal"
         return "home" if isinstance(self.about, MountingPose) else "axis"
 
     def measures(self, robot: RobotInstance) -> Measures | None:
-        """Return each joint's angle; None about the plate's normal, where the model's own quantity says the same."""
+        """Return the angle of each joint; None for the default axes, for which the model has this quantity."""
         if self.about is None or not robot.legs:
             return None
         angles = [
@@ -240,7 +248,7 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
         return Measures(tuple(leg.name for leg in robot.legs), ca.vertcat(*angles), Dimension.ANGLE)
 
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
-        """Return the cosine of each joint's angle."""
+        """Return the constraint on the cosine of each joint's angle."""
         robot = pose.robot
         for leg, axis in zip(robot.legs, self._mounting_axes(robot), strict=True):
             if isinstance(self.about, MountingPose):
@@ -254,7 +262,7 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
             yield between(name, Call(form, inputs), COSINE_OF_ANGLE, self.key, upper=self.max)
 
     def _mounting_axes(self, robot: RobotInstance) -> list[SX]:
-        """Return the unit mounting axis of each joint, (3, 1), in the frame of its plate."""
+        """Return the unit mounting axis (3, 1) of each joint in the frame of its plate."""
         if self.about is None:
             return [SX([0, 0, 1])] * len(robot.legs)
         if isinstance(self.about, MountingPose):
@@ -272,60 +280,60 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
 
 @dataclass(frozen=True)
 class BaseJointAngle(JointAngle):
-    """The cones of the base joints."""
+    """Largest angle between each leg and the mounting axis of its base joint."""
 
     key: ClassVar[str] = "base_joint_angle"
-    description: ClassVar[str] = "half angle of the base joints' cones"
+    description: ClassVar[str] = "largest angle between each leg and the mounting axis of its base joint"
     plate: ClassVar[Literal["base", "platform"]] = "base"
 
 
 @dataclass(frozen=True)
 class PlatformJointAngle(JointAngle):
-    """The cones of the platform joints."""
+    """Largest angle between each leg and the mounting axis of its platform joint."""
 
     key: ClassVar[str] = "platform_joint_angle"
-    description: ClassVar[str] = "of the platform joints' cones"
+    description: ClassVar[str] = "largest angle between each leg and the mounting axis of its platform joint"
     plate: ClassVar[Literal["base", "platform"]] = "platform"
 
     @classmethod
     def fields(cls) -> dict[str, TableField]:
-        """Return the keys of the joint angle, and of the home pose that both plates' cones may be about."""
-        about = 'the pose that about = "home" speaks of'
+        """Return the key of this limit, and the key of the mounting pose for both joint angles."""
+        about = 'mounting pose for joint angles with about = "home"'
         return {**super().fields(), "home": TableField(HomeTable | None, Field(default=None, description=about))}
 
     @classmethod
     def read(cls, limits: Table, model: Model, units: Units) -> Iterator[Self]:
-        """Yield the limit that a case file states.
+        """Yield the limit of a case file.
 
         Raises:
-            CaseError: a home pose is stated that no cone is about, or the other way round.
+            CaseError: a mounting pose is stated without cones about it, or cones about it without a mounting pose.
         """
         cones = [getattr(limits, kind.key) for kind in (BaseJointAngle, PlatformJointAngle)]
         about = [cone.about for cone in cones if isinstance(cone, ConeTable)]
         if _home(limits) is not None and "home" not in about:
-            raise CaseError("limits.home", 'means nothing unless a joint angle has about = "home"')
+            raise CaseError("limits.home", 'has no effect: write about = "home" in a joint angle, or remove it')
         yield from super().read(limits, model, units)
 
 
 def _home(limits: Table) -> HomeTable | None:
-    """Return the home pose of a table ``[limits]``."""
+    """Return the mounting pose of a table ``[limits]``; None without one."""
     home = getattr(limits, "home", None)
     return home if isinstance(home, HomeTable) else None
 
 
 def unit_axes(axes: tuple[Triple, ...], count: int) -> FloatArray:
-    """Return unit mounting axes (count, 3) from one for all joints or one for each."""
+    """Return unit axes (count, 3) from a single axis for all joints, or one for each."""
     rows = [[part / math.hypot(*axis) for part in axis] for axis in axes]
     return frozen_array(rows if len(rows) == count else rows * count, (count, 3))
 
 
 def check_axis(key: str, axis: Triple) -> None:
-    """Refuse an axis that gives no direction; the first argument is its dotted key."""
+    """Refuse an axis that is zero or not finite; the first argument is its dotted key."""
     if len(axis) != 3 or not all(map(math.isfinite, axis)) or not any(axis):
         raise CaseError(key, "must be three finite numbers that are not all zero", list(axis))
 
 
 def triple(values: Sequence[float]) -> Triple:
-    """Return three numbers of a case file."""
+    """Return three numbers as a tuple of floats."""
     x, y, z = (float(value) for value in values)
     return x, y, z

@@ -1,8 +1,8 @@
-"""Limits on the lengths of legs: at each pose, and of the actuator over all poses.
+"""Limits on leg lengths: at each pose, and on stroke and retracted length over all poses.
 
-A leg's length is limited by its square, ``min^2 <= |d|^2 <= max^2``. An actuator's limits are written by pairs of
-poses, because ``longest - shortest <= s`` means ``l_i - l_j <= s`` for all of them, and ``shortest >= e + stroke``
-means ``2 l_i - l_j >= e``. No extra unknowns are needed, and of many pairs only those that can bind become constraints.
+The length of a leg is limited by its square, ``min^2 <= |d|^2 <= max^2``. Limits over all poses are constraints on
+pairs of poses: ``longest - shortest <= s`` means ``l_i - l_j <= s`` for all pairs, and ``shortest >= e + stroke`` means
+``2 l_i - l_j >= e``. This needs no additional variables.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ from .limit import Design, Limit, Measures, NumberRange, PosedRobot, Ranges
 
 @dataclass(frozen=True)
 class LegLength(IntervalLimit):
-    """Shortest and longest length of every leg at every pose."""
+    """Smallest and largest length of every leg at every pose."""
 
     key: ClassVar[str] = "leg_length"
-    description: ClassVar[str] = "of every leg at every pose"
+    description: ClassVar[str] = "smallest and largest length of every leg, at every pose"
     needs_legs: ClassVar[bool] = True
 
     def exists_for(self, model: Model) -> bool:
-        """Return whether a robot has legs, or a measure of this name without them."""
+        """Return whether a robot has legs, or defines a quantity ``leg_length``."""
         return super().exists_for(model) or quantity_named(self.key, model) is not None
 
     def measures(self, robot: RobotInstance) -> Measures | None:
-        """Return the lengths of a robot given joint by joint; the model's own quantity states those of other legs."""
+        """Return the leg lengths of a robot given joint by joint; for other robots, the model's quantity has them."""
         if not (robot.legs and robot.joints):
             return None
         lengths = ca.vertcat(*[ca.norm_2(leg.span) for leg in robot.legs])
@@ -46,7 +46,7 @@ class LegLength(IntervalLimit):
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
         """Return the squared length of each leg between its squared limits."""
         if not pose.model.legs:
-            # A robot without legs may have a measure of this name: that is limited as it is.
+            # A robot without legs may define a quantity with this name, which is then limited directly.
             yield from QuantityLimit(self.key, min=self.min, max=self.max).at_pose(pose)
         for leg in pose.robot.legs:
             name = f"leg_length limb {leg.name}{pose.where}"
@@ -55,31 +55,35 @@ class LegLength(IntervalLimit):
 
 
 class ActuatorTable(Table):
-    """A telescoping leg over all poses; its stroke is its longest length less its shortest."""
+    """Telescoping leg over all poses; its stroke is longest minus shortest length."""
 
-    stroke_max: FiniteFloat | None = Field(default=None, description="largest stroke")
+    stroke_max: FiniteFloat | None = Field(
+        default=None, description="largest stroke of a leg: longest minus shortest length over all poses"
+    )
     dead_length: FiniteFloat | None = Field(
-        default=None, description="what the leg has beside its stroke: shortest >= dead_length + stroke"
+        default=None,
+        description="length of a retracted leg minus its stroke; the shortest length must be at least "
+        "dead_length + stroke",
     )
 
 
 def _stroke(spans: SX) -> SX:
-    """Return the longer length less the shorter, (1, 1), from a leg's shorter and longer span, (6, 1) together."""
+    """Return longer minus shorter length (1, 1) from the shorter and the longer span of a leg, stacked (6, 1)."""
     return ca.norm_2(spans[3:]) - ca.norm_2(spans[:3])
 
 
 def _dead_length(spans: SX) -> SX:
-    """Return the shorter length less the stroke, (1, 1), from a leg's shorter and longer span, (6, 1) together."""
+    """Return shorter length minus stroke (1, 1) from the shorter and the longer span of a leg, stacked (6, 1)."""
     return 2 * ca.norm_2(spans[:3]) - ca.norm_2(spans[3:])
 
 
 @dataclass(frozen=True)
 class Actuator(Limit[ActuatorTable]):
-    """A telescoping leg over all poses: ``stroke = longest - shortest``.
+    """Limits of telescoping legs over all poses: ``stroke = longest - shortest``.
 
     Attributes:
-        stroke_max: the largest stroke.
-        dead_length: length of the leg beside its stroke when retracted: ``shortest >= dead_length + stroke``.
+        stroke_max: largest stroke of a leg, length; None for no limit.
+        dead_length: retracted length of a leg minus its stroke: ``shortest >= dead_length + stroke``; None for none.
     """
 
     stroke_max: float | None = None
@@ -87,13 +91,13 @@ class Actuator(Limit[ActuatorTable]):
 
     key: ClassVar[str] = "actuator"
     table: ClassVar[type[Table]] = ActuatorTable
-    description: ClassVar[str] = "of every leg over all poses"
+    description: ClassVar[str] = "stroke and retracted length of every leg, over all poses"
     numbers: ClassVar[Ranges] = {"stroke_max": NumberRange(), "dead_length": NumberRange()}
     needs_legs: ClassVar[bool] = True
     order: ClassVar[int] = 1
 
     def of_design(self, design: Design) -> Iterator[BoundedConstraint]:
-        """Return the dead length of each leg at a single pose, where it has no stroke."""
+        """Return the constraint on each leg length for a single pose, at which the stroke is 0."""
         if len(design.robots) == 1 and self.dead_length is not None:
             key = "actuator.dead_length"
             for leg in design.robots[0].legs:
@@ -101,7 +105,7 @@ class Actuator(Limit[ActuatorTable]):
                 yield between(f"{key} limb {leg.name}", length, POSITIVE_LENGTH, (key, ""), lower=self.dead_length)
 
     def on_pairs(self, design: Design) -> Iterator[PairFamily]:
-        """Return the stroke and the dead length of each leg, for all pairs of poses."""
+        """Return the constraints on stroke and dead length of each leg, for all pairs of poses."""
         if len(design.robots) == 1:
             return
         for i, leg in enumerate(design.robots[0].legs):
@@ -110,7 +114,7 @@ class Actuator(Limit[ActuatorTable]):
             yield PairFamily(lengths, partial(self._pair, leg.name, spans), self._slack)
 
     def _pair(self, leg: str, spans: SX, a: int, b: int) -> tuple[BoundedConstraint, ...]:
-        """Return the constraints on a leg, with its spans (3, N), that is shorter at pose ``a`` than at ``b``."""
+        """Return the constraints on a leg with spans (3, N) that is shorter at pose ``a`` than at pose ``b``."""
         where, limits = f" limb {leg} poses {a + 1} and {b + 1}", []
         both = ca.vertcat(spans[:, a], spans[:, b])
         if self.stroke_max is not None:
@@ -123,7 +127,7 @@ class Actuator(Limit[ActuatorTable]):
         return tuple(limits)
 
     def _slack(self, shorter: float, longer: float) -> float:
-        """Return the least distance to the limits of two lengths of a leg, negative outside."""
+        """Return the smallest margin of two lengths of a leg; negative for a violated limit."""
         stroke = math.inf if self.stroke_max is None else self.stroke_max - (longer - shorter)
         dead = math.inf if self.dead_length is None else 2 * shorter - longer - self.dead_length
         return min(stroke, dead)

@@ -1,11 +1,8 @@
-"""A limit of a case, with its table in the file, its check against the robot, and its constraints.
+"""Base class of limits: table in the case file, check against the robot, and constraints of the nonlinear program.
 
-Everything is optional: no limit is no restriction. A limit is checked against the robot once, when its case is made.
-
-A limit type is one class in one file of this package, and one row of the registry in
-:mod:`screwsynth.nlp.case.limits.registry`. Lengths are in the case's unit and angles in radians. Every constraint's
-expression grows with the measured number, so that a lower limit is a lower bound; the constraint's reading brings
-bounds and multipliers back to the words of the case.
+A limit type is one class in one file, and one row of :mod:`screwsynth.nlp.case.limits.registry`. Lengths are in the
+case's unit, angles in radians. The expression of each constraint increases with the measured quantity, so that a lower
+limit is a lower bound. The reading of the constraint converts bounds and multipliers back to the quantity.
 """
 
 from __future__ import annotations
@@ -31,19 +28,22 @@ if TYPE_CHECKING:
     from ..table import Table
     from ..toml import TomlValue
 
-#: The value that a case file has at a limit's key: a table, mostly.
+#: Type of the value at a limit's key in a case file, in most cases a table.
 TableT = TypeVar("TableT")
 
 
 class TableField(NamedTuple):
-    """A key of the table ``[limits]``: the type of its value, and pydantic's ``Field`` for it."""
+    """Key of the table ``[limits]``: type of its value, and pydantic's ``Field`` for it."""
 
     annotation: Any
     info: Any
 
 
 class NumberRange(NamedTuple):
-    """Range of a number of a limit, radians for an angle: above one number, from one number on, and at most another."""
+    """Allowed range of a limit's value: above an exclusive lower end, at least an inclusive one, at most an upper end.
+
+    Angles are in radians.
+    """
 
     dimension: Dimension = Dimension.LENGTH
     above: float = 0.0
@@ -51,19 +51,19 @@ class NumberRange(NamedTuple):
     least: float = -math.inf
 
 
-#: Numbers of a limit by name.
+#: Allowed ranges of a limit's values, by name.
 Ranges: TypeAlias = Mapping[str, NumberRange]
 
 
 class Written(NamedTuple, Generic[TableT]):
-    """A limit as a case file writes it, in the file's units.
+    """Limit in a case file, in the file's units.
 
     Attributes:
-        key: its key in ``[limits]``.
-        value: the value at that key.
-        limits: the whole table ``[limits]``.
+        key: key of the limit in ``[limits]``.
+        value: value at this key.
+        limits: whole table ``[limits]``.
         model: the robot.
-        units: the file's units.
+        units: units of the file.
     """
 
     key: str
@@ -73,15 +73,15 @@ class Written(NamedTuple, Generic[TableT]):
     units: Units
 
     def internal(self, number: float, dimension: Dimension) -> float:
-        """Return a number of the file as computations use it."""
+        """Return a number of the file in internal units: radians for angles."""
         return self.units.to_internal(number, dimension)
 
     def numbers(self, ranges: Ranges, table: Table | None = None) -> dict[str, float | None]:
-        """Return numbers of the limit's table, or of a table in it, as computations use them; None where there is none.
+        """Return values of the limit's table, or of a table in it, in internal units; None for a missing value.
 
         Args:
-            ranges: the numbers.
-            table: the table; the limit's own if left out.
+            ranges: names and allowed ranges of the values.
+            table: table with the values; the limit's table if left out.
         """
         given = {name: getattr(table or self.value, name) for name in ranges}
         return {
@@ -91,13 +91,13 @@ class Written(NamedTuple, Generic[TableT]):
 
 
 class LimitedCase(NamedTuple):
-    """A case as far as its limits read it.
+    """Part of a case on which its limits depend.
 
     Attributes:
         model: the robot.
-        units: units for people.
-        scalars: names of the case's own numbers, and the dimension of each.
-        loading: loads on the platform, and its motions.
+        units: units of messages.
+        scalars: dimension of each quantity of the case, by name.
+        loading: loads on the platform, and its largest speeds.
     """
 
     model: Model
@@ -106,15 +106,15 @@ class LimitedCase(NamedTuple):
     loading: Loading = NO_LOADING
 
     def check_number(self, key: str, value: float | None, allowed: NumberRange) -> None:
-        """Refuse a number of a limit that is out of its range.
+        """Refuse a value of a limit outside of its range.
 
         Args:
-            key: its dotted key below ``limits``.
-            value: the number, radians for an angle; None where it is not given.
-            allowed: its range.
+            key: dotted key of the value below ``limits``.
+            value: value to check, radians for an angle; None if not given.
+            allowed: allowed range.
 
         Raises:
-            CaseError: the number is not finite, or out of its range.
+            CaseError: the value is not finite, or outside of its range.
         """
         dimension, above, most, least = allowed
         if value is not None:
@@ -131,26 +131,26 @@ class LimitedCase(NamedTuple):
 
 
 class PlateJoint(NamedTuple):
-    """A joint of a plate: its leg's name, and its centre (3, 1) in the plate's frame."""
+    """Joint of a plate: name of its leg, and joint centre (3, 1) in the plate's frame."""
 
     name: str
     centre: SX
 
 
 class Plate(NamedTuple):
-    """The joint centres of the base or of the platform, in its own frame; no pose changes them."""
+    """Joint centres of the base or of the platform in its frame; they do not depend on the pose."""
 
     name: Literal["base", "platform"]
     joints: tuple[PlateJoint, ...]
 
 
 class Design(NamedTuple):
-    """A whole case as expressions of the program's variables and arguments.
+    """Whole case as expressions of the variables and arguments of the nonlinear program.
 
     Attributes:
-        case: the case.
+        case: part of the case on which limits depend.
         robots: the robot at each pose.
-        numbers: the case's own numbers by name, radians for angles.
+        numbers: quantities of the case by name, radians for angles.
     """
 
     case: LimitedCase
@@ -160,14 +160,14 @@ class Design(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PosedRobot:
-    """The robot at one pose, as expressions of the program's variables and arguments.
+    """Robot at one pose, as expressions of the variables and arguments of the nonlinear program.
 
     Attributes:
-        model: the robot, in its own symbols.
+        model: the robot, with the symbols of its definition.
         robot: the robot at the pose.
-        tasks: names of the tasks that the columns of its rates belong to.
-        where: end of the names of constraints at this pose; empty for a single pose.
-        loading: loads on the platform, and its motions.
+        tasks: names of the tasks, one for each column of the rates.
+        where: suffix of the names of constraints at this pose; empty for a single pose.
+        loading: loads on the platform, and its largest speeds.
     """
 
     model: Model
@@ -187,12 +187,12 @@ class PosedRobot:
 
 
 class Measures(NamedTuple):
-    """Numbers that a limit speaks of, in place of the model's quantity with the limit's key.
+    """Quantities that a limit bounds, if they are not the model's quantity with the limit's key.
 
     Attributes:
-        owners: name of the limb of each number.
+        owners: name of the limb of each quantity.
         values: (n, 1) expressions, radians for angles.
-        dimension: of each number.
+        dimension: physical dimension of the quantities.
     """
 
     owners: tuple[str, ...]
@@ -202,23 +202,22 @@ class Measures(NamedTuple):
 
 @dataclass(frozen=True)
 class Limit(abc.ABC, Generic[TableT]):
-    """A limit that a design must keep.
+    """Limit that a design must satisfy.
 
-    A subclass is a frozen dataclass whose fields are the limit's numbers. It states the class attributes below, and
-    yields its constraints from those of :meth:`on_plate`, :meth:`of_design`, :meth:`on_pairs` and :meth:`at_pose` that
-    concern it. Its table in a file, both ways, and its check follow from its numbers; a limit that is more than numbers
-    has methods of its own for them.
+    A subclass is a frozen dataclass whose fields are the values of the limit. It sets the class attributes below, and
+    overrides those of :meth:`on_plate`, :meth:`of_design`, :meth:`on_pairs` and :meth:`at_pose` that give its
+    constraints. Reader, writer and check follow from ``numbers``; a limit with other values overrides their methods.
 
     Attributes:
-        key: its key in ``[limits]``; empty for a type whose limits have keys of their own.
+        key: key of the limit in ``[limits]``; empty for a type whose instances have different keys.
         table: type of the value at the key.
-        description: a few words for the JSON Schema of case files.
-        numbers: the range of each of its numbers, which have the same names in its table.
-        needs_legs: whether only a robot with legs between joint centres can have it.
-        needs_joints: whether only a robot given joint by joint can have it.
-        needs_motion: whether the numbers depend on the platform's motions: those of the case, or of a path with times.
-        order: place of its constraints among those of other limits on the same plate, design or pose: lower first, and
-            in the registry's order where equal.
+        description: description of the limit in the JSON Schema of case files.
+        numbers: allowed range of each value of the limit; names are those in its table.
+        needs_legs: If true, only robots with legs between joint centres can have the limit.
+        needs_joints: If true, only robots given joint by joint can have the limit.
+        needs_motion: If true, the limited quantity depends on the platform's speeds, from the case or from a path.
+        order: position of the constraints among those of other limits at the same place: lower first, then in the
+            registry's order.
     """
 
     key: ClassVar[str]
@@ -232,19 +231,19 @@ class Limit(abc.ABC, Generic[TableT]):
 
     @classmethod
     def fields(cls) -> dict[str, TableField]:
-        """Return the keys of ``[limits]`` that belong to this type."""
+        """Return the keys of ``[limits]`` for this type."""
         from pydantic import Field  # noqa: PLC0415 - a case without limits starts without it
 
         return {cls.key: TableField(cls.table | None, Field(default=None, description=cls.description))}
 
     @classmethod
     def read(cls, limits: Table, model: Model, units: Units) -> Iterator[Self]:
-        """Yield the limits of this type that a case file states.
+        """Yield the limits of this type in a case file.
 
         Args:
-            limits: the table ``[limits]``.
+            limits: table ``[limits]``.
             model: the robot.
-            units: the file's units.
+            units: units of the file.
 
         Raises:
             CaseError: the table contradicts itself.
@@ -255,7 +254,10 @@ class Limit(abc.ABC, Generic[TableT]):
 
     @classmethod
     def from_table(cls, written: Written[TableT]) -> Self:
-        """Return the limit that a case file writes.
+        """Return the limit of a case file.
+
+        Args:
+            written: the limit in the file.
 
         Raises:
             CaseError: the table contradicts itself.
@@ -263,11 +265,11 @@ class Limit(abc.ABC, Generic[TableT]):
         return cls(**written.numbers(cls.numbers))
 
     def ranges(self, model: Model) -> Ranges:  # noqa: ARG002 - most measures are the same everywhere
-        """Return the range of each number of this limit on a robot."""
+        """Return the allowed range of each value of this limit on a robot."""
         return self.numbers
 
     def angles(self, model: Model) -> Mapping[str, float | None]:
-        """Return the angles among the numbers of this limit, radians, by their dotted keys below ``limits``."""
+        """Return the angles among the values of this limit, radians, by their dotted keys below ``limits``."""
         ranges = self.ranges(model).items()
         names = [name for name, allowed in ranges if allowed.dimension is Dimension.ANGLE]
         return {f"{self.name}.{name}": getattr(self, name) for name in names}
@@ -277,7 +279,7 @@ class Limit(abc.ABC, Generic[TableT]):
 
         Args:
             model: the robot.
-            units: the file's units.
+            units: units of the file.
         """
         given = {name: (getattr(self, name), allowed) for name, allowed in self.ranges(model).items()}
         return {
@@ -299,14 +301,14 @@ class Limit(abc.ABC, Generic[TableT]):
         return (bool(model.legs) or not cls.needs_legs) and (bool(model.joints) or not cls.needs_joints)
 
     def exists_for(self, model: Model) -> bool:
-        """Return whether a robot has the measure that is limited."""
+        """Return whether a robot has the limited quantity."""
         return self.is_for(model)
 
     def check(self, case: LimitedCase) -> None:
-        """Refuse a limit without a number, with one out of its range or crossed sides, and one that contradicts itself.
+        """Check the values of this limit against the case.
 
         Raises:
-            CaseError: in the words of a case file.
+            CaseError: no value is given, a value is outside of its range, or min is not below max.
         """
         ranges = self.ranges(case.model)
         for name, allowed in ranges.items():
@@ -315,7 +317,7 @@ class Limit(abc.ABC, Generic[TableT]):
         two_sided = given.keys() == {"min", "max"}
         if ranges and all(value is None for value in given.values()):
             needed = "min, max, or both" if two_sided else " or ".join(ranges)
-            raise CaseError(f"limits.{self.name}", f"must have {needed}")
+            raise CaseError(f"limits.{self.name}", f"is empty: it must have {needed}")
         if two_sided and None not in given.values() and not given["min"] < given["max"]:
             dimension = ranges["max"].dimension
             fault = f"must be below max = {case.units.text(given['max'], dimension)}"
@@ -323,11 +325,11 @@ class Limit(abc.ABC, Generic[TableT]):
 
     @property
     def reference(self) -> str:
-        """Direction that an angle is measured from, in a word or two; empty for other limits."""
+        """Name of the direction from which an angle is measured; empty for other limits."""
         return ""
 
     def measures(self, robot: RobotInstance) -> Measures | None:  # noqa: ARG002 - most limits need none
-        """Return the numbers that this limit speaks of, where they are not the model's quantity with its key."""
+        """Return the quantities that this limit bounds; None for the model's quantity with its key."""
         return None
 
     def on_plate(self, plate: Plate) -> Iterable[BoundedConstraint]:  # noqa: ARG002 - most limits have none
@@ -335,11 +337,11 @@ class Limit(abc.ABC, Generic[TableT]):
         return ()
 
     def of_design(self, design: Design) -> Iterable[BoundedConstraint]:  # noqa: ARG002 - most limits have none
-        """Return this limit's constraints on the case's numbers, or on several poses together."""
+        """Return this limit's constraints on quantities of the case, or on several poses together."""
         return ()
 
     def on_pairs(self, design: Design) -> Iterable[PairFamily]:  # noqa: ARG002 - most limits have none
-        """Return this limit's constraints on all pairs of many values, such as a leg's lengths at the poses."""
+        """Return this limit's constraints on pairs of values, such as the lengths of a leg at all poses."""
         return ()
 
     def at_pose(self, pose: PosedRobot) -> Iterable[BoundedConstraint]:  # noqa: ARG002 - some limits have none

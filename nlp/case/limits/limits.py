@@ -1,4 +1,4 @@
-"""The limits of a case together: from the table of its file, in the order of the registry, and their check."""
+"""All limits of a case: their reader, their order and their check."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from .limit import Limit, LimitedCase
 if TYPE_CHECKING:
     from ..table import Table
 
-#: Likeness of names from which on one is a slip for the other, and no measure of another robot.
+#: Smallest similarity at which an unknown name is taken for a spelling error, and not for a quantity of another robot.
 _SLIP = 0.85
 
-#: A limit by its key: smallest and largest number, the numbers by name, or one number for the largest angle.
+#: Value of a limit by its key: smallest and largest value, values by name, or one number for the largest angle.
 LimitValue: TypeAlias = Sequence[float | None] | Mapping[str, object] | Sequence[str] | float
 
 LimitT = TypeVar("LimitT", bound=Limit[Any])
@@ -25,18 +25,18 @@ LimitT = TypeVar("LimitT", bound=Limit[Any])
 
 @dataclass(frozen=True, init=False)
 class Limits:
-    """The limits of a case, such as ``Limits(LegLength(min=28, max=40), LegClearance(min=2))``.
+    """Limits of a case, such as ``Limits(LegLength(min=28, max=40), LegClearance(min=2))``.
 
-    The same by the keys of ``[limits]`` in a case file: ``Limits(leg_length=(28, 40), leg_clearance=(2, None))``. The
-    value is the smallest and the largest number, with None for no limit; or a mapping of the limit's arguments, such as
-    ``actuator={"stroke_max": 12}``. Lengths are in the case's unit and angles in radians. A key that belongs to no type
-    of limits is the name of a quantity of the robot.
+    Limits can also be given by the keys of ``[limits]`` in a case file, as in ``Limits(leg_length=(28, 40),
+    leg_clearance=(2, None))``. The value is the smallest and the largest value, with None for no limit; or a mapping of
+    the limit's arguments, such as ``actuator={"stroke_max": 12}``. Lengths are in the case's unit, angles in radians.
+    Any other key is the name of a quantity that the robot defines.
 
     Attributes:
-        items: the limits, in the order of the registry.
+        items: limits, in the order of the registry.
 
     Raises:
-        CaseError: one limit is given twice, or a value by its key has another form.
+        CaseError: a limit is given twice, or the value of a key has another form.
     """
 
     items: tuple[Limit[Any], ...]
@@ -50,17 +50,17 @@ class Limits:
         names = [limit.name for limit in limits]
         for name in names:
             if names.count(name) > 1:
-                raise CaseError(f"limits.{name}", "is given more than once")
+                raise CaseError(f"limits.{name}", f"must be given once, got {names.count(name)} limits with this name")
         object.__setattr__(self, "items", tuple(sorted(limits, key=_rank)))
 
     @classmethod
     def from_table(cls, written: Table | None, model: Model, units: Units) -> Limits:
-        """Return the limits that a case file states.
+        """Return the limits of a case file.
 
         Args:
-            written: the table ``[limits]``; None where there is none.
+            written: table ``[limits]``; None without a table.
             model: the robot.
-            units: the file's units.
+            units: units of the file.
 
         Raises:
             CaseError: the table contradicts itself.
@@ -78,30 +78,33 @@ class Limits:
         return len(self.items)
 
     def of(self, kind: type[LimitT]) -> LimitT | None:
-        """Return the limit of a type, the first where there are several, or None where there is none."""
+        """Return the first limit of a type; None if there is none."""
         return next((limit for limit in self.items if isinstance(limit, kind)), None)
 
     def check(self, case: LimitedCase) -> None:
-        """Refuse limits that the robot they are for cannot have, or whose numbers mean nothing.
+        """Check all limits against the case.
+
+        Args:
+            case: part of the case on which limits depend.
 
         Raises:
-            CaseError: a number is out of its range, two sides are crossed, or the robot has no such measure.
+            CaseError: a value is outside of its range, min is not below max, or the robot has no such quantity.
         """
         for limit in self.items:
             if not limit.exists_for(case.model):
                 known = _measures(case.model)
                 hint = did_you_mean(limit.name, known, _SLIP) if limit.name not in known else ""
-                fault = f"is nothing that {case.model.name!r} has; {hint}it has {listing(known)}"
+                fault = f"no such limit for the robot {case.model.name!r}; {hint}allowed: {listing(known)}"
                 raise CaseError(f"limits.{limit.name}", fault)
         for limit in self.items:
             limit.check(case)
 
 
 def _limit_of(key: str, value: LimitValue) -> Limit[Any]:
-    """Return a limit that is stated by its key in ``[limits]``.
+    """Return the limit of a key in ``[limits]``.
 
     Raises:
-        CaseError: the value has another form, or lacks a number.
+        CaseError: the value has another form, or a value is missing.
     """
     from .registry import LIMIT_TYPES  # noqa: PLC0415 - a case without limits starts without their tables
 
@@ -130,10 +133,10 @@ def _limit_of(key: str, value: LimitValue) -> Limit[Any]:
 
 
 def _forms(key: str, known: Iterable[str]) -> str:
-    """Return the forms of a limit that is stated by its key, in words.
+    """Return the allowed forms of a limit's value in words.
 
     Args:
-        key: the key.
+        key: key of the limit.
         known: names of the limit's arguments.
     """
     if key == "custom":
@@ -145,17 +148,17 @@ def _forms(key: str, known: Iterable[str]) -> str:
 
 
 def _rank(limit: Limit[Any]) -> int:
-    """Return the place of a limit's type in the registry; types of the user's own come last."""
+    """Return the index of a limit's type in the registry; types outside of the registry come last."""
     from .registry import LIMIT_TYPES  # noqa: PLC0415 - a case without limits starts without their tables
 
     return LIMIT_TYPES.index(type(limit)) if type(limit) in LIMIT_TYPES else len(LIMIT_TYPES)
 
 
 def _measures(model: Model) -> list[str]:
-    """Return the keys of ``[limits]`` that mean something for a robot."""
+    """Return the keys of ``[limits]`` that a robot can have."""
     from .registry import LIMIT_TYPES  # noqa: PLC0415 - a case without limits starts without their tables
 
     of_legs = [kind.key for kind in LIMIT_TYPES if kind.needs_legs and kind.is_for(model)]
-    own = [quantity.name for quantity in model.quantities]
+    measures = [quantity.name for quantity in model.quantities]
     always = [kind.key for kind in LIMIT_TYPES if not kind.needs_legs and kind.fields() and kind.is_for(model)]
-    return list(dict.fromkeys([*of_legs, *own, *always]))
+    return list(dict.fromkeys([*of_legs, *measures, *always]))

@@ -1,4 +1,4 @@
-"""A limit on F itself: what an exchange of poses demands of F at every pose, where its worst value is optimised."""
+"""Limit on F at every pose, which the exchange method uses to optimise the worst F over a workspace or path."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from .limit import PosedRobot
 
 @dataclass(frozen=True)
 class ObjectiveLimit(IntervalLimit):
-    """Smallest or largest F of a case's only task at every pose; no key of a case file."""
+    """Smallest or largest F of the only task at every pose; not available in case files."""
 
     key: ClassVar[str] = "F"
-    description: ClassVar[str] = "of the task"
+    description: ClassVar[str] = "F of the task"
 
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
-        """Return F."""
+        """Return the constraint on F."""
         yield between(
             f"{self.key}{pose.where}", pose.robot.F[0], NOT_NEGATIVE, self.key, lower=self.min, upper=self.max
         )

@@ -1,7 +1,7 @@
-"""Limits on the joint centres of the plates, which no pose changes: spacing, footprint, ratio of radii.
+"""Limits on the joint centres of base and platform: spacing, radius, and ratio of radii.
 
-Distances are limited by their squares. A joint's radius is its distance from its plate's z axis; a plate's radius is
-the root mean square of its joints' radii.
+Distances are limited by their squares. The radius of a joint is its distance from the z axis of its plate, which is the
+base or the platform; the radius of a plate is the root mean square of the radii of its joints.
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ from .limit import Design, Limit, NumberRange, Plate, Ranges
 
 
 def _squared_distance(points: SX) -> SX:
-    """Return the squared distance (1, 1) of two points, (6, 1) together."""
+    """Return the squared distance (1, 1) of two points, stacked (6, 1)."""
     return ca.sumsqr(points[:3] - points[3:])
 
 
 @dataclass(frozen=True)
 class JointSpacing(LowerLimit):
-    """Smallest distance between two joint centres of one plate."""
+    """Smallest distance between two joint centres of the base, or of the platform."""
 
     key: ClassVar[str] = "joint_spacing"
-    description: ClassVar[str] = "between joint centres of one plate"
+    description: ClassVar[str] = "smallest distance between two joint centres of the base, or of the platform"
     needs_legs: ClassVar[bool] = True
 
     def on_plate(self, plate: Plate) -> Iterator[BoundedConstraint]:
-        """Return the squared distance of each pair of joints."""
+        """Return the constraint on the squared distance of each pair of joints."""
         for one, other in itertools.combinations(plate.joints, 2):
             name = f"joint_spacing {plate.name} joints {one.name} and {other.name}"
             apart = Call(Form(_squared_distance), ca.vertcat(one.centre, other.centre))
@@ -44,27 +44,36 @@ class JointSpacing(LowerLimit):
 
 
 class FootprintTable(Table):
-    """Largest distance of joint centres from their plate's axis."""
+    """Largest distance of joint centres from the z axis of base or platform."""
 
-    base: FiniteFloat | None = Field(default=None, description="of the base's joints")
-    platform: FiniteFloat | None = Field(default=None, description="of the platform's joints")
+    base: FiniteFloat | None = Field(
+        default=None, description="largest distance of the base joints from the z axis of the base"
+    )
+    platform: FiniteFloat | None = Field(
+        default=None, description="largest distance of the platform joints from the z axis of the platform"
+    )
 
 
 @dataclass(frozen=True)
 class Footprint(Limit[FootprintTable]):
-    """Largest distance of joint centres from their plate's axis, its z axis."""
+    """Largest distance of joint centres from the z axis of base or platform.
+
+    Attributes:
+        base: largest distance of the base joints, length; None for no limit.
+        platform: largest distance of the platform joints, length; None for no limit.
+    """
 
     base: float | None = None
     platform: float | None = None
 
     key: ClassVar[str] = "footprint"
     table: ClassVar[type[Table]] = FootprintTable
-    description: ClassVar[str] = "largest radii"
+    description: ClassVar[str] = "largest distance of joint centres from the z axis of base and platform"
     numbers: ClassVar[Ranges] = {"base": NumberRange(), "platform": NumberRange()}
     needs_legs: ClassVar[bool] = True
 
     def on_plate(self, plate: Plate) -> Iterator[BoundedConstraint]:
-        """Return the squared radius of each joint."""
+        """Return the constraint on the squared radius of each joint."""
         largest = self.base if plate.name == "base" else self.platform
         if largest is None:
             return
@@ -75,15 +84,15 @@ class Footprint(Limit[FootprintTable]):
 
 @dataclass(frozen=True)
 class RadiusRatio(IntervalLimit):
-    """Smallest and largest ratio of the platform's radius to the base's."""
+    """Smallest and largest ratio of the platform radius to the base radius."""
 
     key: ClassVar[str] = "radius_ratio"
-    description: ClassVar[str] = "platform's radius over base's"
+    description: ClassVar[str] = "ratio of platform radius to base radius, root mean squares over the joints"
     numbers: ClassVar[Ranges] = two_sided(NumberRange(Dimension.NUMBER))
     needs_legs: ClassVar[bool] = True
 
     def of_design(self, design: Design) -> Iterator[BoundedConstraint]:
-        """Return the squared ratio."""
+        """Return the constraint on the squared ratio."""
         legs = design.robots[0].legs
         platform, base = (
             sum((ca.sumsqr(joint[:2]) for joint in joints), SX(0))

@@ -1,7 +1,7 @@
-"""The registry of all types of limits, and the table ``[limits]`` of a case file that follows from it.
+"""Registry of all limit types, and the table ``[limits]`` of case files.
 
-To add a limit, write a subclass of :class:`~.limit.Limit` in a file of its own, and add it to :data:`LIMIT_TYPES`. A
-case without limits does not load this module: the tables need pydantic, which takes longer to import than the rest.
+To add a limit, write a subclass of :class:`~.limit.Limit` in a new file, and add it to :data:`LIMIT_TYPES`. A case
+without limits does not import this module, because pydantic builds its tables slowly.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from .rates import ActuatorRate, RateShare
 from .relation import Relations
 from .singular_values import ConditionNumber, SmallestSingularValue
 
-#: Every type of limit, in the order of documentation and messages.
+#: All limit types, in the order of documentation and messages.
 LIMIT_TYPES: tuple[type[Limit[Any]], ...] = (
     LegLength,
     Actuator,
@@ -50,21 +50,22 @@ LIMIT_TYPES: tuple[type[Limit[Any]], ...] = (
 
 
 class _OpenTable(Table):
-    """Limits that a design must keep to be built; other keys are measures that the robot itself has."""
+    """Limits that a design must satisfy to be buildable; other keys are quantities that the robot's file defines."""
 
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, IntervalTable]
 
     over: Literal["poses", "workspace", "path"] = Field(
         default="poses",
-        description="whether the limits hold at the stated poses alone, or over the workspace or along the path too",
+        description="poses at which the limits must hold: poses: the stated poses; workspace or path: also every pose "
+        "of the workspace or along the tool path",
     )
 
 
 if TYPE_CHECKING:
     LimitsTable: TypeAlias = _OpenTable
 else:
-    #: The table ``[limits]`` of a case file.
+    #: Table ``[limits]`` of a case file.
     LimitsTable = create_model(
         "LimitsTable",
         __base__=_OpenTable,

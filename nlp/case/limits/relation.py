@@ -1,10 +1,8 @@
-"""Relations between the case's numbers as limits, such as ``x1 - 1.5*x2 >= 0``.
+"""Relations between quantities of a case as limits, such as ``x1 - 1.5*x2 >= 0``.
 
-Numbers are in the case's units in a relation. The language is small: numbers, names, ``+ - * / ^``, brackets, the
-functions ``sqrt``, ``sin``, ``cos`` and ``abs``, and one relation ``>=``, ``<=`` or ``==``. A name may have a dot in
-it, as ``robot.p_x`` has. ``^`` binds tighter than a sign and to the right, as in mathematics. Nothing is ever handed to
-Python's own interpreter: a text becomes a tree, and a tree a CasADi expression, as in a robot's own numbers. Python's
-parser is not used, because its messages do not name the expected text and its place.
+Values are in the case's units. The language has numbers, names (with dots, as in ``robot.p_x``), ``+ - * / ^``,
+brackets, ``sqrt``, ``sin``, ``cos``, ``abs``, and one of ``>=``, ``<=``, ``==``. ``^`` binds tighter than a sign and
+to the right. The parser is not Python's, so that no text is executed and messages show what was expected and where.
 """
 
 from __future__ import annotations
@@ -28,11 +26,11 @@ from ..toml import TomlValue
 from .constraint import NUMBER, BoundedConstraint, Constraint
 from .limit import Design, Limit, LimitedCase, TableField, Written
 
-#: A text is refused beyond this many characters, and beyond this many brackets, signs and powers in each other.
+#: Largest number of characters of a relation, and of nested brackets, signs and powers.
 LONGEST = 400
 _DEEPEST = 40
 
-#: Functions of expressions; those of angles, which take the case's unit; operations.
+#: Functions; functions of an angle in the case's unit; operators.
 _FUNCTIONS = ("sqrt", "sin", "cos", "abs")
 _OF_ANGLES = ("sin", "cos")
 _OPERATIONS: dict[str, type[ast.operator]] = {
@@ -48,7 +46,7 @@ _TOKEN = re.compile(
 
 
 class Relation(NamedTuple):
-    """``left >= right`` and the like."""
+    """Relation between two expressions, such as ``left >= right``."""
 
     left: ast.expr
     sign: Literal[">=", "<=", "=="]
@@ -62,18 +60,18 @@ class _Token(NamedTuple):
 
 
 def parse(text: str, names: Collection[str], angle: float = 1.0) -> Relation:
-    """Return the relation that a text states.
+    """Return the relation of a text.
 
     Args:
-        text: the relation as it is written.
-        names: names that may stand in it.
-        angle: unit of the angles that ``sin`` and ``cos`` take, radians.
+        text: text of the relation.
+        names: allowed names.
+        angle: unit of the arguments of ``sin`` and ``cos``, radians.
 
     Raises:
-        ExpressionError: the text is no relation; the message has the offending token and its place.
+        ExpressionError: the text is not a relation; the message shows the wrong token and its position.
     """
     if len(text) > LONGEST:
-        raise ExpressionError(f"is longer than {LONGEST} characters")
+        raise ExpressionError(f"must have at most {LONGEST} characters, got {len(text)}")
     reader = _Reader(text, names)
     left = reader.sum()
     token = reader.next()
@@ -90,12 +88,12 @@ def parse(text: str, names: Collection[str], angle: float = 1.0) -> Relation:
 
 
 def expression(tree: ast.expr, values: Mapping[str, SX], angle: float = 1.0) -> SX:
-    """Return a tree as an expression of the values of its names.
+    """Return the CasADi expression of a syntax tree.
 
     Args:
-        tree: the tree.
-        values: an expression (1, 1) for each name.
-        angle: unit of the angles that ``sin`` and ``cos`` take, radians.
+        tree: syntax tree of one side of a relation.
+        values: expression (1, 1) of each name.
+        angle: unit of the arguments of ``sin`` and ``cos``, radians.
     """
     functions = {name: FUNCTIONS[name] for name in _FUNCTIONS}
     for name in _OF_ANGLES:
@@ -104,10 +102,10 @@ def expression(tree: ast.expr, values: Mapping[str, SX], angle: float = 1.0) -> 
 
 
 def _constant(tree: ast.expr, angle: float) -> float | None:
-    """Return the value of a tree without names; None for a tree with names.
+    """Return the value of a syntax tree without names; None for a tree with names.
 
     Raises:
-        ExpressionError: a part without names has no finite value, or a constant power is too large.
+        ExpressionError: a part without names has no finite value, or a constant exponent is too large.
     """
     sign = ""
     parts: list[ast.expr] = []
@@ -124,19 +122,19 @@ def _constant(tree: ast.expr, angle: float) -> float | None:
     values = [_constant(each, angle) for each in parts]
     last = values[-1] if values else None
     if sign == "^" and last is not None and abs(last) > LARGEST_POWER:
-        raise ExpressionError(f"has the power {last:g}, which must be at most {LARGEST_POWER:g} in size")
+        raise ExpressionError(f"must have exponents of at most {LARGEST_POWER:g} in magnitude, got {last:g}")
     if sign == "/" and last == 0:
-        raise ExpressionError("divides by zero")
+        raise ExpressionError("divides by zero, which is not allowed")
     if None in values:
         return None
     value = float(expression(tree, {}, angle))
     if not math.isfinite(value):
-        raise ExpressionError(f"has a constant part, of {sign!r}, without a finite value")
+        raise ExpressionError(f"has a constant part with {sign!r} without a finite value")
     return value
 
 
 class _Reader:
-    """Recursive descent over the tokens of a text."""
+    """Recursive-descent parser of a text."""
 
     def __init__(self, text: str, names: Collection[str]) -> None:
         self._text, self._names = text, names
@@ -145,12 +143,12 @@ class _Reader:
         self._at = self._depth = 0
 
     def wrong(self, token: _Token, expected: str) -> ExpressionError:
-        """Return the fault at a token, which shows the text with the token marked."""
-        found = "the sentence ends" if token.kind == "end" else f"{token.text!r} stands"
-        return ExpressionError(f"{expected}, but {found} at position {token.place + 1}: {self._pointed(token.place)}")
+        """Return the error at a token; its message shows the text with the token marked."""
+        read = "the end" if token.kind == "end" else repr(token.text)
+        return ExpressionError(f"{expected}, got {read} at position {token.place + 1}: {self._pointed(token.place)}")
 
     def next(self) -> _Token:
-        """Return the next token, and go on; the end stays the next one."""
+        """Return the next token and advance; at the end, return the end token again and again."""
         token = self._tokens[self._at]
         self._at = min(self._at + 1, len(self._tokens) - 1)
         return token
@@ -173,7 +171,7 @@ class _Reader:
         """Read ``(+|-)* power``."""
         self._depth += 1
         if self._depth > _DEEPEST:
-            raise ExpressionError(f"has more than {_DEEPEST} brackets, signs and powers in each other")
+            raise ExpressionError(f"must have at most {_DEEPEST} nested brackets, signs and powers")
         if self._tokens[self._at].text in ("+", "-"):
             sign = self.next().text
             tree = self._signed()
@@ -211,7 +209,7 @@ class _Reader:
                 raise self.wrong(bracket, f"expected a bracket after {token.text}")
             return ast.Call(ast.Name(token.text), [self._closed(bracket)], [])
         hint = nearest(token.text, [*self._names, *_FUNCTIONS])
-        raise ExpressionError(f"{token.text!r} at position {token.place + 1} is no number of this case; {hint}")
+        raise ExpressionError(f"{token.text!r} at position {token.place + 1} is not a quantity of this case; {hint}")
 
     def _closed(self, opened: _Token) -> ast.expr:
         tree = self.sum()
@@ -226,53 +224,52 @@ class _Reader:
             found = _TOKEN.match(self._text, at)
             if found is None:
                 at += len(self._text[at:]) - len(self._text[at:].lstrip())
-                raise ExpressionError(
-                    f"{self._text[at]!r} at position {at + 1} means nothing here: {self._pointed(at)}"
-                )
+                fault = f"{self._text[at]!r} at position {at + 1} is not allowed: {self._pointed(at)}"
+                raise ExpressionError(f"{fault}; allowed are numbers, names, + - * / ^ ( ) and one of >=, <=, ==")
             kind = str(found.lastgroup)
             text, start = found[kind], found.start(kind)
             head = text.partition(".")[0]
-            # A dot belongs to a name only behind a word that begins names with a dot.
+            # A dot belongs to a name only after the first part of a name with a dot.
             text = head if kind == "name" and head not in self._heads else text
             yield _Token(kind, text, start)
             at = start + len(text)
         yield _Token("end", "", len(self._text.rstrip()))
 
     def _pointed(self, place: int) -> str:
-        """Return the text with a place marked."""
+        """Return the text with a position marked."""
         return f"{self._text[:place]}»{self._text[place:]}"
 
 
 @dataclass(frozen=True, init=False)
 class Relations(Limit[list[str]]):
-    """Relations between the case's own numbers.
+    """Relations between quantities of the case.
 
     Attributes:
-        texts: each relation as it is written.
+        texts: relations, such as ``"x1 - 1.5*x2 >= 0"``, with values in the case's units.
     """
 
     texts: tuple[str, ...]
 
     key: ClassVar[str] = "custom"
     table: ClassVar[Any] = list[str]
-    description: ClassVar[str] = 'relations such as "x1 - 1.5*x2 >= 0"'
+    description: ClassVar[str] = 'relations between dimensions and pose coordinates, such as "x1 - 1.5*x2 >= 0"'
 
     def __init__(self, *texts: str) -> None:
         object.__setattr__(self, "texts", texts)
 
     @classmethod
     def fields(cls) -> dict[str, TableField]:
-        """Return the key of the list, which is empty if left out."""
+        """Return the key of the list of relations, which is empty by default."""
         return {cls.key: TableField(cls.table, Field(default_factory=empty_list, description=cls.description))}
 
     @classmethod
     def read(cls, limits: Table, model: Model, units: Units) -> Iterator[Self]:
-        """Yield the relations that a case file states, if there are any."""
+        """Yield the relations of a case file, if there are any."""
         return (each for each in super().read(limits, model, units) if each.texts)
 
     @classmethod
     def from_table(cls, written: Written[list[str]]) -> Self:
-        """Return the relations that a case file writes."""
+        """Return the relations of a case file."""
         return cls(*written.value)
 
     def to_keys(self, model: Model, units: Units) -> Mapping[str, TomlValue]:  # noqa: ARG002 - texts have no units
@@ -280,10 +277,10 @@ class Relations(Limit[list[str]]):
         return {self.key: list(self.texts)}
 
     def check(self, case: LimitedCase) -> None:
-        """Refuse a relation that cannot be understood.
+        """Check that each text is a relation between quantities of the case.
 
         Raises:
-            CaseError: in the words of a case file.
+            CaseError: a text is not a relation, or has an unknown name.
         """
         unit = case.units.to_internal(1.0, Dimension.ANGLE)
         for index, text in enumerate(self.texts):
@@ -293,7 +290,7 @@ class Relations(Limit[list[str]]):
                 raise CaseError(f"limits.custom[{index}]", str(error), text) from None
 
     def of_design(self, design: Design) -> Iterator[BoundedConstraint]:
-        """Return left side less right side of each relation."""
+        """Return the constraint on left side minus right side of each relation."""
         dimensions = design.case.scalars
         unit = design.case.units.to_internal(1.0, Dimension.ANGLE)
         shown = {

@@ -1,17 +1,15 @@
-"""Limits on the singular values of J, made homogeneous: moments about the platform's origin, divided by a length.
+"""Limits on singular values of the homogenised J: moments about the platform origin, divided by a length.
 
-The constraints are on eigenvalues of ``J'J``. The smallest one is estimated from below and the largest from above, so
-that a design that keeps the constraints keeps the limits. The measured numbers are computed from the singular value
-decomposition of J at a point.
+The constraints are on smooth estimates of eigenvalues of ``J'J``: the smallest from below and the largest from above,
+so that a design that satisfies the constraints satisfies the limits. Eigenvalues themselves have a kink where two of
+them coincide, and optima often lie there. The measured values are computed by a singular value decomposition of J.
 
-No closed form of an eigenvalue exists, and an eigenvalue itself has a kink where two of them coincide, where optima
-often lie. The estimates of this module are smooth everywhere, made of ``+ - * /`` and square roots alone, and never on
-the unsafe side. For a positive definite matrix A,
+For a positive definite matrix A,
 
     mu(A) = (tr A^-m)^(-1/m) <= lambda_min(A),
 
-short of it by the factor ``r^(-1/m)`` where r eigenvalues are smallest and by little where one is. Shifting A by almost
-this estimate, and estimating again, multiplies the error by ``1 - r^(-1/m)`` once more:
+too small by the factor ``r^(-1/m)`` if r eigenvalues are equal to the smallest one. Shifting A by almost this estimate,
+and estimating again, multiplies the error by ``1 - r^(-1/m)`` each time:
 
     theta <- theta + mu(A - theta I),        theta < lambda_min(A) throughout.
 
@@ -44,7 +42,7 @@ def _condition_from(value: float) -> float:
 
 
 def _condition_slope(value: float) -> float:
-    """Return the derivative of ``-1 / c^2`` with respect to c, at a value of it."""
+    """Return the derivative of ``-1 / c^2`` with respect to c, at a value of ``-1 / c^2``."""
     return float(2 * max(-value, 0.0) ** 1.5)
 
 
@@ -53,25 +51,25 @@ def _condition_bound(number: SX) -> SX:
     return -1 / (number * number)
 
 
-#: ``-1 / c^2`` read as the condition number c.
+#: Reading of ``-1 / c^2`` as the condition number c.
 _CONDITION = Reading(
     Dimension.NUMBER, from_value=_condition_from, slope=_condition_slope, to_value=_condition_bound, above=1.0
 )
 
 
 class SmallestTable(AtLeast):
-    """The smallest singular value of J, homogenised."""
+    """Smallest singular value of the homogenised J."""
 
-    length: FiniteFloat = Field(description="by which moments about the platform's origin are divided")
+    length: FiniteFloat = Field(description="length by which moments about the platform origin are divided")
 
 
 @dataclass(frozen=True)
 class SmallestSingularValue(Limit[SmallestTable]):
-    """Smallest singular value of the homogenised J.
+    """Lower limit on the smallest singular value of the homogenised J, at every pose.
 
     Attributes:
-        min: smallest value.
-        length: length by which moments are divided.
+        min: smallest allowed singular value, above 0.
+        length: length by which moments about the platform origin are divided.
     """
 
     min: float
@@ -79,11 +77,13 @@ class SmallestSingularValue(Limit[SmallestTable]):
 
     key: ClassVar[str] = "smallest_singular_value"
     table: ClassVar[type[Table]] = SmallestTable
-    description: ClassVar[str] = "of the same J"
+    description: ClassVar[str] = (
+        "lower limit on the smallest singular value of J, with moments divided by a length; distance from a singularity"
+    )
     numbers: ClassVar[Ranges] = {"min": NumberRange(Dimension.NUMBER), "length": NumberRange()}
 
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
-        """Return the smallest eigenvalue of ``J'J``."""
+        """Return the constraint on the smallest eigenvalue of ``J'J``."""
         J = _homogenised(pose, self.length)
         yield between(
             f"smallest_singular_value{pose.where}",
@@ -97,18 +97,18 @@ class SmallestSingularValue(Limit[SmallestTable]):
 
 
 class ConditionTable(AtMost):
-    """The ratio of the singular values of J, homogenised."""
+    """Condition number of the homogenised J."""
 
-    length: FiniteFloat = Field(description="by which moments about the platform's origin are divided")
+    length: FiniteFloat = Field(description="length by which moments about the platform origin are divided")
 
 
 @dataclass(frozen=True)
 class ConditionNumber(Limit[ConditionTable]):
-    """Largest ratio of the singular values of the homogenised J.
+    """Upper limit on the condition number of the homogenised J, at every pose: largest over smallest singular value.
 
     Attributes:
-        max: largest value.
-        length: length by which moments are divided.
+        max: largest allowed condition number, above 1.
+        length: length by which moments about the platform origin are divided.
     """
 
     max: float
@@ -116,7 +116,9 @@ class ConditionNumber(Limit[ConditionTable]):
 
     key: ClassVar[str] = "condition_number"
     table: ClassVar[type[Table]] = ConditionTable
-    description: ClassVar[str] = "of J, made homogeneous by a length"
+    description: ClassVar[str] = (
+        "largest condition number of J (largest over smallest singular value), with moments divided by a length"
+    )
     numbers: ClassVar[Ranges] = {
         "max": NumberRange(Dimension.NUMBER, above=1.0),
         "length": NumberRange(),
@@ -124,7 +126,7 @@ class ConditionNumber(Limit[ConditionTable]):
     order: ClassVar[int] = 1
 
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
-        """Return minus the ratio of the smallest to the largest eigenvalue of ``J'J``."""
+        """Return the constraint on minus the ratio of smallest to largest eigenvalue of ``J'J``."""
         J = _homogenised(pose, self.length)
         gram = J.T @ J
         yield between(
@@ -160,33 +162,33 @@ def _singular_values(length: float, jacobian: FloatArray, position: FloatArray) 
 
 #: Squarings of the inverse: ``m = 2 ** _SQUARINGS``.
 _SQUARINGS = 3
-#: Rounds of shifting. Two leave an error of 0.083^2 = 0.7 % of a double eigenvalue (0.35 % of the singular value), and
-#: next to none of one whose neighbour is half as large again. More would be closer, and the rounded corner so sharp
-#: that Newton steps across it fail: with four rounds two thirds of the searches did.
+#: Number of shifts. Two leave an error of 0.083^2 = 0.7 % for a double eigenvalue (0.35 % of the singular value), and
+#: almost none if the next eigenvalue is 1.5 times as large. More shifts make the estimate's curvature so large that
+#: Newton steps across it fail: with four shifts, two thirds of the searches failed.
 _ROUNDS = 2
-#: The next shift goes this part of the way, so that the matrix to be inverted stays well away from singular.
+#: Part of the distance to the estimate by which the matrix is shifted, so that it stays well away from singular.
 _CLOSE = 0.999
-#: A first shift below zero, in parts of the mean eigenvalue, so that a singular matrix can be inverted.
+#: Initial shift below zero, relative to the mean eigenvalue, so that a singular matrix can be inverted.
 _FLOOR = 1e-10
 
 
-#: The upper triangle of a symmetric matrix, row by row: ``rows[i][j - i]`` for ``i <= j``.
+#: Upper triangle of a symmetric matrix by rows: ``rows[i][j - i]`` for ``i <= j``.
 Rows: TypeAlias = list[list[SX]]
 
 
 def smallest_eigenvalue(A: SX) -> SX:
-    """Return an estimate (1, 1) from below of the smallest eigenvalue of a symmetric positive semidefinite (n, n)."""
+    """Return an estimate (1, 1) from below of the smallest eigenvalue of a positive semidefinite matrix (n, n)."""
     return _estimate(_estimate_smallest, A.shape[0])(A)
 
 
 def largest_eigenvalue(A: SX) -> SX:
-    """Return an estimate (1, 1) from above of the largest eigenvalue of a symmetric positive semidefinite (n, n)."""
+    """Return an estimate (1, 1) from above of the largest eigenvalue of a positive semidefinite matrix (n, n)."""
     return _estimate(_estimate_largest, A.shape[0])(A)
 
 
 @cache
 def _estimate(formula: Callable[[SX], SX], n: int) -> ca.Function:
-    """Return an estimate as a function of a matrix (n, n): a call copies thousands of operations at once."""
+    """Return an estimate as a CasADi function of a matrix (n, n), so that its many operations are built only once."""
     A = SX.sym("A", n, n)
     return ca.Function("estimate", [A], [formula(A)])
 
@@ -205,7 +207,7 @@ def _estimate_smallest(A: SX) -> SX:
 def _estimate_largest(A: SX) -> SX:
     scale = ca.trace(A)
     rows = _upper(A / scale)
-    # (tr A^m)^(1/m) is above, by no more than n^(1/m).
+    # (tr A^m)^(1/m) is an upper bound, too large by at most the factor n^(1/m).
     above = _root_of_trace(rows) * (2 - _CLOSE)
     found = above
     negative = [[-each for each in row] for row in rows]
@@ -232,7 +234,7 @@ def _root_of_inverse(rows: Rows) -> SX:
 
 
 def _root_of_trace(rows: Rows) -> SX:
-    """Return ``(tr A^m)^(1/m)``; the last square's trace is the sum of all squared entries."""
+    """Return ``(tr A^m)^(1/m)``; the trace of the last square is the sum of all squared entries."""
     for _ in range(_SQUARINGS - 1):
         rows = _square(rows)
     value = sum((row[0] ** 2 + 2 * sum((each**2 for each in row[1:]), SX(0)) for row in rows), SX(0))

@@ -12,11 +12,11 @@
 
 /* Largest violation of a side that counts as rounding; variables and rows are of order 1. */
 #define VIOLATED 1e-13
-/* Violation of a side that depends on the active ones: the largest that counts as rounding, in numbers of order 1 and in parts
- * of the first d. */
+/* Largest violation of a side dependent on the active ones that counts as rounding, for values of order 1 and relative to the
+ * first d. */
 #define LENIENT 1e-10
 #define ROUNDING 1e-15
-/* Part of a normal outside the span of the active ones below which it depends on them. */
+/* Relative size of a normal outside the span of the active ones below which it is dependent. */
 #define DEPENDENT 1e-11
 
 static inline double dot(const double *a, const double *b, int n) {
@@ -30,8 +30,8 @@ double screwsynth_QP_dot(const double *a, const double *b, int n) {
     return dot(a, b, n);
 }
 
-/* Of sides that are not held, the one that d is farthest outside of, where that is farther than `worst`, which is negative;
- * else -1. Sides: n lower bounds, n upper bounds, lower and upper bounds of c rows. `products` takes those of the rows and d. */
+/* Inactive side that d violates most, if by more than `worst`, which is negative; else -1. Sides: n lower bounds, n upper
+ * bounds, lower and upper bounds of c rows. `products` receives the products of the rows and d. */
 static int most_violated(const screwsynth_QP_data *q, const double *d, const int *held, double *products, double *worst) {
     const int n = q->n, c = q->c;
     double least = *worst;
@@ -139,15 +139,15 @@ int screwsynth_QP(const screwsynth_QP_data *q, double *d, double *multipliers, d
         multipliers[side] = 0.0;
         held[side] = 0;
     }
-    /* An equation enters as the lower one of its sides; the upper one never does. */
+    /* An equation enters by its lower side; its upper side never enters. */
     for (i = 0; i < n; ++i) held[n + i] = is_equation(q, i);
     for (k = 0; k < q->c; ++k) held[2 * n + q->c + k] = is_equation(q, 2 * n + k);
 
     for (pass = 0; pass < most; ++pass) {
         int entering = -1;
         double worst = -VIOLATED, sign = 1.0, fresh = 0.0;
-        /* The entering side: equations first, those of fixed variables before all others, because rows that these variables
-         * determine then hold but for rounding; then the side with the largest violation. Equations stay. */
+        /* The entering side: equations first, beginning with fixed variables, because rows that these variables determine are
+         * then satisfied up to rounding; then the side with the largest violation. Equations stay active. */
         for (; next < 2 * n + q->c && entering < 0; ++next) {
             if (!is_equation(q, next)) continue;
             entering = next;
@@ -188,10 +188,10 @@ int screwsynth_QP(const screwsynth_QP_data *q, double *d, double *multipliers, d
             }
             if (outside > DEPENDENT * DEPENDENT * (inside + outside)) full = -worst / outside;
             if (full == HUGE_VAL && fresh == 0.0 && worst >= -lenient) {
-                held[entering] = 1; /* it depends on the active sides, and holds with them but for rounding */
+                held[entering] = 1; /* dependent on the active sides, and satisfied with them up to rounding */
                 break;
             }
-            if (full == HUGE_VAL && leaving < 0) return 1; /* no point is inside all of them */
+            if (full == HUGE_VAL && leaving < 0) return 1; /* the sides contradict each other */
             step = full < partial ? full : partial;
             for (k = 0; k < count; ++k) u[k] -= step * r[k];
             fresh += step;
@@ -200,7 +200,7 @@ int screwsynth_QP(const screwsynth_QP_data *q, double *d, double *multipliers, d
                 worst += step * outside;
             }
             if (full <= partial) {
-                /* Rotate t until only its first component beyond the active ones is left: the new column of R. */
+                /* Rotate t until only its first component beyond the active ones remains: the new column of R. */
                 for (k = n - 2; k >= count; --k) {
                     double cosine, sine;
                     turn(J, n, k, &t[k], &t[k + 1], &cosine, &sine);

@@ -1,20 +1,20 @@
 /* Search for a feasible point: minimises f = 1/2 sum (violation / first violation)^2 within the bounds of the variables.
  *
- * f has second derivatives wherever the set of violated constraints stays the same, so that the search ends in few steps:
- * at a feasible point, or at a point from which no small step lessens f, which is infeasible.
+* f has second derivatives where the set of violated constraints does not change, so that the search ends in few steps: at
+ * a feasible point, or at an infeasible point from which no small step reduces f.
  */
 #include <math.h>
 
 #include "screwsynth-sqp.h"
 
-/* The search's own program, and numbers at the last point in its place: constraints, gradients, multipliers. */
+/* Program of the search, with the values at the last point: constraints, gradients, multipliers. */
 typedef struct {
     const screwsynth_SQP_problem *p;
     double *gradient, *g, *rows, *multipliers;
     double objective, size;
 } restoration;
 
-/* Violation of constraint j in parts of the first largest one, negative below the lower bound. */
+/* Violation of constraint j relative to the first largest one, negative below the lower bound. */
 static double violated(const restoration *of, int j) {
     double off = screwsynth_SQP_outside(of->p, j, of->g[j]) / of->size;
     return of->g[j] < of->p->g_lower[j] ? -off : off;

@@ -1,11 +1,11 @@
 /* Sequential quadratic programming with exact second derivatives, for few variables.
  *
- * Each step solves a quadratic program. Its matrix is the Hessian of the Lagrangian along the sides that were active in the
- * last one, made positive definite; its curvature across those sides may be chosen freely. Near a solution these are
- * Newton's steps. A line search on the merit f + sum w |violation| makes them a descent from any point. Where
- * constraints curve, a second-order correction of the step is tried before it is shortened.
+* Each step solves a quadratic program. Its matrix is the Hessian of the Lagrangian along the active sides of the last one,
+ * made positive definite; its curvature across those sides is arbitrary. Near a solution these are Newton's steps. A line
+ * search on the merit f + sum w |violation| makes them a descent from any point. For curved constraints, a second-order
+ * correction of the step is tried before it is shortened.
  *
- * Source of its parts: J. Nocedal and S. J. Wright, Numerical Optimization, 2nd ed., Springer 2006, chapter 18.
+* Source: J. Nocedal and S. J. Wright, Numerical Optimization, 2nd ed., Springer 2006, chapter 18.
  */
 #include <math.h>
 #include <string.h>
@@ -13,21 +13,21 @@
 #include "screwsynth-search.h"
 
 #define AIM 1e-10         /* residual at which the search ends; the caller's tolerances are wider */
-#define AIM_INSIDE 1e-12  /* violation likewise */
-#define ENOUGH 1e-7       /* residual or violation that may be rounding error where no step descends */
+#define AIM_INSIDE 1e-12  /* violation at which the search ends */
+#define ENOUGH 1e-7       /* residual or violation that may be rounding error if no step descends */
 #define STILL 1e-14       /* length of a step that changes nothing */
-#define NEAR 1e-8         /* distance of a side that counts as active at the start, in parts of the largest half range */
+#define NEAR 1e-8         /* distance of a side that counts as active at the start, relative to the largest half range */
 #define WEAK 1e-8         /* multiplier below which a side counts as inactive */
-#define KICK 0.1          /* length of the step away from a saddle, in parts of the largest half range */
+#define KICK 0.1          /* length of the step away from a saddle, relative to the largest half range */
 #define KICKS 8
-#define CREEP 1e-2        /* length of a short step, in parts of the largest half range */
+#define CREEP 1e-2        /* length of a short step, relative to the largest half range */
 #define THIN 1e-12        /* half range below which bounds are within rounding error of each other */
-#define POOR 3            /* number of steps in turn that go a part of the way to violated bounds, after which the search ends */
-#define IDLE 2            /* likewise from feasible points: narrow bounds or rounding error leave a violation of them */
-#define HELD 1e-9         /* change of f within narrow bounds below which their multipliers alone make a point stationary */
-#define GOOD 0.7          /* part of the violation or residual to which a step must lessen it */
-#define TRIALS 30        /* number of lengths of a step that are tried, each half of the one before */
-#define DESCENT 1e-4      /* part of the predicted descent that is required (Armijo) */
+#define POOR 3            /* number of successive partial steps to violated bounds after which the search ends */
+#define IDLE 2            /* same from feasible points, which narrow bounds or rounding error leave slightly violated */
+#define HELD 1e-9         /* change of f within narrow bounds below which their multipliers make a point stationary */
+#define GOOD 0.7          /* ratio to which a step must reduce the violation or residual */
+#define TRIALS 30        /* number of trial lengths of a step, each half of the one before */
+#define DESCENT 1e-4      /* required fraction of the predicted descent (Armijo) */
 #define ROUNDING 1e-14    /* rounding error of f, which is of order 1 */
 
 static double merit(const screwsynth_SQP_problem *p, const point *at, const double *weights) {
@@ -37,7 +37,7 @@ static double merit(const screwsynth_SQP_problem *p, const point *at, const doub
     return sum;
 }
 
-/* KKT residual: gradient of the Lagrangian, complementarity. The multipliers are not negative, by the quadratic program. */
+/* KKT residual: gradient of the Lagrangian, complementarity. The quadratic program gives nonnegative multipliers. */
 static double residual_of(const screwsynth_SQP_problem *p, const point *at, const double *u, double *left) {
     int n = p->n, c = p->c, i, j;
     double most;
@@ -118,7 +118,7 @@ static void set_up(search *of, const screwsynth_SQP_problem *p, double *s, doubl
     of->unit = p->extent > 0.0 && p->extent < NARROW ? fmax(p->extent, THIN) : 1.0;
 }
 
-/* Marks the sides that are active at the start: those that the point lies on and towards which f falls. */
+/* Marks the active sides at the start: sides through the point towards which f falls. */
 static void guess_sides(search *of) {
     const screwsynth_SQP_problem *p = of->p;
     const point *at = &of->at;
@@ -138,7 +138,7 @@ static void guess_sides(search *of) {
 }
 
 /* Steps away from a saddle along (-L^-T l, 1, 0), where l is row k of the triangle: the curvature along it is the pivot,
- * which is not positive. Of the two senses it takes the one with the lesser merit. */
+* which is not positive. Of the two directions it takes that with the smaller merit. */
 static void leave_saddle(search *of, int k) {
     const int n = of->p->n, c = of->p->c;
     double best = HUGE_VAL, chosen = 0.0;
@@ -169,7 +169,7 @@ static double weigh(search *of) {
         slope -= of->weights[j] * off;
         distance += off;
     }
-    /* A step that goes a part of the way only may increase the merit: then the weights must exceed the multipliers. */
+    /* A partial step may increase the merit: then the weights must exceed the multipliers. */
     if (slope > 0.0 && distance > 0.0) {
         double more = 2.0 * slope / distance;
         for (j = 0; j < of->p->c; ++j) of->weights[j] += more;
@@ -178,7 +178,7 @@ static double weigh(search *of) {
     return slope;
 }
 
-/* Line search: takes the step, shortened until the merit falls enough. Returns its length, or 0 where the merit does not. */
+/* Line search: takes the step, shortened until the merit falls enough. Returns its length, or 0 if the merit does not fall. */
 static double advance(search *of) {
     const screwsynth_SQP_problem *p = of->p;
     const double slope = weigh(of), now = merit(p, &of->at, of->weights), slack = ROUNDING * (1.0 + fabs(now));
@@ -200,7 +200,7 @@ static double advance(search *of) {
     return length;
 }
 
-/* Counts the steps in turn that do not help, and keeps what the next one is compared with. */
+/* Counts successive steps without progress, and keeps the reference values of the next one. */
 static void compare_with_last(search *of, double residual, double violation) {
     const int is_little = violation > GOOD * of->last;
     of->poor = is_little && of->part < 1.0 && !of->is_feasible ? of->poor + 1 : 0;
@@ -211,8 +211,8 @@ static void compare_with_last(search *of, double residual, double violation) {
     of->last = violation;
 }
 
-/* Whether the multipliers of the variables' bounds alone make the point stationary, because f changes by next to nothing
- * within them. Then they are the point's multipliers. */
+/* Returns 1 if the multipliers of the variables' bounds make the point stationary, because f hardly changes within them.
+ * Then they are the multipliers of the point. */
 static int is_held_by_bounds(search *of) {
     const int n = of->p->n;
     int i;
@@ -242,7 +242,7 @@ int screwsynth_SQP(const screwsynth_SQP_problem *p, double *s, screwsynth_SQP_en
         if (of.poor == POOR) break;
         if ((end->residual <= AIM && end->violation <= AIM_INSIDE) || screwsynth_SQP_largest(of.d, p->n) <= STILL) settled = 1;
         if (of.idle == IDLE) settled = 1;
-        /* Within narrow bounds F changes too little to tell: there the first step is always taken. */
+        /* Within narrow bounds F changes too little for a test: there the first step is always taken. */
         if (end->iterations == 1 && p->extent < NARROW && screwsynth_SQP_largest(of.d, p->n) > CREEP * p->extent) settled = 0;
         /* Short steps with negative curvature approach a saddle. */
         creeps = of.shift > of.damping * of.size && screwsynth_SQP_largest(of.d, p->n) <= CREEP * p->extent && end->violation <= CREEP;
@@ -250,7 +250,7 @@ int screwsynth_SQP(const screwsynth_SQP_problem *p, double *s, screwsynth_SQP_en
             int row;
             for (i = 0; settled && i < 2 * (p->n + p->c); ++i)
                 if (fabs(of.u[i]) <= WEAK) of.u[i] = 0.0;
-            if (screwsynth_SQP_curve(&of)) break; /* along the sides that are active now */
+            if (screwsynth_SQP_curve(&of)) break; /* along the present active sides */
             row = screwsynth_SQP_saddle_row(&of);
             end->is_minimum = settled && row == p->n;
             if (settled && (row == p->n || kicks == KICKS)) break;
@@ -263,7 +263,7 @@ int screwsynth_SQP(const screwsynth_SQP_problem *p, double *s, screwsynth_SQP_en
             if (screwsynth_SQP_curve(&of) || screwsynth_SQP_factorise(&of)) break;
         }
         length = advance(&of);
-        /* A matrix with too little curvature gives steps that have to be shortened. */
+        /* A matrix with too little curvature gives steps that must be shortened. */
         if (length < 0.3) {
             of.damping = fmax(fmax(of.damping, MILD), of.shift / of.size) * fmin(0.5 / fmax(length, 1e-9), 64.0);
         } else {

@@ -5,11 +5,11 @@
 
 #include "screwsynth-search.h"
 
-#define LEAST 1e-8        /* smallest first shift, in parts of the curvature */
-#define FLAT 1e-6         /* curvature assumed for a function without any */
-#define CURVED 1e-7       /* part of the largest curvature below whose negative a curvature counts as negative */
-#define PARTS 6           /* parts of the way to contradicting bounds that are tried: a quadratic program for each */
-#define ROUNDED 1e-13     /* curvature of f, which is of order 1, below whose negative it may be rounding error */
+#define LEAST 1e-8        /* smallest first shift, relative to the curvature */
+#define FLAT 1e-6         /* assumed curvature of a linear function */
+#define CURVED 1e-7       /* relative size from which on a negative curvature counts as negative */
+#define PARTS 6           /* number of trial fractions of the way to contradicting bounds: a quadratic program for each */
+#define ROUNDED 1e-13     /* size up to which a negative curvature of f, of order 1, may be rounding error */
 
 double screwsynth_SQP_largest(const double *values, int n) {
     double size = 0.0;
@@ -51,7 +51,7 @@ static int cholesky(const double *M, double *L, int n, double shift, double leas
     return n;
 }
 
-/* An orthonormal basis of the gradients of the active rows, across the active bounds. sides: multipliers or marks, not 0 for
+/* Orthonormal basis of the gradients of the active rows, without active variables. sides: multipliers or marks, nonzero for
  * an active side. Returns the number of its vectors; `free` is the number of directions along all active sides. */
 static int span(const screwsynth_SQP_problem *p, const point *at, const double *sides, double *basis, int *free) {
     const int n = p->n, c = p->c;
@@ -121,18 +121,18 @@ int screwsynth_SQP_curve(search *of) {
     else
         of->curvature = size;
     of->free_size = reduce(n, of->u, of->basis, count, size, of->H, of->spare);
-    /* Below this, the curvature is rounding error of the whole Hessian. */
+    /* Below this value, the curvature is rounding error of the whole Hessian. */
     if (!(of->free_size > 1e-10 * size)) of->free_size = 1e-10 * size;
-    /* A linear f, as a level where no constraint is active, has no curvature to choose shifts by. Those of the variables' own
-     * scale keep the quadratic program's unconstrained minimum near enough for its rounding error. */
+    /* A linear f, such as a level without active constraints, has no curvature as a scale of shifts. The scale of the variables
+     * keeps the quadratic program's unconstrained minimum near enough for its rounding error. */
     of->size = is_flat ? 1.0 : of->free_size;
     return 0;
 }
 
 int screwsynth_SQP_factorise(search *of) {
     const int n = of->p->n;
-    const double most = 10.0 * n * of->size; /* n times the largest entry is enough where numbers are finite */
-    const double least = of->size > of->free_size ? MILD : LEAST; /* of a linear f: no residual says more */
+    const double most = 10.0 * n * of->size; /* n times the largest entry is enough for finite values */
+    const double least = of->size > of->free_size ? MILD : LEAST; /* for a linear f, because no residual gives a better value */
     const double first = fmin(fmax(of->residual, least * of->size), MILD * of->size);
     double pivot;
     int i;
@@ -179,7 +179,7 @@ int screwsynth_SQP_find_step(search *of) {
     of->q.rows = of->at.rows;
     for (i = 0; failed && i <= last; ++i) {
         of->part = parts[i];
-        /* The violation of a feasible point may be larger than narrow bounds: then the step lessens it by a part of these. */
+        /* The violation of a feasible point may exceed narrow bounds: then the step reduces it by a fraction of these. */
         if (i == 1 && of->is_feasible) {
             of->part *= of->unit / fmax(screwsynth_SQP_violation(of->p, of->at.g), of->unit);
             i = last - 1;

@@ -1,4 +1,4 @@
-"""Loops of a description closed from where it stands, and by least squares from other starts where this fails."""
+"""Closure of the loops of a description: by Newton's method from the stated configuration, or by least squares."""
 
 from __future__ import annotations
 
@@ -17,30 +17,30 @@ from ....models.newton import newton
 from ..frames import Frame, cross_matrix, rotation_vector
 from .description import Closing, Description, LoopClosure, unique_name
 
-#: Loops are closed where no equation is larger, in parts of the robot's size: rounding leaves 1e-16 to 1e-14.
+#: Largest residual of closed loops, relative to the robot's size: rounding leaves 1e-16 to 1e-14.
 CLOSED = 1e-12
-#: Steps of Newton's method, of which decimals of six digits need three, and the parts of a step that are tried.
+#: Largest number of Newton steps, of which values with six digits need three; and the tried fractions of a step.
 _STEPS, _PARTS = 60, [0.5**k for k in range(13)]
-#: Singular values below this share of the largest count as zero, in the order in which they are tried. By its decimals,
-#: dependent equations of an overconstrained robot are independent, which no motion of its joints is to make up for.
+#: Relative singular values that count as zero, in the order of trial. Rounded decimals make the dependent equations of
+#: an overconstrained robot independent; no joint motion should compensate for that.
 _RANKS = (1e-5, 1e-9)
-#: Largest equation that least squares may leave of loops that do not close, in parts of the size: typed decimals.
+#: Largest accepted residual of loops that cannot be closed exactly, relative to the size: rounding of typed decimals.
 LEAST = 1e-4
-#: Driven joints move only where this makes the least squares so much smaller.
+#: Actuated joints move only if this reduces the residual by this factor.
 _WORTH = 0.1
-#: Random starts beside the stated configuration, their largest motions in radians and parts of the size, and the seed.
+#: Number of random starts, their largest motions in radians or relative to the size, and their seed.
 _STARTS, _FAR, _SEED = 4, (0.1, 0.3, 1.0), 0
-#: Damped steps to least squares, of which loops need 5 to 25; and the part of the equations that the last one leaves.
+#: Largest number of damped steps, of which loops need 5 to 25; and relative decrease of the residual of the last one.
 _DAMPED, _STUCK = 300, 1 - 1e-12
 
 
 class Gap(NamedTuple):
-    """How far a loop is open.
+    """Gap of an open loop.
 
     Attributes:
-        name: name of the joint that closes it.
-        distance: in length.
-        angle: in radians.
+        name: name of the joint that closes the loop.
+        distance: translational gap, length.
+        angle: rotational gap, radians.
     """
 
     name: str
@@ -48,23 +48,23 @@ class Gap(NamedTuple):
     angle: float
 
     def share(self, size: float) -> float:
-        """Return how far the loop is open, in parts of the robot's size."""
+        """Return the gap relative to the robot's size."""
         return max(self.distance / size, self.angle)
 
     @property
     def words(self) -> str:
-        """How far the loop is open in words."""
+        """Gap as text, with distance and angle."""
         return f"{self.distance:.3g} and {math.degrees(self.angle):.3g} deg"
 
 
 class Closed(NamedTuple):
-    """A description with its loops closed as far as Newton's method came.
+    """Description with loops closed as far as possible.
 
     Attributes:
-        description: with all bodies and joints moved.
-        turn: largest angle by which a joint moved, radians.
-        way: largest displacement of a slide, length.
-        kept: whether the driven joints stayed where they were.
+        description: description with all bodies and joints moved.
+        turn: largest rotation of a joint, radians.
+        way: largest displacement of a prismatic joint, length.
+        kept: True if the actuated joints did not move.
     """
 
     description: Description
@@ -74,20 +74,25 @@ class Closed(NamedTuple):
 
 
 def gap_of(closure: LoopClosure, places: Mapping[str, Frame]) -> Gap:
-    """Return how far a closure is open where its bodies are."""
+    """Return the gap of a closure.
+
+    Args:
+        closure: the closure.
+        places: frame of each body by name.
+    """
     A, B = (places[name] @ frame for name, frame in _sides(closure))
     found = _equations(closure, A, B, None, np.zeros((6, 0)))
     return Gap(closure.name, float(np.linalg.norm(found.lengths)), float(np.linalg.norm(found.angles)))
 
 
 def gap_of_coupling(given: Description, coupling: Coupling) -> Gap:
-    """Return by how much a coupling does not hold: in the unit of the coordinate of its first joint."""
+    """Return the residual of a coupling as a gap, in the unit of the coordinate of its first joint."""
     value = abs(given.offsets.get(coupling.name, 0.0))
     return Gap(coupling.name, value, 0.0) if _is_length(given, coupling) else Gap(coupling.name, 0.0, value)
 
 
 def _is_length(given: Description, coupling: Coupling) -> bool:
-    """Return whether the first joint of a coupling is a slide."""
+    """Return whether the first joint of a coupling is prismatic."""
     return any(joint.name == coupling.factors[0][0] and joint.kind == "P" for joint in given.joints)
 
 
@@ -109,13 +114,13 @@ def _equations(closure: LoopClosure, A: Frame, B: Frame, kept: float | None, twi
 
     Args:
         closure: the closure.
-        A: its frame on the first body, in the world.
-        B: its frame on the second body.
-        kept: cosine between the axes of a universal joint; None for that of the frames themselves.
-        twist: (6, n) twists of the second body minus those of the first, velocities at the world's origin.
+        A: frame of the closure on the first body, in world coordinates.
+        B: frame of the closure on the second body, in world coordinates.
+        kept: required cosine between the axes of a universal joint; None for the present one.
+        twist: (6, n) twists of the second body minus twists of the first body, with velocities at the world origin.
     """
     w, v = twist[:3], twist[3:]
-    # In axes of the first body's frame no common motion of both bodies changes an equation.
+    # In coordinates of the first body's frame, a common motion of both bodies changes no equation.
     apart, moved = A.rotation.T @ (B.position - A.position), A.rotation.T @ (v - cross_matrix(B.position) @ w)
     x, y, z, other = *A.rotation.T, B.rotation[:, 2]
     angles, turned = np.zeros(0), np.zeros((0, twist.shape[1]))
@@ -127,20 +132,20 @@ def _equations(closure: LoopClosure, A: Frame, B: Frame, kept: float | None, twi
         case Closing.UNIVERSAL:
             angles = np.array([0.0 if kept is None else float(z @ other) - kept])
             turned = np.cross(other, z)[None] @ w
-    # Along the axis of a slide or cylinder the frames are free.
+    # Frames of a prismatic or cylindrical joint are free to move along the axis.
     count = 2 if closure.closing in (Closing.SLIDE, Closing.CYLINDER) else 3
     return _Equations(apart[:count], angles, moved[:count], turned)
 
 
 class _Loops:
-    """Equations of a description by the joints of its tree.
+    """Loop equations of a description as functions of the joint coordinates of its tree.
 
-    A body that floats freely hangs on three slides and a ball joint in the world's origin.
+    A floating body gets three prismatic joints and a spherical joint in the world origin.
 
     Args:
         given: the description.
-        size: size of the robot, by which lengths become plain numbers.
-        keeps_driven: whether driven joints stay where they are.
+        size: size of the robot, by which lengths are divided.
+        keeps_driven: If true, actuated joints do not move.
 
     Attributes:
         motions: kinematics of the tree.
@@ -152,10 +157,10 @@ class _Loops:
         joints = [each for body in given.bodies[1:] for each in joint_of.get(body.name) or _floating(given, body.name)]
         self.motions = motions = Motions(Mechanism(given.name, (), tuple(joints), given.root, given.root))
         self._columns = {each.name: columns for each, columns in zip(joints, motions.columns, strict=True)}
-        kept = [own for name, own in self._columns.items() if keeps_driven and name in given.driven]
+        kept = [columns for name, columns in self._columns.items() if keeps_driven and name in given.driven]
         self._free = np.delete(np.arange(motions.count), np.r_[(slice(0), *kept)])
         lengths = np.array([each.kind == "P" for each in joints for _ in range(WIDTHS[each.kind])], dtype=bool)
-        # Of the coordinates that move: what makes radians and parts of the size, or radians and lengths, of order 1.
+        # Scales of the moving coordinates: to radians and relative lengths, and to radians and lengths.
         self._parts = np.where(lengths, size / motions.units, 1.0)[self._free]
         self._lengths = 1 / motions.units[self._free]
         self._cosines = {
@@ -165,7 +170,7 @@ class _Loops:
         }
 
     def equations(self, at: Coordinates, placed: Placed) -> Equations:
-        """Return equations (m,) and their derivatives (m, n), lengths in parts of the size."""
+        """Return equations (m,) and their derivatives (m, n), with lengths relative to the size."""
         given, size, motions = self.given, self.size, self.motions
         values, rows = [np.zeros(0)], [np.zeros((0, motions.count))]
         for each in given.closures:
@@ -184,33 +189,33 @@ class _Loops:
         return Equations(np.concatenate(values), np.vstack(rows))
 
     def random(self, rng: np.random.Generator, far: float) -> Coordinates:
-        """Return random coordinates up to a distance from the stated ones: radians, or parts of the size."""
+        """Return random coordinates up to a distance from the stated ones, radians or relative to the size."""
         step = np.zeros(self.motions.count)
         step[self._free] = far * self._parts * rng.uniform(-1, 1, len(self._free))
         return self.motions.stepped(self.motions.stated, step, self.motions.placed(self.motions.stated))
 
     def solved(self, start: Coordinates, rank: float = _RANKS[0]) -> Reached:
-        """Return coordinates near others at which loops are closed, or from where no step makes them closer.
+        """Return coordinates near a start with closed loops, or with a residual that no step reduces.
 
-        Of all steps those move joints least, in radians and in the file's unit of length.
+        Each step has the smallest norm, in radians and in the file's unit of length.
         """
         descent = Descent(self.motions, self.equations, self._free, CLOSED / 100, size=self._lengths, is_damped=False)
         return newton(descent, descent.at(start), steps=_STEPS, zeros=[rank], parts=_PARTS)
 
     def least_squares(self, start: Coordinates) -> Reached:
-        """Return coordinates near others at which the sum of the squared equations is smallest."""
+        """Return coordinates near a start with the smallest sum of squared equations."""
         descent = Descent(self.motions, self.equations, self._free, 0.0, size=self._parts, stuck=_STUCK)
         return newton(descent, descent.at(start), steps=_DAMPED, parts=_PARTS)
 
     def starts(self) -> Iterator[Coordinates]:
-        """Yield coordinates where the model stands, and random ones, some near and some far."""
+        """Yield the stated coordinates, and random ones at several distances."""
         rng = np.random.default_rng(_SEED)
         yield self.motions.stated
         for k in range(1, 1 + _STARTS):
             yield self.random(rng, _FAR[k % len(_FAR)])
 
     def closed(self, found: Reached) -> Closed:
-        """Return the description with all its bodies and joints at coordinates."""
+        """Return the description with all bodies and joints at the result's coordinates."""
         given, values = self.given, found.at.values * self.motions.units
         coordinates = {each.name: float(values[self._columns[each.name]].sum()) for each in given.joints}
 
@@ -225,8 +230,8 @@ class _Loops:
             for each in given.couplings
         }
         turns = [
-            float(np.linalg.norm(rotation_vector(own[:3, :3])))
-            for each, own in zip(self.motions.mechanism.joints, found.placed.joints, strict=True)
+            float(np.linalg.norm(rotation_vector(moved[:3, :3])))
+            for each, moved in zip(self.motions.mechanism.joints, found.placed.joints, strict=True)
             if each.name in coordinates and each.kind in ("R", "S")
         ]
         ways = [abs(coordinates[each.name]) for each in given.joints if each.kind == "P"]
@@ -240,7 +245,7 @@ class _Loops:
 
 
 def _floating(given: Description, body: str) -> list[MechanismJoint]:
-    """Return the joints of a body that floats freely: three slides, and a ball joint in the world's origin."""
+    """Return the joints of a floating body: three prismatic joints, and a spherical joint in the world origin."""
     taken = {*(each.name for each in given.bodies), *(each.name for each in given.joints)}
     names = [unique_name(f"{body} floating {axis}", taken) for axis in "xyz"]
     inner = [given.root, *names]
@@ -258,16 +263,16 @@ def _frame(placed: Placed, body: str) -> Frame:
 
 
 def close(given: Description, size: float) -> Closed:
-    """Return a description with its loops closed by Newton's method, with driven joints kept where that is possible.
+    """Return a description with its loops closed by Newton's method, without motion of actuated joints if possible.
 
-    Loops of an overconstrained robot whose numbers do not fit each other are closed by least squares.
+    Loops of an overconstrained robot with inconsistent dimensions are closed in the least-squares sense.
 
     Args:
         given: the description.
-        size: size of the robot, by which lengths become plain numbers.
+        size: size of the robot, by which lengths are divided.
 
     Returns:
-        The best that was reached; the gaps of its closures say how good it is.
+        Best result; the gaps of its closures tell how well the loops are closed.
     """
     found: list[tuple[float, Reached, _Loops]] = []
     for rank in _RANKS:
@@ -289,7 +294,7 @@ def _first(found: tuple[float, Reached, _Loops]) -> float:
 
 
 def close_from_other_starts(given: Description, size: float) -> Closed | None:
-    """Return a description with its loops closed from another start; None where none of a few closes them."""
+    """Return a description with its loops closed from another start; None if no tried start closes them."""
     for keeps_driven in (True, False):
         loops = _Loops(given, size, keeps_driven=keeps_driven)
         for start in loops.starts():
@@ -301,10 +306,10 @@ def close_from_other_starts(given: Description, size: float) -> Closed | None:
 
 
 def least_gaps(given: Description, size: float) -> dict[str, float]:
-    """Return loops that do not close by themselves, all others cut and no actuator held.
+    """Return the loops that cannot be closed even if all other loops are cut and all actuators are free.
 
     Returns:
-        The largest equation at the smallest sum of squares that was found, by the loop's name, in parts of the size.
+        Smallest gap of each of these loops by name, relative to the size.
     """
     found = {}
     for each in given.closures:

@@ -1,4 +1,4 @@
-"""A robot as both formats state it: a tree of bodies with joints, and loops that equations close."""
+"""Description of a robot in MJCF or URDF: a tree of bodies with joints, and joints that close loops."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from itertools import takewhile
 from ....models.mechanism import Coupling, MechanismJoint
 from ..frames import Frame
 
-#: Largest coordinate, in the file's unit of length: beyond it, squares of distances lose what a loop is open by.
+#: Largest coordinate, in the file's unit of length: beyond it, rounding of squared distances exceeds the gaps of loops.
 LARGEST = 1e9
 
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A body of the tree.
+    """Body of the tree.
 
     Attributes:
-        name: unique among the bodies.
-        parent: name of the body that it hangs on; empty for the root, and for one that floats freely.
-        place: its frame in the world, with all joints at their stated positions.
+        name: name of the body, unique among all bodies.
+        parent: name of the parent body; empty for the root, and for a floating body.
+        place: frame of the body in the world, with all joints at their stated coordinates.
     """
 
     name: str
@@ -31,7 +31,7 @@ class Body:
 
 
 class Closing(Enum):
-    """The joint that closes a loop, with z as its axis in both frames."""
+    """Kinds of joints that close loops; their axis is z of both frames."""
 
     BALL = "ball"
     WELD = "weld"
@@ -43,19 +43,19 @@ class Closing(Enum):
 
 @dataclass(frozen=True, eq=False)
 class LoopClosure:
-    """A joint that closes a loop, with a frame on each of its bodies, in the body's own frame.
+    """Joint that closes a loop, with a frame on each of its two bodies.
 
-    The two frames coincide where the loop is closed, but for the freedom of the joint. The axis of a hinge, slide or
-    cylinder is z of both frames. A universal joint has its first axis along z of the first frame, its second along z
-    of the other; at the stated configuration they have the angle that they keep.
+    In a closed loop, the two frames coincide up to the motion of the joint. The axis of a hinge, slide or cylinder is z
+    of both frames. The first axis of a universal joint is z of the first frame, the second axis is z of the second
+    frame; their angle is that of the stated configuration.
 
     Attributes:
-        name: unique among joints and closures.
-        closing: its kind.
-        first: name of the body on one side.
-        second: name of the other body.
-        first_frame: frame on the first body.
-        second_frame: frame on the second body.
+        name: name of the closure, unique among joints and closures.
+        closing: kind of the joint.
+        first: name of the first body.
+        second: name of the second body.
+        first_frame: frame on the first body, in body coordinates.
+        second_frame: frame on the second body, in body coordinates.
     """
 
     name: str
@@ -68,22 +68,22 @@ class LoopClosure:
 
 @dataclass(frozen=True, eq=False)
 class Description:
-    """A robot as a file states it.
+    """Robot in a file.
 
     Attributes:
-        name: of the robot.
+        name: name of the robot.
         source: name of the file, for messages.
         root: name of the fixed body.
-        bodies: parents before children.
-        joints: between a body, the outer link, and its parent, at their stated positions; a body that floats freely has
-            none.
+        bodies: bodies of the tree, parents before children.
+        joints: joint between each body (the outer link) and its parent, at the stated coordinates; none for a floating
+            body.
         closures: joints that close loops.
         couplings: linear relations of joint coordinates.
-        offsets: value of each coupling at the stated configuration, by its name; 0 where it has none.
-        driven: names of the joints with an actuator.
-        frames: named places on bodies, as name of the body and the frame in it.
-        keyframes: names of the configurations in which the file can be read.
-        notes: sentences about what was left out or assumed.
+        offsets: value of each coupling at the stated configuration, by name; 0 if missing.
+        driven: names of the actuated joints.
+        frames: named frames on bodies: name of the body, and frame in body coordinates.
+        keyframes: names of the configurations of the file.
+        notes: notes about omitted elements and assumptions.
     """
 
     name: str
@@ -100,17 +100,17 @@ class Description:
     notes: tuple[str, ...] = ()
 
     def place_of(self, name: str) -> Frame:
-        """Return the place of a body in the world; of one without size between two joints, the world's own."""
+        """Return the frame of a body in the world; the world frame for a massless body between two joints."""
         return self._places.get(name) or Frame()
 
     @cached_property
     def _places(self) -> dict[str, Frame]:
-        """The places of all bodies."""
+        """Frames of all bodies by name."""
         return {body.name: body.place for body in self.bodies}
 
 
 def unique_name(wanted: str, taken: Mapping[str, object] | set[str]) -> str:
-    """Return a name, with a number behind it where it is taken."""
+    """Return a name, with a number appended if it is taken."""
     name, number = wanted, 2
     while name in taken:
         name, number = f"{wanted}_{number}", number + 1
@@ -118,6 +118,6 @@ def unique_name(wanted: str, taken: Mapping[str, object] | set[str]) -> str:
 
 
 def common_name(names: Sequence[str]) -> str:
-    """Return the common beginning of names such as ``closing_a_1`` and ``closing_a_2``; empty for none."""
+    """Return the common prefix of names such as ``closing_a_1`` and ``closing_a_2``; empty for none."""
     common = takewhile(lambda letters: len(set(letters)) == 1, zip(*names, strict=False))
     return "".join(letters[0] for letters in common).rstrip("_-. ")

@@ -1,4 +1,4 @@
-"""A description's joints and closures as one list of elementary joints between bodies, in the world."""
+"""Joints and closures of a description as elementary joints between bodies, in world coordinates."""
 
 from __future__ import annotations
 
@@ -14,16 +14,19 @@ from ....models.mechanism.graph import ElementaryKind
 from ....models.mechanism.topology import Classes
 from .description import Closing, Description, LoopClosure
 
-#: Points nearer than this, in parts of the robot's size, are one point: rounding of decimals of nine digits.
+#: Distance, relative to the robot's size, below which points coincide: rounding of values with nine digits.
 SAME_POINT = 1e-9
 
 
 def elements_of(given: Description, size: float) -> list[MechanismJoint]:
-    """Return all joints of a description: couplings of one joint hold it, and two balls are a hinge, three a weld.
+    """Return all elementary joints of a description.
+
+    A coupling of a single joint fixes the joint. Two spherical closures between the same bodies are a hinge, and three
+    are a rigid connection.
 
     Args:
         given: the description.
-        size: of the robot.
+        size: characteristic size of the robot, length.
     """
     held = {each.factors[0][0] for each in given.couplings if len(each.factors) == 1}
     joints = [replace(joint, kind="weld", axis=np.zeros(3)) if joint.name in held else joint for joint in given.joints]
@@ -32,7 +35,7 @@ def elements_of(given: Description, size: float) -> list[MechanismJoint]:
 
 
 def _closing_joints(given: Description, closure: LoopClosure) -> list[MechanismJoint]:
-    """Return the elementary joints of a closure; between two of them stands a body without size."""
+    """Return the elementary joints of a closure, with a massless body between two of them."""
     A = given.place_of(closure.first) @ closure.first_frame
     B = given.place_of(closure.second) @ closure.second_frame
     none, z, other = np.zeros(3), A.rotation[:, 2], B.rotation[:, 2]
@@ -55,7 +58,7 @@ def _closing_joints(given: Description, closure: LoopClosure) -> list[MechanismJ
 
 
 def rigid_groups(joints: Sequence[MechanismJoint], bodies: list[str]) -> dict[str, str]:
-    """Return for each body the first one of those to which welds fix it."""
+    """Return the representative of each body: the first body of its rigid group."""
     groups, order = Classes(bodies), {name: k for k, name in enumerate(bodies)}
     for each in joints:
         if each.kind == "weld":
@@ -65,13 +68,13 @@ def rigid_groups(joints: Sequence[MechanismJoint], bodies: list[str]) -> dict[st
 
 
 def bodies_of(given: Description, joints: Sequence[MechanismJoint]) -> list[str]:
-    """Return the names of all bodies, with those that stand between elementary joints of one closure."""
+    """Return the names of all bodies, including massless bodies between the elementary joints of a closure."""
     names = [body.name for body in given.bodies]
     return list(dict.fromkeys([*names, *(name for each in joints for name in (each.inner, each.outer))]))
 
 
 def _with_hinges(joints: list[MechanismJoint], closing: list[MechanismJoint], size: float) -> list[MechanismJoint]:
-    """Return the joints with closing balls between the same two rigid bodies as one joint."""
+    """Return the joints, with several spherical closures between the same rigid bodies merged into one joint."""
     both = [*joints, *closing]
     leader = rigid_groups(both, list(dict.fromkeys(name for each in both for name in (each.inner, each.outer))))
     pairs: dict[frozenset[str], list[MechanismJoint]] = {}
@@ -86,7 +89,7 @@ def _with_hinges(joints: list[MechanismJoint], closing: list[MechanismJoint], si
 
 
 def _joined(balls: list[MechanismJoint], size: float) -> MechanismJoint:
-    """Return the joint that several balls between two bodies are: a ball, a hinge, or a weld."""
+    """Return the joint equivalent to several spherical joints between two bodies: spherical, hinge or rigid."""
     first = balls[0]
     apart = [each.point - first.point for each in balls[1:]]
     longest = max(apart, key=lambda way: float(np.linalg.norm(way)))

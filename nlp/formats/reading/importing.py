@@ -1,4 +1,4 @@
-"""A robot in MJCF or URDF as a robot file."""
+"""Import of a robot in MJCF or URDF as the tables of a robot file."""
 
 from __future__ import annotations
 
@@ -28,28 +28,28 @@ from .symmetry import joints_of_limb
 from .urdf import read_urdf
 from .xmltext import read_xml
 
-#: Loops that are open by more than this, in parts of the robot's size, are closed only if asked for: decimals of six
-#: digits are nearer.
+#: Gap, relative to the robot's size, above which loops are closed only on request: rounding of values with six digits
+#: is smaller.
 OPEN = 1e-6
-#: Most names that a message lists.
+#: Largest number of names in a message.
 _MOST_NAMES = 12
-#: Entries below this are rounding of rotations, and are written as 0; lengths in parts of the robot's size.
+#: Largest rounding error of rotations, and of lengths relative to the robot's size; smaller values are written as 0.
 _ROUNDING = 1e-14
-#: Keys whose values hold tables.
+#: Keys with tables as values.
 _NESTED = ("limb", "joints", "branch", "joint")
 
 
 @dataclass(frozen=True)
 class Request:
-    """The robot to import, and how.
+    """Request of an import.
 
     Attributes:
-        path: of the file.
+        path: path of the file.
         ends: base, platform and actuators.
-        closes: whether Newton's method closes the loops.
-        loops: YAML file of a URDF file's loops; None for the one beside it.
-        keyframe: of an MJCF file, by its name; empty for its reference configuration.
-        snap: largest distance by which axes are moved so that they meet or are parallel, length; 0 for none.
+        closes: If true, open loops are closed by Newton's method.
+        loops: YAML file with the loops of a URDF file; None for a file with the same name, if there is one.
+        keyframe: name of a keyframe of an MJCF file; empty for the reference configuration.
+        snap: largest distance by which axes are moved to make them meet or parallel, length; 0 for no correction.
     """
 
     path: Path
@@ -62,20 +62,23 @@ class Request:
 
 @dataclass(frozen=True, eq=False)
 class Imported(Reduced):
-    """A robot that was imported, with how far its loops are open in the description.
+    """Imported robot.
 
     Attributes:
-        tables: of the robot file, with numbers.
+        tables: tables of the robot file, with numbers.
     """
 
     tables: dict[str, Any]
 
 
 def import_robot(request: Request) -> Imported:
-    """Return the robot that a file describes, as the tables of a robot file.
+    """Return the robot of a file as the tables of a robot file.
+
+    Args:
+        request: file, ends and options of the import.
 
     Raises:
-        InputError: the file cannot be read, or describes no robot with closed loops between base and platform.
+        InputError: the file cannot be read, or has no robot with closed loops between base and platform.
     """
     given = _read(request)
     reduced = reduce(given, request.ends)
@@ -111,22 +114,22 @@ def import_robot(request: Request) -> Imported:
 
 
 def _read(request: Request) -> Description:
-    """Return the description in a file of either format."""
+    """Return the description in an MJCF or URDF file."""
     root = read_xml(request.path)
     if root.tag in ("mujoco", "mujocoinclude"):
         if request.loops is not None:
-            raise InputError(f"--loops {request.loops}: is for URDF files; {request.path} is MJCF")
+            raise InputError(f"--loops {request.loops}: is only for URDF files, and {request.path} is MJCF")
         return read_mjcf(root, request.path, request.keyframe)
     if root.tag == "robot":
         if request.keyframe:
-            raise InputError(f"--keyframe {request.keyframe}: is for MJCF files; {request.path} is URDF")
+            raise InputError(f"--keyframe {request.keyframe}: is only for MJCF files, and {request.path} is URDF")
         return read_urdf(root, request.path, request.loops)
     tag = root.tag[:40]
-    raise InputError(f"{request.path}: begins with <{tag}>; <mujoco> of MJCF or <robot> of URDF is needed")
+    raise InputError(f"{request.path}: expected <mujoco> of MJCF or <robot> of URDF as root element, got <{tag}>")
 
 
 def _with_loops(given: Description, gaps: Sequence[Gap]) -> Description:
-    """Return a description with the loops of the mechanism alone: those of side chains stay as they are."""
+    """Return a description with only the loops of the mechanism, without those of side chains."""
     names = {gap.name for gap in gaps}
     return replace(
         given,
@@ -136,66 +139,66 @@ def _with_loops(given: Description, gaps: Sequence[Gap]) -> Description:
 
 
 def _reduced_at(closed: Closed, given: Description, request: Request) -> Reduced:
-    """Return a robot at the configuration in which its loops were closed, with all loops that the file has."""
+    """Return the mechanism at the configuration with closed loops, with all loops of the file."""
     return reduce(replace(closed.description, closures=given.closures, couplings=given.couplings), request.ends)
 
 
 def _not_closed(given: Description, loops: Description, reduced: Reduced, request: Request) -> str:
-    """Return the sentence about loops that stay open: the smallest gap found, which loops cannot close, what to do."""
+    """Return the message about loops that cannot be closed: smallest gap, loops at fault, and advice."""
     apart = least_gaps(loops, reduced.size)
     others = _other_keyframes(given, request.keyframe)
-    words = f"{_open_loop(given, reduced)} after Newton's method, which came no closer from other starts"
+    words = f"{_open_loop(given, reduced)} after Newton's method, also from other starts"
     if apart:
         each = [f"{name} by {value:.3g}" for name, value in list(apart.items())[:_MOST_NAMES]]
-        words += f"; even by itself, with every joint free, a loop stays open by parts of the size: {', '.join(each)}"
-        return f"{words}; correct the frames of these loops or the joints between them in the file{others}"
-    return f"{words}; each loop closes by itself, but not with the others: correct the lengths in the file{others}"
+        words += f"; some loops cannot be closed even separately (gaps relative to the size: {', '.join(each)})"
+        return f"{words}; correct the frames or joints of these loops in the file{others}"
+    return f"{words}; each loop can be closed separately, but not all together: correct the lengths in the file{others}"
 
 
 def _open_loop(given: Description, reduced: Reduced) -> str:
-    """Return the sentence that says which loop is open most."""
+    """Return the message about the loop with the largest gap."""
     fault = f"the loop {reduced.worst.name} is open by {reduced.worst.words}"
     return f"{given.source}: {fault}, more than {OPEN:g} of the robot's size {reduced.size:.3g}"
 
 
 def _other_keyframes(given: Description, keyframe: str) -> str:
-    """Return the words on the other configurations that a file has; empty without any."""
+    """Return a hint at the other configurations of a file; empty if there are none."""
     others = [each for each in given.keyframes if each != keyframe][:_MOST_NAMES]
-    return f", --keyframe takes another configuration: {listing(others)}" if others else ""
+    return f", or choose another configuration with --keyframe: {listing(others)}" if others else ""
 
 
 def _closed_words(closed: Closed, reduced: Reduced) -> str:
-    """Return the note on loops that were closed."""
+    """Return the note on closed loops."""
     moved = f"joints moved by up to {math.degrees(closed.turn):.3g} deg"
     moved += f" and {closed.way:.3g}" if closed.way else ""
-    kept = "driven joints stayed" if closed.kept else "driven joints moved too"
+    kept = "actuated joints did not move" if closed.kept else "actuated joints moved too"
     words = f"loops were closed by Newton's method: {moved}; {kept}"
     left = reduced.worst
     if left.share(reduced.size) <= CLOSED:
         return words
-    fault = f"{left.name} stays open by {left.words}, the least squares of numbers that contradict each other"
-    return f"{words}; {fault}: the robot file has the joint where its first body has it"
+    fault = f"{left.name} stays open by {left.words} (least squares), because dimensions in the file are inconsistent"
+    return f"{words}; {fault}; the robot file has this joint at its place on the first body"
 
 
 def _singular(mechanism: Mechanism, size: float) -> Iterator[str]:
-    """Yield a note for each singularity that a mechanism is in where it stands."""
+    """Yield a note for each singularity of a mechanism at the stated configuration."""
     try:
         generic = generic_ranks(mechanism)
     except MechanismError:
-        fault = "its loops close nowhere else near where the model stands"
-        yield f"{fault}: the robot cannot move, or its numbers contradict each other"
+        fault = "no closed configuration near the stated one"
+        yield f"{fault}: check that the mechanism is mobile and its dimensions are consistent"
         return
     for each in singularities_of(wrenches_of(mechanism, size).ranks, generic):
-        where = "" if each.type is SingularityType.ARCHITECTURE else " where it stands"
-        whose = "the robot" if each.member is None else f"member {each.member + 1}"
-        yield f"{whose} is singular{where}: {each.type.value}"
+        where = "" if each.type is SingularityType.ARCHITECTURE else " at the stated configuration"
+        part = "the robot" if each.member is None else f"member {each.member + 1}"
+        yield f"{part} is singular{where}: {each.type.value}"
 
 
 def _without_rounding(value: Any, size: float) -> Any:  # noqa: ANN401 - tables of any depth
-    """Return tables with numbers of the size of rounding errors as 0; the size is that of a list's numbers."""
+    """Return tables with 0 for rounding errors; ``size`` is the magnitude of the numbers in a list."""
     if isinstance(value, Mapping):
-        own = {key: size if key in ("at", "to", "home") else 1.0 for key in value}
-        return {key: _without_rounding(each, size if key in _NESTED else own[key]) for key, each in value.items()}
+        sizes = {key: size if key in ("at", "to", "home", *_NESTED) else 1.0 for key in value}
+        return {key: _without_rounding(each, sizes[key]) for key, each in value.items()}
     if isinstance(value, list):
         return [_without_rounding(each, size) for each in value]
     if isinstance(value, float):
@@ -204,7 +207,7 @@ def _without_rounding(value: Any, size: float) -> Any:  # noqa: ANN401 - tables 
 
 
 def _with_limb_names(tables: dict[str, Any]) -> dict[str, Any]:
-    """Return tables with each limb called by its first driven joint, or by its first joint."""
+    """Return tables with each limb named after its first actuated joint, or its first joint."""
     if "limb" not in tables:
         return tables
     taken: set[str] = set()

@@ -1,7 +1,8 @@
-"""Joints that stand for one: hinges about one axis, three hinges through one point, which are a ball, and pairs.
+"""Merging of joints: coaxial hinges, three intersecting hinges (spherical joint), and pairs of joints.
 
-In the tables of a robot file two crossing hinges are a universal joint, and a hinge and a slide along it are a ``C``.
-The wrenches of a limb depend on axes that meet exactly. Joints are replaced only where they do.
+In the tables of a robot file, two intersecting hinges become a universal joint, and a hinge and a slide along its axis
+become a cylindrical joint. Joints are merged only if their axes meet to rounding, because the wrenches of a limb depend
+on that.
 """
 
 from __future__ import annotations
@@ -18,24 +19,27 @@ from ...errors import listing
 from .description import common_name
 from .elements import SAME_POINT
 
-#: Axes whose distance, in parts of the robot's size, or whose sine is below this almost meet or are almost parallel:
-#: decimals that are typed with three digits are nearer.
+#: Distance, relative to the robot's size, or sine of the angle, below which axes almost meet or are almost parallel:
+#: rounding of values with three digits is smaller.
 ALMOST = 1e-3
-#: Smallest volume that three unit axes span as a ball joint. Below it they are nearly in one plane, and the stated
-#: configuration is the singular one of a wrist.
+#: Smallest volume spanned by three unit axes of a spherical joint. Below it the axes are nearly in one plane, and the
+#: stated configuration is a wrist singularity.
 _FLAT = 1e-3
-#: Most names that a note lists.
+#: Largest number of names in a note.
 _MOST_NAMES = 12
 
 
 def with_meeting_joints(given: Mechanism, size: float) -> tuple[Mechanism, list[str]]:
-    """Return a mechanism with passive hinges about one axis as one hinge, and three through one point as a ball.
+    """Return a mechanism with coaxial passive hinges merged, and three intersecting ones as a spherical joint.
 
-    Only hinges with nothing else between them are replaced, and none that a coupling names. Notes say which.
+    Only adjacent hinges without couplings are merged.
 
     Args:
         given: the mechanism.
-        size: of the robot.
+        size: characteristic size of the robot, length.
+
+    Returns:
+        Mechanism, and notes about the merged joints.
     """
     hinges: list[str] = []
     while (joined := _same_axis(given, size)) is not None:
@@ -45,30 +49,30 @@ def with_meeting_joints(given: Mechanism, size: float) -> tuple[Mechanism, list[
     while (joined := _ball(given, size)) is not None:
         given, words = joined
         balls.append(words)
-    notes = [f"hinges about one axis were read as one hinge: {_some(hinges)}"] if hinges else []
-    notes += [f"three hinges through one point were read as a ball joint: {_some(balls)}"] if balls else []
+    notes = [f"coaxial hinges were merged: {_some(hinges)}"] if hinges else []
+    notes += [f"three intersecting hinges were merged to a spherical joint: {_some(balls)}"] if balls else []
     return given, notes
 
 
 def _some(words: list[str]) -> str:
-    """Return the first of many words as a list."""
+    """Return the first few texts as a list."""
     return listing(words[:_MOST_NAMES]) + (f" and {len(words) - _MOST_NAMES} more" if len(words) > _MOST_NAMES else "")
 
 
 def chains_of(given: Mechanism) -> list[list[MechanismJoint]]:
-    """Return the sequences of joints between links that have more than two joints, or are base or platform."""
-    own = _joints_of_links(given)
-    ends = {name for name, joints in own.items() if len(joints) != 2} | {given.base, given.platform}
+    """Return the chains of joints between branching links; base and platform count as branching links."""
+    of_link = _joints_of_links(given)
+    ends = {name for name, joints in of_link.items() if len(joints) != 2} | {given.base, given.platform}
     found: list[list[MechanismJoint]] = []
     seen: set[str] = set()
     for link in [each.name for each in given.links if each.name in ends]:
-        for joint in own.get(link, []):
+        for joint in of_link.get(link, []):
             if joint.name in seen:
                 continue
             chain, at, step = [joint], _other(joint, link), joint
             seen.add(joint.name)
             while at not in ends:
-                step = next(each for each in own[at] if each.name != step.name)
+                step = next(each for each in of_link[at] if each.name != step.name)
                 chain.append(step)
                 seen.add(step.name)
                 at = _other(step, at)
@@ -77,7 +81,7 @@ def chains_of(given: Mechanism) -> list[list[MechanismJoint]]:
 
 
 def axes_gap(one: MechanismJoint, other: MechanismJoint) -> tuple[float, float]:
-    """Return the distance of two axes, and the sine of their angle."""
+    """Return the distance between two axes, and the sine of their angle."""
     normal = np.cross(one.axis, other.axis)
     sine, apart = float(np.linalg.norm(normal)), other.point - one.point
     if sine < ALMOST:
@@ -86,11 +90,11 @@ def axes_gap(one: MechanismJoint, other: MechanismJoint) -> tuple[float, float]:
 
 
 def _joints_of_links(given: Mechanism) -> dict[str, list[MechanismJoint]]:
-    own: dict[str, list[MechanismJoint]] = {}
+    found: dict[str, list[MechanismJoint]] = {}
     for joint in given.joints:
-        own.setdefault(joint.inner, []).append(joint)
-        own.setdefault(joint.outer, []).append(joint)
-    return own
+        found.setdefault(joint.inner, []).append(joint)
+        found.setdefault(joint.outer, []).append(joint)
+    return found
 
 
 def _other(joint: MechanismJoint, link: str) -> str:
@@ -98,7 +102,7 @@ def _other(joint: MechanismJoint, link: str) -> str:
 
 
 def _runs(given: Mechanism, length: int) -> list[list[MechanismJoint]]:
-    """Return all sequences of so many passive hinges that follow each other."""
+    """Return all sequences of ``length`` adjacent passive hinges without couplings."""
     coupled = {name for each in given.couplings for name, _ in each.factors}
     found = []
     for chain in chains_of(given):
@@ -110,7 +114,7 @@ def _runs(given: Mechanism, length: int) -> list[list[MechanismJoint]]:
 
 
 def _same_axis(given: Mechanism, size: float) -> tuple[Mechanism, str] | None:
-    """Return the mechanism with two hinges about one axis as one; None where there are none."""
+    """Return the mechanism with two coaxial hinges merged, and a note; None if there are none."""
     for one, other in _runs(given, 2):
         distance, sine = axes_gap(one, other)
         if sine < SAME_POINT and distance < SAME_POINT * size:
@@ -120,7 +124,7 @@ def _same_axis(given: Mechanism, size: float) -> tuple[Mechanism, str] | None:
 
 
 def _ball(given: Mechanism, size: float) -> tuple[Mechanism, str] | None:
-    """Return the mechanism with three hinges through one point as a ball; None where there are none."""
+    """Return the mechanism with three intersecting hinges merged, and a note; None if there are none."""
     for run in _runs(given, 3):
         one, two, _ = run
         if abs(float(np.linalg.det(np.array([each.axis for each in run])))) < _FLAT:
@@ -129,10 +133,10 @@ def _ball(given: Mechanism, size: float) -> tuple[Mechanism, str] | None:
         off = [np.linalg.norm(np.cross(each.axis, point - each.point)) for each in run]
         if max(off) < SAME_POINT * size:
             common = common_name([each.name for each in run])
-            is_own = common and not any(each.name.startswith(common) for each in given.joints if each not in run)
+            is_unique = common and not any(each.name.startswith(common) for each in given.joints if each not in run)
             ball = replace(
                 one,
-                name=common if is_own else run[0].name,
+                name=common if is_unique else run[0].name,
                 kind="S",
                 point=point,
                 axis=np.zeros(3),
@@ -143,7 +147,7 @@ def _ball(given: Mechanism, size: float) -> tuple[Mechanism, str] | None:
 
 
 def _replaced(given: Mechanism, run: list[MechanismJoint], joint: MechanismJoint) -> Mechanism:
-    """Return a mechanism with one joint in the place of several that follow each other, without the links between."""
+    """Return a mechanism with several adjacent joints replaced by one joint, without the links between them."""
     counts: dict[str, int] = {}
     for each in run:
         for link in (each.inner, each.outer):
@@ -152,7 +156,7 @@ def _replaced(given: Mechanism, run: list[MechanismJoint], joint: MechanismJoint
     inner, outer = (link for link, count in counts.items() if count == 1)
     if run[0].inner == outer or run[-1].outer == inner:
         inner, outer = outer, inner
-    # The axis of a hinge that was read from its other side is turned over, so that its coordinate keeps its sign.
+    # The axis is reversed if inner and outer link are exchanged, so that the joint coordinate keeps its sign.
     turned = joint.kind == "R" and joint.inner != inner
     new = replace(joint, inner=inner, outer=outer, axis=-joint.axis if turned else joint.axis)
     names = {each.name for each in run}
@@ -167,11 +171,11 @@ def _replaced(given: Mechanism, run: list[MechanismJoint], joint: MechanismJoint
 
 
 def with_universal_joints(tables: Mapping[str, Any], size: float) -> dict[str, Any]:
-    """Return the tables of a robot file with limbs, with pairs of passive joints as one joint ``U`` or ``C``.
+    """Return the tables of a robot file with pairs of passive joints merged to joints ``U`` or ``C``.
 
     Args:
-        tables: of the robot file, with numbers; one with links and joints stays as it is.
-        size: of the robot.
+        tables: tables of the robot file, with numbers; a file with links and joints is not changed.
+        size: characteristic size of the robot, length.
     """
     if "limb" not in tables:
         return dict(tables)
@@ -179,7 +183,7 @@ def with_universal_joints(tables: Mapping[str, Any], size: float) -> dict[str, A
 
 
 def _limb(limb: Mapping[str, Any], size: float) -> dict[str, Any]:
-    """Return a limb with its joints paired; those before and behind a branching are paired apart."""
+    """Return a limb with pairs of joints merged, separately before and after a branching."""
     found = dict(limb)
     if "joints" in limb:
         found["joints"] = _paired(limb["joints"], size)
@@ -189,7 +193,7 @@ def _limb(limb: Mapping[str, Any], size: float) -> dict[str, Any]:
 
 
 def _paired(joints: Sequence[Mapping[str, Any]], size: float) -> list[dict[str, Any]]:
-    """Return joints with pairs as one."""
+    """Return joints with pairs merged."""
     found: list[dict[str, Any]] = []
     rest = [dict(joint) for joint in joints]
     while rest:
@@ -202,7 +206,7 @@ def _paired(joints: Sequence[Mapping[str, Any]], size: float) -> list[dict[str, 
 
 
 def _pair(one: Mapping[str, Any], other: Mapping[str, Any], size: float) -> dict[str, Any] | None:
-    """Return two joints as one; None where they are not."""
+    """Return the joint equivalent to two joints; None if there is none."""
     kinds = one["type"], other["type"]
     if one.get("actuated") or other.get("actuated") or kinds not in (("R", "R"), ("R", "P"), ("P", "R")):
         return None

@@ -1,4 +1,4 @@
-"""Reader of MuJoCo's MJCF, through MuJoCo's own parser."""
+"""Reader of MJCF by MuJoCo's parser."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ if TYPE_CHECKING:
 
 
 def read_mjcf(root: Element, path: Path, keyframe: str = "") -> Description:
-    """Return the robot that a MuJoCo model states, at a keyframe or at its reference configuration ``qpos0``.
+    """Return the robot of a MuJoCo model, at a keyframe or at the reference configuration ``qpos0``.
 
     Args:
-        root: of the main file.
-        path: of the main file.
-        keyframe: name of the keyframe, or its number from 1 on; empty for ``qpos0``.
+        root: root element of the main file.
+        path: path of the main file.
+        keyframe: name of the keyframe, or its number from 1; empty for ``qpos0``.
 
     Raises:
         InputError: MuJoCo is not installed, or the model cannot be read.
@@ -56,7 +56,7 @@ def read_mjcf(root: Element, path: Path, keyframe: str = "") -> Description:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep what a library writes to the process's standard output and error from the user."""
+    """Suppress standard output and error of the process, to which MuJoCo writes."""
     with tempfile.TemporaryFile() as lost:
         kept = [(descriptor, os.dup(descriptor)) for descriptor in (1, 2)]
         try:
@@ -70,7 +70,7 @@ def _quiet() -> Iterator[None]:
 
 
 class _Reader:
-    """A compiled model at a configuration."""
+    """Reader of a compiled model at a configuration."""
 
     def __init__(self, mujoco: Any, model: Any, data: Any, source: str) -> None:  # noqa: ANN401 - no stubs
         self.mujoco, self.model, self.data, self.source = mujoco, model, data, source
@@ -84,7 +84,7 @@ class _Reader:
         self.notes: list[str] = []
 
     def _names(self, count: int, of: Any, kind: str) -> list[str]:  # noqa: ANN401 - no stubs
-        """Return a name for each of ``count`` things; those without one are numbered."""
+        """Return a unique name for each of ``count`` elements; elements without a name are numbered."""
         given = [str(of(k).name) for k in range(count)]
         names = []
         for k, name in enumerate(given):
@@ -94,7 +94,7 @@ class _Reader:
         return names
 
     def description(self, name: str, clean: CleanModel, notes: tuple[str, ...]) -> Description:
-        """Return the robot."""
+        """Return the description of the robot."""
         self.bodies.append(Body(self.body_names[0], "", Frame()))
         for k in range(1, self.model.nbody):
             self._add_body(k)
@@ -103,7 +103,9 @@ class _Reader:
         known = {joint.name for joint in self.joints}
         for joint in driven:
             if joint not in known:
-                raise InputError(f"{self.source}: an actuator drives {joint!r}, which is no joint that can be driven")
+                raise InputError(
+                    f"{self.source}: an actuator drives {joint!r}, which is not a hinge or slide of the model"
+                )
         return Description(
             name=name,
             source=self.source,
@@ -120,7 +122,7 @@ class _Reader:
         )
 
     def _add_body(self, k: int) -> None:
-        """Add a body with its joints; between two joints of one body stands a body without size."""
+        """Add a body with its joints, with massless bodies between several joints of a body."""
         model, data, mujoco = self.model, self.data, self.mujoco
         name, parent = self.body_names[k], self.body_names[model.body_parentid[k]]
         place = Frame(data.xpos[k].copy(), data.xmat[k].reshape(3, 3).copy())
@@ -154,7 +156,7 @@ class _Reader:
             parent = moved
 
     def _sites(self) -> dict[str, tuple[str, Frame]]:
-        """Return the named sites in the frames of their bodies."""
+        """Return the body and the frame, in body coordinates, of each named site."""
         found = {}
         for k in range(self.model.nsite):
             if self.model.site(k).name:
@@ -162,12 +164,12 @@ class _Reader:
         return found
 
     def _site(self, k: int) -> tuple[str, Frame]:
-        """Return a site's body, and its frame there."""
+        """Return the body of a site, and the frame of the site in body coordinates."""
         rotation = rotation_from_quaternion(self.model.site_quat[k])
         return self.body_names[self.model.site_bodyid[k]], Frame(self.model.site_pos[k].copy(), rotation)
 
     def _equalities(self) -> tuple[list[LoopClosure], list[Coupling], dict[str, float]]:
-        """Return the model's equalities as joints that close loops, as couplings, and what these are open by."""
+        """Return the equalities of the model: joints that close loops, couplings, and residuals of the couplings."""
         model, kinds = self.model, self.mujoco.mjtEq
         closures: list[LoopClosure] = []
         couplings: list[Coupling] = []
@@ -178,9 +180,9 @@ class _Reader:
             is_coupling = model.eq_type[k] in (int(kinds.mjEQ_JOINT), int(kinds.mjEQ_TENDON))
             closure = None if is_coupling else self._closure(k, name)
             if not model.eq_active0[k]:
-                self.notes.append(f"the equality {name} is not active and was left out")
+                self.notes.append(f"equality {name} was omitted: it is not active")
             elif closure is not None and {closure.first, closure.second} & self.mocap:
-                self.notes.append(f"the equality {name} with a mocap body, which the simulation moves, was left out")
+                self.notes.append(f"equality {name} was omitted: it has a mocap body, which only a simulation moves")
             elif closure is not None:
                 closures.append(closure)
                 taken.add(name)
@@ -192,7 +194,7 @@ class _Reader:
         return closures, couplings, offsets
 
     def _name_of_equality(self, k: int) -> str:
-        """Return the name of an equality; without one, what the names of its sites have in common."""
+        """Return the name of an equality; without one, the common prefix of the names of its sites."""
         given = str(self.model.equality(k).name)
         if given or self.model.eq_objtype[k] != int(self.mujoco.mjtObj.mjOBJ_SITE):
             return given or f"equality_{k + 1}"
@@ -210,7 +212,7 @@ class _Reader:
         else:
             one, other, numbers = self.body_names[first], self.body_names[second], model.eq_data[k]
             if is_weld:
-                # The anchor's place comes in both frames, the first body's behind; the rotation is the second body's.
+                # eq_data has the anchor on the second body, then on the first body, then the relative rotation.
                 one_frame = Frame(numbers[3:6].copy(), rotation_from_quaternion(numbers[6:10]))
                 other_frame = Frame(numbers[0:3].copy())
             else:
@@ -220,15 +222,15 @@ class _Reader:
     def _coupling(self, k: int, name: str) -> tuple[Coupling, float]:
         """Return the linear relation of an equality of joints or fixed tendons, and its value at the configuration.
 
-        Coordinates of the relation are counted from there, those of MuJoCo's polynomial from ``qpos0``.
+        Coordinates of the relation are relative to the configuration; those of MuJoCo's polynomial to ``qpos0``.
         """
         model = self.model
         is_tendon = model.eq_type[k] == int(self.mujoco.mjtEq.mjEQ_TENDON)
         sides = [int(each) for each in (model.eq_obj1id[k], model.eq_obj2id[k]) if each >= 0]
         constant, slope, *higher = (float(each) for each in model.eq_data[k][:5])
         if any(higher) and len(sides) == 2:
-            fault = "has a polynomial; only a constant and a factor as the first two of its polycoef are read"
-            raise InputError(f"{self.source}: the equality {name} of {'tendons' if is_tendon else 'joints'} {fault}")
+            fault = "must be linear: its polycoef may have a constant and a factor, followed by zeros"
+            raise InputError(f"{self.source}: equality {name} of {'tendons' if is_tendon else 'joints'}: {fault}")
         total: dict[int, float] = {}
         for side, sign in zip(sides, (1.0, -slope), strict=False):
             for joint, factor in self._pulls(side) if is_tendon else [(side, 1.0)]:
@@ -246,14 +248,14 @@ class _Reader:
         return [(int(self.model.wrap_objid[k]), float(self.model.wrap_prm[k])) for k in steps]
 
     def _tendon_motor(self, name: str, couplings: list[Coupling]) -> str:
-        """Return the joint that the actuator of a fixed tendon drives.
+        """Return the name of the joint that the actuator of a fixed tendon drives.
 
-        A tendon of several joints has a motor of its own beside the first of them. A coupling makes the length of the
-        tendon the motor's coordinate.
+        A tendon of several joints has its motor on the link before the first of them. A coupling makes the length of
+        the tendon the coordinate of the motor.
 
         Args:
             name: name of the tendon.
-            couplings: to which this one is added.
+            couplings: couplings of the robot; that of the motor is added.
         """
         pulls = [(joint, factor) for joint, factor in self._pulls(self.model.tendon(name).id) if factor]
         if len(pulls) == 1:
@@ -270,5 +272,5 @@ class _Reader:
         self.joints.append(MechanismJoint(motor, first.kind, inner.name, rotor, first.point, first.axis))
         factors = ((motor, 1.0), *((self.joint_names[joint], -factor) for joint, factor in pulls))
         couplings.append(Coupling(unique_name(f"{motor} tendon", taken), factors))
-        self.notes.append(f"the actuator of the tendon {name} is the joint {motor}, whose coordinate is its length")
+        self.notes.append(f"actuator of tendon {name}: joint {motor}, whose coordinate is the length of the tendon")
         return motor

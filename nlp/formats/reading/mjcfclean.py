@@ -1,4 +1,4 @@
-"""The files of a MuJoCo model as one tree of bodies, joints, sites and equalities, which needs no mesh or plugin."""
+"""Reduction of a MuJoCo model to bodies, joints, sites and equalities, without meshes, plugins and included files."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element, SubElement
 from ...errors import InputError, nearest
 from .xmltext import LARGEST_FILE, read_xml
 
-#: Elements that remain, by the element that holds them; of a body's children those of ``body``.
+#: Elements that are kept, by their parent element.
 _KEPT = {
     "mujoco": ("compiler", "default", "worldbody", "tendon", "equality"),
     "default": ("default", "joint", "site", "equality"),
@@ -21,38 +21,38 @@ _KEPT = {
 }
 #: Attributes that remain of fixed tendons and of their joints.
 _TENDON = {"fixed": ("name",), "joint": ("joint", "coef")}
-#: Settings of the compiler that change where bodies and joints are.
+#: Settings of the compiler that affect the poses of bodies and joints.
 _COMPILER = ("angle", "eulerseq", "coordinate", "autolimits")
-#: Attributes that name something that is left out, or whose length depends on it.
+#: Attributes that refer to omitted elements.
 _DROPPED = ("material", "user")
-#: Attributes of a keyframe that say where bodies are.
+#: Attributes of a keyframe that determine the poses of bodies.
 _KEYFRAME = ("name", "qpos", "mpos", "mquat")
-#: What actuators that drive no joint act on, by the attribute that names it.
+#: Targets of actuators other than joints, by the attribute with their name.
 _TRANSMISSIONS = {
     "tendon": "the tendon",
     "site": "the site",
     "body": "the body",
     "cranksite": "the slider-crank at the site",
 }
-#: Most copies that ``replicate`` may make in all: a robot has dozens of bodies.
+#: Largest total number of copies by ``replicate``: a robot has dozens of bodies.
 _MOST_COPIES = 2000
-#: Deepest chain of files that include each other.
+#: Largest depth of included files.
 _DEEPEST = 16
-#: Most files of one model.
+#: Largest number of files of one model.
 _MOST_FILES = 200
-#: Elements whose children stand in the place of an ``include``.
+#: Allowed root elements of included files.
 _ROOTS = ("mujoco", "mujocoinclude")
 
 
 class CleanModel(NamedTuple):
-    """The remaining elements, and what was read from the others.
+    """Reduced model.
 
     Attributes:
-        root: elements that MuJoCo compiles without any further file.
-        driven: names of the joints that actuators drive, in order.
-        tendons: names of the fixed tendons that actuators drive, in order.
-        keyframes: names of the model's keyframes, or their numbers from 1 on; of these the wanted one alone remains.
-        notes: sentences about what was left out.
+        root: root element of a model that MuJoCo compiles without other files, with only the requested keyframe.
+        driven: names of the actuated joints, in order.
+        tendons: names of the actuated fixed tendons, in order.
+        keyframes: names of all keyframes of the model, or their numbers from 1.
+        notes: notes about omitted elements.
     """
 
     root: Element
@@ -63,37 +63,40 @@ class CleanModel(NamedTuple):
 
 
 def clean_model(main: Element, path: Path, keyframe: str = "") -> CleanModel:
-    """Return a model without what does not matter for its geometry.
+    """Return a model reduced to its geometry.
 
     Args:
-        main: root of the main file.
-        path: of the main file.
-        keyframe: name or number of the keyframe that is wanted; empty for none.
+        main: root element of the main file.
+        path: path of the main file.
+        keyframe: name or number of the requested keyframe; empty for none.
 
     Raises:
-        InputError: an included file cannot be read or found, includes itself, or there are too many; the model is put
-            together from other models, copies bodies too often, or has no such keyframe.
+        InputError: an included file cannot be read, includes itself, or there are too many; the model attaches other
+            models, copies bodies too often, or has no such keyframe.
     """
     root, source = _Files(path).expanded(main, (path,)), str(path)
     for element in root.iter("attach"):
-        fault = f"attaches {element.get('model', 'another model')!r}; write the model as one file first"
-        raise InputError(f"{source}: {fault}")
+        fault = f"attaches {element.get('model', 'another model')!r}, which is not supported"
+        raise InputError(f"{source}: {fault}; save the model as a single file first")
     notes: list[str] = []
     fixed = _without_other_tendons(root)
     driven, tendons = _driven(root, fixed, notes)
     for element in root.iter("equality"):
-        other = [each for each in element if each.tag not in _KEPT["equality"] or not _ties(each, fixed)]
-        notes += [f"the equality {each.get('name', '(unnamed)')} of the kind {each.tag} was left out" for each in other]
+        other = [each for each in element if each.tag not in _KEPT["equality"] or not _is_read(each, fixed)]
+        notes += [
+            f"equality {each.get('name', '(unnamed)')} was omitted: the kind {each.tag} is not supported"
+            for each in other
+        ]
         for each in other:
             element.remove(each)
     if any(True for tag in ("composite", "flexcomp", "flex") for _ in root.iter(tag)):
-        notes.append("soft bodies were left out")
+        notes.append("soft bodies were omitted")
     result = Element("mujoco", {key: value for key, value in root.attrib.items() if key == "model"})
     _copy_children(root, result, "mujoco", 1, source)
     keys = {key.get("name") or str(k): key for k, key in enumerate(root.iterfind("keyframe/key"), 1)}
     if keyframe:
         if keyframe not in keys:
-            hint = nearest(keyframe, list(keys)) if keys else "the model has none"
+            hint = nearest(keyframe, list(keys)) if keys else "the model has no keyframes"
             raise InputError(f"{source}: --keyframe {keyframe}: no such keyframe; {hint}")
         attributes = {key: value for key, value in keys[keyframe].attrib.items() if key in _KEYFRAME}
         SubElement(SubElement(result, "keyframe"), "key", attributes)
@@ -101,13 +104,13 @@ def clean_model(main: Element, path: Path, keyframe: str = "") -> CleanModel:
 
 
 class _Files:
-    """The files of one model: how many there are, and how large they are together."""
+    """Included files of one model, with limits on their number and total size."""
 
     def __init__(self, main: Path) -> None:
         self.main, self.files, self.size = main, 0, 0
 
     def expanded(self, element: Element, chain: tuple[Path, ...]) -> Element:
-        """Return an element with the content of included files in the place of each ``include``."""
+        """Return an element with each ``include`` replaced by the content of its file."""
         result = Element(element.tag, element.attrib)
         result.text = element.text
         for child in element:
@@ -121,8 +124,8 @@ class _Files:
         """Return the elements of an included file."""
         name = element.get("file", "")
         if not name:
-            raise InputError(f"{chain[-1]}: an include names no file")
-        # MuJoCo looks beside the main file; models that are assembled by hand mean the file that includes.
+            raise InputError(f'{chain[-1]}: <include>: file is missing; write <include file="NAME"/>')
+        # MuJoCo searches in the folder of the main file; some models need the folder of the including file.
         places = [self.main.parent / name, chain[-1].parent / name]
         path = next((each for each in places if each.is_file()), places[0])
         if any(path.resolve() == each.resolve() for each in chain):
@@ -130,14 +133,14 @@ class _Files:
         if len(chain) > _DEEPEST:
             raise InputError(f"{chain[-1]}: includes {name} more than {_DEEPEST} files deep")
         if not path.is_file():
-            raise InputError(f"{chain[-1]}: includes {name}, which cannot be found")
+            raise InputError(f"{chain[-1]}: includes {name}, which does not exist")
         self.files, self.size = self.files + 1, self.size + path.stat().st_size
         if self.files > _MOST_FILES or self.size > LARGEST_FILE:
             most = f"{_MOST_FILES} files or {LARGEST_FILE // 2**20} MB"
-            raise InputError(f"{self.main}: includes more than {most} in all")
+            raise InputError(f"{self.main}: must not include more than {most} in total")
         root = read_xml(path)
         if root.tag not in _ROOTS:
-            raise InputError(f"{path}: begins with <{root.tag}>; <mujoco> or <mujocoinclude> is needed")
+            raise InputError(f"{path}: expected <mujoco> or <mujocoinclude> as root element, got <{root.tag}>")
         return list(self.expanded(root, (*chain, path)))
 
 
@@ -156,14 +159,14 @@ def _without_other_tendons(root: Element) -> set[str]:
     return kept
 
 
-def _ties(equality: Element, fixed: set[str]) -> bool:
+def _is_read(equality: Element, fixed: set[str]) -> bool:
     """Return whether an equality is none of tendons, or one of fixed tendons alone."""
     names = [equality.get(key) for key in ("tendon1", "tendon2")]
     return equality.tag != "tendon" or all(name in fixed for name in names if name is not None)
 
 
 def _driven(root: Element, fixed: set[str], notes: list[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the joints, and the fixed tendons, that actuators drive; actuators of anything else become notes."""
+    """Return the joints, and the fixed tendons, that actuators drive; actuators of other elements become notes."""
     driven: list[str] = []
     tendons: list[str] = []
     for section in root.iter("actuator"):
@@ -175,15 +178,15 @@ def _driven(root: Element, fixed: set[str], notes: list[str]) -> tuple[tuple[str
                 tendons.append(each.get("tendon", ""))
             else:
                 on = next((f"{words} {each.get(key)!r}" for key, words in _TRANSMISSIONS.items() if each.get(key)), "")
-                fault = f"acts on {on}, which is not read" if on else "acts on nothing that is read"
+                fault = f"acts on {on}" if on else "does not act on a joint"
                 notes.append(
-                    f"the actuator {each.get('name', 'without a name')!r} {fault}; --actuated names what it drives"
+                    f"actuator {each.get('name', '(unnamed)')!r} was omitted: it {fault}; name a joint by --actuated"
                 )
     return tuple(dict.fromkeys(driven)), tuple(dict.fromkeys(tendons))
 
 
 def _copy_children(given: Element, result: Element, kind: str, copies: int, source: str) -> None:
-    """Copy the children that remain."""
+    """Copy the children that are kept."""
     for child in given:
         if child.tag not in _KEPT[kind]:
             continue
@@ -197,10 +200,11 @@ def _copy_children(given: Element, result: Element, kind: str, copies: int, sour
             count = child.get("count", "1")
             inner_copies = copies * int(count) if count.isdecimal() and len(count) < 9 else _MOST_COPIES + 1
             if inner_copies > _MOST_COPIES:
-                raise InputError(f"{source}: replicate count = {count}: at most {_MOST_COPIES} copies in all are read")
+                fault = f"must give at most {_MOST_COPIES} copies in total"
+                raise InputError(f"{source}: replicate count = {count}: {fault}")
         copy = SubElement(result, child.tag, attributes)
         if child.tag == "body":
-            # MuJoCo wants a mass of each body that moves; no result here depends on it.
+            # MuJoCo requires a mass of each moving body; it has no effect here.
             SubElement(copy, "inertial", {"pos": "0 0 0", "mass": "1", "diaginertia": "1 1 1"})
         if child.tag in ("body", "frame", "replicate"):
             inner = "body" if kind == "body" or child.tag == "body" else "worldbody"

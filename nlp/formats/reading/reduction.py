@@ -1,4 +1,4 @@
-"""From a description to the mechanism between base and platform: rigid bodies merged, side chains left out."""
+"""Reduction of a description to the mechanism between base and platform: rigid bodies merged, side chains removed."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from .closing import Gap, gap_of, gap_of_coupling
 from .description import LARGEST, Description
 from .elements import bodies_of, elements_of, rigid_groups
 
-#: Most names that a message lists.
+#: Largest number of names in a message.
 _MOST_NAMES = 12
-#: Rounding of a distance, as a part of it.
+#: Relative rounding error of a distance.
 _UP = 1e-12
 
 
 @dataclass(frozen=True)
 class Ends:
-    """Base, platform and actuators by name, as the user gives them; empty for what the description says.
+    """Names of base, platform and actuated joints, as given by the user.
 
     Attributes:
-        platform: a body, or a frame on one, whose origin is that of the platform.
-        base: a body; empty for the fixed root.
-        actuated: joints; empty for those with an actuator in the description.
+        platform: name of the platform: a body, or a frame on a body, whose origin becomes that of the platform frame.
+        base: name of the base body; empty for the fixed root.
+        actuated: names of the actuated joints; empty for the joints with an actuator in the description.
     """
 
     platform: str
@@ -38,13 +38,13 @@ class Ends:
 
 @dataclass(frozen=True, eq=False)
 class Reduced:
-    """The mechanism between base and platform.
+    """Mechanism between base and platform.
 
     Attributes:
-        mechanism: of rigid links and joints, at the stated configuration.
-        size: largest distance of two of its joints, length.
-        gaps: how far the loops are open that closing joints close.
-        notes: sentences about what was left out.
+        mechanism: mechanism of rigid links and joints, at the stated configuration.
+        size: largest distance between two joints of the mechanism, length.
+        gaps: gap of each loop in the description.
+        notes: notes about omitted elements.
     """
 
     mechanism: Mechanism
@@ -54,23 +54,23 @@ class Reduced:
 
     @property
     def worst(self) -> Gap:
-        """The gap of the loop that is open most; one of 0 where there is no loop."""
+        """Largest gap of all loops; 0 without loops."""
         return max(self.gaps, key=lambda gap: gap.share(self.size), default=Gap("", 0.0, 0.0))
 
 
 def size_of(given: Description) -> float:
-    """Return the largest distance between joints of a description, 1 where all are in one place."""
+    """Return the largest distance between joints of a description; 1 if all coincide."""
     points = [each.point for each in given.joints]
     points += [(given.place_of(each.first) @ each.first_frame).position for each in given.closures]
     return _extent(points)
 
 
 def _extent(points: Sequence[np.ndarray]) -> float:
-    """Return the largest distance between points, 1 where it is zero."""
+    """Return the largest distance between points; 1 if all coincide."""
     if len(points) < 2:
         return 1.0
     cloud = np.array(points)
-    # Two points are no farther apart than both from the middle: the farthest ones decide, but for clouds like a sphere.
+    # The distance of two points is at most the sum of their distances from the middle, so that few pairs are compared.
     away = np.linalg.norm(cloud - (cloud.min(axis=0) + cloud.max(axis=0)) / 2, axis=1)
     order = np.argsort(-away, kind="stable")
     cloud, away, largest = cloud[order], away[order] * (1 + _UP), 0.0
@@ -83,14 +83,15 @@ def _extent(points: Sequence[np.ndarray]) -> float:
 
 
 def reduce(given: Description, ends: Ends) -> Reduced:
-    """Return the mechanism that joins base and platform.
+    """Return the mechanism that connects base and platform.
 
     Args:
         given: the description.
-        ends: base, platform and actuators.
+        ends: names of base, platform and actuated joints.
 
     Raises:
-        InputError: a name means nothing, the platform is on an open chain or is part of the base, or nothing drives it.
+        InputError: a name is unknown, the platform is on an open chain or rigidly joined to the base, or the mechanism
+            has no actuator.
     """
     check_names(given)
     _check_places(given)
@@ -104,7 +105,9 @@ def reduce(given: Description, ends: Ends) -> Reduced:
     moving = [each for each in elements if leader[each.inner] != leader[each.outer]]
     start, end = leader[base], leader[platform]
     if start == end:
-        raise InputError(f"{given.source}: --platform {ends.platform}: is rigidly joined to the base {base}")
+        raise InputError(
+            f"{given.source}: --platform {ends.platform}: is rigidly joined to the base {base}; choose a moving body"
+        )
     edges = [(leader[each.inner], leader[each.outer]) for each in moving]
     kept = [moving[k] for k in between(edges, start, end)]
     motors = _coupled_motors(given, moving, kept, leader)
@@ -125,33 +128,34 @@ def reduce(given: Description, ends: Ends) -> Reduced:
         couplings=couplings,
     )
     bodies = {body.name: body.place for body in given.bodies}
-    own = {each.name for each in kept}
-    # A closure counts where it is a joint that is kept, or two; where it welds bodies of a link that is kept; and where
-    # it is a further ball of a hinge there.
+    joint_names = {each.name for each in kept}
+    # Closures of the mechanism are its joints, and closures between bodies of its rigid links.
     gaps = [
         gap_of(each, bodies)
         for each in given.closures
-        if own & {each.name, f"{each.name} 1"} or {leader[each.first], leader[each.second]} <= names.keys()
+        if joint_names & {each.name, f"{each.name} 1"} or {leader[each.first], leader[each.second]} <= names.keys()
     ]
-    gaps += [gap_of_coupling(given, each) for each in given.couplings if _holds(given, each, own, leader, names)]
+    gaps += [
+        gap_of_coupling(given, each) for each in given.couplings if _is_within(given, each, joint_names, leader, names)
+    ]
     return Reduced(mechanism, _extent([each.point for each in kept]), tuple(gaps), (*given.notes, *notes, *more))
 
 
-def _holds(
-    given: Description, coupling: Coupling, own: set[str], leader: dict[str, str], names: dict[str, str]
+def _is_within(
+    given: Description, coupling: Coupling, joint_names: set[str], leader: dict[str, str], names: dict[str, str]
 ) -> bool:
-    """Return whether a coupling ties joints that are kept, or fixes a joint within a link that is kept."""
+    """Return whether a coupling is between joints of the mechanism, or fixes a joint within one of its rigid links."""
     tied = [name for name, _ in coupling.factors]
     if len(tied) > 1:
-        return own.issuperset(tied)
+        return joint_names.issuperset(tied)
     return all(leader[joint.outer] in names for joint in given.joints if joint.name in tied)
 
 
 def check_names(given: Description) -> None:
-    """Refuse names with characters that no text shows.
+    """Refuse names with characters that cannot be printed.
 
     Raises:
-        InputError: there is one.
+        InputError: a name is empty or has such a character.
     """
     for kind, names in {
         "body": [each.name for each in given.bodies],
@@ -161,14 +165,15 @@ def check_names(given: Description) -> None:
     }.items():
         for name in names:
             if not name.isprintable() or not name.strip():
-                raise InputError(f"{given.source}: the {kind} {name!r} has a name with characters that cannot be shown")
+                fault = "must have a name of printable characters, and not only spaces"
+                raise InputError(f"{given.source}: the {kind} {name!r} {fault}")
 
 
 def _check_places(given: Description) -> None:
-    """Refuse places that are no finite numbers, or too large.
+    """Refuse coordinates that are not finite, or too large.
 
     Raises:
-        InputError: there is one.
+        InputError: there is such a coordinate.
     """
     places = {f"body {each.name}": each.place.position for each in given.bodies}
     places |= {f"joint {each.name}": each.point for each in given.joints}
@@ -176,11 +181,11 @@ def _check_places(given: Description) -> None:
         places |= {f"joint {each.name}": np.concatenate([each.first_frame.position, each.second_frame.position])}
     for name, place in places.items():
         if not float(np.abs(place).max()) <= LARGEST:
-            raise InputError(f"{given.source}: the {name} has a coordinate above {LARGEST:g}, or one that is no number")
+            raise InputError(f"{given.source}: the {name} must have finite coordinates of at most {LARGEST:g}")
 
 
 def _platform(given: Description, name: str) -> tuple[str, Frame]:
-    """Return the body of the platform, and the place of its frame."""
+    """Return the body of the platform, and the platform frame in the world."""
     bodies = [body.name for body in given.bodies]
     if name in bodies:
         return name, given.place_of(name)
@@ -194,16 +199,16 @@ def _platform(given: Description, name: str) -> tuple[str, Frame]:
 def _refuse_open(
     given: Description, ends: Ends, kept: list[MechanismJoint], leader: dict[str, str], nodes: tuple[str, str]
 ) -> None:
-    """Refuse a platform to which no path, or only one, leads from the base."""
+    """Refuse a platform that is not connected to the base, or only by a single open chain."""
     where = f"{given.source}: --platform {ends.platform}:"
     base = ends.base or given.root
     if not kept:
-        raise InputError(f"{where} no joints lead to it from the base {base}; choose the base by --base")
+        raise InputError(f"{where} no joints connect it to the base {base}; choose the base with --base")
     links = {leader[name] for each in kept for name in (each.inner, each.outer)} | set(nodes)
     if len(kept) < len(links):
         fault = "is at the end of an open chain"
         raise InputError(
-            f"{where} {fault} of {len(kept)} joints from the base {base}; a parallel robot has two or more"
+            f"{where} {fault} of {len(kept)} joints from the base {base}; a parallel robot has two or more chains"
         )
 
 
@@ -238,71 +243,74 @@ def _coupled_motors(
 
 
 def _driven(given: Description, ends: Ends, kept: list[MechanismJoint]) -> tuple[set[str], list[str]]:
-    """Return the actuated joints of the mechanism, and notes about actuators elsewhere."""
-    own = {each.name: None for each in kept}
+    """Return the actuated joints of the mechanism, and notes about other actuators."""
+    inside = {each.name: None for each in kept}
     if ends.actuated:
         for name in ends.actuated:
-            if name not in own:
-                hint = nearest(name, list(own)[:_MOST_NAMES])
-                fault = "is no joint between base and platform"
+            if name not in inside:
+                hint = nearest(name, list(inside)[:_MOST_NAMES])
+                fault = "no such joint between base and platform"
                 raise InputError(f"{given.source}: --actuated {name}: {fault}; {hint}")
     wanted = set(ends.actuated) or set(given.driven)
     for each in kept:
         if each.name in wanted and each.kind == "S":
             raise InputError(
-                f"{given.source}: the ball joint {each.name} has an actuator; hinges and slides may have one"
+                f"{given.source}: the ball joint {each.name} must not have an actuator; only hinges and slides may"
             )
-    leading = _leading(given, own.keys())
-    outside = sorted(wanted - own.keys() - leading)
-    notes = [f"actuators outside the mechanism were left out: {listing(outside[:_MOST_NAMES])}"] if outside else []
-    driven = wanted & own.keys()
+    leading = _leading(given, inside.keys())
+    outside = sorted(wanted - inside.keys() - leading)
+    notes = [f"actuators outside of the mechanism were omitted: {listing(outside[:_MOST_NAMES])}"] if outside else []
+    driven = wanted & inside.keys()
     if not driven and not wanted & leading:
         able = [each.name for each in kept if each.kind in ("R", "P")]
-        fault = "no joint between base and platform has an actuator; name them by --actuated, of"
+        fault = "no joint between base and platform has an actuator; name actuated joints with --actuated; allowed:"
         raise InputError(f"{given.source}: {fault} {listing(able[:_MOST_NAMES])}")
     return driven, notes
 
 
-def _leading(given: Description, own: Set[str]) -> set[str]:
-    """Return the joints outside the mechanism to which couplings tie joints of it."""
+def _leading(given: Description, inside: Set[str]) -> set[str]:
+    """Return the joints outside of the mechanism that are coupled to joints of the mechanism."""
     found: set[str] = set()
     for each in given.couplings:
         names = {name for name, _ in each.factors}
-        if names & own:
-            found |= names - own
+        if names & inside:
+            found |= names - inside
     return found
 
 
 def _couplings(
     given: Description, kept: list[MechanismJoint], driven: set[str]
 ) -> tuple[tuple[Coupling, ...], set[str], list[str]]:
-    """Return the couplings within the mechanism; a joint coupled to a driven one outside it counts as driven."""
-    own = {each.name for each in kept}
+    """Return the couplings within the mechanism, its actuated joints, and notes.
+
+    A joint of the mechanism that is coupled to an actuated joint outside of it counts as actuated.
+    """
+    joint_names = {each.name for each in kept}
     inside: list[Coupling] = []
     driven = set(driven)
     notes: list[str] = []
     for each in given.couplings:
         names = [name for name, _ in each.factors]
-        if len(names) < 2 or not own & set(names):
+        if len(names) < 2 or not joint_names & set(names):
             continue
-        if set(names) <= own:
+        if set(names) <= joint_names:
             inside.append(each)
             continue
-        within, without = sorted(own & set(names)), sorted(set(names) - own)
+        within, without = sorted(joint_names & set(names)), sorted(set(names) - joint_names)
         if set(without) & given.driven:
             driven |= set(within)
             notes.append(
-                f"{listing(within)} is driven through {listing(without)}; its rate is that of the joint itself"
+                f"{listing(within)} is driven by {listing(without)}; its rate in results is that of the joint itself"
             )
         else:
-            notes.append(f"the coupling of {listing(within)} with {listing(without)} was left out")
+            notes.append(f"the coupling of {listing(within)} with {listing(without)} was omitted")
     return tuple(inside), driven, notes
 
 
 def _link_names(
     given: Description, kept: list[MechanismJoint], leader: dict[str, str], given_names: dict[str, str]
 ) -> dict[str, str]:
-    """Return the name of each rigid link by its first body, in the order of the bodies."""
+    """Return the name of each rigid link by its representative body, in the order of the bodies."""
     order = {name: k for k, name in enumerate(bodies_of(given, kept))}
     keys = {leader[name] for each in kept for name in (each.inner, each.outer)} | set(given_names)
     return {key: given_names.get(key, key) for key in sorted(keys, key=lambda key: order.get(key, len(order)))}
@@ -311,13 +319,13 @@ def _link_names(
 def _oriented(
     kept: list[MechanismJoint], leader: dict[str, str], start: str, driven: set[str], names: dict[str, str]
 ) -> list[MechanismJoint]:
-    """Return the joints with the link nearer to the base inside.
+    """Return the joints with the link nearer to the base as inner link.
 
-    The motion of the first body relative to the second about the opposite axis has the same coordinate.
+    If the links are exchanged, the axis is reversed, so that the joint coordinate stays the same.
     """
     depth = {start: 0}
     waiting, neighbours = [start], incident([(leader[each.inner], leader[each.outer]) for each in kept])
-    for node in waiting:  # which grows
+    for node in waiting:  # the list grows in the loop
         for _, other in neighbours[node]:
             if other not in depth:
                 depth[other] = depth[node] + 1

@@ -1,4 +1,4 @@
-"""An imported robot as the text of a robot file, laid out as people write it, and read again before it is returned."""
+"""Writer of robot files for imported robots; each text is checked by reading it again."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from .freeing import with_dimensions
 from .importing import Imported
 from .symmetry import Offers
 
-#: Largest difference of the work rates of two equal robots, in parts of the largest: numbers are written with all
-#: their digits, and rounding of closed loops of six-digit models is 1e-12.
+#: Largest relative difference of the work rates of equal robots: numbers are written with all digits, and rounding of
+#: closed loops of six-digit models is 1e-12.
 SAME_ROBOT = 1e-9
-#: Robots with more joints than this are not built symbolically when their file is checked: with 60 joints it takes 2 s.
+#: Largest number of joints of a robot that is built symbolically in the check: 60 joints take 2 s.
 _MOST_BUILT = 40
-#: Largest difference of work rates where copies of one limb stand for limbs that are copies but for decimals.
+#: Largest relative difference of work rates if copies of a limb replace limbs that are copies up to rounding.
 _COPIES = 1e-2
-#: Beginning of the comment at the head of an imported robot file, and of the file itself.
+#: Beginning of the comment at the head of an imported robot file, and of the file.
 _IMPORTED = "Imported by screwsynth from "
 BEGINNING = f"# {_IMPORTED}"
 #: Longest line of a list that is written on one line.
@@ -35,16 +35,16 @@ _LONGEST = 110
 def robot_file(
     found: Imported, source: str, wanted: Sequence[str], offers: Offers | None
 ) -> tuple[str, tuple[tuple[str, str], ...]]:
-    """Return the text of the robot file of an imported robot, and lines about it as label and text.
+    """Return the text of the robot file of an imported robot, and summary lines as label and text.
 
     Args:
-        found: the robot.
-        source: name of the file that it is from, for the comment at the head.
-        wanted: numbers that become dimensions, as :func:`.freeing.with_dimensions` takes them.
-        offers: circles and symmetries; None where nothing is wanted.
+        found: imported robot.
+        source: name of the imported file, for the comment at the head.
+        wanted: values that become dimensions, as for :func:`.freeing.with_dimensions`.
+        offers: detected circles and symmetries; None if no value becomes a dimension.
 
     Raises:
-        InputError: a name means nothing, or the text would not state this robot.
+        InputError: a name is unknown, or the robot file would give another robot.
     """
     tables = found.tables if offers is None else with_dimensions(found.tables, wanted, offers)
     remarks = [f"{_IMPORTED}{source}, with its numbers, in the frame and the units of that file."]
@@ -53,7 +53,7 @@ def robot_file(
     difference = check_text(text, found.mechanism, found.size, _COPIES if is_folded else SAME_ROBOT)
     if not is_folded:
         return text, ()
-    words = f"work rates differ by up to {difference:.2g} from those of the model, as its limbs are not exact copies"
+    words = f"work rates differ by up to {difference:.2g} from those of the model, whose limbs are not exact copies"
     return text, (("copies", words),)
 
 
@@ -61,8 +61,8 @@ def robot_file_text(tables: Mapping[str, Any], remarks: Sequence[str] = ()) -> s
     """Return the text of a robot file.
 
     Args:
-        tables: of the robot file.
-        remarks: sentences for the comment at its head.
+        tables: tables of the robot file.
+        remarks: lines of the comment at the head.
     """
     lines = [f"# {one_line(each)}" for each in remarks]
     named = ("dimensions", "derived", "limb", "joint", "coupling")
@@ -86,14 +86,14 @@ def _limb_lines(limb: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _list_lines(key: str, values: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Yield a list of tables, each on a line of its own where one line is too short."""
+    """Yield the lines of a list of tables: one line, or one line for each table if that is too long."""
     whole = f"{key} = {toml_text(values)}"
     if len(whole) <= _LONGEST:
         yield whole
         return
     yield f"{key} = ["
     for value in values:
-        # TOML wants a table within a list on one line; only lists within it may be broken.
+        # TOML allows no line breaks in an inline table, except in lists within it.
         if "joints" in value:
             yield "    { joints = ["
             yield from (f"        {toml_text(joint)}," for joint in value["joints"])
@@ -104,19 +104,19 @@ def _list_lines(key: str, values: Sequence[Mapping[str, Any]]) -> Iterator[str]:
 
 
 def check_text(text: str, mechanism: Mechanism, size: float, allowed: float = SAME_ROBOT) -> float:
-    """Read the text of a robot file, and return the difference of its work rates from those of a mechanism.
+    """Return the relative difference of work rates between a robot file and a mechanism.
 
-    The difference is that of ``J'J``, from which F of every motion follows, and of ``Q'Q``, with ``Q`` the actuators'
-    rates for six motions, in parts of their largest entries.
+    The difference is the larger one of ``J'J``, which gives F for every motion, and of ``Q'Q``, with ``Q`` the actuator
+    rates for six motions, relative to their largest entries.
 
     Args:
-        text: of the robot file.
-        mechanism: the robot that it must state.
-        size: of the robot, as characteristic length.
-        allowed: largest difference.
+        text: text of the robot file.
+        mechanism: expected robot.
+        size: characteristic length of the robot.
+        allowed: largest allowed difference.
 
     Raises:
-        InputError: the text is no robot file, or states a robot with other work rates.
+        InputError: the text is not a robot file, or gives a robot with other work rates.
     """
     tables = tomllib.loads(text)
     try:
@@ -125,20 +125,20 @@ def check_text(text: str, mechanism: Mechanism, size: float, allowed: float = SA
             model_of_definition(tables, "robot file")
         again = mechanism_of(tables)
     except (CaseError, RobotError, MechanismError) as error:
-        raise InputError(f"the robot file would not be read: {error}") from None
+        raise InputError(f"the robot cannot be written as a robot file: {error}") from None
     pairs = zip(_measures(again, size), _measures(mechanism, size), strict=True)
     difference = max(float(np.abs(found - expected).max() / np.abs(expected).max()) for found, expected in pairs)
     if not difference <= allowed:
-        fault = "the robot file, read again, differs from the model: its work rates are off by"
-        advice = "--snap makes axes meet that nearly do"
-        raise InputError(f"{fault} {difference:.2g} of the largest, and {allowed:.2g} is allowed; {advice}")
+        fault = f"work rates of the robot file must differ by at most {allowed:.2g} from those of the model"
+        advice = "--snap makes nearly intersecting axes meet"
+        raise InputError(f"{fault}, got {difference:.2g}; {advice}")
     return difference
 
 
 def _measures(mechanism: Mechanism, size: float) -> tuple[FloatArray, FloatArray]:
-    """Return ``J'J`` and ``Q'Q`` (6, 6), with twists about the platform's origin and lengths in parts of the size.
+    """Return ``J'J`` and ``Q'Q`` (6, 6), with twists about the platform origin and lengths relative to the size.
 
-    Neither depends on the order of members and actuators. An actuator that cannot drive the platform has no rate.
+    Neither depends on the order of members and actuators. Undetermined actuator rates are set to 0.
     """
     platform = mechanism.link(mechanism.platform)
     wrenches = wrenches_of(mechanism, size)

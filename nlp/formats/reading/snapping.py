@@ -1,9 +1,7 @@
-"""Axes that meet, coincide or are parallel up to the decimals of a file, and correction of them.
+"""Correction of joint axes that nearly meet, coincide or are parallel, and of hinges that nearly are a parallelogram.
 
-Four hinges that are nearly a parallelogram become one.
-
-The freedoms of a robot need such relations exactly. Every relation within a tolerance becomes equations in the points
-and directions of all axes; Newton's method with least-norm steps finds the nearest joints that satisfy all.
+The degrees of freedom of a robot depend on exact relations. Each relation within a tolerance becomes equations in the
+points and directions of all axes; Newton's method with least-norm steps finds the nearest joints that satisfy all.
 """
 
 from __future__ import annotations
@@ -24,22 +22,22 @@ from ..frames import cross_matrix
 from .elements import SAME_POINT
 from .meeting import ALMOST, axes_gap
 
-#: Steps of Newton's method, which needs three to five.
+#: Largest number of Newton steps, of which three to five are needed.
 _MOST_STEPS = 30
-#: Relations hold where no equation, of order 1, is larger: rounding leaves 1e-16.
+#: Largest residual of a satisfied relation: rounding leaves 1e-16.
 _HOLDS = 1e-14
-#: Relations depend on each other, but for what they are off by: singular values below this many times the tolerance, as
-#: a part of the largest one, and below this share in any case, count as zero.
+#: Relations are dependent up to their errors: relative singular values below this many times the relative tolerance,
+#: and at least below ``_RANK``, count as zero.
 _DEPENDENT = 10.0
 _RANK = 1e-6
-#: Relations that are off by less, in parts of the size, are meant to be exact: decimals of CAD files are nearer.
+#: Error of a relation, relative to the size, below which it is taken for rounding of decimals in CAD files.
 _DECIMALS = 1e-5
-#: Joints may move this many times farther than the tolerance: beyond it the relations contradict each other.
+#: Largest motion of a joint as a multiple of the tolerance: beyond it the relations contradict each other.
 _FARTHEST = 3.0
 
 
 class Kind(Enum):
-    """A relation of two joints; each value is a clause for people."""
+    """Kinds of relations between two joints; each value is a clause for messages."""
 
     PARALLEL = "are nearly parallel"
     MEETING = "nearly meet"
@@ -48,7 +46,7 @@ class Kind(Enum):
 
 
 class Relation(NamedTuple):
-    """A relation of two joints by their numbers, and by how much it is off: a length, or the size times a sine."""
+    """Relation between two joints, by their indices, with its error: a length, or the robot's size times a sine."""
 
     kind: Kind
     one: int
@@ -57,7 +55,13 @@ class Relation(NamedTuple):
 
 
 def relations_of(joints: Sequence[MechanismJoint], size: float, within: float) -> Iterator[Relation]:
-    """Yield the relations of any two joints that are off by less than a length."""
+    """Yield the relations between all pairs of joints with an error below a length.
+
+    Args:
+        joints: joints of the mechanism.
+        size: characteristic size of the robot, length.
+        within: largest error, length.
+    """
     for j, other in enumerate(joints):
         for i, one in enumerate(joints[:j]):
             kinds = {one.kind, other.kind}
@@ -79,11 +83,11 @@ def relations_of(joints: Sequence[MechanismJoint], size: float, within: float) -
 
 
 def near_misses(given: Mechanism, size: float) -> Iterator[str]:
-    """Yield a note for each kind of relation that joints of one link nearly have.
+    """Yield a note for each kind of nearly satisfied relation between joints of one link.
 
     Args:
         given: the mechanism.
-        size: of the robot.
+        size: characteristic size of the robot, length.
     """
     joints = [each for each in given.joints if each.kind != "weld"]
     found: dict[tuple[Kind, bool], list[Relation]] = {}
@@ -97,23 +101,23 @@ def near_misses(given: Mechanism, size: float) -> Iterator[str]:
         more = f" and {len(misses) - 1} more pairs" if len(misses) > 1 else ""
         by = f"{sizes[0]:.1g}" if len(misses) == 1 else f"{sizes[0]:.1g} to {sizes[-1]:.1g}"
         words = f"the axes of {first} and {second}{more} {kind.value}: off by {by}"
-        words += f", {sizes[-1] / size:.1g} of the robot's size, they stay as they are"
+        words += f", {sizes[-1] / size:.1g} of the robot's size; they were not changed"
         yield f"{words}; --snap {_rounded_up(sizes[-1]):g} makes them exact" if is_rounding else words
 
 
 def _rounded_up(value: float) -> float:
-    """Return the next number above a positive one that has a single digit."""
+    """Return a positive number rounded up to a single digit."""
     unit = 10.0 ** math.floor(math.log10(value))
     return math.ceil(value / unit * (1 + 1e-9)) * unit
 
 
 def _parallelograms(given: Mechanism, joints: Sequence[MechanismJoint], within: float) -> Iterator[tuple[int, ...]]:
-    """Yield the numbers of four hinges that are a parallelogram but for a length: two of a rod, two of its twin."""
+    """Yield the indices of four hinges that are a parallelogram up to an error: two of a rod, two of the other rod."""
     rods: dict[tuple[str, ...], list[tuple[int, int]]] = {}
     for link in given.links:
-        own = [(k, each) for k, each in enumerate(joints) if link.name in (each.inner, each.outer)]
-        if len(own) == 2 and all(each.kind == "R" for _, each in own):
-            ends = sorted((each.outer if each.inner == link.name else each.inner, k) for k, each in own)
+        hinges = [(k, each) for k, each in enumerate(joints) if link.name in (each.inner, each.outer)]
+        if len(hinges) == 2 and all(each.kind == "R" for _, each in hinges):
+            ends = sorted((each.outer if each.inner == link.name else each.inner, k) for k, each in hinges)
             rods.setdefault(tuple(name for name, _ in ends), []).append((ends[0][1], ends[1][1]))
     for sides, pairs in rods.items():
         for number, (i, j) in enumerate(pairs):
@@ -125,12 +129,12 @@ def _parallelograms(given: Mechanism, joints: Sequence[MechanismJoint], within: 
 
 
 def snapped(given: Mechanism, size: float, within: float) -> tuple[Mechanism, str]:
-    """Return a mechanism with the relations that its joints have within a length as exact ones, and a note about it.
+    """Return a mechanism with all relations within a tolerance satisfied exactly, and a note.
 
     Args:
         given: the mechanism.
-        size: of the robot.
-        within: largest length by which a relation is off.
+        size: characteristic size of the robot, length.
+        within: tolerance, the largest error of a relation that is corrected, length.
 
     Raises:
         InputError: the relations contradict each other.
@@ -149,8 +153,8 @@ def snapped(given: Mechanism, size: float, within: float) -> tuple[Mechanism, st
     way = size * float(np.linalg.norm(x[:, 0] - points, axis=1).max(initial=0.0))
     turn = size * float(np.linalg.norm(x[:, 1] - axes, axis=1).max(initial=0.0))
     if not found.error <= 10 * _HOLDS or max(way, turn) > _FARTHEST * within:
-        fault = "the axes cannot all be made to meet or to be parallel that are so within this length"
-        raise InputError(f"--snap {within:g}: {fault}; a smaller length may do")
+        fault = "not all axes that nearly meet or are nearly parallel can be corrected together"
+        raise InputError(f"--snap {within:g}: {fault}; try a smaller length")
     moved = iter(x)
     new = []
     for each in given.joints:
@@ -162,13 +166,13 @@ def snapped(given: Mechanism, size: float, within: float) -> tuple[Mechanism, st
             replace(each, point=size * point, axis=axis / np.linalg.norm(axis) if each.kind != "S" else each.axis)
         )
     count = sum(each.off > SAME_POINT * size for each in relations)
-    note = f"{count} relations of axes that were off by up to {within:g} were made exact"
-    note += f": joints moved by up to {way:.1g}, their axes turned by up to {turn / size:.1g} rad"
+    note = f"{count} relations of axes with errors of up to {within:g} were made exact"
+    note += f": joints moved by up to {way:.1g}, axes rotated by up to {turn / size:.1g} rad"
     return replace(given, joints=tuple(new)), note
 
 
 class _Rows:
-    """Equations in the points and axes of joints, x (n, 2, 3), with their derivatives."""
+    """Equations in the points and axes of joints, x (n, 2, 3), with derivatives."""
 
     def __init__(self, x: FloatArray) -> None:
         self._shape = x.shape
@@ -176,7 +180,7 @@ class _Rows:
         self._slopes: list[FloatArray] = [np.zeros((0, x.size))]
 
     def add(self, value: FloatArray, *slopes: tuple[int, int, FloatArray]) -> None:
-        """Add equations (k,), with derivatives (k, 3) by points, part 0, or axes, part 1, of joints."""
+        """Add equations (k,) with derivatives (k, 3) by the point (part 0) or the axis (part 1) of a joint."""
         row = np.zeros((len(value), *self._shape))
         for joint, part, slope in slopes:
             row[:, joint, part] += slope
@@ -212,7 +216,7 @@ def _equations(
 
 
 def _add_relation(rows: _Rows, relation: Relation, x: FloatArray, *, is_ball: bool) -> None:
-    """Add the equations of a relation, whose first joint may be a ball."""
+    """Add the equations of a relation; ``is_ball`` is True for a spherical first joint."""
     kind, i, j, _ = relation
     (p, a), (q, b) = x[i], x[j]
     A, B, apart = cross_matrix(a), cross_matrix(b), q - p
@@ -221,7 +225,7 @@ def _add_relation(rows: _Rows, relation: Relation, x: FloatArray, *, is_ball: bo
     elif kind is Kind.PARALLEL:
         rows.add(np.cross(a, b), (i, 1, -B), (j, 1, A))
     elif kind is Kind.CENTRE or np.linalg.norm(np.cross(a, b)) < ALMOST:
-        # One axis passes through the other's point; a ball has no axis.
+        # The axis of one joint passes through the point of the other joint; a spherical joint has no axis.
         axis, hinge = (b, j) if is_ball else (a, i)
         C = cross_matrix(axis)
         rows.add(np.cross(axis, apart), (hinge, 1, -cross_matrix(apart)), (i, 0, -C), (j, 0, C))

@@ -1,4 +1,4 @@
-"""Circles and symmetries in the numbers of a robot: offers for dimensions."""
+"""Detection of circles and symmetries in a robot file, as candidates for dimensions."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ import numpy as np
 from ....models.arrays import FloatArray
 from ..frames import rotation_about
 
-#: Places and directions that differ by less than this, in parts of the robot's size, are taken for the same: models
-#: that are written with six digits differ by 1e-6 and less.
+#: Difference, relative to the robot's size, below which points and directions are equal: values with six digits differ
+#: by at most 1e-6.
 SAME = 1e-5
-#: An axis this near to a coordinate axis, and a point this near to the origin of a coordinate, are taken for it.
+#: Difference below which an axis is rounded to a coordinate axis, and a coordinate to 0, relative to the size.
 _ROUND = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
 class CircleOffer:
-    """Joints on a circle, whose radius could be a dimension.
+    """Circle of joints, whose radius can become a dimension.
 
     Attributes:
-        name: by which it is asked for.
-        joints: names of the joints.
-        points: (n, 3) their places.
-        centre: (3,) of the circle.
-        axis: (3,) unit direction of its axis.
-        radius: of the circle.
+        name: name of the circle for ``--free``.
+        joints: names of the joints on the circle.
+        points: (n, 3) centres of the joints.
+        centre: (3,) centre of the circle.
+        axis: (3,) unit direction of the circle's axis.
+        radius: radius of the circle.
         deviation: largest distance of a joint from the circle, length.
     """
 
@@ -43,15 +43,15 @@ class CircleOffer:
 
 @dataclass(frozen=True, eq=False)
 class FoldOffer:
-    """Limbs that are copies of each other by rotation about an axis.
+    """Rotational symmetry: limbs that are copies of each other by rotation about an axis.
 
     Attributes:
-        name: by which it is asked for.
-        count: number of copies.
-        orbits: indices of the limbs of each orbit, in the order of their angles.
-        centre: (3,) point of the axis.
-        axis: (3,) its unit direction.
-        deviation: largest distance of a joint from that of the turned limb, or difference of axes times the size.
+        name: name of the symmetry for ``--free``.
+        count: number of copies of each limb.
+        orbits: indices of the limbs that are copies of each other, in the order of their angles.
+        centre: (3,) point on the axis of rotation.
+        axis: (3,) unit direction of the axis of rotation.
+        deviation: largest distance between joints of a rotated limb and its copy, or difference of axes times the size.
     """
 
     name: str
@@ -63,7 +63,7 @@ class FoldOffer:
 
 
 class Mirror(NamedTuple):
-    """A plane in which the robot is its own mirror image: point, normal, and the largest deviation."""
+    """Mirror symmetry of the robot: point and normal of the plane, and largest deviation."""
 
     point: FloatArray
     normal: FloatArray
@@ -71,7 +71,13 @@ class Mirror(NamedTuple):
 
 
 class Offers(NamedTuple):
-    """All that was found."""
+    """Detected circles and symmetries.
+
+    Attributes:
+        circles: circles of joints.
+        fold: rotational symmetry; None if there is none.
+        mirrors: mirror symmetries.
+    """
 
     circles: tuple[CircleOffer, ...]
     fold: FoldOffer | None
@@ -80,15 +86,15 @@ class Offers(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _LimbNumbers:
-    """A limb in numbers, its joints in the order of the file.
+    """Points and axes of a limb, in the order of the file.
 
     Attributes:
-        index: of the limb in the file.
-        shape: types, actuation and branches: limbs of one shape may be copies of each other.
-        names: of the joints.
-        points: (n, 3) their places.
-        axes: (m, 3) the axes of its joints, in order.
-        driven: whether each axis is that of an actuated joint, whose sign counts.
+        index: index of the limb in the file.
+        shape: types, actuation and branches of the joints; only limbs of equal shape can be copies.
+        names: names of the joints.
+        points: (n, 3) centres of the joints.
+        axes: (m, 3) axes of the joints.
+        driven: True for each axis of an actuated joint, whose sign matters.
     """
 
     index: int
@@ -100,11 +106,11 @@ class _LimbNumbers:
 
 
 def offers_of(tables: Mapping[str, Any], size: float) -> Offers:
-    """Return the circles and symmetries of a robot file with limbs in numbers.
+    """Return the circles and symmetries of a robot file with numbers only.
 
     Args:
-        tables: of the robot file; one with links and joints has none.
-        size: of the robot.
+        tables: tables of the robot file; files with links and joints give no circles and symmetries.
+        size: characteristic size of the robot, length.
     """
     limbs = _limbs_in_numbers(tables)
     circles = _circles(limbs, size)
@@ -114,7 +120,7 @@ def offers_of(tables: Mapping[str, Any], size: float) -> Offers:
 
 
 def _groups(limbs: list[_LimbNumbers]) -> list[list[_LimbNumbers]]:
-    """Return the limbs by shape."""
+    """Return groups of limbs with equal shapes."""
     shapes: dict[tuple[Any, ...], list[_LimbNumbers]] = {}
     for limb in limbs:
         shapes.setdefault(limb.shape, []).append(limb)
@@ -122,7 +128,7 @@ def _groups(limbs: list[_LimbNumbers]) -> list[list[_LimbNumbers]]:
 
 
 def _circles(limbs: list[_LimbNumbers], size: float) -> list[CircleOffer]:
-    """Return the circles on which the same joint of all limbs of a shape lies."""
+    """Return the circles through the corresponding joints of all limbs with equal shapes."""
     found: list[CircleOffer] = []
     for group in _groups(limbs):
         for k in range(len(group[0].names)):
@@ -145,18 +151,18 @@ def _circles(limbs: list[_LimbNumbers], size: float) -> list[CircleOffer]:
 
 
 def _is_even(radial: FloatArray, radius: float) -> bool:
-    """Return whether three points of a circle, on which any three are, are evenly spread."""
+    """Return whether three points on a circle are evenly spaced; any three points are on a circle."""
     return bool(np.linalg.norm(radial.sum(axis=0)) < SAME * radius)
 
 
 def _radial(points: FloatArray, centre: FloatArray, axis: FloatArray) -> FloatArray:
-    """Return the parts (n, 3) of the ways from an axis to points."""
+    """Return the perpendicular vectors (n, 3) from an axis to points."""
     apart = points - centre
     return np.asarray(apart - np.outer(apart @ axis, axis))
 
 
 def _circle_through(points: FloatArray, size: float) -> tuple[FloatArray, FloatArray, float] | None:
-    """Return centre, axis and radius of the circle nearest to points (n, 3); None where they are on a line."""
+    """Return centre, axis and radius of the least-squares circle of points (n, 3); None for collinear points."""
     middle = points.mean(axis=0)
     _, values, rows = np.linalg.svd(points - middle)
     if values[1] < SAME * size:
@@ -164,7 +170,7 @@ def _circle_through(points: FloatArray, size: float) -> tuple[FloatArray, FloatA
     axis = _rounded_direction(rows[2])
     plane = rows[:2]
     flat = (points - middle) @ plane.T
-    # |p|^2 = 2 c.p + (r^2 - |c|^2) is linear in the centre and in the bracket.
+    # |p|^2 = 2 c.p + (r^2 - |c|^2) is linear in the centre c and in the expression in brackets.
     system = np.column_stack([2 * flat, np.ones(len(flat))])
     solution = np.linalg.lstsq(system, (flat**2).sum(axis=1), rcond=None)[0]
     centre = middle + solution[:2] @ plane
@@ -174,16 +180,17 @@ def _circle_through(points: FloatArray, size: float) -> tuple[FloatArray, FloatA
 
 
 def _rounded_direction(axis: FloatArray) -> FloatArray:
-    """Return a direction as a coordinate axis where it is near one, with its largest component positive."""
+    """Return a direction with positive largest component, rounded to a coordinate axis if it is near one."""
     axis = axis * np.sign(axis[int(np.argmax(np.abs(axis)))])
     nearest = np.eye(3)[int(np.argmax(axis))]
     return nearest if float(np.linalg.norm(axis - nearest)) < _ROUND else axis
 
 
 def _turned(limb: _LimbNumbers, other: _LimbNumbers, matrix: FloatArray, centre: FloatArray, size: float) -> float:
-    """Return how far a limb after an orthogonal map about a point is from another one; infinity for another shape.
+    """Return the largest deviation of a mapped limb from another limb; infinity for different shapes.
 
-    A reflection turns the axes of rotation over once more, so that signs of axes do not count there.
+    The map is orthogonal, about a point. A reflection also reverses axes of rotation, so that signs of axes do not
+    matter then.
     """
     if limb.shape != other.shape:
         return float("inf")
@@ -198,7 +205,7 @@ def _turned(limb: _LimbNumbers, other: _LimbNumbers, matrix: FloatArray, centre:
 
 
 def _fold(limbs: list[_LimbNumbers], circle: CircleOffer, size: float) -> FoldOffer | None:
-    """Return the rotations about a circle's axis that map the robot to itself; None where there are none."""
+    """Return the rotational symmetry of the robot about a circle's axis; None if there is none."""
     most = min(len(group) for group in _groups(limbs))
     for count in range(most, 1, -1):
         turn = rotation_about(circle.axis, 2 * np.pi / count)
@@ -218,7 +225,7 @@ def _fold(limbs: list[_LimbNumbers], circle: CircleOffer, size: float) -> FoldOf
 
 
 def _orbits(images: Mapping[int, int]) -> tuple[tuple[int, ...], ...]:
-    """Return the cycles of a permutation, each from its smallest index on."""
+    """Return the cycles of a permutation, each starting at its smallest index."""
     found, seen = [], set[int]()
     for start in sorted(images):
         if start in seen:
@@ -232,7 +239,7 @@ def _orbits(images: Mapping[int, int]) -> tuple[tuple[int, ...], ...]:
 
 
 def _mirrors(limbs: list[_LimbNumbers], circle: CircleOffer, size: float) -> list[Mirror]:
-    """Return the planes through a circle's axis in which the robot is its own mirror image."""
+    """Return the mirror symmetries of the robot with planes through a circle's axis."""
     radial = _radial(circle.points, circle.centre, circle.axis)
     found: list[Mirror] = []
     for way in [radial[0] - each for each in radial[1:]] + [np.cross(circle.axis, radial[0])]:
@@ -250,12 +257,12 @@ def _mirrors(limbs: list[_LimbNumbers], circle: CircleOffer, size: float) -> lis
 
 
 def joints_of_limb(limb: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the tables of all joints of a limb: those that its branches share, then those of each branch."""
+    """Return the tables of all joints of a limb: the common joints, then those of each branch."""
     return [*limb.get("joints", []), *(joint for branch in limb.get("branch", []) for joint in branch["joints"])]
 
 
 def joints_of(tables: Mapping[str, Any]) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Yield the index of the limb and the table of every joint; the index is 0 in a file without limbs."""
+    """Yield limb index and table of each joint; the index is 0 in a file without limbs."""
     for joint in tables.get("joint", []):
         if "at" in joint:
             yield 0, joint
@@ -265,7 +272,7 @@ def joints_of(tables: Mapping[str, Any]) -> Iterator[tuple[int, dict[str, Any]]]
 
 
 def _limbs_in_numbers(tables: Mapping[str, Any]) -> list[_LimbNumbers]:
-    """Return the limbs of a robot file that has numbers only."""
+    """Return the points and axes of the limbs of a robot file with numbers only."""
     found = []
     for index, limb in enumerate(tables.get("limb", [])):
         joints = joints_of_limb(limb)

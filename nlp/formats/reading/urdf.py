@@ -40,25 +40,25 @@ _TYPES: dict[str, tuple[ElementaryKind, ...]] = {
 
 
 def read_urdf(root: Element, path: Path, loops: Path | None = None) -> Description:
-    """Return the robot that a URDF file states, with all joints at 0.
+    """Return the robot of a URDF file, with all joint coordinates 0.
 
     Args:
-        root: of the file.
-        path: of the file.
-        loops: YAML file of loops; None for one with the same name beside the URDF file, if there is one.
+        root: root element of the file.
+        path: path of the file.
+        loops: YAML file of loops; None for a file with the same name in the same folder, if there is one.
 
     Raises:
-        InputError: the file states no tree of links, or a value in it is not allowed.
+        InputError: the links are not a tree, or a value is not allowed.
     """
     if any(element.tag.startswith("xacro:") for element in root.iter()):
-        raise InputError(f"{path}: has elements of xacro: write it out as plain URDF first")
+        raise InputError(f"{path}: has xacro elements, which are not supported; convert it to plain URDF first")
     if loops is None:
         loops = next((each for each in (path.with_suffix(".yaml"), path.with_suffix(".yml")) if each.is_file()), None)
     return _Reader(root, path, None if loops is None else read_loop_file(loops)).description()
 
 
 class _Reader:
-    """A URDF file while its tree is walked."""
+    """Reader of a URDF file, which walks its tree of links."""
 
     def __init__(self, root: Element, path: Path, loops: LoopFile | None) -> None:
         self.root, self.source, self.loops = root, str(path), loops
@@ -68,28 +68,28 @@ class _Reader:
         self._unique(root.findall("joint"))
         self.bodies: list[Body] = []
         self.joints: list[MechanismJoint] = []
-        #: Last elementary joint of each joint: the one that carries its name.
+        #: Last elementary joint of each joint, which has the name of the joint.
         self.moved: dict[str, str] = {}
 
     def _unique(self, elements: Iterable[Element]) -> set[str]:
-        """Return the names of elements; refuse one that is given twice."""
+        """Return the names of elements; raise an error for a duplicate name."""
         names: set[str] = set()
         for each in elements:
             name = name_of(each, self.source)
             if name in names:
-                raise InputError(f"{self.source}: has two elements <{each.tag}> with the name {name!r}")
+                raise InputError(f"{self.source}: has two elements <{each.tag}> with the name {name!r}; rename one")
             names.add(name)
         return names
 
     def description(self) -> Description:
-        """Return the robot."""
+        """Return the description of the robot."""
         children: dict[str, list[tuple[str, str]]] = {}
         parents: dict[str, str] = {}
         for name, element in self.elements.items():
             where = f"{self.source}: joint {name}"
             parent, child = (link_of(element, tag, self.links, where) for tag in ("parent", "child"))
             if child in parents:
-                raise InputError(f"{where}: its child {child!r} is the child of the joint {parents[child]} already")
+                raise InputError(f"{where}: the link {child!r} is already the child of the joint {parents[child]}")
             parents[child] = name
             children.setdefault(parent, []).append((name, child))
         roots = [
@@ -98,7 +98,8 @@ class _Reader:
             if name not in parents
         ]
         if len(roots) != 1:
-            raise InputError(f"{self.source}: must have one root link; it has {listing(roots[:10])}")
+            fault = "must have exactly one root link, which is no joint's child"
+            raise InputError(f"{self.source}: {fault}, got {listing(roots[:10])}")
         self.bodies.append(Body(roots[0], "", Frame()))
         waiting = [(roots[0], Frame())]
         while waiting:
@@ -108,7 +109,7 @@ class _Reader:
         if len(self.bodies) < len(self.links):
             lost = sorted(self.links - {body.name for body in self.bodies})
             raise InputError(
-                f"{self.source}: the links {listing(lost[:10])} hang in a circle of joints, not on the root"
+                f"{self.source}: the links {listing(lost[:10])} are in a cycle of joints without connection to the root"
             )
         closures, notes = self._closures()
         couplings = self._couplings()
@@ -126,7 +127,7 @@ class _Reader:
         )
 
     def _add(self, name: str, link: str, child: str, place: Frame) -> Frame:
-        """Add a joint with the link that it moves, and return the link's place."""
+        """Add a joint with its child link, and return the frame of the link."""
         element = self.elements[name]
         where = f"{self.source}: joint {name}"
         kind = element.get("type", "")
@@ -141,22 +142,22 @@ class _Reader:
         for k, (part, local) in enumerate(parts):
             last = k == len(parts) - 1
             moved = child if last else unique_name(f"{child} behind {name} {k + 1}", self.links)
-            own = name if last else unique_name(f"{name} {k + 1}", self.elements)
+            part_name = name if last else unique_name(f"{name} {k + 1}", self.elements)
             axis = at.rotation @ local if part in ("R", "P") else np.zeros(3)
             limits = self._limits(element, kind, where) if len(parts) == 1 and part in ("R", "P") else None
-            self.joints.append(MechanismJoint(own, part, parent, moved, at.position, axis, range=limits))
+            self.joints.append(MechanismJoint(part_name, part, parent, moved, at.position, axis, range=limits))
             self.bodies.append(Body(moved, parent, at))
             parent = moved
         return at
 
     def _parts(self, element: Element, kind: str, other: str, where: str) -> list[tuple[ElementaryKind, FloatArray]]:
-        """Return the elementary joints of a joint, each with its axis in the joint's frame.
+        """Return the kinds of the elementary joints of a joint, each with its axis in the joint's frame.
 
         Args:
-            element: the joint.
-            kind: its type.
-            other: its type by the YAML file, which counts instead; empty for none.
-            where: the joint, for messages.
+            element: element of the joint.
+            kind: type of the joint in the URDF file.
+            other: type of the joint in the YAML file, which has priority; empty if not given.
+            where: place of the joint, for messages.
         """
         if other == "SPHERICAL":
             return [("S", np.zeros(3))]
@@ -174,7 +175,7 @@ class _Reader:
         return [(each, np.zeros(3)) for each in parts]
 
     def _limits(self, element: Element, kind: str, where: str) -> tuple[float, float] | None:
-        """Return the range of a joint; None for one that has none."""
+        """Return the range of a joint; None without a range."""
         limit = element.find("limit")
         if kind == "continuous" or limit is None or "lower" not in limit.attrib or "upper" not in limit.attrib:
             return None
@@ -191,15 +192,15 @@ class _Reader:
         taken |= {each.name for each in closures}
         if self.loops is not None:
             return [*closures, *closures_of_pairs(self.loops, {**links, **joints})], []
-        # A frame is a link without size that is fixed to its parent.
+        # A frame is a link that is fixed to its parent.
         fixed = {joint.outer for joint in self.joints if joint.kind == "weld"}
         frames = {name: (name, Frame()) for name in places if name in fixed}
         found, notes = closures_of_frames(frames, sorted(taken), places)
-        # A hinge's second pair of frames lies on other links than the first, fixed to the same ones.
+        # The second pair of frames of a hinge is fixed to the same links as the first pair.
         return [*closures, *found], notes
 
     def _couplings(self) -> dict[Coupling, float]:
-        """Return the joints that follow others (``mimic``), each with its value with all joints at 0."""
+        """Return the couplings by ``mimic``, each with its value for all joint coordinates 0."""
         found = {}
         for name, element in self.elements.items():
             mimic = element.find("mimic")
@@ -208,18 +209,18 @@ class _Reader:
             place = f"{self.source}: joint {name}, mimic"
             other = mimic.get("joint", "")
             if other not in self.elements or other == name:
-                raise InputError(f'{place} = "{other[:60]}": must be another joint')
+                raise InputError(f'{place} = "{other[:60]}": must be the name of another joint')
             factor = number_of(mimic, "multiplier", 1.0, place)
             coupling = Coupling(f"{name} mimic", ((name, 1.0), (other, -factor)))
             found[coupling] = -number_of(mimic, "offset", 0.0, place)
         return found
 
     def _driven(self) -> set[str]:
-        """Return the driven joints: those of the YAML file, of transmissions and of ``ros2_control``."""
+        """Return the actuated joints, from the YAML file, or from transmissions and ``ros2_control``."""
         if self.loops is not None and self.loops.driven is not None:
             for name in self.loops.driven:
                 if name not in self.elements:
-                    raise InputError(f'{self.loops.path}: name_mot = "{name[:60]}": is no joint of the URDF')
+                    raise InputError(f'{self.loops.path}: name_mot = "{name[:60]}": no such joint in the URDF file')
             return set(self.loops.driven)
         named = [each.get("name", "") for each in self.root.iterfind("transmission/joint")]
         named += [

@@ -1,4 +1,4 @@
-"""Elements of URDF as values: origins, axes, limits and names, each refused with its place where it is wrong."""
+"""Values of URDF elements: origins, axes, limits and names, with errors that name the element."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ...errors import InputError, listing
 from ..frames import Frame, rotation_from_roll_pitch_yaw
 from .description import LARGEST
 
-#: Shortest vector that is a direction: a shorter one is a zero in decimals.
+#: Smallest length of a direction; a shorter vector counts as zero.
 _SHORTEST = 1e-12
 
 
@@ -20,19 +20,25 @@ def name_of(element: Element, source: str) -> str:
     """Return the name of an element.
 
     Raises:
-        InputError: it has none.
+        InputError: the element has no name.
     """
     name = element.get("name", "")
     if not name:
-        raise InputError(f"{source}: a <{element.tag}> has no name")
+        raise InputError(f"{source}: an element <{element.tag}> has no name; give it an attribute name")
     return name
 
 
 def numbers_of(element: Element, key: str, default: str, place: str) -> FloatArray:
-    """Return the three numbers of an attribute, (3,).
+    """Return the three numbers (3,) of an attribute.
+
+    Args:
+        element: the element.
+        key: name of the attribute.
+        default: text of the attribute if it is missing.
+        place: place of the element, for messages.
 
     Raises:
-        InputError: they are not three finite numbers.
+        InputError: the attribute is not three finite numbers.
     """
     text = element.get(key, default)
     try:
@@ -40,15 +46,21 @@ def numbers_of(element: Element, key: str, default: str, place: str) -> FloatArr
     except ValueError:
         numbers = []
     if len(numbers) != 3 or not all(abs(number) <= LARGEST for number in numbers):
-        raise InputError(f'{place}, {key} = "{text[:60]}": must be three finite numbers of {LARGEST:g} or less')
+        raise InputError(f'{place}, {key} = "{text[:60]}": must be three finite numbers of at most {LARGEST:g}')
     return np.array(numbers)
 
 
 def number_of(element: Element, key: str, default: float, place: str) -> float:
     """Return the number of an attribute.
 
+    Args:
+        element: the element.
+        key: name of the attribute.
+        default: number of a missing attribute.
+        place: place of the element, for messages.
+
     Raises:
-        InputError: it is no finite number.
+        InputError: the attribute is not a finite number.
     """
     text = element.get(key, str(default))
     try:
@@ -61,7 +73,7 @@ def number_of(element: Element, key: str, default: float, place: str) -> float:
 
 
 def origin_of(element: Element, tag: str, place: str) -> Frame:
-    """Return the frame of a child element with ``xyz`` and ``rpy``; the identity where there is none."""
+    """Return the frame of a child element with ``xyz`` and ``rpy``; the identity if it is missing."""
     child = element.find(tag)
     if child is None:
         return Frame()
@@ -71,24 +83,24 @@ def origin_of(element: Element, tag: str, place: str) -> Frame:
 
 
 def axis_of(element: Element, tag: str, place: str) -> FloatArray:
-    """Return the unit direction (3,) of a child element with ``xyz``; x where there is none, as URDF has it.
+    """Return the unit direction (3,) of a child element with ``xyz``; the x axis if it is missing, as in URDF.
 
     Raises:
-        InputError: it is zero.
+        InputError: the direction is zero.
     """
     child = element.find(tag)
     axis = np.array([1.0, 0.0, 0.0]) if child is None else numbers_of(child, "xyz", "1 0 0", f"{place}, {tag}")
     length = float(np.linalg.norm(axis))
     if length < _SHORTEST:
-        raise InputError(f'{place}, {tag} = "0 0 0": must be a direction')
+        raise InputError(f'{place}, {tag} = "0 0 0": must be a direction, and not zero')
     return axis / length
 
 
 def link_of(element: Element, tag: str, links: set[str], place: str) -> str:
-    """Return the name of the link that a child element means.
+    """Return the name of the link in a child element.
 
     Raises:
-        InputError: it is missing, or there is no such link.
+        InputError: the child element is missing, or there is no such link.
     """
     child = element.find(tag)
     name = "" if child is None else child.get("link", "")

@@ -1,7 +1,7 @@
-"""The four ways in which URDF files state closed loops.
+"""Closed loops of URDF files, in four conventions.
 
-- a YAML file beside the URDF with pairs of frames ``closed_loop``, their ``type`` (``3d`` or ``6d``), the driven joints
-  ``name_mot``, and joints of another kind ``joint_name`` and ``joint_type``
+- a YAML file beside the URDF with pairs of frames ``closed_loop``, their ``type`` (``3d`` or ``6d``), the actuated
+  joints ``name_mot``, and joints of another kind ``joint_name`` and ``joint_type``
   (github.com/Gepetto/example-parallel-robots),
 - frames ``closing_NAME_1`` and ``closing_NAME_2``, with a second pair ``closing_NAME_1_z`` for a hinge
   (github.com/Rhoban/onshape-to-robot, docs/source/kinematic_loops.rst and onshape_to_robot/assembly.py),
@@ -28,7 +28,7 @@ from ..frames import Frame, axis_frame
 from .description import Closing, LoopClosure, common_name, unique_name
 from .urdfelements import axis_of, link_of, name_of, origin_of
 
-#: Largest YAML file, bytes: those that are published have 2 kB.
+#: Largest YAML file, bytes: published files have 2 kB.
 _LARGEST_YAML = 2**20
 _CLOSING_FRAME = re.compile(r"(closing_.+)_1")
 _PAIR_TYPES = {"3d": Closing.BALL, "6d": Closing.WELD}
@@ -47,13 +47,14 @@ _JOINT_TYPE = re.compile(r"SPHERICAL|FIXED|UJOINT_[XYZ][XYZ]")
 
 @dataclass(frozen=True)
 class LoopFile:
-    """A YAML file of loops.
+    """YAML file of loops.
 
     Attributes:
-        path: the file.
-        pairs: names of the two frames of each loop, with its kind.
-        driven: names of the driven joints; None where the file does not say.
-        kinds: joints of another kind than the URDF has, ``SPHERICAL``, ``FIXED`` or ``UJOINT_XY``.
+        path: path of the file.
+        pairs: names of the two frames of each loop, with the kind of its joint.
+        driven: names of the actuated joints; None if the file does not list them.
+        kinds: type by name of joints with another type than in the URDF file: ``SPHERICAL``, ``FIXED`` or
+            ``UJOINT_XY``.
     """
 
     path: Path
@@ -63,10 +64,10 @@ class LoopFile:
 
 
 def read_loop_file(path: Path) -> LoopFile:
-    """Return a YAML file of loops.
+    """Return the content of a YAML file of loops.
 
     Raises:
-        InputError: it cannot be read, or its keys are not those of such a file.
+        InputError: the file cannot be read, or a key has a wrong value.
     """
     yaml = required("yaml", "YAML files of loops", "pyyaml")
     try:
@@ -75,19 +76,20 @@ def read_loop_file(path: Path) -> LoopFile:
         reason = str(error).splitlines() or [""]
         raise InputError(f"{path}: is not valid YAML: {reason[0]}") from None
     if not isinstance(tables, dict):
-        raise InputError(f"{path}: is not a table of loops with the key closed_loop")
+        raise InputError(f"{path}: must be a table of loops with the key closed_loop, got {type(tables).__name__}")
     pairs = tables.get("closed_loop") or []
     if not isinstance(pairs, list) or not all(isinstance(pair, list) and len(pair) == 2 for pair in pairs):
         raise InputError(f"{path}: closed_loop: must be a list of pairs of names")
     kinds = _texts(path, tables, "type") or ["6d"] * len(pairs)
     if len(kinds) != len(pairs):
-        raise InputError(f"{path}: type: has {len(kinds)} entries for {len(pairs)} loops")
+        raise InputError(f"{path}: type: must have {len(pairs)} entries, one for each loop, got {len(kinds)}")
     for kind in kinds:
         if kind.lower() not in _PAIR_TYPES:
             raise InputError(f'{path}: type = "{kind[:60]}": must be 3d or 6d')
     names, types = _texts(path, tables, "joint_name") or [], _texts(path, tables, "joint_type") or []
     if len(names) != len(types):
-        raise InputError(f"{path}: joint_type: has {len(types)} entries for {len(names)} joints in joint_name")
+        fault = f"must have {len(names)} entries, one for each name in joint_name, got {len(types)}"
+        raise InputError(f"{path}: joint_type: {fault}")
     for kind in types:
         if not _JOINT_TYPE.fullmatch(kind):
             fault = "must be SPHERICAL, FIXED or UJOINT_ with two of the letters X, Y and Z"
@@ -102,7 +104,7 @@ def read_loop_file(path: Path) -> LoopFile:
 
 
 def _texts(path: Path, tables: Mapping[str, object], key: str) -> list[str] | None:
-    """Return a list of texts; None where the key is missing."""
+    """Return a list of texts; None if the key is missing."""
     value = tables.get(key)
     if value is None:
         return None
@@ -115,17 +117,18 @@ def closures_of_pairs(loops: LoopFile, frames: Mapping[str, tuple[str, Frame]]) 
     """Return the closures of a YAML file.
 
     Args:
-        loops: the file.
-        frames: places that a name may mean: those of links, and of joints as they move.
+        loops: content of the file.
+        frames: frame on a link for each name of a link or joint.
 
     Raises:
-        InputError: a name means no frame.
+        InputError: a name is unknown.
     """
     found: list[LoopClosure] = []
     for first, second, closing in loops.pairs:
         for name in (first, second):
             if name not in frames:
-                raise InputError(f'{loops.path}: closed_loop = "{name[:60]}": is no link or joint of the URDF')
+                fault = "no such link or joint in the URDF file"
+                raise InputError(f'{loops.path}: closed_loop = "{name[:60]}": {fault}')
         (one, one_frame), (other, other_frame) = frames[first], frames[second]
         name = unique_name(
             common_name([first, second]) or f"{first} {second}", {each.name for each in found} | set(frames)
@@ -137,12 +140,12 @@ def closures_of_pairs(loops: LoopFile, frames: Mapping[str, tuple[str, Frame]]) 
 def closures_of_frames(
     frames: Mapping[str, tuple[str, Frame]], taken: Sequence[str], places: Mapping[str, Frame]
 ) -> tuple[list[LoopClosure], list[str]]:
-    """Return the closures that frames ``closing_NAME_1`` and ``closing_NAME_2`` mean, and notes about them.
+    """Return the closures by frames ``closing_NAME_1`` and ``closing_NAME_2``, and notes.
 
     Args:
-        frames: named places on links, as name of the link and the frame there.
-        taken: names that are given already.
-        places: the links' frames in the world.
+        frames: named frames on links: name of the link, and frame in link coordinates.
+        taken: names already in use.
+        places: frames of the links in the world.
     """
     found: list[LoopClosure] = []
     notes: list[str] = []
@@ -153,19 +156,19 @@ def closures_of_frames(
         other, other_frame = frames[f"{match[1]}_2"]
         closing, first_frame, second_frame = Closing.BALL, one_frame, other_frame
         if {f"{name}_z", f"{match[1]}_2_z"} <= set(frames):
-            # The second pair lies on the hinge's axis.
+            # The second pair is on the axis of the hinge.
             closing = Closing.HINGE
             first_frame = _towards(one_frame, one, frames[f"{name}_z"], places)
             second_frame = _towards(other_frame, other, frames[f"{match[1]}_2_z"], places)
         else:
-            notes.append(f"{match[1]} is taken for a ball joint: its two frames do not say its kind")
+            notes.append(f"{match[1]} is assumed to be a ball joint, because its two frames do not give its kind")
         chosen = unique_name(match[1], {*taken, *(each.name for each in found)})
         found.append(LoopClosure(chosen, closing, one, other, first_frame, second_frame))
     return found, notes
 
 
 def _towards(frame: Frame, link: str, end: tuple[str, Frame], places: Mapping[str, Frame]) -> Frame:
-    """Return a frame of a link with its axis z towards another frame's point; the same frame where they coincide."""
+    """Return a frame of a link with its z axis towards the origin of another frame; unchanged if both coincide."""
     at = places[link].inverse() @ places[end[0]] @ end[1]
     direction = at.position - frame.position
     return axis_frame(frame.position, direction) if np.linalg.norm(direction) > 0 else frame
@@ -175,7 +178,7 @@ def closures_of_elements(root: Element, links: set[str], taken: Collection[str],
     """Return the closures of the elements ``<constraint>`` and ``<loop_joint>``.
 
     Raises:
-        InputError: a link or type is unknown, the hinge or slide of a loop joint has no axis, or a number is none.
+        InputError: a link or type is unknown, a loop joint needs an axis, or a value is not a number.
     """
     found: dict[str, LoopClosure] = {}
     for element in (*root.findall("constraint"), *root.findall("loop_joint")):
@@ -190,7 +193,7 @@ def closures_of_elements(root: Element, links: set[str], taken: Collection[str],
         first, second = (link_of(element, side, links, place) for side in sides)
         frames = [origin_of(element, side if is_joint else f"{side}_origin", place) for side in sides]
         if is_joint and closing not in (Closing.BALL, Closing.WELD) and element.find("axis") is None:
-            fault = f"is missing; a joint of the type {kind} needs it, in the frame of each link"
+            fault = f"is missing: a joint of type {kind} needs an axis, in the frame of each link"
             raise InputError(f"{place}, axis: {fault}")
         axes = [axis_of(element, "axis" if is_joint else f"{side}_axis", place) for side in sides]
         if closing is not Closing.WELD:

@@ -1,4 +1,4 @@
-"""XML files as elements; content that needs unbounded memory or time, or other files, is refused."""
+"""Safe reader of XML files: content that needs unbounded memory or time, or other files, is refused."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from xml.parsers import expat
 from ...errors import InputError
 from ...system.reading import read_limited
 
-#: Largest description, bytes: twenty times the largest of those that robots' makers publish (without meshes).
+#: Largest file, bytes: twenty times the largest published description without meshes.
 LARGEST_FILE = 16 * 2**20
-#: Deepest element: a chain of 60 bodies needs 62.
+#: Largest depth of elements: a chain of 60 bodies needs 62.
 _DEEPEST = 400
-#: Most elements of a description.
+#: Largest number of elements.
 _MOST_ELEMENTS = 200_000
 
 
 class _RefusedError(Exception):
-    """A reason to stop reading, as a clause."""
+    """Reason to stop reading, as a clause."""
 
 
 def read_xml(path: Path) -> Element:
     """Return the root element of an XML file, without comments.
 
     Raises:
-        InputError: the file cannot be read, is too large or too deep, is no XML, or declares a document type, by which
-            entities could grow without end or bring in other files.
+        InputError: the file cannot be read, is too large or too deep, is not XML, or declares a document type, whose
+            entities could grow without limit or include other files.
     """
     content = read_limited(path, LARGEST_FILE, is_regular=True)
     builder = TreeBuilder()
@@ -48,7 +48,7 @@ def read_xml(path: Path) -> Element:
         builder.end(tag)
 
     def refuse(*_: object) -> None:
-        raise _RefusedError("it declares a document type or entities, which are not read")
+        raise _RefusedError("it declares a document type or entities, which are not allowed")
 
     parser.StartElementHandler, parser.EndElementHandler = start, end
     parser.CharacterDataHandler = builder.data

@@ -1,4 +1,4 @@
-"""A robot given joint by joint as a mechanism at a pose: its loops are closed near the coordinates of the program."""
+"""Robots given joint by joint as mechanisms at a pose, with loops closed near the joint coordinates of the program."""
 
 from __future__ import annotations
 
@@ -21,33 +21,34 @@ from ...errors import InputError
 from ...evidence.state import RobotState
 from .words import ExportedJoint, RobotMechanism, extent_of, framed, joint_name, link_name, renamed, unique_names
 
-#: Parts of a joint by its type, one for each elementary joint: names of coordinates, and ends of joints' names.
+#: Elementary joints of a joint by its type: name of the coordinate, and suffix of the elementary joint's name.
 _PARTS: Mapping[str, tuple[tuple[str, str], ...]] = {
     "U": (("first", "first"), ("second", "second")),
     "C": (("angle", "angle"), ("stroke", "stroke")),
     "Pa": (("", "a"), ("back", "back_a"), ("", "b"), ("back", "back_b")),
 }
-#: Largest difference of the platform's pose and of joint coordinates from those of the program, radians and parts of
-#: the robot's size: results are closed to the solver's accuracy, and another assembly differs by parts of 1.
+#: Largest difference of pose and joint coordinates from those of the program, radians or relative to the robot's size:
+#: loops of results are closed to the solver's accuracy, and another assembly mode differs by order 1.
 _SAME = 1e-6
 
 _RODS = (
-    "A parallelogram is two rods with a hinge at each end. Their distance, a fifth of a rod, is our choice: the"
-    " robot has no such number, and the motion of its platform does not depend on it."
+    "A parallelogram has two rods with a hinge at each end. The distance between the rods, a fifth of their length, is"
+    " an assumption: the robot file does not define it, and the motion of the platform does not depend on it."
 )
 _DRIVEN_ROD = (
-    "The rate of a driven one in results is a length; that of its hinge is an angle, the length over the rod's."
+    "In results, the rate of an actuated parallelogram is a length; the rate of its hinge is an angle: this length"
+    " divided by the length of the rod."
 )
 
 
 class GivenRobot(NamedTuple):
-    """A robot given joint by joint, as the program has it at a pose.
+    """Robot given joint by joint, at a pose of its program.
 
     Attributes:
         model: the robot.
-        state: its dimensions and the pose.
-        joints: as limits read them.
-        coordinates: known coordinates from home by label and part of a joint, such as ``("2:3", "first")``.
+        state: dimensions and pose of the robot.
+        joints: joints of the robot.
+        coordinates: known joint coordinates from home, by label and part of a joint, such as ``("2:3", "first")``.
     """
 
     model: Model
@@ -60,15 +61,15 @@ def given_mechanism(robot: GivenRobot) -> RobotMechanism:
     """Return a robot given joint by joint as a mechanism at its pose.
 
     Raises:
-        InputError: the actuators do not lead from home to the pose and to the program's coordinates.
-        MechanismError: the loops do not close there.
+        InputError: the actuators do not move the robot from home to the pose and the joint coordinates.
+        MechanismError: the loops cannot be closed at the pose.
     """
     home = home_of(read_robot(definition_of(robot.model)))
     has_networks = home.graph is not None and bool(home.graph.networks)
     angles = {name for name, each in home.words.dimensions.items() if each.kind is Dimension.ANGLE}
     numbers = {name: float(value.item()) for name, value in robot.state.parameters.items()}
     values = {name: math.degrees(value) if name in angles else value for name, value in numbers.items()}
-    # Limbs are named alike, whether they are written limb by limb or link by link.
+    # Limbs have the same names in robot files with limbs and with links.
     at_home = mechanism_at_home(home if has_networks else replace(home, graph=None), values)
     size = extent_of(at_home)
     words = _words(robot, at_home, by_name=has_networks)
@@ -76,16 +77,16 @@ def given_mechanism(robot: GivenRobot) -> RobotMechanism:
     found = closed.mechanism if has_networks else framed(closed.mechanism, closed.coordinates, size)
     found = renamed(found, {} if has_networks else _link_names(at_home, words))
     joints = tuple(replace(joint, name=each.name) for joint, each in zip(found.joints, words, strict=True))
-    said = tuple(
+    exported = tuple(
         replace(each, coordinate=closed.coordinates.get(joint.name))
         for each, joint in zip(words, at_home.joints, strict=True)
     )
     mechanism = replace(found, name=robot.model.name, joints=joints)
-    return RobotMechanism(mechanism, said, size, _notes(robot, said))
+    return RobotMechanism(mechanism, exported, size, _notes(robot, exported))
 
 
 def _closed(robot: GivenRobot, at_home: Mechanism, words: Sequence[ExportedJoint], size: float) -> ClosedMechanism:
-    """Return a mechanism closed at the program's pose and coordinates: near these, or along its actuators from home."""
+    """Return a mechanism at the program's pose: closed near its joint coordinates, or by actuator motions from home."""
     wanted = {}
     for joint, each in zip(at_home.joints, words, strict=True):
         value = robot.coordinates.get((each.label, each.part))
@@ -97,13 +98,13 @@ def _closed(robot: GivenRobot, at_home: Mechanism, words: Sequence[ExportedJoint
     driven = {joint.name: wanted[joint.name] for joint in at_home.joints if joint.actuated and joint.name in wanted}
     found = close(at_home, actuators=driven)
     if not _apart(robot, found, wanted, size) <= _SAME:
-        fault = "moving its actuators from home leads to another assembly or pose than the answer's"
+        fault = "its actuator coordinates lead from home to another assembly mode or pose than that of the result"
         raise InputError(f"robot {robot.model.name!r} cannot be exported: {fault}")
     return found
 
 
 def _apart(robot: GivenRobot, closed: ClosedMechanism, wanted: Mapping[str, float], size: float) -> float:
-    """Return how far a mechanism is from the program's pose and coordinates: radians, or parts of the robot's size."""
+    """Return the largest difference from the program's pose and coordinates, radians or relative to the size."""
     found = closed.mechanism
     platform = found.link(found.platform)
     apart = [
@@ -118,12 +119,12 @@ def _apart(robot: GivenRobot, closed: ClosedMechanism, wanted: Mapping[str, floa
 
 
 def _words(robot: GivenRobot, at_home: Mechanism, *, by_name: bool) -> list[ExportedJoint]:
-    """Return the elementary joints of a mechanism in the words of the robot file, without coordinates.
+    """Return the elementary joints of a mechanism with their names in the robot file, without coordinates.
 
     Args:
         robot: the robot.
-        at_home: its mechanism at home.
-        by_name: whether the mechanism calls joints by the names that the robot file gives them, not by their labels.
+        at_home: mechanism of the robot in the home configuration.
+        by_name: If true, joints of the mechanism have the names of the robot file; if false, labels such as ``2:3``.
     """
     places = {joint.name: joint.point for joint in at_home.joints}
     known: dict[str, ExportedJoint] = {}
@@ -148,7 +149,7 @@ def _words(robot: GivenRobot, at_home: Mechanism, *, by_name: bool) -> list[Expo
 
 
 def _actuators(robot: GivenRobot, at_home: Mechanism, limbs: Mapping[str, Sequence[str]]) -> dict[str, str]:
-    """Return the name of the actuator of each driven joint; both are in one order in a limb."""
+    """Return the actuator name of each actuated joint; joints and actuators of a limb are in the same order."""
     driven = {joint.name for joint in at_home.joints if joint.actuated}
     found: dict[str, str] = {}
     for limb, joints in limbs.items():
@@ -158,7 +159,7 @@ def _actuators(robot: GivenRobot, at_home: Mechanism, limbs: Mapping[str, Sequen
 
 
 def _link_names(at_home: Mechanism, words: Sequence[ExportedJoint]) -> dict[str, str]:
-    """Return a name of each link after the first joint behind which it is; rods of a parallelogram keep their end."""
+    """Return the name of each link, from the first joint that leads to it; parallelogram rods keep their suffix."""
     found: dict[str, str] = {}
     for joint, each in zip(at_home.joints, words, strict=True):
         is_shared = each.name.endswith("_back_a")

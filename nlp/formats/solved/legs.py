@@ -1,11 +1,9 @@
-"""Straight legs as a mechanism at a pose.
+"""Robots with straight legs as mechanisms at a pose.
 
-A leg with a force alone is a universal joint at the base, a slide along the leg and a spherical joint at the platform.
-Its row does not depend on the axes of the universal joint. Our choice: the first axis is fixed to the base, normal to
-the leg and to the base's z axis; the second is normal to it and to the leg.
-
-A leg with a force and a couple (a limb of a 3-UPU) is U, P and U. The axes on the platform are those of the robot.
-Those on the base are parallel to them at this pose, which makes the couple a pure one.
+A leg with only a force becomes a universal joint at the base, a prismatic joint and a spherical joint at the platform.
+The axes of the universal joint are an assumption: the first is normal to the leg and to the z axis of the base, the
+second is normal to the first and to the leg. A leg with a force and a couple, as in a 3-UPU, becomes U, P and U: the
+axes on the platform are those of the robot; those on the base are parallel to them, which makes the couple pure.
 """
 
 from __future__ import annotations
@@ -22,27 +20,29 @@ from ....models.mechanism.graph import ElementaryKind
 from ...errors import InputError
 from .words import ExportedJoint, RobotMechanism, extent_of, framed, joint_name, link_name, unique_names
 
-#: Sine of the angle between a leg and the z axis below which they are parallel.
+#: Sine of the angle below which a leg and the z axis are parallel.
 _PARALLEL = 1e-9
 
 _UPS = (
-    "Legs are U, P and S, the robot's model has lines between joint centres only: the first axis of each U is fixed to"
-    " the base, normal to the leg and to the base's z axis at this pose; the second is normal to the first and the leg."
+    "Legs are U, P and S joints. The model of the robot has only lines between joint centres, so the axes of each U are"
+    " assumptions: the first one is fixed to the base, normal to the leg and to the z axis of the base at this pose;"
+    " the second one is normal to the first one and to the leg."
 )
 _UPU = (
-    "Limbs are U, P and U: the axes on the platform are the robot's, those on the base are parallel to them at this"
-    " pose, which the robot's model leaves open."
+    "Limbs are U, P and U joints. The axes on the platform are those of the model. The model does not define the axes"
+    " on the base, which are assumed to be parallel to those on the platform at this pose."
 )
 
 
 @dataclass(frozen=True, eq=False)
 class PosedLeg:
-    """A leg at a pose, in the world frame.
+    """Leg at a pose, in the world frame.
 
     Attributes:
-        name: of the limb.
-        base, platform: (3,) centres of its joints, length.
-        axes: (3,) each, both axes of its upper universal joint, that on the platform first; none for a spherical joint.
+        name: name of the limb.
+        base: (3,) centre of the base joint, length.
+        platform: (3,) centre of the platform joint, length.
+        axes: (3,) each, axes of the upper universal joint, the one on the platform first; empty for a spherical joint.
     """
 
     name: str
@@ -52,10 +52,10 @@ class PosedLeg:
 
 
 def check_legs(model: Model) -> None:
-    """Refuse a robot that is given by its rows, unless straight legs have them all.
+    """Refuse a robot given by its rows if not all of them belong to straight legs.
 
     Raises:
-        InputError: a limb is no straight leg, or has other rows than a force, or a force and a couple about an axis.
+        InputError: a limb is not a straight leg, or its rows are neither a force nor a force and a couple.
     """
     kinds: dict[str, list[WrenchKind]] = {leg.name: [] for leg in model.legs}
     drawn: Mapping[str, int] = {name: len(axes_of(model, name)) for name in kinds}
@@ -65,12 +65,12 @@ def check_legs(model: Model) -> None:
         is_leg = limb in drawn and found == [WrenchKind.FORCE]
         is_limb = limb in drawn and found == [WrenchKind.FORCE, WrenchKind.COUPLE] and drawn[limb] == 2
         if not (is_leg or is_limb):
-            fault = "the joints of its limbs are not known; a robot with straight legs or given joint by joint can be"
+            fault = "the joints of its limbs are not known; use a robot with straight legs, or a robot file"
             raise InputError(f"robot {model.name!r} cannot be exported: {fault}")
 
 
 def axes_of(model: Model, limb: str) -> list[int]:
-    """Return the indices, among the directions of the drawing, of the joint axes of a limb on the platform."""
+    """Return the indices of the platform joint axes of a limb among the directions of the drawing."""
     return [k for k, each in enumerate(model.scene.directions) if each.limb == limb and each.body is Body.PLATFORM]
 
 
@@ -78,13 +78,13 @@ def leg_mechanism(name: str, legs: Sequence[PosedLeg], rotation: FloatArray, pos
     """Return legs at a pose as a mechanism.
 
     Args:
-        name: of the robot.
-        legs: the legs at the pose.
-        rotation: (3, 3) ``R`` of the pose, platform to world coordinates.
-        position: (3,) ``p`` of the pose, length.
+        name: name of the robot.
+        legs: legs at the pose.
+        rotation: (3, 3) rotation ``R`` of the pose, from platform to world coordinates.
+        position: (3,) position ``p`` of the pose, length.
 
     Raises:
-        InputError: a leg has no length.
+        InputError: a leg has zero length.
     """
     steps = [step for leg in legs for step in _steps(leg)]
     names = unique_names(joint_name(step.label, step.part) for step in steps)
@@ -104,7 +104,7 @@ def leg_mechanism(name: str, legs: Sequence[PosedLeg], rotation: FloatArray, pos
 
 
 class _Step(NamedTuple):
-    """A joint of a leg: names of the leg, of the joint, and of its part; its kind, centre and axis."""
+    """Elementary joint of a leg: name of the leg, label of the joint, its part, its kind, centre and axis."""
 
     leg: str
     label: str
@@ -119,7 +119,7 @@ def _steps(leg: PosedLeg) -> tuple[_Step, ...]:
     span = leg.platform - leg.base
     length = float(np.linalg.norm(span))
     if not length > 0:
-        raise InputError(f"limb {leg.name!r} cannot be exported: it has zero length")
+        raise InputError(f"limb {leg.name!r} cannot be exported: it has zero length, so it has no direction")
     along = span / length
 
     def step(number: int, part: str, kind: ElementaryKind, point: FloatArray, axis: FloatArray) -> _Step:

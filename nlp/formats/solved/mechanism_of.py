@@ -1,7 +1,7 @@
-"""A solved case as a mechanism: every joint at its place, at one pose of the platform.
+"""Solved cases as mechanisms: every joint at one pose of the platform, with its range.
 
-Joints have ranges from ``leg_length``, from ``actuator_angle`` and ``actuator_length``, and from ranges of joints, all
-counted from the exported pose. Other limits (cones, strokes, clearances, rates) are no ranges of one joint.
+Ranges of joints come from ``leg_length``, ``actuator_angle``, ``actuator_length`` and limits on joints, measured from
+the exported pose. Other limits, such as cones, strokes, clearances and rates, do not give the range of a single joint.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from .given import GivenRobot, given_mechanism
 from .legs import PosedLeg, axes_of, check_legs, leg_mechanism
 from .words import ExportedJoint, RobotMechanism, Travel
 
-#: A slide with one side of a range has this many times the robot's size as the other: no loop of the robot is as long.
+#: Missing limit of a prismatic joint with only one limit, as a multiple of the robot's size: no loop is that long.
 _FAR = 100.0
 
 
 @dataclass(frozen=True, eq=False)
 class Exported(RobotMechanism):
-    """A solved case as a mechanism, with what its files say about it.
+    """Solved case as a mechanism, with the data of its files.
 
     Attributes:
         case: the case.
         pose: number of the pose, from 1.
-        travels: of the slides whose lengths or coordinates are known.
+        travels: travel of each prismatic joint with a known length or coordinate.
     """
 
     case: Case
@@ -45,18 +45,18 @@ class Exported(RobotMechanism):
 
 
 def mechanism_of(nlp: Nlp, x: FloatArray, pose: int = 1) -> Exported:
-    """Return a robot at a point of its program as a mechanism.
+    """Return a robot at a point of its nonlinear program as a mechanism.
 
     Args:
-        nlp: the program, of one task.
-        x: (n,) the point.
+        nlp: nonlinear program of one task.
+        x: (n,) point of the program.
         pose: number of the pose, from 1.
 
     Raises:
-        InputError: the joints of the robot's limbs are not known, a leg has zero length, or the configuration is not
-            reached from home.
-        MechanismError: a loop does not close.
-        EvaluationError: a number is not finite at the point.
+        InputError: the joints of the robot's limbs are not known, a leg has zero length, or the actuators do not move
+            the robot from home to the configuration.
+        MechanismError: a loop cannot be closed.
+        EvaluationError: a value is not finite at the point.
     """
     state = evaluate(nlp, x, pose - 1)
     model, known = nlp.program.model, nlp.program.robots[pose - 1].joints
@@ -72,10 +72,10 @@ def mechanism_of(nlp: Nlp, x: FloatArray, pose: int = 1) -> Exported:
     spans, joints, travels = {leg.name: leg.platform - leg.base for leg in legs}, [], []
     at_poses = [_values_at(nlp, x, k) for k in range(nlp.case.pose_count)]
     for joint, words in zip(found.mechanism.joints, found.joints, strict=True):
-        own = labelled.get(words.label)
-        leg = words.actuator if own is None else own.limb
+        given_joint = labelled.get(words.label)
+        leg = words.actuator if given_joint is None else given_joint.limb
         length = _signed_length(found.mechanism, joint, spans[leg]) if leg in spans and joint.actuated else None
-        limits = _limits_of_joint(nlp.case, joint, words, own, length)
+        limits = _limits_of_joint(nlp.case, joint, words, given_joint, length)
         joints.append(replace(joint, range=_range_of(joint, words, limits, found.size)))
         key = (words.label, words.part) if length is None else (leg, "length")
         if joint.kind == "P" and all(key in each for each in at_poses):
@@ -85,7 +85,7 @@ def mechanism_of(nlp: Nlp, x: FloatArray, pose: int = 1) -> Exported:
 
 
 def _coordinates(nlp: Nlp, x: FloatArray, pose: int) -> dict[tuple[str, str], float]:
-    """Return the coordinates from home that the program knows, by label and part of the joint."""
+    """Return the joint coordinates from home that the program can compute, by label and part of the joint."""
     robot = nlp.program.robots[pose]
     known = [(joint.label, each) for joint in robot.joints for each in joint.coordinates]
     function = ca.Function(
@@ -97,7 +97,7 @@ def _coordinates(nlp: Nlp, x: FloatArray, pose: int) -> dict[tuple[str, str], fl
 
 
 def _values_at(nlp: Nlp, x: FloatArray, pose: int) -> dict[tuple[str, str], float]:
-    """Return coordinates from home by label and part of the joint, and lengths of legs by limb and the word length."""
+    """Return joint coordinates from home by label and part, and leg lengths by limb name and ``length``."""
     spans = zip(nlp.program.model.legs, legs_at(nlp, x, pose)[1], strict=True)
     lengths = {(leg.name, "length"): float(np.linalg.norm(span)) for leg, span in spans}
     return {**_coordinates(nlp, x, pose), **lengths}
@@ -106,15 +106,16 @@ def _values_at(nlp: Nlp, x: FloatArray, pose: int) -> dict[tuple[str, str], floa
 def _travel(
     case: Case, joint: str, length: float | None, values: Sequence[float], pose: int, limits: tuple[float, float]
 ) -> Travel:
-    """Return the travel of a slide.
+    """Return the travel of a prismatic joint.
 
     Args:
-        case: with its limits.
-        joint: name of the slide.
-        length: of the leg that it drives at the exported pose, negative where it shortens it; None for another slide.
-        values: its length or its coordinate from home at every pose.
+        case: the case, for its limits.
+        joint: name of the joint.
+        length: length of the leg that the joint drives, at the exported pose; negative if a positive coordinate
+            shortens the leg; None for a joint that does not drive a leg.
+        values: length of the leg, or coordinate from home, at every pose.
         pose: number of the exported pose, from 1.
-        limits: smallest and largest coordinate from the exported pose, infinite without a limit.
+        limits: smallest and largest coordinate from the exported pose; infinite for no limit.
     """
     at, (lower, upper) = values[pose - 1], limits
     ends = (at - upper, at - lower) if length is not None and length < 0 else (at + lower, at + upper)
@@ -124,13 +125,13 @@ def _travel(
 
 
 def _largest_stroke(case: Case, ends: tuple[float, float], shortest: float, *, is_leg: bool) -> float:
-    """Return the largest stroke within the limits of a case from a length of at most the shortest one used.
+    """Return the largest stroke within the limits of a case that includes the smallest used length.
 
     Args:
-        case: with its limits.
-        ends: smallest and largest value of the slide within them, infinite without a limit.
-        shortest: smallest value used.
-        is_leg: whether the values are lengths of a leg, of which limits on telescoping legs speak.
+        case: the case, for its limits.
+        ends: smallest and largest allowed value of the prismatic joint; infinite for no limit.
+        shortest: smallest used value.
+        is_leg: True if the values are leg lengths, to which limits on telescoping legs apply.
     """
     (least, most), stroke, dead = ends, math.inf, -math.inf
     if is_leg and case.limits:
@@ -142,7 +143,7 @@ def _largest_stroke(case: Case, ends: tuple[float, float], shortest: float, *, i
                 dead = max(dead, -math.inf if limit.dead_length is None else limit.dead_length)
     if math.isinf(dead):
         return min(stroke, most - least)
-    # The stroke is at most the way up to the largest length, and the retracted length beside the dead one.
+    # The stroke is bounded by the largest length, and by retracted length minus dead length.
     retracted = shortest if math.isinf(most) else max(least, min(shortest, (most + dead) / 2))
     return min(stroke, most - retracted, retracted - dead)
 
@@ -166,7 +167,7 @@ def _legs(nlp: Nlp, x: FloatArray, pose: int, state: RobotState) -> list[PosedLe
 
 
 def _signed_length(mechanism: Mechanism, slide: MechanismJoint, span: FloatArray) -> float:
-    """Return the length of a leg from its base joint by a vector (3,); negative where its slide shortens it."""
+    """Return the length of a leg with a span (3,); negative if a positive coordinate of its slide shortens it."""
     ends = ((each.inner, each.outer) for each in mechanism.joints if each is not slide)
     on_base = reached(mechanism.base, [each for each in ends if mechanism.platform not in each])
     is_longer = bool(slide.axis @ span > 0) == (slide.inner in on_base)
@@ -176,19 +177,20 @@ def _signed_length(mechanism: Mechanism, slide: MechanismJoint, span: FloatArray
 def _limits_of_joint(
     case: Case, joint: MechanismJoint, words: ExportedJoint, given: LimbJoint | None, length: float | None
 ) -> tuple[float, float]:
-    """Return the smallest and the largest coordinate of a joint from the exported pose, infinite without a limit.
+    """Return the smallest and the largest coordinate of a joint from the exported pose; infinite for no limit.
 
     Args:
-        case: with its limits.
-        joint: the joint.
-        words: the same in the words of the case.
-        given: the joint of the robot file that it is part of; None for a leg.
-        length: of the leg that it drives at that pose, negative where it shortens it; None for another joint.
+        case: the case, for its limits.
+        joint: elementary joint of the mechanism.
+        words: names and coordinate of the elementary joint.
+        given: joint of the robot file that contains the elementary joint; None for a leg.
+        length: length of the leg that the joint drives, at this pose; negative if a positive coordinate shortens the
+            leg; None for a joint that does not drive a leg.
     """
     lower, upper, lever, value = -math.inf, math.inf, words.lever or 1.0, words.coordinate or 0.0
     if not case.limits or joint.kind in ("S", "weld") or words.follows:
         return lower, upper
-    # The classes of limits need pydantic, which a case without limits does not load.
+    # Classes of limits need pydantic, which is not imported for a case without limits.
     from ...case.limits.interval import QuantityLimit  # noqa: PLC0415
     from ...case.limits.joint_motion import JointMotion  # noqa: PLC0415
     from ...case.limits.legs import LegLength  # noqa: PLC0415
@@ -214,17 +216,17 @@ def _limits_of_joint(
 def _range_of(
     joint: MechanismJoint, words: ExportedJoint, limits: tuple[float, float], size: float
 ) -> tuple[float, float] | None:
-    """Return limits as formats have them, with two sides; None without a limit.
+    """Return the range of a joint with two finite ends, as file formats need it; None without a limit.
 
     Args:
-        joint: the joint.
-        words: the same in the words of the case.
-        limits: smallest and largest coordinate from the exported pose, infinite without a limit.
-        size: length of the order of the robot's own.
+        joint: elementary joint of the mechanism.
+        words: names and coordinate of the elementary joint.
+        limits: smallest and largest coordinate from the exported pose; infinite for no limit.
+        size: length of the order of the robot's size.
     """
     if math.isinf(limits[0]) and math.isinf(limits[1]):
         return None
-    # A limit of an angle counts within half a turn from home.
+    # Limits on angles hold up to half a turn from home.
     is_slide = joint.kind == "P"
     far = _FAR * size if is_slide else math.pi
     middle = 0.0 if is_slide else -(words.coordinate or 0.0)

@@ -1,6 +1,6 @@
-"""Files of a mechanism for other programs.
+"""Writers of mechanisms in the formats of other programs.
 
-The modules in order, each of which imports only those before it: ``numbers`` (numbers as text), ``tree`` (a spanning
-tree and the loops that close it), ``shapes`` (lines and sizes that show a link), ``mjcf``, ``urdf``, ``tables`` (CSV),
-``plates`` (joint centres in the plane of their plate, and DXF), ``readme``.
+The modules import each other in this order: ``numbers`` (numbers as text), ``tree`` (spanning tree and loop closures),
+``shapes`` (displayed lines of links), ``mjcf``, ``urdf``, ``tables`` (CSV), ``plates`` (joint centres in the plane of a
+plate, and DXF), ``cutlist``, ``readme``.
 """

@@ -1,6 +1,6 @@
-"""A mechanism as a list for the saw: distances of joint centres on each link, and strokes of slides; equal parts once.
+"""Cut list of a mechanism: distances of joint centres on each link, and strokes of prismatic joints.
 
-Base and platform are plates, whose joint centres are in tables and drawings of their own.
+Equal parts are listed once. Base and platform are plates, with separate tables and drawings of their joint centres.
 """
 
 from __future__ import annotations
@@ -19,14 +19,19 @@ from ..solved.words import Travel
 from .numbers import number
 from .shapes import joint_centres
 
-#: Lengths that differ by less than this part of the robot's size are one.
+#: Difference, relative to the robot's size, below which lengths are equal.
 _SAME = 1e-9
 
 
 class _Row(NamedTuple):
-    """A row of the list without its number of parts: item, name of the part, ends, and lengths, None for an empty one.
+    """Row of the cut list without the number of parts; parts with equal item, kinds and lengths are equal.
 
-    Rows with the same item, ends' kinds and lengths are of equal parts.
+    Attributes:
+        item: kind of the row, such as ``link``.
+        part: name of the link or joint.
+        ends: names of the joints at both ends.
+        kinds: kinds of these joints.
+        lengths: lengths of the row; None for an empty cell.
     """
 
     item: str
@@ -37,20 +42,20 @@ class _Row(NamedTuple):
 
 
 def drawn_links(mechanism: Mechanism, size: float) -> tuple[str, ...]:
-    """Return the links between base and platform that have an extent: joint centres at two places or more."""
+    """Return the names of the links between base and platform with two or more different joint centres."""
     ends = (mechanism.base, mechanism.platform)
     names = (link.name for link in mechanism.links if link.name not in ends)
     return tuple(name for name in names if len(joint_centres(mechanism, name, size)) > 1)
 
 
 def cut_list_csv(mechanism: Mechanism, travels: Iterable[Travel], size: float, units: Units) -> str:
-    """Return distances of joint centres on links, and lengths and strokes of slides.
+    """Return the cut list as CSV: distances of joint centres on links, and lengths and strokes of prismatic joints.
 
     Args:
         mechanism: the mechanism.
-        travels: of its slides.
-        size: the robot's.
-        units: of the table.
+        travels: travel of each prismatic joint.
+        size: characteristic size of the robot, length.
+        units: units of the table.
     """
     parts = [_distances(mechanism, name, size) for name in drawn_links(mechanism, size)]
     parts += [[_stroke(each)] for each in travels]
@@ -68,7 +73,7 @@ def cut_list_csv(mechanism: Mechanism, travels: Iterable[Travel], size: float, u
 
 
 def _distances(mechanism: Mechanism, link: str, size: float) -> list[_Row]:
-    """Return the distance of every two joint centres of a link."""
+    """Return a row for the distance of each pair of joint centres of a link."""
     kinds = {joint.name: joint.kind for joint in mechanism.joints}
     rows = []
     for (one, at_one), (other, at_other) in combinations(joint_centres(mechanism, link, size), 2):
@@ -79,13 +84,13 @@ def _distances(mechanism: Mechanism, link: str, size: float) -> list[_Row]:
 
 
 def _stroke(travel: Travel) -> _Row:
-    """Return the row of a slide: its length or way at the pose, over all poses, and as its limits allow it."""
+    """Return the row of a prismatic joint: length or displacement at the pose, over all poses and within limits."""
     lengths = (travel.value, *travel.used, travel.used[1] - travel.used[0], *travel.allowed, travel.stroke)
     return _Row("length of a leg" if travel.is_leg else "way from home", travel.joint, ("", ""), "", lengths)
 
 
 def _grouped(parts: Sequence[Sequence[_Row]], size: float) -> list[list[Sequence[_Row]]]:
-    """Return parts together that are equal, in the order of the first of each."""
+    """Return groups of equal parts, in the order of their first parts."""
     groups: list[list[Sequence[_Row]]] = []
     for part in parts:
         same = next((group for group in groups if _are_equal(group[0], part, size)), None)
@@ -94,7 +99,7 @@ def _grouped(parts: Sequence[Sequence[_Row]], size: float) -> list[list[Sequence
 
 
 def _are_equal(one: Sequence[_Row], other: Sequence[_Row], size: float) -> bool:
-    """Return whether two parts have the same joints at the same distances, in the same order."""
+    """Return whether two parts have the same kinds of joints at the same distances, in the same order."""
     if [(row.item, row.kinds) for row in one] != [(row.item, row.kinds) for row in other]:
         return False
     pairs = [pair for a, b in zip(one, other, strict=True) for pair in zip(a.lengths, b.lengths, strict=True)]

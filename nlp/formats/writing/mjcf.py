@@ -1,8 +1,8 @@
-"""A mechanism as MJCF, the format of MuJoCo.
+"""Writer of MJCF, the format of MuJoCo.
 
-The bodies are placed at the exported pose, so that all coordinates are 0 there. Loops are closed by ``connect`` for a
-ball and by ``weld`` otherwise; MuJoCo takes the relative places of these constraints from that pose. A screw is a hinge
-and a slide of one body that a ``joint`` constraint couples.
+All joint coordinates are 0 at the exported pose. Loops are closed by ``connect`` for spherical joints and by ``weld``
+for others; MuJoCo takes the relative poses of these constraints from the exported pose. A helical joint is a hinge and
+a slide, coupled by a ``joint`` constraint.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .numbers import direction, number, numbers, plain_name
 from .shapes import MARK, PIN, ROD, extent, shape_of
 from .tree import Edge, spanning_tree
 
-#: Time step, and time constant of the constraints, seconds: constraints need at least two steps.
+#: Time step, and time constant of the constraints, seconds; MuJoCo needs at least two steps per time constant.
 _STEP, _TIME_CONSTANT = 0.001, 0.002
 #: Natural frequency of a position actuator that moves the placeholder masses, radians per second.
 _FREQUENCY = 60.0
@@ -32,34 +32,34 @@ _BASE, _LIMB, _PLATFORM, _JOINT, _DRIVEN = (
     ".2 .2 .2 1",
     ".85 .35 .1 1",
 )
-#: Types of the joints of one coordinate, and of the ball.
+#: MuJoCo's type of each kind of joint.
 _TYPES: Mapping[str, str] = {"R": "hinge", "H": "hinge", "P": "slide", "S": "ball"}
 _COMMENT = (
     " Written by screwsynth. Lengths are in the unit of the case, see README.md. Masses, gains and shapes are"
-    " placeholders, and there is no gravity: the case has no such numbers. "
+    " placeholders, and gravity is 0, because the case does not define them. "
 )
 
 
 def mjcf_text(mechanism: Mechanism) -> str:
-    """Return a mechanism as the text of an MJCF file.
+    """Return the text of an MJCF file of a mechanism.
 
     Raises:
-        MechanismError: a link is not connected with the base.
+        MechanismError: a link is not connected to the base.
     """
     return _Writer(mechanism).text()
 
 
 class _Writer:
-    """The elements of the file while the tree is walked."""
+    """Writer of one file, which walks the spanning tree."""
 
     def __init__(self, mechanism: Mechanism) -> None:
         self._mechanism, self._tree, self._size = mechanism, spanning_tree(mechanism), extent(mechanism)
         self._home: list[str] = []
-        #: Names of the balls that close a loop.
+        #: Names of the spherical joints that close a loop.
         self._shared = {each.name for each in self._tree.closings if each.kind == "connect"}
 
     def text(self) -> str:
-        """Return the file."""
+        """Return the text of the file."""
         root = ET.Element("mujoco", model=plain_name(self._mechanism.name))
         root.append(ET.Comment(_COMMENT))
         ET.SubElement(root, "compiler", angle="radian", autolimits="true")
@@ -86,7 +86,7 @@ class _Writer:
         return ET.tostring(root, encoding="unicode") + "\n"
 
     def _body(self, link: str) -> str:
-        """Return the name of a link's body: MuJoCo has a body ``world`` already."""
+        """Return the name of a link's body, different from MuJoCo's own body ``world``."""
         names = {each.name for each in self._mechanism.links}
         name = link
         while name == "world" or (name != link and name in names):
@@ -94,7 +94,7 @@ class _Writer:
         return name
 
     def _children(self, body: ET.Element, link: MechanismLink) -> None:
-        """Add the bodies behind a link, one inside the other."""
+        """Add the bodies of all links below a link of the tree, nested."""
         for edge in self._tree.below(link.name):
             child = edge.child
             inner = ET.SubElement(body, "body", {"name": self._body(child.name)} | _placed(child, link))
@@ -113,7 +113,7 @@ class _Writer:
             self._children(inner, child)
 
     def _joint(self, body: ET.Element, edge: Edge) -> None:
-        """Add the joint of a body, and its coordinates to the home position."""
+        """Add the joint of a body, and its coordinates in the key frame."""
         joint, child = edge.joint, edge.child
         if joint.kind == "weld":
             return
@@ -140,7 +140,7 @@ class _Writer:
             ET.SubElement(body, "geom", type="capsule", fromto=line, size=number(ROD * self._size), rgba=colour)
 
     def _mark(self, body: ET.Element, link: MechanismLink, joint: MechanismJoint, axis: FloatArray) -> None:
-        """Add the mark of a joint to a link: a ball, or a pin along the axis (3,)."""
+        """Add the displayed mark of a joint to a link: a sphere, or a pin along the axis (3,)."""
         place = link.local(joint.point)
         colour = _DRIVEN if joint.actuated else _JOINT
         if joint.kind == "S":
@@ -160,7 +160,7 @@ class _Writer:
                 anchor = numbers(body.local(each.point))
                 ET.SubElement(equality, "connect", ends, anchor=anchor)
             else:
-                # Rotations count as lengths of the robot's size, so that the rows of the weld are of one order.
+                # Rotations are scaled by the robot's size, so that all rows of the weld have the same magnitude.
                 ET.SubElement(equality, "weld", ends, torquescale=number(self._size))
         for joint in self._mechanism.joints:
             if joint.kind == "H":
@@ -170,7 +170,7 @@ class _Writer:
             root.remove(equality)
 
     def _couplings(self, root: ET.Element, equality: ET.Element) -> None:
-        """Add the couplings of coordinates: of two by a polynomial, of more by a tendon of constant length."""
+        """Add the couplings: of two coordinates by a polynomial, of more by a tendon of constant length."""
         for coupling in self._mechanism.couplings:
             if len(coupling.factors) == 2:
                 one, other = coupling.factors
@@ -184,7 +184,7 @@ class _Writer:
             ET.SubElement(equality, "tendon", name=coupling.name, tendon1=coupling.name)
 
     def _actuators(self, root: ET.Element) -> None:
-        """Add a position actuator for each driven joint."""
+        """Add a position actuator for each actuated joint."""
         driven = [joint for joint in self._mechanism.joints if joint.actuated]
         actuator = ET.SubElement(root, "actuator") if driven else root
         total = sum(shape_of(self._mechanism, link.name, self._size).mass for link in self._mechanism.links)
@@ -198,18 +198,18 @@ class _Writer:
 
 
 def _couple(equality: ET.Element, name: str, one: tuple[str, float], other: tuple[str, float]) -> None:
-    """Add a constraint by which the sum of factors times the coordinates of two joints stays as it is."""
+    """Add a constraint that keeps the sum of factors times coordinates of two joints constant."""
     factor = number(-one[1] / other[1])
     ET.SubElement(equality, "joint", name=name, joint1=other[0], joint2=one[0], polycoef=f"0 {factor} 0 0 0")
 
 
 def _slide_name(joint: MechanismJoint) -> str:
-    """Return the name of the slide of a screw."""
+    """Return the name of the slide of a helical joint."""
     return f"{joint.name}_slide"
 
 
 def _placed(link: MechanismLink, parent: MechanismLink | None) -> dict[str, str]:
-    """Return the attributes of a body's place in its parent, or in the world."""
+    """Return the attributes of a body's pose in its parent, or in the world."""
     origin: FloatArray = np.zeros(3) if parent is None else parent.position
     turn: FloatArray = np.eye(3) if parent is None else parent.rotation
     return {

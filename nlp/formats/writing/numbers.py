@@ -1,4 +1,4 @@
-"""Numbers as the shortest text from which the same double is read again, and names that XML has a place for."""
+"""Numbers as the shortest text that reads as the same double, and names that are valid in XML."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from ....models import FloatArray
 
-#: Entries of a unit vector or rotation below this are rounding errors of zero.
+#: Largest rounding error of a zero entry of a unit vector or rotation.
 _NOISE = 1e-16
 
 
@@ -19,15 +19,15 @@ def number(value: float) -> str:
 
 
 def numbers(values: Iterable[float]) -> str:
-    """Return numbers with spaces between them."""
+    """Return numbers as text, separated by spaces."""
     return " ".join(number(value) for value in values)
 
 
 def direction(vector: FloatArray) -> str:
-    """Return a unit vector (3,) as text, without entries that are rounding errors."""
+    """Return a unit vector (3,) as text, with 0 for rounding errors."""
     return numbers(np.where(np.abs(vector) < _NOISE, 0.0, vector))
 
 
 def plain_name(name: str) -> str:
-    """Return a robot's name without the characters that XML has no place for."""
+    """Return a robot's name with underscores for characters that are not allowed in XML."""
     return "".join(char if char.isprintable() else "_" for char in name)

@@ -1,6 +1,6 @@
-"""Base and platform as flat plates: joint centres in the plane of their plate, and their distances from it.
+"""Links as flat plates: joint centres in the plane of least squares, with their distances from it, as CSV and DXF.
 
-Drawings of plates are written in DXF by ezdxf: joint centres, outline and names.
+The library ezdxf writes the DXF drawings, with joint centres, outline and names.
 """
 
 from __future__ import annotations
@@ -22,26 +22,26 @@ from ..extra import required
 from .numbers import number
 from .shapes import joint_centres
 
-#: Extents of points across a plane, sines of angles, and distances in parts of the robot's size, that count as zero.
+#: Relative rounding error: of extents and distances, relative to the robot's size, and of sines of angles.
 _FLAT = 1e-9
-#: Codes of length units in DXF's header by the label of a case; 0, no unit, for all others.
+#: Codes of length units in the DXF header; 0 (no unit) for all others.
 _UNITS: Mapping[str, int] = {"in": 1, "ft": 2, "mm": 4, "cm": 5, "m": 6, "km": 7, "um": 13, "dm": 14}
-#: Radius of a joint's circle and height of letters, in parts of the plate's extent.
+#: Radius of a joint's circle and height of letters, relative to the plate's extent.
 _CIRCLE, _LETTERS = 0.02, 0.025
 
 
 @dataclass(frozen=True, eq=False)
 class Plate:
-    """A plate with the centres of the joints on it.
+    """Plate with its joint centres.
 
     Attributes:
-        name: of the link.
+        name: name of the link.
         joints: names of the joints at each centre.
-        origin: (3,) origin of the drawing in the frame of the link, length: the foot of that frame's origin.
-        axes: (3, 3) x, y and normal of the drawing as columns, in the frame of the link.
-        places: (n, 2) centres in the drawing, length.
-        offsets: (n,) distances of the centres from the plane, along its normal, length.
-        corners: indices of the centres that are corners of the outline, in order.
+        origin: (3,) origin of the drawing in the frame of the link, length: projection of the frame's origin.
+        axes: (3, 3) x axis, y axis and normal of the drawing as columns, in the frame of the link.
+        places: (n, 2) joint centres in the drawing, length.
+        offsets: (n,) signed distances of the joint centres from the plane, length.
+        corners: indices of the joint centres at corners of the outline, in order.
     """
 
     name: str
@@ -53,20 +53,20 @@ class Plate:
     corners: tuple[int, ...]
 
     def is_flat(self, size: float) -> bool:
-        """Return whether all centres are in the plane."""
+        """Return whether all joint centres are in the plane."""
         return float(np.abs(self.offsets).max(initial=0.0)) <= _FLAT * size
 
 
 def plate_of(mechanism: Mechanism, link: str, size: float) -> Plate:
-    """Return a link as a plate in the plane of least squares of its joints' centres.
+    """Return a link as a plate in the plane of least squares of its joint centres.
 
-    The normal has a positive part along the z axis of the link's frame; the plane of a line or a point is as near as
-    possible to its xy plane. The drawing's x axis is that of the frame, projected.
+    The normal has a positive component along the z axis of the link's frame. For collinear joint centres, the plane is
+    as near as possible to the xy plane of the frame. The x axis of the drawing is the projected x axis of the frame.
 
     Args:
         mechanism: the mechanism.
         link: name of the link.
-        size: the robot's.
+        size: characteristic size of the robot, length.
     """
     frame, centres = mechanism.link(link), joint_centres(mechanism, link, size)
     points = np.array([frame.local(point) for point, _ in centres]).reshape(-1, 3)
@@ -100,7 +100,7 @@ def _normal(points: FloatArray, size: float) -> FloatArray:
 
 
 def plates_csv(plates: tuple[Plate, ...], units: Units) -> str:
-    """Return the joint centres of plates in their drawings, with their distances from the plane."""
+    """Return a CSV table of the joint centres of plates in their drawings, with distances from the plane."""
     length = units.label(Dimension.LENGTH)
     head = ["plate", "joints", f"x in drawing [{length}]", f"y in drawing [{length}]", f"offset from plane [{length}]"]
     rows = [
@@ -112,26 +112,26 @@ def plates_csv(plates: tuple[Plate, ...], units: Units) -> str:
 
 
 def required_dxf() -> Any:  # noqa: ANN401 - a module
-    """Return the library that writes drawings.
+    """Return the library ezdxf.
 
     Raises:
-        InputError: it is not installed.
+        InputError: ezdxf is not installed.
     """
     return required("ezdxf", "drawings in DXF")
 
 
 def dxf_text(plate: Plate, unit: str) -> str:
-    """Return the drawing of a plate: the same text for the same plate.
+    """Return the DXF drawing of a plate; equal plates have equal texts.
 
     Args:
         plate: the plate.
-        unit: label of the length unit.
+        unit: name of the length unit.
 
     Raises:
         InputError: ezdxf is not installed.
     """
     ezdxf, alignment = required_dxf(), import_module("ezdxf.enums").TextEntityAlignment
-    # Dates and identifiers of the document would make two drawings of one plate differ.
+    # Without this option, ezdxf writes dates and random identifiers.
     fixed = ezdxf.options.write_fixed_meta_data_for_testing
     ezdxf.options.write_fixed_meta_data_for_testing = True
     try:
@@ -155,7 +155,7 @@ def dxf_text(plate: Plate, unit: str) -> str:
             space.add_line((0.0, 0.0), end, dxfattribs={"layer": "FRAME"})
             letter = space.add_text(name, height=_LETTERS * extent, dxfattribs={"layer": "FRAME"})
             letter.set_placement(end, align=alignment.BOTTOM_LEFT)
-        # ezdxf would add the classes of a set, whose order differs from process to process.
+        # ezdxf adds these classes in the order of a set, which differs between processes.
         for name in sorted(document.entitydb.dxf_types_in_use()):
             document.classes.add_class(name)
         stream = io.StringIO()

@@ -1,4 +1,4 @@
-"""The page that explains the files of an exported robot: frames, units, joints, choices and versions."""
+"""README of an exported robot: files, units, frames, assumptions and joints."""
 
 from __future__ import annotations
 
@@ -17,43 +17,45 @@ from ..solved.words import ExportedJoint
 from .plates import Plate
 
 _FILES: Mapping[str, str] = {
-    "robot.xml": """MJCF for MuJoCo. Coordinates are 0 at this pose, which is the key frame `solved`. Loops are
-        closed by `connect` (balls) and by `weld` (`end_of_...`, the end of a limb, to the link that it is). Actuators
-        hold positions; their ranges are limits of the case.""",
-    "robot.urdf": """The tree of the links. A ball is three hinges. Where a link's frame is not at its joint, a fixed
-        joint leads to it. Frames `closing_..._1` and `closing_..._2` coincide where a loop is closed.""",
+    "robot.xml": """MJCF model for MuJoCo. Joint coordinates are 0 at this pose, which is the key frame `solved`. Loops
+        are closed by `connect` for spherical joints, and otherwise by `weld`, which joins a copy `end_of_...` of a link
+        to the link. Actuators control positions; their ranges are limits of the case.""",
+    "robot.urdf": """URDF model of the tree of links. A spherical joint is three hinges. If the frame of a link is not
+        at its joint, a fixed joint leads to the frame. The frames `closing_..._1` and `closing_..._2` of a closed loop
+        coincide.""",
     "robot.yaml": """Loops and actuated joints of `robot.urdf`: pairs of frames, `3d` for a common point and `6d` for a
         common frame, with the keys of github.com/Gepetto/example-parallel-robots.""",
     "joints.csv": "Centre and axis of every joint in the frames of base, platform, and the two links of the joint.",
     "links.csv": "Frame of every link in the frame of the base.",
-    "cut-list.csv": """Distances of joint centres on every link between base and platform, equal links once, and
-        lengths of legs and ways of slides from home: at this pose, over all poses, and within the limits.""",
-    "plates.csv": "Joint centres of base and platform in the plane of their plate, and their distances from it.",
+    "cut-list.csv": """Distances of joint centres on every link between base and platform, with equal links listed once;
+        leg lengths and displacements of prismatic joints from home: at this pose, over all poses, and within the
+        limits.""",
+    "plates.csv": "Joint centres of base and platform in the plane of their plate, with distances from the plane.",
     "base.dxf": "Outline and joint centres of the base, in its plane.",
     "platform.dxf": "Outline and joint centres of the platform, in its plane.",
 }
 _LINK = "Outline and joint centres of this link, in the plane of its joint centres."
-_UNITS = """Lengths are in {length} everywhere; nothing is converted. MJCF and URDF have angles in radians; tables have
-    them in {angle}."""
-_FRAMES = """The base's frame is the world's of the case. The platform's frame is that of the case, at this pose. The
-    frame of another link has its origin at the joint on the base's side, and its x axis points to the link's farthest
-    other joint. Its z axis is the first joint's axis, or the next joint's, as far as it is normal to x."""
-_COORDINATES = """A joint's coordinate is the motion of its outer link relative to its inner link, 0 at this pose. `from
-    home` is its coordinate at this pose as the case counts it. Ranges count from this pose."""
-_PLACEHOLDERS = """Masses, inertias, gains, efforts, speeds and shapes are placeholders, and there is no gravity. Limits
-    other than ranges of a joint (cones, strokes, clearances, rates) are not exported."""
+_UNITS = """Lengths are in {length} in all files, without conversion. Angles are in radians in MJCF and URDF, and in
+    {angle} in tables."""
+_FRAMES = """The base frame is the world frame of the case. The platform frame is that of the case, at this pose. Every
+    other link has a frame with its origin at the joint on the base side; its x axis points to the farthest other joint
+    of the link; its z axis is the axis of the first or the next joint, projected normal to x."""
+_COORDINATES = """A joint coordinate is the motion of the outer link relative to the inner link, 0 at this pose. `from
+    home` is the coordinate of this pose relative to the home configuration. Ranges are relative to this pose."""
+_PLACEHOLDERS = """Masses, inertias, gains, efforts, speeds and shapes are placeholders, and gravity is 0. Limits other
+    than joint ranges (cones, strokes, clearances, rates) are not exported."""
 _WIDTH = 120
-#: The links whose joint centres are in plates.csv.
+#: Links with joint centres in plates.csv.
 _ENDS = ("base", "platform")
 
 
 def readme_text(exported: Exported, files: Iterable[str], plates: Sequence[Plate]) -> str:
-    """Return the page.
+    """Return the text of the README.
 
     Args:
-        exported: the robot.
-        files: names of the files beside the page.
-        plates: the plates that are drawn.
+        exported: the robot as a mechanism.
+        files: names of the other exported files.
+        plates: plates with a drawing.
     """
     case, units = exported.case, exported.case.units
     pose = f", pose {exported.pose} of {case.pose_count}" if case.pose_count > 1 else ""
@@ -69,14 +71,14 @@ def readme_text(exported: Exported, files: Iterable[str], plates: Sequence[Plate
         "## Frames",
         _paragraph(_FRAMES),
         _paragraph(_COORDINATES),
-        "## Not from the case",
+        "## Assumptions and placeholders",
         _paragraph(_PLACEHOLDERS),
         *map(_paragraph, exported.notes),
         *(_paragraph(_offsets(plate, length)) for plate in plates if not plate.is_flat(exported.size)),
         "## Joints",
         "\n".join(
             [
-                "| joint | kind | between | in the robot file | actuator |",
+                "| joint | kind | links | joint in the robot file | actuator |",
                 "|---|---|---|---|---|",
                 *map(_row, exported.mechanism.joints, exported.joints),
             ]
@@ -86,22 +88,22 @@ def readme_text(exported: Exported, files: Iterable[str], plates: Sequence[Plate
 
 
 def _paragraph(text: str, indent: str = "") -> str:
-    """Return a text in lines of the page's width."""
+    """Return a text in lines of the README's width."""
     words = " ".join(text.split())
     return textwrap.fill(words, _WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
 
 
 def _row(joint: MechanismJoint, words: ExportedJoint) -> str:
-    """Return the row of a joint."""
+    """Return the table row of a joint."""
     label, actuator = markdown_text(f"{words.label} {words.part}".rstrip()), markdown_text(words.actuator)
     name, inner, outer = map(markdown_text, (joint.name, joint.inner, joint.outer))
     return f"| {name} | {joint.kind} | {inner}, {outer} | {label} | {actuator} |"
 
 
 def _offsets(plate: Plate, unit: str) -> str:
-    """Return the note on a plate whose joint centres are not in one plane."""
+    """Return the note on a plate with joint centres out of its plane."""
     largest = float(np.abs(plate.offsets).max())
     return (
-        f"The joint centres of the {plate.name} are not in one plane. Its drawing shows them projected; they are up to"
-        f" {largest:.6g} {unit} away from it, see {'plates.csv' if plate.name in _ENDS else 'joints.csv'}."
+        f"The joint centres of the {plate.name} are not in one plane. The drawing shows their projections; they are up"
+        f" to {largest:.6g} {unit} off the plane, see {'plates.csv' if plate.name in _ENDS else 'joints.csv'}."
     )

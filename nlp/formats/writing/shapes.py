@@ -1,4 +1,4 @@
-"""Lines and sizes with which a link is shown, and placeholders of its mass: the robot's model has neither."""
+"""Displayed lines of links, and placeholders of their masses, which the model of a robot does not define."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from ....models import FloatArray
 from ....models.drawing import outline
 from ....models.mechanism import Mechanism
 
-#: Joints nearer to each other than this part of the robot's size are at one place.
+#: Distance, relative to the robot's size, below which joint centres coincide.
 _NEAR = 1e-9
-#: Radii of a link's lines and of the mark of a joint, and half the length of a hinge's mark, in parts of the size.
+#: Radii of lines and of joint marks, and half length of a hinge's mark, relative to the robot's size.
 ROD, MARK, PIN = 0.008, 0.014, 0.02
-#: Mass of a link, and of a link without extent, such as a universal joint's cross: placeholders.
+#: Placeholders: mass of a link, and of a link without extent, such as the cross of a universal joint.
 MASS, SMALL_MASS = 1.0, 0.05
-#: Radius of gyration of a link in parts of the robot's size: a placeholder.
+#: Placeholder: radius of gyration of a link relative to the robot's size.
 _GYRATION = 0.1
 
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """A link as it is shown.
+    """Displayed shape of a link.
 
     Attributes:
-        points: (3,) each, different places of its joints in the world, length.
-        lines: pairs of indices of the points.
-        mass: placeholder.
-        inertia: placeholder, about every axis through the middle of the points: mass times length squared.
+        points: (3,) each, different joint centres of the link in the world frame, length.
+        lines: pairs of indices of the points that are connected by a line.
+        mass: placeholder of the mass.
+        inertia: placeholder of the moment of inertia about every axis through the mean of the points.
     """
 
     points: tuple[FloatArray, ...]
@@ -40,13 +40,19 @@ class Shape:
 
 
 def extent(mechanism: Mechanism) -> float:
-    """Return the diagonal of the box around all joints, or 1 where all are at one place, length."""
+    """Return the diagonal of the box around all joint centres, length; 1 if all coincide."""
     points = np.array([joint.point for joint in mechanism.joints])
     return float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
 
 
 def joint_centres(mechanism: Mechanism, link: str, size: float) -> list[tuple[FloatArray, list[str]]]:
-    """Return the different places (3,) of a link's joints in the world, each with the names of the joints there."""
+    """Return the different joint centres (3,) of a link in the world frame, each with the names of its joints.
+
+    Args:
+        mechanism: the mechanism.
+        link: name of the link.
+        size: characteristic size of the robot, length.
+    """
     found: list[tuple[FloatArray, list[str]]] = []
     for joint in mechanism.joints:
         if link in (joint.inner, joint.outer):
@@ -57,12 +63,12 @@ def joint_centres(mechanism: Mechanism, link: str, size: float) -> list[tuple[Fl
 
 
 def shape_of(mechanism: Mechanism, link: str, size: float) -> Shape:
-    """Return a link as it is shown: the line between two joints, or the outline of more with lines to those inside.
+    """Return the displayed shape of a link: a line between two joints, or an outline with lines to inner joints.
 
     Args:
         mechanism: the mechanism.
         link: name of the link.
-        size: the robot's.
+        size: characteristic size of the robot, length.
     """
     points = [point for point, _ in joint_centres(mechanism, link, size)]
     lines = _lines(points)
@@ -71,7 +77,7 @@ def shape_of(mechanism: Mechanism, link: str, size: float) -> Shape:
 
 
 def _lines(points: Sequence[FloatArray]) -> list[tuple[int, int]]:
-    """Return the lines of an outline, and from points inside to the nearest corner."""
+    """Return the lines of the outline of points, and a line from each inner point to the nearest corner."""
     if len(points) < 2:
         return []
     corners = outline(np.array(points))

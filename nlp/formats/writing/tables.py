@@ -1,4 +1,4 @@
-"""A mechanism as tables of comma-separated values: joints in four frames, and frames of links."""
+"""CSV tables of a mechanism: joints in four frames, and frames of links."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ _COORDINATES = ("x", "y", "z")
 
 
 def joints_csv(mechanism: Mechanism, joints: Iterable[ExportedJoint], units: Units) -> str:
-    """Return the centres and axes of all joints in the frames of base, platform, and the two links of each.
+    """Return a CSV table of all joints, with centre and axis in the frames of base, platform and the joint's two links.
 
     Args:
         mechanism: the mechanism.
-        joints: its joints in the words of the case; those that are missing have none.
-        units: of the table.
+        joints: joints with their names in the case; other joints have empty cells.
+        units: units of the table.
     """
     words = {joint.name: joint for joint in joints}
     frames = ("base", "platform", "inner", "outer")
@@ -31,10 +31,10 @@ def joints_csv(mechanism: Mechanism, joints: Iterable[ExportedJoint], units: Uni
         head += [f"{c} in {frame} [{length}]" for c in _COORDINATES] + [f"axis {c} in {frame}" for c in _COORDINATES]
     rows = []
     for joint in mechanism.joints:
-        said = words.get(joint.name)
+        known = words.get(joint.name)
         row = [joint.name, joint.kind, joint.inner, joint.outer]
-        row += ["", ""] if said is None else [said.label, said.actuator]
-        row += _coordinates(joint, None if said is None else said.coordinate, units)
+        row += ["", ""] if known is None else [known.label, known.actuator]
+        row += _coordinates(joint, None if known is None else known.coordinate, units)
         row.append(number(joint.pitch) if joint.kind == "H" else "")
         for frame in (mechanism.base, mechanism.platform, joint.inner, joint.outer):
             row += _place(joint, mechanism.link(frame))
@@ -43,11 +43,11 @@ def joints_csv(mechanism: Mechanism, joints: Iterable[ExportedJoint], units: Uni
 
 
 def links_csv(mechanism: Mechanism, units: Units) -> str:
-    """Return the frames of all links in the frame of the base: origin, and axes."""
+    """Return a CSV table of the frames of all links in the base frame: origin and axes."""
     length = units.label(Dimension.LENGTH)
     base = mechanism.link(mechanism.base)
     head = ["link", *(f"{c} [{length}]" for c in _COORDINATES)]
-    head += [f"{own} axis {c}" for own in _COORDINATES for c in _COORDINATES]
+    head += [f"{axis} axis {c}" for axis in _COORDINATES for c in _COORDINATES]
     rows = []
     for link in mechanism.links:
         origin = base.local(link.position)
@@ -57,7 +57,7 @@ def links_csv(mechanism: Mechanism, units: Units) -> str:
 
 
 def _coordinates(joint: MechanismJoint, coordinate: float | None, units: Units) -> list[str]:
-    """Return the coordinate from home, the range from the exported pose, and their unit."""
+    """Return the cells of a joint's coordinate from home, its range from the exported pose, and their unit."""
     if joint.kind in ("S", "weld"):
         return ["", "", "", ""]
     dimension = Dimension.LENGTH if joint.kind == "P" else Dimension.ANGLE
@@ -67,7 +67,7 @@ def _coordinates(joint: MechanismJoint, coordinate: float | None, units: Units) 
 
 
 def _place(joint: MechanismJoint, link: MechanismLink) -> list[str]:
-    """Return the centre and the axis of a joint in the frame of a link; no axis for a ball."""
+    """Return the cells of a joint's centre and axis in the frame of a link; spherical joints have no axis."""
     axis: list[str] = [""] * 3
     if joint.kind not in ("S", "weld"):
         axis = [number(value) for value in link.rotation.T @ joint.axis]

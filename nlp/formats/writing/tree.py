@@ -1,8 +1,8 @@
-"""A spanning tree of a mechanism from its base, and the constraints that close its loops.
+"""Spanning tree of a mechanism from its base, and constraints that close its loops.
 
-Joints with one coordinate come into the tree first, balls where no other way reaches a link. A ball that is left
-closes a loop as a point that two links share. Any other joint that is left comes into the tree as well, with a copy of
-its outer link, and the copy is welded to the link: so every coordinate of the mechanism is one of the tree.
+Joints with one coordinate are preferred to spherical joints. A spherical joint outside of the tree closes a loop by a
+common point of two links. Any other joint outside of the tree is added with a copy of its outer link, and the copy is
+welded to the link, so that the tree has every joint coordinate of the mechanism.
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ from ....models import FloatArray
 from ....models.mechanism import Mechanism, MechanismError, MechanismJoint, MechanismLink, topology
 from ..solved.words import unique_names
 
-#: Order in which joints come into the tree.
+#: Order in which joints are added to the tree, by kind.
 _WEIGHTS = {"weld": 0, "R": 1, "P": 1, "H": 1, "S": 2}
 
 
 @dataclass(frozen=True, eq=False)
 class Edge:
-    """A joint of the tree.
+    """Joint of the tree.
 
     Attributes:
-        joint: the joint.
-        parent: name of the link on the tree's base side.
-        child: the other link, or a copy of it.
-        axis: (3,) direction about which the child turns, or along which it slides, by the joint's coordinate: the
-            opposite one where the child is the joint's inner link.
-        is_copy: whether the child is a copy.
+        joint: joint of the mechanism.
+        parent: name of the link on the base side of the tree.
+        child: other link of the joint, or a copy of it.
+        axis: (3,) axis of rotation or direction of translation of the child for a positive joint coordinate; opposite
+            to the joint's axis if the child is the joint's inner link.
+        is_copy: True if the child is a copy of a link.
     """
 
     joint: MechanismJoint
@@ -43,13 +43,14 @@ class Edge:
 
 @dataclass(frozen=True, eq=False)
 class Closing:
-    """A constraint that closes a loop.
+    """Constraint that closes a loop.
 
     Attributes:
-        name: of the joint that it closes.
-        kind: ``connect`` for a point that two links share, ``weld`` for a rigid connection.
-        first, second: names of the links; the first one of a weld may be a copy.
-        point: (3,) the shared point, or the joint's, in the world, length.
+        name: name of the joint at which the loop is closed.
+        kind: ``connect`` for a common point of two links, ``weld`` for a rigid connection.
+        first: name of the first link; for a weld, it may be a copy of a link.
+        second: name of the second link.
+        point: (3,) common point, or centre of the joint, in the world frame, length.
     """
 
     name: str
@@ -61,11 +62,11 @@ class Closing:
 
 @dataclass(frozen=True, eq=False)
 class Tree:
-    """A mechanism as a tree and its closings.
+    """Spanning tree of a mechanism.
 
     Attributes:
         mechanism: the mechanism.
-        edges: joints of the tree, in their order below each link.
+        edges: joints of the tree, in the order of the children of each link.
         closings: constraints that close the loops.
     """
 
@@ -75,7 +76,7 @@ class Tree:
 
     @property
     def base(self) -> MechanismLink:
-        """The base."""
+        """Base link."""
         return self.mechanism.link(self.mechanism.base)
 
     def below(self, link: str) -> Iterator[Edge]:
@@ -84,10 +85,10 @@ class Tree:
 
 
 def spanning_tree(mechanism: Mechanism) -> Tree:
-    """Return a spanning tree of a mechanism from its base.
+    """Return the spanning tree of a mechanism from its base.
 
     Raises:
-        MechanismError: a link is not connected with the base.
+        MechanismError: a link is not connected to the base.
     """
     links, joints = {link.name: link for link in mechanism.links}, mechanism.joints
     order = [(_WEIGHTS[joint.kind], k) for k, joint in enumerate(joints)]
@@ -95,7 +96,7 @@ def spanning_tree(mechanism: Mechanism) -> Tree:
     branches, chords = topology.spanning_tree([mechanism.base], ends, lambda k: order[k][0])
     apart = next((name for name in links if name not in {mechanism.base, *(each.child for each in branches)}), None)
     if apart is not None:
-        raise MechanismError(f"link {apart}", "is not connected with the base")
+        raise MechanismError(f"link {apart}", "is not connected to the base by joints")
     edges = [
         Edge(joints[k], parent, links[child], joints[k].axis if joints[k].inner == parent else -joints[k].axis)
         for k, parent, child in sorted(branches, key=lambda each: order[each.edge])

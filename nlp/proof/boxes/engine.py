@@ -25,16 +25,16 @@ if TYPE_CHECKING:
 
     from ....models import FloatArray
 
-#: How many times longer than that of the functions a tape must be for the gradients of conditions to wait.
+#: Length of the whole tape, in lengths of the functions' tape, from which gradients of conditions are computed later.
 _MANY_CONDITIONS = 4
-#: Largest number of variables for which the first pass is made: a value has half its square as coefficients.
+#: Largest number n of variables for the first pass, whose forms have about n^2 / 2 coefficients.
 MOST_VARIABLES = 12
-#: Boxes examined at once: Python's work between blocks takes no noticeable part of the time. The order of the search
-#: depends on this number, which must not depend on that of the threads.
+#: Number of boxes examined at once, so large that Python's work between blocks is negligible. The order of the search
+#: depends on this number, so it must not depend on the number of threads.
 BLOCK = 4096
-#: An end of a box that contraction did not move, and one that was moved to the opposite face by monotonicity.
+#: Marks of an end of a box that contraction did not move, and of an end that monotonicity moved to the opposite face.
 UNMOVED, COLLAPSED = -2, -1
-#: Fewest boxes of a piece: two of the kernel's blocks of 32. Starting a piece costs about as much as a few boxes.
+#: Smallest number of boxes of a piece: two of the kernel's blocks of 32. Starting a piece costs as much as a few boxes.
 _LEAST_PIECE = 64
 
 
@@ -46,7 +46,7 @@ class Threads:
     """Threads that share the parts of one step of a search; they end with this object.
 
     Args:
-        jobs: number of threads; one for each processor when left out.
+        jobs: number of threads; if left out, one for each processor.
 
     Attributes:
         jobs: number of threads.
@@ -57,7 +57,7 @@ class Threads:
         self._pool = ThreadPoolExecutor(self.jobs) if self.jobs > 1 else None
 
     def map(self, function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
-        """Return the results of a function for some items, in their order; a thread that is done takes the next one."""
+        """Return the results of a function for some items, in their order; a free thread takes the next item."""
         every = list(items)
         if self._pool is None or len(every) < 2:
             return [function(each) for each in every]
@@ -65,17 +65,17 @@ class Threads:
 
 
 def pieces(count: int, jobs: int) -> Sequence[tuple[int, int]]:
-    """Return begins and ends of the pieces of so many boxes for some threads.
+    """Return the start and end of each piece of a block of boxes, for a number of threads.
 
-    Boxes cost differently, by what closes them. So each piece is a part of what is left: large ones first, in which
-    few lanes of the kernel stay empty, and small ones last, so that no thread waits long for another.
+    Boxes take different times, by the rule that closes them. So pieces become smaller: large pieces first, in which few
+    lanes of the kernel stay empty, and small pieces last, so that no thread waits long for another one.
     """
     if jobs == 1:
         return [(0, count)]
     found, begin = [], 0
     while begin < count:
         size = max(_LEAST_PIECE, (count - begin) // (2 * jobs) // _LEAST_PIECE * _LEAST_PIECE)
-        # A last piece that would be smaller is added to this one.
+        # A last piece below the smallest size is added to this one.
         end = begin + size if count - begin - size >= _LEAST_PIECE else count
         found.append((begin, end))
         begin = end
@@ -83,13 +83,13 @@ def pieces(count: int, jobs: int) -> Sequence[tuple[int, int]]:
 
 
 class BoxState(enum.IntEnum):
-    """BoxState on a box: open, or closed by a rule. The numbers are those of ``kernel/examination.h``."""
+    """State of a box: open, or closed by a rule. The values are those of ``kernel/examination.h``."""
 
     OPEN = 0
     BOUNDED = 1  # its bound does not exceed the threshold
-    INFEASIBLE = 2  # a condition holds nowhere in it
-    MONOTONE = 3  # the functions increase along a variable, in a direction in which the whole box goes on
-    EMPTIED = 4  # contraction along a variable left nothing of it
+    INFEASIBLE = 2  # a condition is violated everywhere in it
+    MONOTONE = 3  # the functions increase along a variable, towards a neighbouring part of the whole box
+    EMPTIED = 4  # contraction along a variable made it empty
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,13 +98,13 @@ class Examination:
 
     Attributes:
         verdict: (B,) :class:`BoxState`.
-        reason: (B,) index of the condition that cannot hold, or of the variable that is monotone or emptied.
+        reason: (B,) index of the violated condition, or of the variable that is monotone or emptied.
         bound: (B,) upper bound over the feasible part of the box; infinite where a value may be undefined.
-        lower, upper: (n, B) the part of the box left by contraction, or the face that it collapsed on.
-        cut_lower, cut_upper: (n, B) index of the expression that moved that end, or ``UNMOVED`` or ``COLLAPSED``.
-        split: (B,) the variable to bisect next.
+        lower, upper: (n, B) ends of the contracted box, or of the face that it collapsed to.
+        cut_lower, cut_upper: (n, B) index of the expression that moved this end, or ``UNMOVED`` or ``COLLAPSED``.
+        split: (B,) index of the variable to bisect next.
         value: (B,) lower bound of the maximised value at the centre; -inf where a condition may be violated.
-        centre: (n, B).
+        centre: (n, B) centres of the boxes.
     """
 
     verdict: NDArray[np.int32]
@@ -123,16 +123,16 @@ class Examination:
 class LimbModels(Examination):
     """Results for B boxes of a limb with n variables, the first m of them shared with other limbs, and upper models.
 
-    Nothing may be said of a shared variable from one limb alone: monotonicity and contraction are those of own
-    variables, by the limb's conditions; of shared ones where there are no own ones. The bound is the function's.
+    One limb cannot exclude values of shared variables: monotonicity and contraction apply to the limb's own variables,
+    or to shared ones if the limb has no own ones. The bound is the bound of the limb's function.
 
     Attributes:
         is_possible: (B,) whether an optimum may lie in the box.
-        defined: (B,) whether the limb's function has a value in the whole box.
-        holds: (B,) whether every condition of the limb holds on the whole box.
-        L: upper models of the Lagrangian, whose multipliers make its gradient small in the own variables.
-        slope_lo, slope_hi: (m, B) gradient of the function along shared variables.
-        stops_up, stops_down: (m, B) whether a condition may stop a point from moving along a shared variable.
+        defined: (B,) whether the limb's function is defined in the whole box.
+        holds: (B,) whether every condition of the limb is satisfied in the whole box.
+        L: upper models of the Lagrangian, with multipliers for a small gradient in the own variables.
+        slope_lo, slope_hi: (m, B) ends of the gradient of the function along shared variables.
+        stops_up, stops_down: (m, B) whether a condition may prevent a motion up or down along a shared variable.
     """
 
     is_possible: NDArray[np.bool_]
@@ -146,16 +146,16 @@ class LimbModels(Examination):
 
 
 class Engine:
-    """The C kernel on several threads. The results do not depend on their number.
+    """The C kernel on several threads. The results do not depend on the number of threads.
 
     Args:
-        form: the form whose box is searched.
-        jobs: threads; one for each processor when left out.
-        shared: number of the first variables that the form, a limb's, shares with others; None for a whole form.
-        tangents: whether the first pass has tangents to the squares of a minimum.
+        form: form of the search.
+        jobs: number of threads; if left out, one for each processor.
+        shared: number of variables that a limb's form shares with other limbs, the first ones; None for a whole form.
+        tangents: If true, the first pass of a minimum uses tangents to squares.
 
     Raises:
-        UncoveredError: an expression holds an operation without a rule.
+        UncoveredError: an expression has an operation without an interval rule.
         InputError: the kernel was not built.
     """
 
@@ -189,13 +189,13 @@ class Engine:
     def examine(
         self, lower: FloatArray, upper: FloatArray, threshold: float, models: Sequence[Any] = (None,) * 3
     ) -> Examination:
-        """Examine boxes, and close those whose bounds do not exceed a threshold.
+        """Examine boxes, and close boxes with bounds of at most a threshold.
 
         Args:
             lower: (n, B) lower ends.
             upper: (n, B) upper ends.
-            threshold: boxes whose bound is at most this are closed.
-            models: arrays of the kernel that only limbs have.
+            threshold: largest bound of a box that is closed.
+            models: arrays of the kernel for limbs.
         """
         n, count = lower.shape
         verdict, reason, split = (np.empty(count, dtype=np.int32) for _ in range(3))
@@ -219,22 +219,22 @@ class Engine:
         tilts: FloatArray | None = None,
         threshold: float = -np.inf,
     ) -> LimbModels:
-        """Return upper models of a limb over boxes, or of the part with shared variables alone with the limbs' tilts.
+        """Return upper models of a limb over boxes, or of the common part with the limbs' tilts.
 
-        What is left of boxes of shared variables is where the conditions can hold and the sum can exceed the threshold;
-        nothing is left where a lower end is above the upper one.
+        Boxes of shared variables are contracted to the part where the conditions may be satisfied and the sum can
+        exceed the threshold. A box is empty if a lower end is above its upper end.
 
         Args:
-            lower: (n, B) lower ends; those of shared variables come first.
+            lower: (n, B) lower ends; shared variables come first.
             upper: (n, B) upper ends.
-            least: (B,) points whose values are less do not matter; None where all do.
-            tilts: (3 + m + m^2, B) sum of the limbs' bests, sum of their sizes, bound of the rounding of each sum of
-                tilts, and these sums: gradients, and matrices row by row; None for a limb.
-            threshold: the threshold.
+            least: (B,) value below which points are irrelevant; None if all points are relevant.
+            tilts: (3 + m + m^2, B) sum of the limbs' best values, sum of their absolute values, bound of the rounding
+                of each sum of tilts, and these sums: gradients, and matrices row by row; None for a limb.
+            threshold: largest bound of a box that is closed.
         """
         (n, count), m = lower.shape, self._shared
-        # Flags, the models, then slopes and stops of shared variables. A flag is 1 where the function is defined, plus
-        # 2 where every condition holds.
+        # Flags, the models, then slopes and stops of shared variables. A flag is 1 if the function is defined, plus 2
+        # if every condition is satisfied.
         rows = np.empty((3 + 4 * n + n * n + 4 * m, count))
         matters = (None if each is None else np.ascontiguousarray(each) for each in (least, tilts))
         found = self.examine(lower, upper, threshold, (rows, *matters))
@@ -257,12 +257,12 @@ class Engine:
 
 
 def search_tape(form: StandardForm, rows: Rows | None = None, *, is_short: bool = True) -> Tape:
-    """Compile the E rows of a form, its R expressions if left out, then their derivatives, row by row.
+    """Compile the rows of a form (its R expressions if left out), then their derivatives, row by row.
 
-    Equal parts are written once with ``is_short``; looking for them cannot be stopped, and takes as long as the rest.
+    With ``is_short``, common subexpressions are written once. Their search cannot be interrupted, and doubles the time.
 
     Raises:
-        UncoveredError: an expression holds an operation without a rule, or its value jumps.
+        UncoveredError: an expression has an operation without an interval rule, or a jump.
     """
     try:
         rows = search_rows(form, apart=False) if rows is None else rows
@@ -275,9 +275,10 @@ def search_tape(form: StandardForm, rows: Rows | None = None, *, is_short: bool 
 
 
 def value_tape(form: StandardForm, rows: Rows | None = None) -> Tape | None:
-    """Compile a form's R expressions alone, for the first pass, and the rows for tangents behind them.
+    """Compile a form's R expressions without derivatives for the first pass, then the rows for tangents.
 
-    None is returned for a form with too many variables for a first pass.
+    Returns:
+        The tape; None for a form with too many variables for a first pass.
     """
     if form.n > MOST_VARIABLES:
         return None
@@ -286,15 +287,15 @@ def value_tape(form: StandardForm, rows: Rows | None = None) -> Tape | None:
 
 
 def without_conditions(form: StandardForm) -> StandardForm:
-    """Return the form of the functions alone."""
+    """Return the form without its conditions."""
     return replace(form, conditions=())
 
 
 def objective_tape(form: StandardForm, length: int) -> Tape | None:
-    """Compile the functions and their derivatives; None where they take much of a whole tape of so many operations."""
+    """Compile the functions and their derivatives; None if they are a large part of a tape of the given length."""
     if form.n > MOST_VARIABLES or not form.conditions:
         return None
-    # Without derivatives it is shorter, and mostly too long already.
+    # The tape without derivatives is shorter, and often already too long.
     values = ca.Function("values", [form.x], [ca.cse(ca.vertcat(*form.functions))])
     shortest = sum(values.instruction_id(k) != ca.OP_CONST for k in range(values.n_instructions()))
     if (shortest + len(form.functions) * form.n) * _MANY_CONDITIONS > length:
@@ -304,7 +305,7 @@ def objective_tape(form: StandardForm, length: int) -> Tape | None:
 
 
 def _uncovered_limit(form: StandardForm) -> str | None:
-    """Return the key of the limit whose expressions hold an operation without a rule; None where the robot's do."""
+    """Return the key of the limit with an operation without a rule; None if it is in the robot's expressions."""
     keys = {each.name: next(filter(None, each.keys), None) for each in form.nlp.program.constraints}
     whose = [*(None for _ in form.functions), *(keys.get(each.name) for each in form.conditions)]
     for k, key in enumerate(whose):

@@ -1,4 +1,4 @@
-"""The incumbent of a search: the best feasible point known, of the whole box or of limbs."""
+"""Incumbent of a search: the best known feasible point, of the whole box or of limbs."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from ...program.sampling import starting_points
 from ..statement.limb_separation import Limb
 from ..statement.standard_form import StandardForm
 
-#: Difference allowed between a claimed value and the one computed there, in parts of the objective's scale.
+#: Largest difference between a claimed and a computed value, relative to the objective's scale.
 _SAME_VALUE = 1e-9
-#: Points that are tried when none is given.
+#: Number of points that are tried if none is given.
 _POINTS = 8
-#: Improvement, in parts of the objective's scale, from which on a new point counts as better than the one given.
+#: Improvement, relative to the objective's scale, from which a new point counts as better than the given point.
 _BETTER = 1e-9
-#: The same for points that a search finds by itself, of which the first one is kept: rounding of the objective.
+#: The same between points of a search; smaller differences are rounding, and the first point is kept.
 _TIE = 1e-13
 
 
 class IncumbentError(InputError):
-    """The point that was given is not feasible, or does not have the value claimed."""
+    """The given point is not feasible, or does not have the claimed value."""
 
 
 class _Point(NamedTuple):
@@ -39,30 +39,30 @@ class _Point(NamedTuple):
 
 
 class Incumbent:
-    """The best feasible point known, and its value in the standard form.
+    """Best known feasible point, and its value in the standard form.
 
     Args:
-        form: the form whose box is searched.
+        form: form of the search.
     """
 
     def __init__(self, form: StandardForm) -> None:
         self._form, self._best, self._given = form, _Point(None, -math.inf), math.nan
-        # The last known part (d,) of each limb while there is no point, by the places of its variables.
+        # Without an incumbent: the last known part (d,) of each limb, by the indices of its variables.
         self._parts: dict[tuple[int, ...], FloatArray] = {}
 
     @property
     def x(self) -> FloatArray | None:
-        """(n,) the point in the form's variables; None without one."""
+        """Point (n,) in the form's variables; None without one."""
         return self._best.x
 
     @property
     def value(self) -> float:
-        """Value of the form there; -inf without a point."""
+        """Maximised value at the point; -inf without one."""
         return self._best.value
 
     @property
     def was_beaten(self) -> bool:
-        """Whether the search has found a better point than the one given."""
+        """Whether the search found a better point than the given one."""
         return self.value > self._given + _BETTER * self._form.size
 
     def program_point(self) -> FloatArray | None:
@@ -70,11 +70,11 @@ class Incumbent:
         return None if self.x is None else self._with_level(self.x, self.value)
 
     def start(self, x: FloatArray | None, claimed: float | None) -> None:
-        """Begin with a given point, or with the best of a few.
+        """Start with a given point, or with the best of a few points.
 
         Args:
-            x: (n,) in the program's variables, or None.
-            claimed: the objective claimed there.
+            x: (n,) point in the program's variables; None without one.
+            claimed: claimed objective at the point.
 
         Raises:
             IncumbentError: the point violates a limit, or has a worse value.
@@ -90,16 +90,16 @@ class Incumbent:
         value = form.value_at(point)
         violation = self._violation(point, value)
         if not violation <= FEASIBLE:
-            raise IncumbentError(f"the incumbent lies outside of the limits by {violation:.3g} half ranges")
+            raise IncumbentError(f"the given point violates the limits by {violation:.3g} half ranges")
         if claimed is not None and form.value_of(claimed) > value + _SAME_VALUE * form.size:
             raise IncumbentError(
-                f"the incumbent is said to have F = {claimed:.10g}, but has {form.objective_of(value):.10g}"
+                f"the given point has F = {form.objective_of(value):.10g}, but {claimed:.10g} was claimed"
             )
         self._best, self._given = _Point(point, value), value
 
     def consider(self, point: FloatArray) -> None:
-        """Keep a point (n,) if it is feasible and better; likewise the points that Newton's method reaches from it."""
-        if self._form.nlp.sides.equal.any():  # else the point is that at which equations hold
+        """Keep a point (n,) if it is feasible and better; also test the points of Newton's method from it."""
+        if self._form.nlp.sides.equal.any():  # without equations, only the corrected point is tested
             self._keep_if_better(point)
         self.improve_near(point)
 
@@ -118,7 +118,7 @@ class Incumbent:
         self._keep_if_better(self._form.point_of(np.clip(corrected.x, nlp.lower, nlp.upper)), corrected)
 
     def _with_level(self, point: FloatArray, value: float) -> FloatArray:
-        """Return the point with the program's epigraph variable, where it has one."""
+        """Return the point with the program's epigraph variable, if the program has one."""
         variables = self._form.program_variables(point)
         if self._form.nlp.program.places.epigraph is None:
             return variables
@@ -126,9 +126,9 @@ class Incumbent:
         return np.append(variables, np.clip(self._form.objective_of(value), nlp.lower[-1], nlp.upper[-1]))
 
     def _violation(self, point: FloatArray, value: float, known: Linearisation | None = None) -> float:
-        """Return the largest violation of the program's limits, in half ranges; infinite where loops are open.
+        """Return the largest violation of the program's limits, in half ranges; infinite with open loops.
 
-        The program has independent loop equations only, which other ways to assemble the joints fulfil too.
+        The program has only independent loop equations, which joints in another assembly may also satisfy.
         """
         nlp, whole = self._form.nlp, self._with_level(point, value)
         if not self._form.keeps_signs(whole):
@@ -138,15 +138,15 @@ class Incumbent:
         return violation if violation > FEASIBLE or loops_are_closed(nlp, whole) else math.inf
 
     def _keep_if_better(self, point: FloatArray, known: Linearisation | None = None) -> None:
-        """Keep a point if it is feasible and better; the program linearised there may be known."""
+        """Keep a point if it is feasible and better; ``known`` is the linearised program at the point, if available."""
         value = self._form.value_at(point)
-        # Rounding chooses none of several points with the same value.
+        # Rounding errors must not select among points with the same value.
         better = value > self.value + _TIE * self._form.size
         if better and self._violation(point, value, known) <= FEASIBLE:
             self._best = _Point(np.array(point), value)
 
     def with_part(self, limbs: Sequence[Limb], part: FloatArray) -> FloatArray | None:
-        """Return the point with another part (d,) of limbs; without one the limbs' parts, once there is one of each."""
+        """Return the point with a new part (d,) of limbs; without an incumbent, the parts of all limbs once known."""
         given, whole = {each.own: part for each in limbs}, self.x
         if whole is None:
             self._parts |= given
@@ -158,11 +158,11 @@ class Incumbent:
 
 
 class LimbPoint:
-    """The part of the incumbent that belongs to one limb, or to its copies too.
+    """Part of the incumbent that belongs to one limb and its copies.
 
     Args:
         limbs: the limb and its copies.
-        whole: the incumbent, which a better part improves.
+        whole: incumbent of the whole form, which a better part improves.
     """
 
     def __init__(self, limbs: Sequence[Limb], whole: Incumbent) -> None:
@@ -172,23 +172,23 @@ class LimbPoint:
 
     @property
     def value(self) -> float:
-        """Value of the limb at the incumbent, the mean where it has copies; -inf without one."""
+        """Value of the limb at the incumbent (the mean over its copies); -inf without an incumbent."""
         at = self._whole.x
         if at is not self._at and at is not None:
             values = [each.form.value_at(at[list(each.own)]) for each in self._limbs]
-            # The point last: an interrupt before it leaves the value to be computed again.
+            # The point is set last: after an interrupt before it, the value is computed again.
             self._value = math.fsum(values) / len(values)
             self._at = at
         return self._value
 
     def consider(self, point: FloatArray) -> None:
-        """Improve the incumbent by a part (d,) of it, if that is feasible and better."""
+        """Improve the incumbent by a part (d,) if the result is feasible and better."""
         whole = self._whole.with_part(self._limbs, point)
         if whole is not None:
             self._whole.consider(whole)
 
     def improve_near(self, point: FloatArray) -> None:
-        """Improve the incumbent from a part (d,) of it that is not feasible yet."""
+        """Improve the incumbent from a part (d,) that need not be feasible."""
         whole = self._whole.with_part(self._limbs, point)
         if whole is not None:
             self._whole.improve_near(whole)

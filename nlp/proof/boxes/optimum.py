@@ -1,4 +1,4 @@
-"""Rule of the optimum of a form: boxes are closed by their bounds, contracted or bisected."""
+"""Branch and bound for the optimum of a form: boxes are closed by their bounds, contracted or bisected."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from .incumbent import Incumbent, LimbPoint
 from .search import SMALL, WHOLE, Boxes, BoxResults, Order, Rule, Search
 from .tree import TreeRecord, halves_of, keys_of
 
-#: Widths, in parts of the whole box, below which a box is not bisected: one without a finite bound, which is taken to
-#: hold a point without a value, and others.
+#: Relative widths below which a box is not bisected: without a finite bound, where the functions are probably undefined
+#: at a point; and with one.
 LEAST_WIDTHS = 2.0**-16, 2.0**-40
 
 
@@ -31,16 +31,16 @@ def optimum_search(
 
 
 class OptimumRule(Rule[tuple[()]]):
-    """Rule of the maximum of a form.
+    """Rule for the maximum of a form.
 
     Args:
         form: the form.
-        incumbent: the best point known, which the search improves.
-        jobs: threads.
-        recorder: records the search's tree for a proof, whose checker does not have tangents to squares.
+        incumbent: best known point, which the search improves.
+        jobs: number of threads.
+        recorder: recorder of the search's tree for a proof; tangents to squares are not used then.
 
     Attributes:
-        incumbent: the best point known.
+        incumbent: best known point.
     """
 
     block = BLOCK
@@ -54,7 +54,7 @@ class OptimumRule(Rule[tuple[()]]):
 
     @cached_property
     def _engine(self) -> Engine:
-        """The engine, which takes seconds to build for long expressions: the first step does, which can be stopped."""
+        """The engine. For long expressions its set-up takes seconds, so it is done in the first step of the search."""
         return Engine(self._form, self._jobs, tangents=self._recorder is None)
 
     def examine(self, boxes: Boxes[tuple[()]]) -> BoxResults[tuple[()]]:
@@ -64,19 +64,19 @@ class OptimumRule(Rule[tuple[()]]):
         self._improve(found)
         bounded = found.verdict == BoxState.BOUNDED
         closed = float(found.bound[bounded].max(initial=-math.inf))
-        # A checker with other arithmetic needs the room up to the threshold to show these boxes again.
+        # The checker has other arithmetic, and needs a margin up to the threshold to prove these boxes.
         if (bounded.any() and self._recorder is not None) or self._is_contracted_by_value(found):
             closed = max(closed, self.target)
-        # Most boxes of a block may be closed: only the open ones are looked at here, since this is no work for threads.
+        # Most boxes of a block may be closed; only the open ones are processed here, in one thread.
         rest = np.flatnonzero(found.verdict == BoxState.OPEN)
         lower, upper = found.lower[:, rest].T, found.upper[:, rest].T
-        # A box that collapsed to one that cannot be bisected, such as a corner, has not been examined as that box yet.
+        # A box that collapsed to a box that cannot be bisected, such as a corner, must be examined again.
         moved = ((lower != boxes.lower[rest]) | (upper != boxes.upper[rest])).any(axis=1)
         left = Boxes(lower, upper, np.fmin(found.bound[rest], boxes.bound[rest]), found.split[rest].astype(np.intp), ())
         return BoxResults(left, closed, len(boxes.split), moved, reasons=(found, rest))
 
     def record(self, boxes: Boxes[tuple[()]], found: BoxResults[tuple[()]], split: NDArray[np.intp]) -> None:
-        """Record a block of boxes; a contraction closes the part cut off."""
+        """Record a block of boxes; a contraction closes the part that it cuts off."""
         if self._recorder is None:
             return
         (examined, rest), left = found.reasons, found.left
@@ -92,7 +92,7 @@ class OptimumRule(Rule[tuple[()]]):
     def _improve(self, found: Examination) -> None:
         """Improve the incumbent from the best centre of a block, or from the centre of the box with the largest bound.
 
-        The latter costs more, and is tried at turns 1, 2, 4, 8 and so on.
+        The second attempt takes longer, and is made in steps 1, 2, 4, 8 and so on.
         """
         best = int(np.argmax(found.value))
         if found.value[best] > self.incumbent.value:
@@ -101,19 +101,18 @@ class OptimumRule(Rule[tuple[()]]):
             self.incumbent.improve_near(found.centre[:, int(np.argmax(np.nan_to_num(found.bound, posinf=-math.inf)))])
 
     def _is_contracted_by_value(self, found: Examination) -> bool:
-        """Return whether a contraction excluded points because of their value, which is at most the threshold."""
-        # A box that is closed by its bound needs no contraction. The bound of a proof keeps the distance from what its
-        # checker must show.
+        """Return whether a contraction excluded points with values of at most the threshold."""
+        # A box that is closed by its bound needs no contraction, except for a proof, whose checker needs the margin.
         count, rest = self._functions, (found.verdict != BoxState.BOUNDED) | (self._recorder is not None)
         return any(
-            # Numbers from 0 to count - 1, in one comparison: negative ones are large without a sign.
+            # One comparison for 0 <= why < count: negative values are large as unsigned integers.
             bool(((why.view(np.uint32) < count) & rest).any())
             for why in (found.cut_lower, found.cut_upper)
         )
 
 
 def _node_of(found: Examination, k: int, upper: FloatArray, functions: int) -> bytes:
-    """Return the bytes of box number ``k``, with upper ends (n,), up to those of a bisection or of its parts."""
+    """Return the bytes of box ``k`` with upper ends (n,), without those of its bisection or its parts."""
     verdict, reason = int(found.verdict[k]), int(found.reason[k])
     if verdict == BoxState.BOUNDED:
         return bytes([Node.BOUNDED])
@@ -124,7 +123,7 @@ def _node_of(found: Examination, k: int, upper: FloatArray, functions: int) -> b
 
 
 def _contraction(found: Examination, k: int, i: int, upper: float, functions: int) -> bytes:
-    """Return the nodes of the contraction of box number ``k`` along variable ``i``."""
+    """Return the nodes of the contraction of box ``k`` along variable ``i``."""
     below, above = int(found.cut_lower[i, k]), int(found.cut_upper[i, k])
     low, high = float(found.lower[i, k]), float(found.upper[i, k])
     if COLLAPSED in (below, above):
@@ -138,5 +137,5 @@ def _contraction(found: Examination, k: int, i: int, upper: float, functions: in
 
 
 def _reason(why: int, functions: int) -> bytes:
-    """Return the reason for cutting a part off, from the number of the expression that excludes it."""
+    """Return the reason for cutting a part off, from the index of the expression that excludes it."""
     return bytes([Node.BOUNDED]) if why < functions else node_bytes(Node.INFEASIBLE, why)

@@ -1,11 +1,11 @@
 """Branch and bound over boxes: the loop of every search.
 
-A rule examines boxes: it closes them, or returns the part left, a bound over it and the coordinate to bisect. The loop
-takes examined boxes in an order, bisects them, has the halves examined, and keeps those that are open. Bounds are upper
-bounds of a value that is maximised; a rule without a value leaves them at 0.
+A rule examines boxes: it closes them, or returns the open part, a bound over it and the coordinate to bisect. The loop
+takes examined boxes in an order, bisects them, has the halves examined, and keeps the open ones. Bounds are upper
+bounds of a maximised value; a rule without a value leaves them at 0.
 
-All claims of a search are one value, :class:`State`, which a step replaces by its last assignment: a search that is
-interrupted in a step keeps its claims from before the step.
+The state of a search is one value, :class:`State`, which the last assignment of a step replaces: a search that is
+interrupted in a step keeps the state before the step.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ if TYPE_CHECKING:
     from ....models import FloatArray
 
 #: Reason for stopping at boxes below the least width.
-TOO_SMALL = "the boxes that are left are too small to be divided"
-#: With more open boxes than this the newest ones are taken first, so that a search needs no more memory.
+TOO_SMALL = "the open boxes are too small to be bisected"
+#: Number of open boxes above which the newest ones are taken first, to limit the memory.
 _MANY = 2_000_000
-#: With more open boxes than this those with the largest bounds are no longer looked for among all.
+#: Number of open boxes above which the largest bounds are no longer searched among all boxes.
 _FEW = 50_000
-#: Number of boxes with which a search begins that are kept together.
+#: Number of first boxes that are kept together.
 _ROOTS = 4096
 #: Seconds between two reports of progress.
 _REPORT_EVERY = 0.1
-#: Coordinates to bisect of boxes that are examined again as they are, and of those that are too small to be bisected.
+#: Values in place of a coordinate to bisect: the box is examined again as it is; the box is too small to be bisected.
 WHOLE, SMALL = -1, -2
 
 Columns = TypeVar("Columns")
@@ -51,8 +51,8 @@ class Boxes(NamedTuple, Generic[Columns]):
     Attributes:
         lower, upper: (B, n) ends.
         bound: (B,) upper bounds.
-        split: (B,) coordinate to bisect; ``WHOLE`` for none.
-        more: columns that a rule carries: arrays (B, ...), or tuples of them.
+        split: (B,) index of the coordinate to bisect; ``WHOLE`` for none.
+        more: data of the rule for each box: arrays (B, ...), or tuples of them.
     """
 
     lower: FloatArray
@@ -63,7 +63,7 @@ class Boxes(NamedTuple, Generic[Columns]):
 
 
 def some(rows: Rows, which: NDArray[np.bool_] | NDArray[np.intp]) -> Rows:
-    """Return some rows of an array, or of all arrays of a tuple; other columns have a method ``some`` of their own."""
+    """Return some rows of an array, or of all arrays of a tuple; other types have a method ``some``."""
     each: Any = rows
     if isinstance(each, tuple):
         chosen: Rows = _alike(each, [some(part, which) for part in each])
@@ -86,12 +86,12 @@ def joined(parts: Sequence[Rows]) -> Rows:
 
 
 def _alike(pattern: Any, columns: Sequence[Any]) -> Any:  # noqa: ANN401 - any kind of tuple
-    """Return columns as a tuple of the same type."""
+    """Return columns as a tuple of the same type as a pattern."""
     return getattr(type(pattern), "_make", tuple)(columns)
 
 
 def bisected(boxes: Boxes[Columns]) -> Boxes[Columns]:
-    """Return the lower halves of all boxes, then the upper ones."""
+    """Return the lower halves of all boxes, then the upper halves."""
     every, count = np.arange(len(boxes.split)), len(boxes.split)
     parts = some(boxes, np.concatenate([every, every]))
     middle = 0.5 * boxes.lower[every, boxes.split] + 0.5 * boxes.upper[every, boxes.split]
@@ -100,24 +100,24 @@ def bisected(boxes: Boxes[Columns]) -> Boxes[Columns]:
 
 
 class Order(enum.Enum):
-    """The boxes that a search takes first."""
+    """Order in which a search takes boxes."""
 
     NEWEST = "parts of the boxes of the step before: depth first"
     LARGEST_CHUNK = "parts of the boxes of the step with the largest bound: cheap, for many boxes"
-    LARGEST = "the boxes with the largest bounds; of many, those of the step with the largest one"
+    LARGEST = "the boxes with the largest bounds; with many open boxes as LARGEST_CHUNK"
 
 
 class BoxResults(NamedTuple, Generic[Columns]):
     """Results for boxes.
 
     Attributes:
-        left: (O,) the parts of the open boxes that are left, with ``WHOLE`` or ``SMALL`` as for :meth:`Rule.record`.
-        closed: largest bound of what was closed or cut off.
-        examined: number of boxes examined.
-        again: (O,) whether a part that is too small to be bisected is to be examined again, as one that was moved; None
+        left: (O,) remaining parts of the open boxes, with ``WHOLE`` or ``SMALL`` as in :meth:`Rule.record`.
+        closed: largest bound of closed boxes and of parts that were cut off.
+        examined: number of examined boxes.
+        again: (O,) whether a part that is too small to be bisected must be examined again, because it was moved; None
             for no part.
-        is_better: whether a better point is known, for which boxes that are too small are examined again.
-        reasons: what a record of the search needs beside.
+        is_better: whether a better point is known, so that too small boxes must be examined again.
+        reasons: additional data for a record of the search.
     """
 
     left: Boxes[Columns]
@@ -132,9 +132,9 @@ class Rule(ABC, Generic[Columns]):
     """Examination of boxes for a kind of claim.
 
     Attributes:
-        target: bound up to which boxes may be closed.
+        target: largest bound of a box that may be closed.
         block: number of boxes examined at once.
-        names: of the coordinates, for :attr:`Search.fault`.
+        names: names of the coordinates, for :attr:`Search.fault`.
     """
 
     target: float = -math.inf
@@ -142,7 +142,7 @@ class Rule(ABC, Generic[Columns]):
     names: Sequence[str] = ()
 
     def divided(self, boxes: Boxes[Columns]) -> Boxes[Columns]:
-        """Return the halves of boxes, with what they carry: all lower ones, then all upper ones."""
+        """Return the halves of boxes with their data: all lower halves, then all upper halves."""
         return bisected(boxes)
 
     @abstractmethod
@@ -154,13 +154,13 @@ class Rule(ABC, Generic[Columns]):
 
         Args:
             boxes: the boxes before their examination.
-            found: its results.
-            split: (O,) coordinate along which each part that is left is bisected; ``WHOLE`` for those that are examined
-                again, and ``SMALL`` for those that are too small.
+            found: results of the examination.
+            split: (O,) index of the coordinate along which each remaining part is bisected; ``WHOLE`` for parts that
+                are examined again, ``SMALL`` for parts that are too small.
         """
 
 
-#: Boxes in the order of a search, the next one last: their largest bound, a number that counts up, and themselves.
+#: Boxes in the order of a search, the next one last: largest bound, running number, and the boxes.
 _Chunk = tuple[float, int, Boxes[Columns]]
 
 
@@ -168,10 +168,10 @@ class State(NamedTuple, Generic[Columns]):
     """A search after a step.
 
     Attributes:
-        waiting: parts of examined boxes, or examined boxes that are to be divided, as the order has it.
-        small: boxes that are too small to be divided.
-        closed: largest bound of what was closed.
-        examined: number of boxes examined.
+        waiting: examined boxes that are to be bisected, or their parts, in the search's order.
+        small: boxes that are too small to be bisected.
+        closed: largest bound of closed boxes.
+        examined: number of examined boxes.
     """
 
     waiting: list[_Chunk[Columns]]
@@ -181,7 +181,7 @@ class State(NamedTuple, Generic[Columns]):
 
     @property
     def left(self) -> list[Boxes[Columns]]:
-        """All boxes that are left."""
+        """All open boxes."""
         return [*(boxes for _, _, boxes in self.waiting), *self.small]
 
 
@@ -192,15 +192,15 @@ class Search(Generic[AnyRule]):
     """A search of a box.
 
     Args:
-        rule: examines boxes.
-        root: the whole box, or boxes that cover what is searched.
-        whole: (n,) widths of the whole box; those of 0 do not count.
-        least: width, in parts of the whole box, below which a box is not bisected, without and with a finite bound.
-        order: the boxes that are taken first.
+        rule: rule for the examination of boxes.
+        root: the whole box, or boxes that cover the domain.
+        whole: (n,) widths of the whole box; coordinates with width 0 are ignored.
+        least: relative widths below which a box is not bisected, without and with a finite bound.
+        order: order in which boxes are taken.
 
     Attributes:
-        rule: examines boxes.
-        state: after the last complete step.
+        rule: rule for the examination of boxes.
+        state: state after the last complete step.
     """
 
     def __init__(
@@ -209,7 +209,7 @@ class Search(Generic[AnyRule]):
         self.rule, self._order = rule, order
         self._columns = np.flatnonzero(whole > 0)
         self._whole, self._least, self._newest = whole[self._columns], least, 0
-        # Of very many boxes, steps would copy all that are left.
+        # Very many first boxes are kept in chunks, as a step copies all boxes of a chunk.
         count = len(root.split)
         parts = [some(root, np.arange(k, min(k + _ROOTS, count))) for k in range(0, count, _ROOTS)]
         waiting = [(math.inf, -k, part) for k, part in reversed(list(enumerate(parts)))]
@@ -227,28 +227,28 @@ class Search(Generic[AnyRule]):
 
     @property
     def left(self) -> int:
-        """Number of boxes that are left."""
+        """Number of open boxes."""
         return sum(len(each.split) for each in self.state.left)
 
     @property
     def bound(self) -> float:
-        """Upper bound over the whole box; -inf where all of it is closed without one."""
+        """Upper bound over the whole box; -inf if all of it is closed without a bound."""
         waiting = self.state.waiting[-1][0] if self.state.waiting else -math.inf
         return max([self.state.closed, waiting, *(float(each.bound.max()) for each in self.state.small)])
 
     @property
     def fault(self) -> str:
-        """Reason for stopping at small boxes of which one has no finite bound, with its place; else empty."""
+        """Reason for stopping if a small box has no finite bound, with its place; else empty."""
         for boxes in self.state.small:
             which = int(np.argmin(np.isfinite(boxes.bound)))
             if not np.isfinite(boxes.bound[which]):
                 point = 0.5 * (boxes.lower[which] + boxes.upper[which])
                 at = ", ".join(f"{name} = {value:.4g}" for name, value in zip(self.rule.names, point, strict=True))
-                return f"the expressions have no finite bound near {at}, as where a limb has zero length"
+                return f"the expressions have no finite bound near {at}; for example, a limb may have zero length there"
         return ""
 
     def step(self, target: float) -> None:
-        """Examine the parts of some boxes, and close those whose bounds do not exceed a target."""
+        """Examine the parts of some boxes, and close parts with bounds of at most a target."""
         waiting, small = list(self.state.waiting), list(self.state.small)
         parts = self._divided(self._take(waiting))
         self.rule.target = target
@@ -272,7 +272,7 @@ class Search(Generic[AnyRule]):
         self.state = State(waiting, small, closed, examined)
 
     def _divided(self, boxes: Boxes[Any]) -> Boxes[Any]:
-        """Return the parts of boxes, of which some may stay whole."""
+        """Return the parts of boxes; some boxes may stay whole."""
         is_cut = boxes.split >= 0
         if not is_cut.any():
             return boxes
@@ -281,7 +281,7 @@ class Search(Generic[AnyRule]):
         return joined([some(boxes, ~is_cut), self.rule.divided(some(boxes, is_cut))])
 
     def _divisions(self, found: BoxResults[Any]) -> NDArray[np.intp]:
-        """Return the coordinates to bisect of the parts that are left: see :meth:`Rule.record`."""
+        """Return the coordinates to bisect of the remaining parts: see :meth:`Rule.record`."""
         lower, upper, bound, split, _ = found.left
         place = np.arange(len(split)), np.maximum(split, 0)
         middle = 0.5 * lower[place] + 0.5 * upper[place]
@@ -299,9 +299,9 @@ class Search(Generic[AnyRule]):
             insort(waiting, (key, self._newest, boxes))
 
     def _take(self, waiting: list[_Chunk[Any]]) -> Boxes[Any]:
-        """Remove and return boxes whose parts are a block; there must be one.
+        """Remove and return boxes for one block of parts; at least one box must be waiting.
 
-        Chunks are ordered by their largest bounds alone, so some other boxes may have larger bounds than these.
+        Chunks are ordered only by their largest bounds, so some other boxes may have larger bounds than these.
         """
         taken: list[Boxes[Any]] = []
         room, count = self.rule.block, self.left
@@ -336,16 +336,16 @@ class Steps(Protocol):
         """Number of boxes examined."""
 
     def step(self, target: float) -> None:
-        """Examine some boxes, and close those whose bounds do not exceed a target."""
+        """Examine some boxes, and close boxes with bounds of at most a target."""
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How long a search may take beside its time; its clock begins with it.
+    """Limits on the effort of a search, with its clock.
 
     Attributes:
-        most_boxes: number of boxes after which it stops.
-        progress: called with the seconds, about ten times a second.
+        most_boxes: number of boxes after which the search stops.
+        progress: function that is called with the seconds, about ten times a second.
         began: time at the start.
     """
 
@@ -365,8 +365,8 @@ class Effort:
 
         Args:
             search: the search.
-            ending: returns the reason for ending, which is empty where the claim is decided; None for going on.
-            target: returns the bound up to which boxes may be closed.
+            ending: function that returns the reason for ending, empty if the claim is decided; None to continue.
+            target: function that returns the largest bound of a box that may be closed.
         """
         return reason_of(lambda: self._run(search, ending, target))
 

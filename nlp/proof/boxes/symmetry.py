@@ -1,9 +1,9 @@
-"""Symmetries of a form, read off its expressions: mirrors, and parts that are copies of each other.
+"""Symmetries of a form, from its expressions: mirrors, and copies of parts.
 
-A mirror changes the signs of some variables, and no function or condition of the form. The axis of a joint, for
-example, may point either way. It is found where every intermediate value either keeps its sign or changes it, for all
-values of the variables. This is a linear condition, modulo 2, on the set of variables that change theirs. So the
-mirrors found are a group, and one half of the box for each of its generators holds an optimum of the whole box.
+A mirror changes the signs of some variables, and no function or condition of the form; for example, the axis of a joint
+may have either sense. It exists if every intermediate value either keeps or changes its sign, for all values of the
+variables. This is a linear condition, modulo 2, on the set of variables that change sign. So the mirrors are a group,
+and for each generator one half of the box contains an optimum of the whole box.
 
 Copies are forms with the same operations, constants and bounds, in other variables. They have the same maximum.
 """
@@ -23,15 +23,15 @@ from .engine import without_conditions
 
 
 def mirrors(form: StandardForm) -> list[tuple[int, ...]]:
-    """Return sets of variables whose signs may be changed together; the first variable of each is in no other one.
+    """Return sets of variables whose signs may change together; the first variable of each set is in no other set.
 
-    Bounds stay as they are, as do the functions, the inequalities, and whether an equation holds.
+    Bounds, functions, inequalities and the solutions of equations stay the same.
     """
     held = [1 << i for i in range(form.n) if form.lower[i] != -form.upper[i]]
     if len(held) == form.n:
         return []
     found: list[int] = []
-    # Mostly the functions alone have no mirror: then the many expressions of the conditions are not looked at.
+    # Often the functions have no mirror; then the many expressions of the conditions are not examined.
     for part in (without_conditions(form), form):
         tape = _tape_of(part)
         found = [] if tape is None else _solutions([*held, *_sums_of(tape, part.is_equation)], form.n)
@@ -41,7 +41,7 @@ def mirrors(form: StandardForm) -> list[tuple[int, ...]]:
 
 
 def halved(form: StandardForm) -> StandardForm:
-    """Return a form with the part of its box that is left of all mirrors: it has the same maximum."""
+    """Return a form on the part of its box that remains after all mirrors; it has the same maximum."""
     found = mirrors(form)
     if not found:
         return form
@@ -51,7 +51,7 @@ def halved(form: StandardForm) -> StandardForm:
 
 
 def grouped(forms: Sequence[StandardForm]) -> list[list[int]]:
-    """Return the numbers of forms, those of copies together."""
+    """Return the indices of forms in groups of copies."""
     groups: dict[object, list[int]] = {}
     for number, form in enumerate(forms):
         tape = _tape_of(form)
@@ -62,7 +62,7 @@ def grouped(forms: Sequence[StandardForm]) -> list[list[int]]:
 
 
 def _tape_of(form: StandardForm) -> Tape | None:
-    """Compile a form's expressions; None where an operation has no rule, which the search refuses by its limit."""
+    """Compile a form's expressions; None if an operation has no interval rule, which the search reports later."""
     try:
         return compile_tape(ca.Function("values", [form.x], [form.expressions]))
     except UncoveredError:
@@ -70,10 +70,10 @@ def _tape_of(form: StandardForm) -> Tape | None:
 
 
 def _sums_of(tape: Tape, is_equation: Sequence[bool]) -> Iterator[int]:
-    """Yield sums of unknowns that are 0 modulo 2 where every value of a tape keeps or changes its sign.
+    """Yield sums of unknowns that must be 0 modulo 2 so that every value of a tape keeps or changes its sign.
 
-    An unknown is 1 where a variable changes its sign; a sum is a number with the bits of its unknowns. A register has
-    the sum that is 1 where it changes its sign.
+    An unknown is 1 if a variable changes its sign; a sum is an integer with the bits of its unknowns. The sum of a
+    register is 1 if the register changes its sign.
     """
     signs: dict[int, int] = {}
     for op, to, a, b, k in zip(*(each.tolist() for each in (tape.op, tape.to, tape.a, tape.b, tape.k)), strict=True):
@@ -90,13 +90,13 @@ def _sums_of(tape: Tape, is_equation: Sequence[bool]) -> Iterator[int]:
         elif op in (Op.SCALE, Op.SIN, Op.ATAN) or (op == Op.SHIFT and k == 0):
             signs[to] = one  # an odd function
         else:
-            # Even functions keep the sign in any case; others are neither odd nor even, and a constant has no operand.
+            # Even functions always keep the sign; other functions are neither odd nor even; a constant has no operand.
             yield 0 if op in (Op.SQUARE, Op.COS, Op.CONSTANT) else one
             signs[to] = 0
 
 
 def _solutions(sums: Iterable[int], unknowns: int) -> list[int]:
-    """Return a basis of the sets of unknowns with which sums are 0 modulo 2: each has a bit of its own, its lowest."""
+    """Return a basis of the sets of unknowns with all sums 0 modulo 2; the lowest bit of each is in no other set."""
     rows: dict[int, int] = {}
     for total in sums:
         left = total
@@ -107,7 +107,7 @@ def _solutions(sums: Iterable[int], unknowns: int) -> list[int]:
     basis = []
     for free in range(unknowns):
         if free not in rows:
-            # The unknowns below the highest one of a row determine it: from the lowest up, with one free unknown 1.
+            # The highest unknown of a row follows from lower ones: solve from the lowest up, with one free unknown 1.
             solution = 1 << free
             for highest in sorted(rows):
                 if (rows[highest] & solution).bit_count() % 2:

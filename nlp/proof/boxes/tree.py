@@ -1,6 +1,6 @@
-"""Record of a search as the tree of a proof: see :mod:`screwsynth.nlp.proof.checker.tree` for the nodes.
+"""Record of a search as the tree of a proof; :mod:`screwsynth.nlp.proof.checker.tree` defines the nodes.
 
-A rule names a node by the ends of its box.
+The key of a node is the ends of its box.
 """
 
 from __future__ import annotations
@@ -19,31 +19,31 @@ if TYPE_CHECKING:
 
     from ....models import FloatArray
 
-#: Part of itself by which the bound of a limb moves outwards: half as much as that of the whole.
+#: Relative outward shift of the bound of a limb, half of the shift of the whole bound.
 _OUTWARDS = 5e-13
 
 
 class TreeRecord:
-    """The tree of a search.
+    """Tree of a search.
 
     Attributes:
-        begin: bytes before those of the root's node.
+        begin: bytes before the root's node.
     """
 
     def __init__(self) -> None:
         self.clear()
 
     def clear(self) -> None:
-        """Forget everything recorded: the search begins again."""
+        """Delete the record: the search begins again."""
         self.begin, self._root = b"", b""
         self._nodes: dict[bytes, tuple[bytes, tuple[bytes, ...]]] = {}
         self._limbs: list[tuple[TreeRecord, Callable[[], float]]] = []
 
     def limb(self, bound: Callable[[], float]) -> TreeRecord:
-        """Return the record of the next limb's tree; the tree of the whole is that of its limbs then.
+        """Return the record of the next limb's tree; the whole tree consists of the limbs' trees then.
 
         Args:
-            bound: returns the limb's bound at the end of the search; -inf without a feasible point.
+            bound: function that returns the limb's bound at the end of the search; -inf without a feasible point.
         """
         record = TreeRecord()
         self._limbs.append((record, bound))
@@ -51,12 +51,12 @@ class TreeRecord:
 
     def add(self, key: bytes, text: bytes, *parts: bytes) -> None:
         """Record a node: its bytes, and the keys of the parts of its box in the order of their trees."""
-        # The first box that a search examines is the whole one.
+        # The first box of a search is the whole box.
         self._root = self._root or key
         self._nodes[key] = text, parts
 
     def cuts(self, lower: FloatArray, upper: FloatArray, split: NDArray[np.signedinteger]) -> None:
-        """Record boxes (B, n) that are cut in the middle of a coordinate each, (B,)."""
+        """Record the bisection of boxes (B, n), each along one coordinate (B,)."""
         middle, halves = halves_of(lower, upper, split)
         for key, i, value, parts in zip(keys_of(lower, upper), split.tolist(), middle.tolist(), halves, strict=True):
             self.add(key, node_bytes(Node.CUT, i, value=value), *parts)
@@ -64,7 +64,7 @@ class TreeRecord:
     def contractions(
         self, before: tuple[FloatArray, FloatArray], after: tuple[FloatArray, FloatArray], outside: NDArray[np.bool_]
     ) -> None:
-        """Record boxes that were moved to the ball of rotations: ends before and after, and where none is left."""
+        """Record boxes contracted to the ball of rotations: ends before and after, and whether each is empty."""
         for k, (old, new) in enumerate(zip(keys_of(*before), keys_of(*after), strict=True)):
             if outside[k]:
                 self.add(old, bytes([Node.OUTSIDE]))
@@ -75,8 +75,8 @@ class TreeRecord:
         """Return the whole tree.
 
         Args:
-            with_open: whether boxes without a node are leaves: open ones, for which the bound of a search that stopped
-                is one as well, or those that a search of poses has not cut.
+            with_open: If true, boxes without a node are leaves: open boxes, which the bound of a stopped search covers
+                too, or boxes that a search of poses did not bisect.
 
         Raises:
             ProofError: a box is not closed.
@@ -88,7 +88,7 @@ class TreeRecord:
     def tree_below(self, key: bytes, *, with_open: bool = False) -> bytes:
         """Return the tree of a box with a key; see :meth:`tree`."""
         parts, waiting = list[bytes](), [key]
-        # A leaf of shared variables has numbers of its own, which an open box lacks.
+        # A leaf of shared variables has additional values, which an open box does not have.
         missing = bytes([Node.BOUNDED]) if with_open and not self.begin else None
         while waiting:
             text, following = self._nodes.get(waiting.pop(), (missing, ()))
@@ -99,7 +99,7 @@ class TreeRecord:
         return b"".join(parts)
 
     def _tree_of_limbs(self, *, with_open: bool) -> bytes:
-        """Return the limbs' bounds and trees; of limbs of which one has no feasible point, the tree of that one."""
+        """Return the limbs' bounds and trees; if a limb has no feasible point, only the tree of this limb."""
         bounds = [bound() for _, bound in self._limbs]
         parts = [bytes([Node.LIMBS])]
         for (record, _), bound in zip(self._limbs, bounds, strict=True):
@@ -119,7 +119,7 @@ def keys_of(lower: FloatArray, upper: FloatArray) -> list[bytes]:
 def halves_of(
     lower: FloatArray, upper: FloatArray, split: NDArray[np.signedinteger]
 ) -> tuple[FloatArray, list[tuple[bytes, bytes]]]:
-    """Return the middles (B,) of a coordinate of each box (B, n), and the keys of its lower and its upper half."""
+    """Return the middle (B,) of the coordinate to bisect of each box (B, n), and the keys of both halves."""
     every = np.arange(len(lower))
     middle = 0.5 * lower[every, split] + 0.5 * upper[every, split]
     below, above = upper.copy(), lower.copy()

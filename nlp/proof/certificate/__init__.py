@@ -1,1 +1,1 @@
-"""Proven bounds of the global optimum over the whole box: ``certificate`` (the value), ``branch_and_bound``."""
+"""Proved bounds of the global optimum of a program: ``certificate`` (the result), ``branch_and_bound`` (the search)."""

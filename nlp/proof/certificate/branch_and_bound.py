@@ -1,10 +1,10 @@
-"""A proven bound of the global optimum, by branch and bound over the whole box.
+"""Proved bound of the global optimum, by branch and bound over the whole box.
 
-Boxes are examined in blocks by the C kernel. A box is closed when its bound does not exceed the incumbent by more than
-the gap, when a condition cannot hold in it, or when no maximum can lie in it; otherwise it is bisected. A search that
-stops early has a bound too, from the boxes that are open: it is wider, and as certain as that at the end.
+The C kernel examines boxes in blocks. A box is closed when its bound does not exceed the incumbent by more than the
+gap, when a condition cannot hold in it, or when no maximum can lie in it; otherwise it is bisected. A search that stops
+early has a bound from the open boxes, which is weaker, but also proved.
 
-No solver is trusted: the value of an incumbent is that of the program's own functions at the point.
+No solver is trusted: the value of an incumbent is computed by the program's functions.
 """
 
 from __future__ import annotations
@@ -33,21 +33,20 @@ from ..statement.limb_separation import separate
 from ..statement.standard_form import StandardForm, is_in_home_mode, standard_form
 from .certificate import Certificate, CertificateStatus
 
-#: The gap asked for when none is given: a ten-thousandth.
+#: Default of the relative gap.
 GAP = 1e-4
-#: Part of itself by which every bound moves outwards in the end: constants that CasADi folded when it built the graph
-#: are rounded doubles of their own.
+#: Relative outward shift of every final bound: constants that CasADi folded into the graph are rounded.
 _FOLDED = 1e-12
-#: Part of the objective's scale below which an incumbent counts as 0: a gap relative to it would have no meaning.
+#: Part of the objective's scale below which an incumbent counts as 0, and a relative gap has no meaning.
 _NEAR_ZERO = 1e-6
-#: Part of a gap by which a bound may exceed it and still count as met: rounding of sums.
+#: Relative excess of a gap that counts as rounding of sums.
 _GAP_ROUNDING = 1e-9
-#: Number of variables up to which the whole box is searched although limbs share variables: it takes fewer boxes then.
+#: Largest number of variables for a search of the whole box if limbs share variables; it takes fewer boxes then.
 _WHOLE_BOX = 12
 #: Largest number of entries in a history.
 _HISTORY = 200
 
-#: Callback with seconds, bound, incumbent, number of boxes examined, number of boxes open.
+#: Callback with seconds, bound, incumbent, number of examined boxes, number of open boxes.
 CertifyProgress = Callable[[float, float, float, int, int], None]
 
 
@@ -67,18 +66,18 @@ def certify_program(
 
     Args:
         nlp: the program.
-        x: (n,) the best point known, as from :func:`screwsynth.nlp.solve`; without one a few are tried.
-        claimed: the objective claimed there; the claim is refused when it is wrong.
-        gap: largest difference of bound and incumbent, as a part of the incumbent; near 0, of the objective's scale.
-        above: prove, instead, that F is above this value on the whole box. The program must be a minimisation.
-        time_limit: seconds after which the search stops with the bound reached.
-        jobs: threads; the result does not depend on it. Left out, one for each processor.
-        progress: called about ten times a second.
-        recorder: records the search's tree for a proof.
+        x: (n,) best known point, such as the result of :func:`screwsynth.nlp.solve`; if None, a few points are tried.
+        claimed: claimed objective at this point; a wrong claim is refused.
+        gap: largest difference of bound and incumbent, relative to the incumbent; near 0, to the objective's scale.
+        above: value below F that is proved instead, on the whole box. The program must be a minimisation.
+        time_limit: seconds after which the search stops with its present bound.
+        jobs: number of threads; the result does not depend on it. If left out, one for each processor.
+        progress: function that is called about ten times a second.
+        recorder: recorder of the search's tree for a proof.
 
     Raises:
-        UncoveredError: an expression holds an operation without a rule.
-        ValueError: ``above`` for a maximisation.
+        UncoveredError: an expression has an operation without an interval rule.
+        ValueError: ``above`` is given for a maximisation.
         InputError: the C kernel was not built.
     """
     if above is not None and nlp.sense is not Sense.MIN:
@@ -87,9 +86,9 @@ def certify_program(
         effort = Effort()
         if nlp.n == 0:
             return _certify_point(nlp, above, effort.seconds)
-        kernel()  # before any work where it is missing
+        kernel()  # fails at once if it is missing
         form = standard_form(nlp)
-        if form.n == 0:  # the level of a worst case alone, which follows from the one point there is
+        if form.n == 0:  # only the level of a worst case is free, and it follows from the single point
             return _certify_point(nlp, above, effort.seconds)
         search = _Search(form, gap, above, effort, jobs, progress)
         try:
@@ -100,18 +99,18 @@ def certify_program(
 
 
 def _certify_point(nlp: Nlp, above: float | None, seconds: float) -> Certificate:
-    """Return the certificate of a program without variables of the case: its value at the one point is the bound."""
+    """Return the certificate of a program without variables of the case: the value at its single point."""
     x = frozen_array(with_exact_level(nlp, nlp.start), (nlp.n,))
     F, violation = nlp.evaluate(x)[0], linearise(nlp, x).violation
     status, reason = CertificateStatus.PROVED, ""
-    if not ((nlp.lower <= x) & (x <= nlp.upper)).all():  # ends of a level are estimates, and no limits of the case
+    if not ((nlp.lower <= x) & (x <= nlp.upper)).all():  # ends of a level are estimates, not limits of the case
         status, reason = CertificateStatus.INCOMPLETE, "the level of the worst case is beyond its estimated ends"
     elif not violation <= FEASIBLE:
         status = CertificateStatus.INFEASIBLE
     elif not math.isfinite(F):
-        status, reason = CertificateStatus.INCOMPLETE, "F has no finite value at the one point there is"
+        status, reason = CertificateStatus.INCOMPLETE, "F has no finite value at the only point"
     elif above is not None and above >= F:
-        status, reason = CertificateStatus.REFUSED, f"F is {F:.10g} at the one point there is, not above {above:.10g}"
+        status, reason = CertificateStatus.REFUSED, f"F is {F:.10g} at the only point, not above {above:.10g}"
     known = F if math.isfinite(F) else math.nan
     return Certificate(
         status, nlp, x, known, known, 0.0, bool(F), above, False, "none", 0, 0, seconds, reason, ((seconds, F, F),)
@@ -119,15 +118,15 @@ def _certify_point(nlp: Nlp, above: float | None, seconds: float) -> Certificate
 
 
 class _Search:
-    """The state of a search; all values are those of the standard form, which is maximised.
+    """State of a search; all values are maximised values of the standard form.
 
     Args:
         form: the form.
-        gap, above, jobs, progress: as for :func:`certify_program`.
-        effort: the clock.
+        gap, above, jobs, progress: arguments of :func:`certify_program`.
+        effort: clock of the search.
 
     Attributes:
-        incumbent: the best feasible point known.
+        incumbent: best known feasible point.
     """
 
     def __init__(
@@ -141,17 +140,17 @@ class _Search:
     ) -> None:
         self._form, self._gap, self._above, self._jobs, self._progress = form, gap, above, jobs, progress
         self._effort, self.incumbent = replace(effort, progress=self._report), Incumbent(form)
-        # The method in use takes the place of this one: what it sets up can be stopped.
+        # Another method may replace this one; its set-up can be interrupted.
         self._method: Search[Any] | IndependentSearch = optimum_search(form, self.incumbent, jobs, None)
-        # (seconds, bound, incumbent) in the program's own sense, and the boxes that methods before this one examined.
+        # (seconds, bound, incumbent) as objectives of the program, and number of boxes of earlier methods.
         self._history: list[tuple[float, float, float]] = []
         self._boxes_before = 0
 
     def run(self, recorder: TreeRecord | None) -> str:
         """Search until no box is open; return the reason for stopping earlier, or an empty text.
 
-        Before a better point was known, limbs may have been closed that leave too little of the gap for the others, or
-        boxes divided until they were too small. Then the search begins again with that point.
+        With a worse incumbent, limbs may have been closed that leave too little of the gap for other limbs, or boxes
+        bisected until they were too small. Then the search begins again with the better point.
         """
         while not (reason := reason_to_stop(self._effort.seconds)):
             self._boxes_before += self._method.boxes
@@ -165,9 +164,9 @@ class _Search:
         return reason
 
     def _new_method(self, recorder: TreeRecord | None) -> Search[Any] | IndependentSearch:
-        """Return the search for the form: by limbs where it separates, else of the whole box.
+        """Return the search for the form: by limbs if it separates, else of the whole box.
 
-        A proof covers the whole box where mirrors would leave a part of it.
+        A proof covers the whole box, without the use of mirror symmetries.
         """
         form, jobs = halved(self._form) if recorder is None else self._form, self._jobs
         separation = separate(form)
@@ -181,25 +180,25 @@ class _Search:
     def _threshold(self) -> float:
         """Largest bound of a box that may be closed."""
         if self._above is not None:
-            # Strictly below, and by more than the bound moves outwards in the end.
+            # Strictly below, by more than the final outward shift of the bound.
             value = self._form.value_of(self._above)
             return math.nextafter(value - 2 * _FOLDED * abs(value), -math.inf)
         if self.incumbent.x is None:
             return -math.inf
-        # The bound moves outwards in the end, and the gap must hold with that.
+        # The gap must include the final outward shift of the bound.
         return self.incumbent.value + self._allowed_gap()[0] - 2 * _FOLDED * abs(self.incumbent.value)
 
     def _has_counterexample(self) -> bool:
-        """Return whether F is not above the value at a known point; an F that is rounding error counts as 0."""
+        """Return whether F is not above the value at a known point; F within rounding errors of 0 counts as 0."""
         if self._above is None or self.incumbent.x is None:
             return False
         return self.incumbent.value >= self._form.value_of(self._above) - ZERO_F * self._form.size
 
     def _allowed_gap(self) -> tuple[float, bool]:
-        """Return the largest difference of bound and incumbent, and whether it is a part of the incumbent."""
+        """Return the largest difference of bound and incumbent, and whether it is relative to the incumbent."""
         floor, value = _NEAR_ZERO * self._form.size, abs(self.incumbent.value)
         is_relative = floor < value < math.inf
-        # A square has a gap of (2 - gap) times that of its root.
+        # The relative gap of a square is gap (2 - gap), with the gap of its root.
         gap = self._gap if self._form.power == 1 else self._gap * (2 - self._gap)
         return gap * (value if is_relative else floor), is_relative
 
@@ -207,23 +206,23 @@ class _Search:
     def _bound(self) -> float:
         """Upper bound of the maximum, at this state of the search."""
         bound = self._bound_of_tree
-        # Signs of a long expression take a while, and matter to few searches.
+        # The signs of a long expression take time, and few searches need them.
         return min(bound, self._form.ceiling) if 0 < bound < math.inf else bound
 
     @property
     def _bound_of_tree(self) -> float:
-        """The same as the boxes show it, which may be above 0 for minus a sum of squares."""
+        """Upper bound of the maximum from the boxes, which may be above 0 for a negative sum of squares."""
         known = max(self._method.bound, self.incumbent.value)
         return known + _FOLDED * abs(known) if math.isfinite(known) else known
 
     def _is_met(self) -> bool:
-        """Return whether the bound is as good as asked for, once no box is open."""
+        """Return whether the bound has the requested gap, once no box is open."""
         if self._above is not None:
             return self._bound_of_tree < self._form.value_of(self._above)
         return self._method.bound <= self._threshold + _GAP_ROUNDING * self._allowed_gap()[0]
 
     def _ending(self) -> str | None:
-        """Return the reason for ending; None for going on."""
+        """Return the reason for ending the search; None to continue."""
         if self._method.fault:
             return self._method.fault
         if not self._method.is_open:
@@ -239,7 +238,7 @@ class _Search:
             self._progress(seconds, bound, incumbent, self._boxes_before + self._method.boxes, self._method.left)
 
     def _noted(self, seconds: float) -> tuple[float, float]:
-        """Return bound and incumbent, added to the history; a full one loses every second entry."""
+        """Return bound and incumbent after adding them to the history; a full history loses every second entry."""
         bound, incumbent = map(self._form.objective_of, (self._bound, self.incumbent.value))
         if math.isfinite(bound) and math.isfinite(incumbent):
             if len(self._history) >= _HISTORY:
@@ -262,7 +261,7 @@ class _Search:
         elif self._is_met():
             status = CertificateStatus.PROVED
         else:
-            status, reason = CertificateStatus.INCOMPLETE, "the bounds of the limbs do not add up to the one asked for"
+            status, reason = CertificateStatus.INCOMPLETE, "the sum of the limbs' bounds misses the requested gap"
         allowed, is_relative = self._allowed_gap()
         allowed = self._gap * abs(incumbent) if is_relative else allowed
         return Certificate(

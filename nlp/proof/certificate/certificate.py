@@ -1,4 +1,4 @@
-"""Certificates: proven bounds, each with a sentence that states its meaning and its limits."""
+"""Certificates: proved bounds of the global optimum, each with a sentence about its meaning and scope."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from ...case.task import Sense
 from ...evidence.state import ZERO_F
 from ...program.nlp import Nlp
 
-#: Part of the incumbent below which a lower bound is as good as 0.
+#: Part of the incumbent below which a lower bound counts as 0.
 _OBVIOUS = 1e-9
-#: Scope of every statement: the expressions as CasADi holds them, not the machine.
+#: Scope of every statement: CasADi's expressions of the robot, in double precision.
 SCOPE = "for the double-precision expression graph of this case"
 
 
 class CertificateStatus(enum.Enum):
-    """Result of a search; each value is the word in results."""
+    """Status of a search; the values are the words in results."""
 
     PROVED = "proved"
     INCOMPLETE = "incomplete"
@@ -30,31 +30,31 @@ class CertificateStatus(enum.Enum):
 
 @dataclass(frozen=True, eq=False)
 class Certificate(Whole, Shown):
-    """A proven bound.
+    """Proved bound of the global optimum.
 
     Attributes:
-        status: ``proved``: the gap asked for holds, or F is above the value on the whole box; ``incomplete``: the bound
-            holds, but is wider than asked for; ``infeasible``: no point of the box keeps the limits; ``refused``: the
-            claim is wrong, as a point shows.
-        nlp: the program.
-        x: (n,) the incumbent; None without one. It may be another point than the one given: see ``was_beaten``.
+        status: ``proved``: the requested gap is reached, or F is above the value on the whole box; ``incomplete``: the
+            bound is proved, but its gap is larger than requested; ``infeasible``: no point of the box satisfies the
+            limits; ``refused``: a known point contradicts the claim.
+        nlp: the nonlinear program.
+        x: (n,) incumbent; None without one. If ``was_beaten`` is true, it is not the given point.
         incumbent: objective at ``x``; NaN without a point.
-        bound: no feasible point of the box has a better objective; infinite where nothing is known.
-        allowed: the gap asked for, in the objective's own unit.
-        is_relative: whether that gap is a part of the incumbent; near 0 it is a part of the objective's scale.
-        above: the value that F is claimed to be above; None without such a claim.
-        was_beaten: whether the search found a better point than the one given.
+        bound: bound of the objective over all feasible points of the box; infinite without one.
+        allowed: requested gap, in the objective's unit.
+        is_relative: whether the gap is relative to the incumbent; near 0 it is relative to the objective's scale.
+        above: value below F that was to be proved; None without one.
+        was_beaten: whether the search found a better point than the given one.
         engine: ``c``, or ``none`` for a program without variables.
-        boxes: number of boxes examined.
-        open: number of boxes that are still open.
+        boxes: number of examined boxes.
+        open: number of open boxes at the end.
         seconds: wall time.
-        reason: for stopping before every box was closed, or for refusing the claim; else empty.
-        history: (seconds, bound, incumbent) during the search, finite numbers only.
-        bound_of_tree: upper bound that the search's boxes show of the value that is maximised in standard form; above 0
-            for a sum of squares whose ``bound`` is 0.
-        in_other_mode: whether the incumbent is in another working mode than home's.
-        scope: dimensions that the bound holds for, as words such as ``with the rounded dimensions``; empty where the
-            box has them all.
+        reason: reason for a search that stopped before every box was closed, or for a refused claim; else empty.
+        history: (seconds, bound, incumbent) during the search; only finite values.
+        bound_of_tree: upper bound from the search's boxes of the maximised value in standard form; above 0 for a sum of
+            squares with a ``bound`` of 0.
+        in_other_mode: whether the incumbent is in another working mode than home.
+        scope: dimensions for which the bound is valid, such as ``with the rounded dimensions``; empty for the whole
+            box.
     """
 
     status: CertificateStatus
@@ -86,15 +86,15 @@ class Certificate(Whole, Shown):
 
     @property
     def relative_gap(self) -> float | None:
-        """The gap as a part of the incumbent; None near 0, or without a finite gap."""
+        """Gap relative to the incumbent; None near 0, or without a finite gap."""
         if not (self.is_relative and math.isfinite(self.gap)):
             return None
         return self.gap / abs(self.incumbent)
 
     @property
     def is_obvious(self) -> bool:
-        """Whether the bound says no more than that F, a sum of squares, is at least 0, and the best F is above that."""
-        # A gap that is not relative is one beside 0: the bound 0 proves it.
+        """Whether the bound only states that F, a sum of squares, is at least 0, and the best known F is larger."""
+        # An absolute gap is used near 0, where the bound 0 is a proof of it.
         met = self.status is CertificateStatus.PROVED and not self.is_relative
         floor = 0.0 if math.isnan(self.incumbent) else _OBVIOUS * abs(self.incumbent)
         reached = abs(self.incumbent) <= ZERO_F * self.nlp.objective_size
@@ -102,38 +102,36 @@ class Certificate(Whole, Shown):
 
     @property
     def statement(self) -> str:
-        """The proven statement in one sentence, with its limits."""
+        """Proved statement in one sentence, with its scope."""
         if self.status is CertificateStatus.INFEASIBLE:
-            return f"proved: no point of the box keeps all limits{self._mode}, {SCOPE}"
+            return f"proved: no point of the box satisfies all limits{self._mode}, {SCOPE}"
         if self.status is CertificateStatus.REFUSED:
             return f"refused: {self.reason}"
         return self._bound_statement
 
     @property
     def _mode(self) -> str:
-        """The set that the statement is about, where it is not the box itself, as words at the end of a clause."""
+        """Restriction of the statement to a part of the box, as words at the end of a clause; empty without one."""
         scope = f" {self.scope}" if self.scope else ""
         return f"{scope} in home's working mode" if self.nlp.in_home_mode else scope
 
     @property
     def _bound_statement(self) -> str:
-        """The statement of a bound."""
+        """Statement of a bound."""
         word = "larger" if self.nlp.sense is Sense.MAX else "smaller"
         value = 0.0 if abs(self.incumbent) <= ZERO_F * self.nlp.objective_size else self.incumbent
-        best = "" if math.isnan(value) else f"; the best point known has {value:.10g}"
-        beaten = ", better than the one given" if self.was_beaten else ""
-        beaten += ", in another working mode than home's" if self.in_other_mode else ""
+        best = "" if math.isnan(value) else f"; the best known point has {value:.10g}"
+        beaten = ", better than the given point" if self.was_beaten else ""
+        beaten += ", in another working mode than home" if self.in_other_mode else ""
         if self.above is not None and self.status is CertificateStatus.PROVED:
-            obvious = ", which says nothing useful: F is at least 0" if self.above < 0 else ""
+            obvious = ", which is trivial: F is at least 0" if self.above < 0 else ""
             where = f"on the whole box within the limits{self._mode}"
             return f"proved: F is above {self.above:.10g} {where}{obvious}{best}, {SCOPE}"
         if not math.isfinite(self.bound):
             return f"nothing is proved: {self.reason}{best}"
         if self.is_obvious:
-            return (
-                f"nothing useful is proved yet ({self.reason or 'the gap asked for allows it'}): F is at least 0{best}"
-            )
-        # A lower bound may be rounded down to 0, an upper one may not.
+            return f"only the trivial bound is proved ({self.reason or 'the gap allows it'}): F is at least 0{best}"
+        # A lower bound may be rounded down to 0; an upper bound may not.
         is_noise = self.nlp.sense is Sense.MIN and 0 < self.bound <= ZERO_F * self.nlp.objective_size
         bound = 0.0 if is_noise else self.bound + 0.0
         what = f"no point of the box within the limits{self._mode} has F {word} than {bound:.10g}{best}{beaten}"

@@ -1,4 +1,4 @@
-"""Operations of CasADi's graphs in polynomials with a ball: those that have a rule, and those composed of others.
+"""Operations of CasADi's graphs for polynomials with an error ball: direct rules, and compositions of other operations.
 
 Compositions are exact identities of real numbers.
 """
@@ -34,11 +34,11 @@ def _power(u: Polynomial, exponent: Polynomial) -> Polynomial:
     """Return a constant whole or half power.
 
     Raises:
-        UncoveredError: the power is another one.
+        UncoveredError: the exponent is not constant, or not whole or half.
     """
     power = exponent.number
     if power is None or not ((2 * power).is_integer() and 0 < abs(power) <= _LARGEST_POWER):
-        raise UncoveredError("a power that is not constant, or not whole or half")
+        raise UncoveredError("a power with an exponent that is not constant, or not whole or half")
     base, left = (u, int(abs(power))) if power.is_integer() else (sqrt(u), int(abs(2 * power)))
     result: Polynomial | None = None
     while left:
@@ -85,13 +85,13 @@ _BINARY: dict[int, Callable[[Polynomial, Polynomial], Polynomial]] = {
 
 
 class PolynomialArithmetic:
-    """Polynomials of a function of one vector: its operations, in order.
+    """Polynomials of a function of one vector, from its operations in order.
 
     Args:
-        function: made of ``SX``, with one dense input (n, 1) and dense outputs.
+        function: function of ``SX`` with one dense input (n, 1) and dense outputs.
 
     Raises:
-        UncoveredError: the function holds an operation without a rule.
+        UncoveredError: the function has an operation without a rule.
     """
 
     def __init__(self, function: ca.Function) -> None:
@@ -102,7 +102,7 @@ class PolynomialArithmetic:
             if op == ca.OP_CONST:
                 self._constants[k] = constant(function.instruction_constant(k))
             elif op not in {ca.OP_INPUT, ca.OP_OUTPUT, *_UNARY, *_BINARY}:
-                raise UncoveredError(f"the operation number {op} of CasADi's")
+                raise UncoveredError(f"operation number {op} of CasADi")
             self._steps.append((op, function.instruction_input(k), function.instruction_output(k)))
         self._offset = np.concatenate([[0], np.cumsum([function.numel_out(i) for i in range(function.n_out())])])
 
@@ -110,9 +110,9 @@ class PolynomialArithmetic:
         """Return polynomials of the outputs' elements, column by column, over boxes with ends (n, N).
 
         Args:
-            lower: lower ends of the first inputs.
-            upper: upper ends.
-            given: values of the inputs after these.
+            lower: (n, N) lower ends of the first n inputs.
+            upper: (n, N) upper ends of the first n inputs.
+            given: values of the remaining inputs.
         """
         work: dict[int, Polynomial] = {}
         results: dict[int, Polynomial] = {}

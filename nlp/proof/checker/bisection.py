@@ -1,4 +1,4 @@
-"""Loop of the checker: claims about boxes are shown on pieces of them, and pieces that are left are bisected."""
+"""Loop of the checker: claims about boxes are proved on pieces of them; pieces without proof are bisected."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 
     from ....models import FloatArray
 
-#: Largest number of bisections on the way to a piece.
+#: Largest number of bisections that lead to a piece.
 _MOST_BISECTIONS = 60
-#: Every so many bisections the widest variable is halved, so that all become narrow whatever the models tell of them.
+#: Period of bisections along the widest variable, so that all variables become narrow whatever the models suggest.
 _WIDEST = 5
 
 
@@ -25,10 +25,10 @@ class Shown:
     """Results on N pieces of n variables.
 
     Attributes:
-        holds: (N,) whether the claim is shown.
-        change: (n, N) how much the claim can gain from halving each variable.
-        lower, upper: (n, N) ends of the part of each piece that is left to be shown; crossed where nothing is.
-        is_wrong: (N,) whether the centre is a counterexample by more than rounding; None where that is not asked.
+        holds: (N,) whether the claim is proved on the piece.
+        change: (n, N) estimated gain of the claim from halving each variable.
+        lower, upper: (n, N) ends of the part of each piece that remains to be proved; crossed where nothing remains.
+        is_wrong: (N,) whether the centre is a counterexample by more than rounding; None where this was not tested.
     """
 
     holds: NDArray[np.bool_]
@@ -38,21 +38,21 @@ class Shown:
     is_wrong: NDArray[np.bool_] | None = None
 
     def keep(self, which: NDArray[np.intp], holds: NDArray[np.bool_], change: FloatArray) -> None:
-        """Add what is shown of some pieces."""
+        """Store the results on some pieces."""
         self.holds[which] |= holds
         self.change[:, which] = np.fmax(self.change[:, which], change)
 
     def cut(self, which: NDArray[np.intp], ends: tuple[FloatArray, FloatArray]) -> None:
-        """Leave only a part of some pieces."""
+        """Reduce some pieces to the given parts."""
         self.lower[:, which] = np.fmax(self.lower[:, which], ends[0])
         self.upper[:, which] = np.fmin(self.upper[:, which], ends[1])
 
 
 class Rule(Protocol):
-    """A rule that shows claims of one kind.
+    """A rule that proves claims of one kind.
 
     Attributes:
-        width: (n,) of the whole box.
+        width: (n,) widths of the whole box.
         block: number of pieces examined at once.
         most_pieces: largest number of pieces of a claim's box.
     """
@@ -62,7 +62,7 @@ class Rule(Protocol):
     most_pieces: int
 
     def examine(self, lower: FloatArray, upper: FloatArray, of: NDArray[np.intp]) -> Shown:
-        """Examine pieces with ends (n, N) of the claims with these numbers (N,).
+        """Examine pieces with ends (n, N); ``of`` has the number of the claim of each piece.
 
         Raises:
             ProofError: a claim is wrong.
@@ -73,24 +73,24 @@ class Rule(Protocol):
 
 
 def show(rule: Rule, lower: FloatArray, upper: FloatArray) -> int:
-    """Show claims, and return the number of pieces examined.
+    """Prove claims, and return the number of examined pieces.
 
     Args:
-        rule: shows them.
+        rule: rule that proves the claims.
         lower: (n, L) lower ends of the claims' boxes.
-        upper: (n, L) upper ends.
+        upper: (n, L) upper ends of the claims' boxes.
 
     Raises:
-        ProofError: a claim could not be shown.
+        ProofError: a claim could not be proved.
     """
     (n, count), begun, total = lower.shape, 0, 0
     used = np.zeros(count, dtype=np.intp)
-    # Declared types spare a type checker minutes of inference from the loop.
+    # Declared types save a type checker minutes of inference in the loop.
     waiting: tuple[FloatArray, FloatArray] = (np.zeros((n, 0)), np.zeros((n, 0)))
     owner: NDArray[np.intp] = np.zeros(0, dtype=np.intp)
     depth: NDArray[np.intp] = np.zeros(0, dtype=np.intp)
     while begun < count or owner.size:
-        # The last pieces are taken first: claims are finished before others begin, as far as blocks allow.
+        # The last pieces come first: claims are finished before others begin, as far as blocks allow.
         more = np.arange(begun, min(begun + max(rule.block - owner.size, 0), count))
         begun += more.size
         a, b = (np.concatenate([old, new[:, more]], axis=1) for old, new in zip(waiting, (lower, upper), strict=True))
@@ -121,7 +121,7 @@ def show(rule: Rule, lower: FloatArray, upper: FloatArray) -> int:
 def _variables_to_bisect(
     found: Shown, lower: FloatArray, upper: FloatArray, width: FloatArray, depth: NDArray[np.intp]
 ) -> NDArray[np.intp]:
-    """Return the variable (N,) along which to bisect what is left of each piece with ends (n, N) and a depth (N,)."""
+    """Return the variable (N,) to bisect in the rest of each piece, with ends (n, N) and a depth (N,)."""
     wide = found.upper - found.lower
     score = found.change * (wide / np.where(upper > lower, upper - lower, 1.0))
     relative = wide / np.where(width > 0, width, np.inf)[:, None]

@@ -1,10 +1,9 @@
-"""Check of a proof about a program, without trust in who made it.
+"""Check of a proof about a program, without trust in its author.
 
-The boxes of the tree start from the program's own bounds, so that the leaves cover them by construction. Every leaf
-and every face is a *claim* about one box, and the check shows each claim again with the polynomials of
-:mod:`screwsynth.nlp.proof.checker.polynomials`; it bisects the box where their balls are too large. It uses neither
-the arithmetic of the search nor its multipliers. Search and check share the case's expressions, and CasADi's
-derivatives of them.
+The boxes of the tree start from the program's own bounds, so that the leaves cover them by construction. Every leaf and
+every face is a *claim* about one box. The check proves each claim again with the polynomials of
+:mod:`screwsynth.nlp.proof.checker.polynomials`, and bisects boxes where their error balls are too large. It uses
+neither the arithmetic of the search nor its multipliers; both share the case's expressions and CasADi's derivatives.
 """
 
 from __future__ import annotations
@@ -27,21 +26,21 @@ from .premises import fingerprint, is_same_program
 from .proof_file import ProofClaim, ProofError
 from .tree import FACES, Box, Node, SharedLeaves, TreeReader, ahead, read_claims, read_shared
 
-#: Rounding of sums of a few numbers, in parts of their sizes: many times the largest possible.
+#: Relative rounding of sums of a few numbers: many times the largest possible error.
 _SUMS = 1e-13
-#: Number of leaves and faces of a block of a tree, and the claims about them.
+#: Number of leaves and faces in a block of a tree, and the claims about them.
 _Block: TypeAlias = "tuple[int, list[Claims]]"
 
 
 @dataclass(frozen=True)
 class VerifiedProof:
-    """A proof that holds.
+    """Result of the check of a valid proof.
 
     Attributes:
         leaves: number of leaves and faces of the tree.
-        pieces: number of boxes that were evaluated to show them.
-        bound: upper bound of the maximised value over the feasible part of the root, 0 at most where that is minus a
-            sum of squares; -inf without a feasible point.
+        pieces: number of boxes evaluated for their proof.
+        bound: upper bound of the maximised value over the feasible part of the root, at most 0 where the value is minus
+            a sum of squares; -inf without a feasible point.
     """
 
     leaves: int
@@ -50,14 +49,14 @@ class VerifiedProof:
 
 
 def check_proof(claim: ProofClaim, nlp: Nlp) -> VerifiedProof:
-    """Check the proof of a claim about a program, by showing each claim of its tree again.
+    """Check the proof of a claim about a program, by proving each claim of its tree again.
 
     Args:
-        claim: the claim, with its tree.
-        nlp: the program that it is about, built from the case.
+        claim: claim with its tree.
+        nlp: nonlinear program of the claim, built from the case.
 
     Raises:
-        ProofError: the proof is for another program, its bytes are no tree, or a claim could not be shown.
+        ProofError: the proof is for another program, its bytes are no tree, or a claim could not be proved.
     """
     if not is_same_program(fingerprint(nlp), claim.graph):
         raise ProofError("the proof is for other expressions or bounds than this case's")
@@ -71,7 +70,7 @@ def check_proof(claim: ProofClaim, nlp: Nlp) -> VerifiedProof:
     for count, every in ahead(blocks, lambda block: sum(2 * each.lower.size for each in block[1])):
         leaves += count
         for each in every:
-            # The rule of one kind of claims serves all blocks of a tree.
+            # All blocks of a tree share one rule for each kind of claims.
             key = id(each.form), each.kind, each.index
             rules[key] = rules[key].about(each) if key in rules else rule_of(each)
             pieces += show(rules[key], each.lower, each.upper)
@@ -79,7 +78,7 @@ def check_proof(claim: ProofClaim, nlp: Nlp) -> VerifiedProof:
 
 
 def _of_tree(tree: bytes, form: StandardForm, bound: float) -> Iterator[_Block]:
-    """Yield the claims of a tree of a whole box."""
+    """Yield the claims of the tree of a whole box."""
     reader = TreeReader(tree)
     for claims in read_claims(reader, form):
         yield _claims_of(claims, form, bound)
@@ -87,20 +86,20 @@ def _of_tree(tree: bytes, form: StandardForm, bound: float) -> Iterator[_Block]:
 
 
 def _of_limbs(tree: bytes, form: StandardForm, bound: float) -> Iterator[_Block]:
-    """Yield the claims of the trees of limbs that share no variable.
+    """Yield the claims of the trees of limbs without shared variables.
 
-    Of a limb with the bound plus infinity nothing is claimed.
+    A limb with an infinite bound makes no claim.
 
     Raises:
-        ProofError: the bytes are no tree, or the bounds of limbs do not add up.
+        ProofError: the bytes are no tree, or the bounds of limbs sum to more than the proven bound.
     """
     separation = separate(form)
     if separation is None or separation.shared:
-        raise ProofError("the tree is one of limbs without shared variables, which the case does not have")
+        raise ProofError("the tree is for limbs without shared variables, which this case does not have")
     reader, bounds, fault = (
         TreeReader(tree, 1),
         list[float](),
-        "the bounds of the limbs are more than the proven one together",
+        "the bounds of the limbs together exceed the proven bound",
     )
     for limb in separation.limbs:
         bounds.append(reader.number())
@@ -118,10 +117,10 @@ def _of_limbs(tree: bytes, form: StandardForm, bound: float) -> Iterator[_Block]
 
 
 def _claims_of(claims: dict[tuple[Node, int], Box], form: StandardForm, bound: float) -> _Block:
-    """Return the number of the boxes of a tree, and the claims about them.
+    """Return the number of boxes of a tree, and the claims about them.
 
     Raises:
-        ProofError: a box collapses on a face that is not the form's.
+        ProofError: a box collapses on a face that is not a face of the form.
     """
     every = []
     for (kind, i), (lower, upper) in claims.items():
@@ -140,10 +139,10 @@ def _of_shared_limbs(tree: bytes, form: StandardForm, bound: float) -> Iterator[
     """
     separation = separate(form)
     if separation is None or separation.common is None:
-        raise ProofError("the tree is one of limbs that share variables, which the case does not have")
+        raise ProofError("the tree is for limbs with shared variables, which this case does not have")
     common, limbs = separation.common, [limb.form for limb in separation.limbs]
     for leaves in read_shared(tree, common.lower, common.upper, len(limbs)):
-        # The sums first: they are quick, and without them the limbs' bounds show nothing.
+        # The sums first: they are quick, and without them the limbs' bounds prove nothing.
         every = [_of_sum(leaves.select(leaves.bounds.min(axis=0) > -np.inf), common, bound)]
         for k, limb in enumerate(limbs):
             claimed = leaves.select(leaves.bounds[k] < np.inf)
@@ -156,10 +155,10 @@ def _of_shared_limbs(tree: bytes, form: StandardForm, bound: float) -> Iterator[
 
 
 def _of_sum(leaves: SharedLeaves, common: StandardForm, bound: float) -> Claims:
-    """Return the claims about the part with shared variables alone: minus the limbs' tilts are its own tilts."""
+    """Return the claims about the part with shared variables only: its tilts are minus the sum of the limbs' tilts."""
     lower, upper, bounds, g, Q = leaves
     tilts = Tilts.over(lower, upper, -g.sum(axis=0), -Q.sum(axis=0))
-    # The tilts' sums are rounded, and so is this one.
+    # The sum of the tilts is rounded, and so is the sum of their bounds.
     parts = [Tilts.over(lower, upper, *each).sizes() for each in zip(g, Q, strict=True)]
     sizes = abs(bound) + np.abs(bounds).sum(axis=0) + np.sum(parts, axis=0)
     left = bound - bounds.sum(axis=0) - _SUMS * sizes

@@ -1,7 +1,7 @@
-"""Fractions: tangents of half angles between two of them, and signs of determinants.
+"""Exact fractions: bounds of tangents of half angles, and signs of determinants.
 
 Doubles are fractions. Sine and cosine of a half angle lie between two partial sums of their series, whose terms
-alternate and fall for angles up to 150 degrees.
+alternate and decrease for angles up to 150 degrees.
 """
 
 from __future__ import annotations
@@ -9,15 +9,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 
-#: Terms of the series of sine and cosine: the last one is below 1e-24 for half of 150 degrees.
+#: Number of terms of the series of sine and cosine: the last one is below 1e-24 for half of 150 degrees.
 _TERMS = 14
 
 
 def tangent_ends(angle: float) -> tuple[Fraction, Fraction]:
-    """Return two fractions between which the tangent of half an angle lies.
+    """Return two fractions that bound the tangent of half an angle.
 
     Args:
-        angle: a double, radians, of at most 150 degrees either way.
+        angle: angle as a double, radians, between -150 and 150 degrees.
     """
     x = abs(Fraction(angle)) / 2
     (sine_low, sine_high), (cosine_low, cosine_high) = _partial_sums(x, x, 1), _partial_sums(Fraction(1), x, 0)
@@ -26,7 +26,7 @@ def tangent_ends(angle: float) -> tuple[Fraction, Fraction]:
 
 
 def _partial_sums(first: Fraction, x: Fraction, order: int) -> tuple[Fraction, Fraction]:
-    """Return two sums of an alternating series: one term apart, the lower one first."""
+    """Return two consecutive partial sums of an alternating series, the lower one first."""
     term, total, before = first, first, first
     for k in range(_TERMS):
         term = -term * x * x / ((order + 2 * k + 1) * (order + 2 * k + 2))

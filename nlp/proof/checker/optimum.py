@@ -1,8 +1,8 @@
-"""Rules of claims about boxes of a form, by polynomials of second order: claims that hold, and contraction of boxes.
+"""Rules for claims about boxes of a form, by polynomials of second order: proofs of claims, and contraction of boxes.
 
-A bound that is clearly wrong at the centre of a contracted box is refused at once, without many bisections. The centres
-are evaluated in doubles, and count only where they miss the bound by far more than rounding; no accepted claim rests on
-this.
+A bound that is clearly wrong at the centre of a contracted box is refused at once, without many bisections. Centres are
+evaluated in doubles, and count only where they exceed the bound by far more than rounding; no accepted claim depends on
+them.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ if TYPE_CHECKING:
 
     from ....models import FloatArray
 
-#: Least and largest number of boxes that are evaluated at once, and largest number of coefficients of a value over them
-#: in between: a call of NumPy costs as much as a hundred boxes, and more coefficients do not fit in a cache.
+#: Least and largest number of boxes that are evaluated at once, and largest number of coefficients of their values in
+#: between: one NumPy call costs as much as a hundred boxes, and more coefficients do not fit into a cache.
 _FEWEST, _MOST, _COEFFICIENTS = 128, 1024, 2**16
-#: Distance from a claim, in parts of the numbers compared or of 1, that rounding does not explain.
+#: Relative distance from a claim, or absolute below 1, that is more than rounding.
 _CLEARLY = 1e-9
 
 
@@ -40,11 +40,11 @@ class Claims:
 
     Attributes:
         form: the form.
-        kind: ``BOUNDED``, ``INFEASIBLE``, ``MONOTONE`` or a face's.
-        index: of the condition or variable; 0 where the kind has none.
+        kind: ``BOUNDED``, ``INFEASIBLE``, ``MONOTONE`` or the kind of a face.
+        index: index of the condition or variable; 0 where the kind has none.
         lower, upper: (n, L) ends of the boxes.
-        bounds: (L,) of the value of the form, minus its tilt; -inf where there is no feasible point.
-        tilts: of the claims about a limb, over the shared variables, which come first; None without any.
+        bounds: (L,) bounds of the value of the form, minus its tilt; -inf where there is no feasible point.
+        tilts: tilts of the claims about a limb, over the shared variables, which come first; None without any.
     """
 
     form: StandardForm
@@ -57,11 +57,11 @@ class Claims:
 
 
 class FormRule:
-    """The rule of some claims, for the loop of the checker.
+    """Rule for some claims, in the loop of the checker.
 
     Args:
         claims: the claims.
-        form: of the functions and conditions that count.
+        form: form with the relevant functions and conditions.
     """
 
     most_pieces = 20_000
@@ -72,7 +72,7 @@ class FormRule:
         self.block = min(max(_COEFFICIENTS // places(form.n).total, _FEWEST), _MOST)
 
     def about(self, claims: Claims) -> Self:
-        """Return the rule of further claims of the same kind about boxes of the same form."""
+        """Return the rule for further claims of the same kind about boxes of the same form."""
         other = copy.copy(self)
         other._claims = claims
         return other
@@ -91,9 +91,9 @@ class FormRule:
     def _use_conditions(
         self, shown: Shown, which: NDArray[np.intp], forms: Forms, lower: FloatArray, upper: FloatArray
     ) -> None:
-        """Leave only parts of some pieces, with ends and forms, where no single condition excludes a point.
+        """Reduce some pieces to the parts that single conditions do not exclude; return their ends and forms.
 
-        Without functions, a piece is shown where a condition excludes all of it.
+        Without functions, a piece is proved where a condition excludes all of it.
         """
         for r in range(self._J, len(self._equation)):
             for sign in (-1.0, 1.0) if self._equation[r] else (-1.0,):
@@ -106,15 +106,14 @@ class FormRule:
 
 
 class BoundRule(FormRule):
-    """The rule of claims that no feasible point of a box has a value above a bound.
+    """Rule for claims that no feasible point of a box has a value above a bound.
 
-    A function is at most the bound, or a condition cannot hold, or a weighted sum of all is at most the bound. The
-    claim that a condition holds nowhere in a box is the same without functions, and with that condition alone.
+    The proof is that a function is at most the bound, or a condition cannot hold, or a weighted sum of both is at most
+    the bound. The claim that a condition holds nowhere in a box uses the same rule with that condition only.
 
-    What is left of a limb's box collapses on its face where the limb rises along a variable of its own, which no
-    condition stops: a feasible point above the bound could be moved to that face, where it would be feasible and above
-    the bound too. Its gradient has no tilt, which depends on the shared variables alone. A tree over all variables has
-    faces itself.
+    The rest of a limb's box collapses on a face if the limb rises along a variable of its own that no condition stops:
+    any feasible point above the bound could move to that face and remain feasible and above the bound. Tilts do not
+    change this gradient, as they depend only on the shared variables. A tree over all variables states its faces.
     """
 
     def __init__(self, claims: Claims) -> None:
@@ -129,7 +128,7 @@ class BoundRule(FormRule):
         self._gradient = PolynomialArithmetic(ca.Function("slopes", [form.x], [ca.cse(self._slopes.expressions)]))
 
     def examine(self, lower: FloatArray, upper: FloatArray, of: NDArray[np.intp]) -> Shown:
-        """Examine pieces with ends (n, N) of the claims with these numbers (N,)."""
+        """Examine pieces with ends (n, N); ``of`` has the number of the claim of each piece."""
         J, bound, values = self._J, self._claims.bounds[of], self._arithmetic(lower, upper)
         if self._claims.tilts is not None:
             values[0] = values[0] - self._claims.tilts.select(of).polynomial(lower, upper)
@@ -156,7 +155,7 @@ class BoundRule(FormRule):
         return shown
 
     def _collapse(self, shown: Shown, which: NDArray[np.intp], forms: Forms) -> None:
-        """Leave only the faces of some pieces, with their forms, along own variables in which the limb rises."""
+        """Reduce some pieces to faces, with their forms, along own variables in which the limb rises."""
         left = np.flatnonzero((shown.lower[:, which] <= shown.upper[:, which]).all(axis=0))
         which, forms = which[left], forms.select(left)
         low, high = shown.lower[:, which], shown.upper[:, which]
@@ -183,11 +182,11 @@ class _Slopes:
 
     Args:
         form: the form.
-        variables: the variables.
+        variables: indices of the variables.
 
     Attributes:
-        stops: numbers of these conditions, for each variable.
-        expressions: the derivatives, (E, 1): for each variable, of the J functions and then of its conditions.
+        stops: indices of these conditions, for each variable.
+        expressions: (E, 1) derivatives: for each variable, of the J functions and then of its conditions.
     """
 
     def __init__(self, form: StandardForm, variables: Sequence[int]) -> None:
@@ -199,12 +198,12 @@ class _Slopes:
         self.expressions = ca.densify(ca.vertcat(*(form.jacobian[r, i] for r, i in entries)))
 
     def rise(self, i: int, side: int, slopes: Sequence[Polynomial], high: FloatArray) -> NDArray[np.bool_]:
-        """Return where (N,) all functions rise towards a side, and no condition may stop a point on its way.
+        """Return where (N,) all functions rise towards a side, and no condition may stop a point before it.
 
         Args:
-            i: the variable.
+            i: index of the variable.
             side: 1 for the upper end of the variable, -1 for the lower one.
-            slopes: the derivatives.
+            slopes: derivatives over the boxes.
             high: (R, N) upper ends of functions and conditions.
         """
 
@@ -221,10 +220,10 @@ class _Slopes:
 
 
 class MonotoneRule(FormRule):
-    """The rule of claims that no maximum lies in a box.
+    """Rule for claims that no maximum lies in a box.
 
     Every function rises along a variable, and no condition stops a point: in either direction for ``MONOTONE``, which
-    needs room beyond the box, and in one for a face.
+    needs room beyond the box, and in one direction for a face.
     """
 
     def __init__(self, claims: Claims) -> None:
@@ -251,5 +250,5 @@ class MonotoneRule(FormRule):
 
 
 def rule_of(claims: Claims) -> BoundRule | MonotoneRule:
-    """Return the rule of some claims."""
+    """Return the rule for some claims."""
     return BoundRule(claims) if claims.kind in (Node.BOUNDED, Node.INFEASIBLE) else MonotoneRule(claims)

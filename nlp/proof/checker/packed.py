@@ -1,7 +1,7 @@
-"""Trees as proof files have them: compressed, in base64, with a digest; unpacked only where their claim is checked.
+"""Trees in proof files: compressed, in base64, with a digest; unpacked only when their claim is checked.
 
-A few bytes can unpack to thousands of times as many, and a file may hold many trees. So all trees of a file share one
-budget, and one tree at a time is in memory.
+A few bytes can unpack to thousands of times as many, and a file may have many trees. All trees of a file therefore
+share one budget, and only one tree at a time is in memory.
 """
 
 from __future__ import annotations
@@ -13,23 +13,23 @@ from dataclasses import dataclass, field
 
 from ...errors import InputError
 
-#: Largest number of bytes of all unpacked trees of a file together: a hundred times the proofs of docs/certificate.md.
+#: Largest number of bytes of all unpacked trees of a file: a hundred times that of the proofs in docs/certificate.md.
 LARGEST_TREES = 2**27
 
 
 class DamagedProofError(InputError):
-    """A proof file with a tree that is damaged, or with trees that are too large."""
+    """A proof file with a damaged tree, or with trees that are too large."""
 
 
 class TreeBudget:
-    """Bytes of unpacked trees that a file may still have; each tree counts once, however often it is unpacked."""
+    """Remaining bytes for the unpacked trees of a file; each tree counts once, however often it is unpacked."""
 
     def __init__(self) -> None:
         self.left = LARGEST_TREES
         self._counted: dict[int, int] = {}
 
     def most_of(self, number: int) -> int:
-        """Return the largest size of a tree, by its number in the file."""
+        """Return the largest allowed size of a tree, by its number in the file."""
         return self._counted.get(number, self.left)
 
     def count(self, number: int, size: int) -> None:
@@ -41,14 +41,14 @@ class TreeBudget:
 
 @dataclass(frozen=True)
 class PackedTree:
-    """A tree as a file has it.
+    """A tree as stored in a file.
 
     Attributes:
         text: compressed bytes in base64.
         digest: SHA-256 of the unpacked bytes, in hexadecimal digits.
         source, claim: file, and claim of the tree, for messages.
         number: number of the tree in its file.
-        budget: of the file.
+        budget: budget of the file.
     """
 
     text: str
@@ -62,13 +62,13 @@ class PackedTree:
         """Return the nodes in bytes.
 
         Raises:
-            DamagedProofError: the text is no compressed tree, the digest is another one, or the trees of the file are
-                larger together than they may be.
+            DamagedProofError: the text is no compressed tree, its digest differs, or the trees of the file exceed
+                their budget.
         """
         most, reader = self.budget.most_of(self.number), zlib.decompressobj()
         damaged = f"{self.source}: is damaged at '{self.claim}'"
         try:
-            # One byte more than allowed tells a tree that is too large.
+            # One byte more than allowed reveals a tree that is too large.
             tree = reader.decompress(base64.b64decode(self.text, validate=True), most + 1)
         except (ValueError, zlib.error):
             raise DamagedProofError(f"{damaged}: its tree cannot be unpacked") from None
@@ -78,7 +78,7 @@ class PackedTree:
         if not reader.eof or reader.unused_data:
             raise DamagedProofError(f"{damaged}: its tree is incomplete")
         if self.digest != hashlib.sha256(tree).hexdigest():
-            raise DamagedProofError(f"{damaged}: its digest is not that of its tree")
+            raise DamagedProofError(f"{damaged}: its tree does not match its digest")
         self.budget.count(self.number, len(tree))
         return tree
 

@@ -1,6 +1,6 @@
 """Quadratic models over boxes for the check of a proof: weighted sums of polynomials, their weights, and tilts.
 
-Coordinates of a box are e in [-1, 1]^n, as those of its polynomials.
+Coordinates of a box are e in [-1, 1]^n, as for its polynomials.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
     from ....models import FloatArray
 
-#: Error of a sum of a few hundred rounded terms, in parts of their sizes.
+#: Relative error of a sum of a few hundred rounded terms.
 _SUMS = 1e-13
-#: More than underflow can cost a sum.
+#: Upper bound of the effect of underflow on a sum.
 _TINY = 1e-290
-#: Weight of slopes beside curvatures in the choice of the variable to bisect.
+#: Weight of slopes relative to curvatures in the choice of the variable to bisect.
 _SLOPE = 0.3
-#: Sweeps over all expressions in the search of weights.
+#: Number of sweeps over all expressions in the search for weights.
 _SWEEPS = 3
 
 
@@ -35,7 +35,7 @@ class Forms(NamedTuple):
     Attributes:
         values: the R polynomials.
         low, high: (R, N) ends of their ranges.
-        share: (n, N) widths of the boxes in parts of the whole box's, the largest of each box being 1.
+        share: (n, N) widths of the boxes relative to the whole box, scaled so that the largest of each box is 1.
     """
 
     values: tuple[Polynomial, ...]
@@ -44,12 +44,12 @@ class Forms(NamedTuple):
     share: FloatArray
 
     def select(self, which: NDArray[np.intp]) -> Forms:
-        """Return those of some boxes."""
+        """Return the forms over some boxes."""
         values = tuple(each.select(which) for each in self.values)
         return Forms(values, self.low[:, which], self.high[:, which], self.share[:, which])
 
     def only(self, r: int) -> Forms:
-        """Return that of one expression."""
+        """Return the form of one expression."""
         return Forms(self.values[r : r + 1], self.low[r : r + 1], self.high[r : r + 1], self.share)
 
     def centres(self) -> FloatArray:
@@ -78,10 +78,10 @@ class SumModel:
     """An upper model ``fixed + b e + 1/2 e'He`` of a weighted sum over N boxes.
 
     Attributes:
-        fixed: (N,) with the balls of the polynomials, and with rounding.
-        b: (n, N).
-        H: (n, n, N) symmetric.
-        balls: (n, N) radii of the balls of the polynomials that depend on each variable, times their weights and the
+        fixed: (N,) constants, including the error balls of the polynomials, and rounding.
+        b: (n, N) linear coefficients.
+        H: (n, n, N) symmetric matrices of the quadratic part.
+        balls: (n, N) weighted radii of the error balls of the polynomials that depend on each variable, times the
             variable's share of the width of the box.
     """
 
@@ -96,18 +96,18 @@ class SumModel:
 
     @property
     def reach(self) -> FloatArray:
-        """Largest change (n, N) of each slope from that at the centre."""
+        """Largest change (n, N) of each slope from its value at the centre."""
         return np.asarray(np.abs(self.H).sum(axis=1))
 
     def bound(self) -> FloatArray:
         """Return an upper bound (N,) over the boxes."""
-        # Where the sum rises along a variable on the whole box, it is largest on that face.
+        # Where the sum rises along a variable on the whole box, its maximum lies on that face.
         reach = self.reach
         side = np.where(np.abs(self.b) > reach + _SUMS * (np.abs(self.b) + reach), np.sign(self.b), 0.0)
         return np.asarray(self.fixed + _largest(self.b, self.H, side) + _TINY)
 
     def change(self) -> FloatArray:
-        """Return how much (n, N) the bound can gain from halving each variable; the balls are of third order."""
+        """Return the gain (n, N) of the bound from halving each variable; error balls are of third order."""
         return np.asarray(self.reach + _SLOPE * np.abs(self.b) + 2 * self.balls)
 
 
@@ -121,7 +121,7 @@ def polynomial_sum(forms: Forms, weights: FloatArray) -> SumModel:
         if not used.any():
             continue
         at, on = places(len(value.on)), np.array(value.on, dtype=np.intp)
-        # An unused value may be undefined, and then 0 times it is no number.
+        # The coefficients of an unused value may be NaN, and 0 times NaN is NaN.
         P = weight * (value.P if used.all() else np.where(used, value.P, 0.0))
         fixed += P[0]
         b[on] += P[at.linear]
@@ -140,7 +140,7 @@ def polynomial_sum(forms: Forms, weights: FloatArray) -> SumModel:
 def _largest(b: FloatArray, H: FloatArray, s: FloatArray) -> FloatArray:
     """Return an upper bound (N,) of ``b e + 1/2 e'He`` for e in [-1, 1]^n, with ``e_i = s_i`` where ``s_i`` is not 0.
 
-    It is that from a tangent plane to a concave part, which Gershgorin's circles give.
+    The bound comes from a tangent plane to a concave part, which Gershgorin's circles give.
     """
     Hs = np.einsum("ijb,jb->ib", H, s)
     base = (b * s).sum(axis=0) + 0.5 * (s * Hs).sum(axis=0)
@@ -164,7 +164,7 @@ def _largest(b: FloatArray, H: FloatArray, s: FloatArray) -> FloatArray:
 def reaching_part(
     model: SumModel, level: FloatArray | float, lower: FloatArray, upper: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return ends (n, N) of the parts of boxes that hold every point where a model reaches a level; crossed if none."""
+    """Return ends (n, N) of the parts of boxes in which a model may reach a level; crossed if there is none."""
     with np.errstate(all="ignore"):
         missing = level - model.fixed - _SUMS * (np.abs(level) + np.abs(model.fixed))
         half = 0.5 * model.reach
@@ -179,7 +179,7 @@ def reaching_part(
         no_right, no_left = known & (right > 1), known & (left > 1)
         centre, radius = middles(lower, upper)
         margin = _SUMS * (np.abs(centre) + radius)
-        # Only an end that is moved is written in the box's own numbers.
+        # Only an end that moves is converted to the coordinates of the box.
         low = np.where(no_left, centre + radius * (right - _SUMS) - margin, lower)
         high = np.where(no_right, centre - radius * (left - _SUMS) + margin, upper)
         none = no_left & no_right
@@ -187,22 +187,22 @@ def reaching_part(
 
 
 def weights_of(functions: int, is_equation: Sequence[bool], forms: Forms) -> FloatArray:
-    """Return weights (R, N): of functions, not negative with sum 1; of inequalities, not positive.
+    """Return weights (R, N): for functions, not negative with sum 1; for inequalities, not positive.
 
-    Any weights give a bound, and these make it small. The bound of ``L = sum_r w_r v_r`` over a box is about
-    ``L(c) + sum_i r_i |dL/dx_i (c)|``, which counts how far a condition is violated at the centre too. The weights are
-    found by coordinate descent: those of functions on the squares of the gradient, those of conditions on this bound.
+    Any weights give a bound; these make it small. The bound of ``L = sum_r w_r v_r`` over a box is about
+    ``L(c) + sum_i r_i |dL/dx_i (c)|``, which also counts the violation of a condition at the centre. Coordinate descent
+    finds the weights: those of functions on the squares of the gradient, those of conditions on this bound.
 
     Args:
         functions: number of functions, which come before the conditions.
         is_equation: whether each of the R expressions must be 0.
-        forms: of the expressions over the boxes.
+        forms: forms of the expressions over the boxes.
     """
     values, G = forms.centres(), forms.gradients()
     usable = np.isfinite(G).all(axis=1) & np.isfinite(values) & np.isfinite(forms.high)
     for r in range(functions, len(G)):
         if not is_equation[r]:
-            # A condition that cannot bind gets no weight.
+            # A condition that cannot be active gets no weight.
             usable[r] &= ~(forms.high[r] < 0)
     G, values = np.where(usable[:, None], G, 0.0), np.where(usable, values, 0.0)
     weights, left = np.zeros_like(values), G[0].copy()
@@ -217,7 +217,7 @@ def weights_of(functions: int, is_equation: Sequence[bool], forms: Forms) -> Flo
 
 
 def _move_towards(r: int, functions: int, weights: FloatArray, G: FloatArray, left: FloatArray) -> None:
-    """Move the weights of the functions towards function r alone, as far as the gradient ``left`` gets smaller."""
+    """Move the weights of the functions towards function r only, as far as the gradient ``left`` gets smaller."""
     direction = G[r] - np.einsum("jn,jin->in", weights[:functions], G[:functions])
     size = np.einsum("in,in->n", direction, direction)
     part = -np.einsum("in,in->n", direction, left) / np.where(size > 0, size, np.inf)
@@ -225,16 +225,17 @@ def _move_towards(r: int, functions: int, weights: FloatArray, G: FloatArray, le
     left += part * direction
     weights[:functions] *= 1 - part
     weights[r] += part
-    # The sum is 1 in spite of rounding.
+    # The sum remains 1 in spite of rounding.
     weights[:functions] /= weights[:functions].sum(axis=0)
 
 
 def _minimise_bound(
     weight: FloatArray, gradient: FloatArray, value: FloatArray, left: FloatArray, is_equation: bool
 ) -> None:
-    """Change one weight (N,) so that ``weight value + sum |left|`` is least; written in place, as is ``left`` (n, N).
+    """Change one weight (N,) so that ``weight value + sum |left|`` is least; written in place, like ``left`` (n, N).
 
-    The function is convex and piecewise linear in the weight: it is least where a component of ``left`` is 0, or at 0.
+    The function is convex and piecewise linear in the weight: its minimum lies where a component of ``left`` is 0, or
+    at 0.
     """
     without = left - weight * gradient
     with np.errstate(all="ignore"):
@@ -255,13 +256,13 @@ class Tilts:
 
         t(s) = g.e + 1/2 e'Q e,    e_i = (s_i - c_i) / r_i
 
-    has the centre c and half widths r of the box, as computed in doubles; a half width of 0 is 1 here, as e is 0 then.
-    Any tilts give a bound, so that nothing of them has to be trusted.
+    with the centre c and half widths r of the box, as computed in doubles; a half width of 0 is replaced by 1, as e is
+    then 0. Any tilts give a bound, so they need not be trusted.
 
     Attributes:
-        centre, radius: (m, L) of the boxes.
-        g: (m, L).
-        Q: (m, m, L) symmetric.
+        centre, radius: (m, L) centres and half widths of the boxes.
+        g: (m, L) linear coefficients.
+        Q: (m, m, L) symmetric matrices.
     """
 
     centre: FloatArray
@@ -280,19 +281,19 @@ class Tilts:
         return Tilts(self.centre[:, which], self.radius[:, which], self.g[:, which], self.Q[:, :, which])
 
     def sizes(self, e: FloatArray | float = 1.0) -> FloatArray:
-        """Return the sums (L,) of the sizes of all terms, for coordinates of at most ``e`` in size, (m, L)."""
+        """Return the sums (L,) of the absolute values of all terms, for coordinates of at most ``e``, (m, L)."""
         far = np.broadcast_to(e, self.g.shape)
         return np.asarray(
             (np.abs(self.g) * far).sum(axis=0) + 0.5 * np.einsum("ib,ijb,jb->b", far, np.abs(self.Q), far)
         )
 
     def at(self, s: FloatArray) -> FloatArray:
-        """Return values (L,) at one point (m, L) for each, as computed in doubles."""
+        """Return values (L,) at one point (m, L) for each box, as computed in doubles."""
         e = (s - self.centre) / self.radius
         return np.asarray((self.g * e).sum(axis=0) + 0.5 * np.einsum("ib,ijb,jb->b", e, self.Q, e))
 
     def polynomial(self, lower: FloatArray, upper: FloatArray) -> Polynomial:
-        """Return the tilts over pieces of the boxes, ends (n, N), whose first m variables are the shared ones."""
+        """Return the tilts over pieces of the boxes with ends (n, N); the first m variables are the shared ones."""
         m, at = len(self.g), places(len(self.g))
         centre, radius = middles(lower[:m], upper[:m])
         e, r = (centre - self.centre) / self.radius, radius / self.radius

@@ -1,22 +1,21 @@
-"""Polynomials of second order with a ball: the arithmetic of the check of a proof.
+"""Polynomials of second order with an error ball: the arithmetic of the check of a proof.
 
 On boxes ``x_i = c_i + r_i e_i``, ``|e_i| <= 1``, every value v is enclosed by
 
     v(e) in c + sum_i a_i e_i + sum_{i <= j} Q_ij e_i e_j + [-s, s]     and     v(e) in V.
 
-``s`` holds all terms of third and higher order, bounded by sums of sizes, and all rounding. A function of one variable
-is its Taylor polynomial with Lagrange's remainder of third order, or an identity that replaces it. A value keeps only
-the coefficients of the variables that it depends on. Coefficients are computed in round to nearest, and ``s`` grows by
-the number of roundings that an operation makes of each of its terms, counted with a margin: the last one in parts of
-the coefficient, and those before in parts of the sizes of the operands. Ends of ranges move outwards by one number at
-every operation, or by a library's error.
+``s`` bounds all terms of third and higher order, and all rounding. A function of one variable is its Taylor polynomial
+with Lagrange's remainder of third order, or an identity that replaces it. A value keeps only the coefficients of the
+variables on which it depends. Coefficients are rounded to nearest, and ``s`` grows by the number of roundings of each
+term, counted with a margin: the last one relative to the coefficient, the earlier ones relative to the operands. Ends
+of ranges move outwards by one double at every operation, or by the error of a library.
 
-A work rate squared is a quotient ``N^2 / D`` of polynomials. Its square and its division one after the other would have
-terms of third order many times as large as the quotient's, so the two are one operation. For any number rho,
+A squared work rate is a quotient ``N^2 / D`` of polynomials. Squaring and dividing separately would give much larger
+terms of third order than the quotient has, so both are one operation. For any number rho,
 
     N^2 / D = rho (2 N - rho D) + E^2 / D,    E = N - rho D.
 
-The first part is linear in N and D. With rho near ``N / D`` at the centre, E is small in the whole box.
+The first part is linear in N and D. With rho near ``N / D`` at the centre, E is small over the whole box.
 
 A value that may be undefined has NaN for ``s`` and ``V``, and so has every value computed from it; NaN proves nothing.
 """
@@ -38,27 +37,27 @@ if TYPE_CHECKING:
 
 #: Rounding unit of doubles.
 UNIT = 2.0**-53
-#: More than underflow can cost an operation.
+#: Upper bound of the effect of underflow on an operation.
 _TINY = 1e-290
-#: Rounding of a number, with a margin, in parts of its size: the last one of each coefficient, and that of a sum.
+#: Relative rounding of a number, with a margin: the last rounding of each coefficient, and that of a sum.
 _ONCE = 2 * UNIT
-#: Roundings of each term of an operation before the last one, with a margin. A product and a square make at most two, a
-#: quotient five, and a Taylor polynomial eleven with those of its slope and its curve.
+#: Number of roundings of each term of an operation before the last one, with a margin. A product and a square make at
+#: most two, a quotient five, and a Taylor polynomial eleven, including those of its slope and its curvature.
 _PRODUCT, _QUOTIENT, _TAYLOR = 4 * UNIT, 10 * UNIT, 14 * UNIT
-#: Error of a library's sine, cosine, exponential, logarithm and arc tangent, in parts of their size or of 1.
+#: Error of a library's sine, cosine, exponential, logarithm and arc tangent, relative to their size or to 1.
 _LIBRARY = 4e-15
-#: Directions outwards of the two ends of a range, and numbers beyond all.
+#: Outward directions of the two ends of a range, as infinite numbers.
 _SIDES = np.array([[-1.0], [1.0]])
 _ENDS = _SIDES * np.inf
 
 
 class Places(NamedTuple):
-    """Places of the m coefficients of polynomials in d variables: constant, linear, squares, and products of two.
+    """Positions of the m coefficients of polynomials in d variables: constant, linear, squares, and mixed products.
 
     Attributes:
         linear, squares, products: slices of rows.
         first, second: (d (d - 1) / 2,) the two variables of each product.
-        slack: bound of the relative rounding error of sums of sizes of m coefficients and of a formula of them.
+        slack: bound of the relative rounding error of sums of m absolute values and of a formula of such sums.
     """
 
     linear: slice
@@ -76,7 +75,7 @@ class Places(NamedTuple):
 
 @cache
 def places(d: int) -> Places:
-    """Return the places of coefficients of polynomials in d variables."""
+    """Return the positions of the coefficients of polynomials in d variables."""
     first, second = np.triu_indices(d, 1)
     count = 1 + 2 * d + len(first)
     return Places(
@@ -86,7 +85,7 @@ def places(d: int) -> Places:
 
 @cache
 def _rows_in(few: tuple[int, ...], many: tuple[int, ...]) -> NDArray[np.intp]:
-    """Return the rows of coefficients in some variables among those in more variables; both sorted."""
+    """Return the rows of coefficients in a few variables among those in more variables; both are sorted."""
     at = {variable: k for k, variable in enumerate(many)}
     d, small, large = len(many), places(len(few)), places(len(many))
     own = [at[variable] for variable in few]
@@ -98,17 +97,17 @@ def _rows_in(few: tuple[int, ...], many: tuple[int, ...]) -> NDArray[np.intp]:
 
 @dataclass(frozen=True, eq=False)
 class Polynomial:
-    """A value over N boxes; a constant has 1 in the place of N.
+    """A value over N boxes; for a constant, N is 1.
 
     Attributes:
-        on: the d variables that it depends on, in order.
+        on: the d variables on which the value depends, in order.
         P: (m, N) coefficients at :func:`places`.
-        s: (N,) radius of the ball; NaN where the value may be undefined.
+        s: (N,) radius of the error ball; NaN where the value may be undefined.
         V: (2, N) ends of the range.
-        rad: (N,) sum of the sizes of linear coefficients.
-        curved: (N,) largest size of the part of second order.
-        size: (N,) sum of the sizes of all coefficients.
-        root: the value whose square this is; None where it is not known to be one.
+        rad: (N,) sum of the absolute linear coefficients.
+        curved: (N,) largest absolute value of the part of second order.
+        size: (N,) sum of the absolute values of all coefficients.
+        root: value whose square this is; None where none is known.
     """
 
     on: tuple[int, ...]
@@ -121,7 +120,7 @@ class Polynomial:
     root: Polynomial | None = None
 
     def select(self, which: NDArray[np.intp]) -> Polynomial:
-        """Return the value over some boxes; a constant is one number for all."""
+        """Return the value over some boxes; a constant stays the same."""
         if self.P.shape[1] == 1:
             return self
         P, s, V, rad, curved, size = (
@@ -130,7 +129,7 @@ class Polynomial:
         return Polynomial(self.on, P, s, V, rad, curved, size)
 
     def spread(self, on: tuple[int, ...]) -> FloatArray:
-        """Return the coefficients (M, N) in more variables."""
+        """Return the coefficients (M, N) in a larger set of variables."""
         if on == self.on:
             return self.P
         P = np.zeros((places(len(on)).total, self.P.shape[1]))
@@ -139,14 +138,14 @@ class Polynomial:
 
     @property
     def number(self) -> float | None:
-        """The number that a constant is; None for another value."""
+        """Value of a constant; None for another value."""
         return float(self.P[0, 0]) if not self.on and self.s.size == 1 and self.s[0] == 0 else None
 
     def __add__(self, other: Polynomial) -> Polynomial:
         """Return the sum."""
         on, X, Y = _together(self, other)
         V = _out(self.V + other.V)
-        # Rounding makes no sum of squares negative: its root exists where all of them may be 0.
+        # Rounding makes no sum of squares negative: the sum keeps its root if both terms can be 0.
         V[0] = np.where((self.V[0] >= 0) & (other.V[0] >= 0), np.maximum(V[0], 0.0), V[0])
         return settled(on, X + Y, self.s + other.s, V)
 
@@ -182,11 +181,11 @@ def settled(
     """Return a value, its range intersected with that of its polynomial; undefined unless that is finite.
 
     Args:
-        on: its variables.
+        on: variables of the value.
         P: (m, N) coefficients.
-        s: (N,) radius of the ball without the last rounding of each coefficient.
-        V: (2, N) a range.
-        rounding: the last rounding of each coefficient, in parts of its size; 0 for exact ones.
+        s: (N,) radius of the error ball without the last rounding of each coefficient.
+        V: (2, N) range of the value.
+        rounding: relative size of the last rounding of each coefficient; 0 for exact ones.
     """
     at = places(len(on))
     sizes = np.abs(P)
@@ -205,7 +204,7 @@ def settled(
 
 
 def variable(i: int, lower: FloatArray, upper: FloatArray) -> Polynomial:
-    """Return variable number i, over boxes with these ends (N,) of it."""
+    """Return variable number i over boxes, whose ends along it are given (N,)."""
     centre, radius = middles(lower, upper)
     none = np.zeros(lower.size)
     P = np.array([centre, radius, none])
@@ -252,9 +251,9 @@ def square(u: Polynomial) -> Polynomial:
 
 
 def _quotient(u: Polynomial, v: Polynomial) -> Polynomial:
-    """Return ``u / v = P + (u - P v) / v``, P the quotient's polynomial: ``u - P v`` has no terms below the third.
+    """Return ``u / v = P + (u - P v) / v``, P the quotient's polynomial: ``u - P v`` has only terms of third order.
 
-    The ball of P v, and what rounding leaves of those below, are divided by the smallest size of v.
+    The error ball of P v, and rounding in its lower terms, are divided by the smallest absolute value of v.
     """
     on, X, Y = _together(u, v)
     at = places(len(on))
@@ -275,7 +274,7 @@ def _quotient(u: Polynomial, v: Polynomial) -> Polynomial:
 def _squared_quotient(N: Polynomial, D: Polynomial, square: FloatArray) -> Polynomial:
     """Return ``N^2 / D``, by the identity of this module's docstring, with the range (2, N) of ``N^2``.
 
-    With a the linear part of E and ``|E - a.e| <= rest``, ``E^2`` is ``(a.e)^2`` to ``rest (2 sum |a_i| + rest)``.
+    With a the linear part of E and ``|E - a.e| <= rest``, ``E^2`` is ``(a.e)^2`` up to ``rest (2 sum |a_i| + rest)``.
     """
     on, X, Y = _together(N, D)
     at = places(len(on))
@@ -290,7 +289,7 @@ def _squared_quotient(N: Polynomial, D: Polynomial, square: FloatArray) -> Polyn
     far = np.abs(inverse).max(axis=0)
     P = rho * (X + E)
     _add_square(P, a, at, middle)
-    # Multiplied in this order, no small factor is lost beside a large one.
+    # In this order of the products, no small factor underflows before a large one.
     s = reach * (reach * (half + _QUOTIENT * far)) + rest * ((2 * reach + rest) * far)
     s = s + size * (N.s + error + _QUOTIENT * (2 * N.size + size * D.size)) + _TINY * (1 + far + reach + rest)
     return settled(on, P, s, _ends_of_product(square, inverse))
@@ -305,12 +304,11 @@ def _taylor(
 ) -> Polynomial:
     """Return ``f(c + Y) = f(c) + f'(c) Y + curve Y^2 +- third |Y|^3``, Y being u without its constant c.
 
-    Args:
-        u: the value.
-        V: (2, N) range of ``f(u)``.
-        terms: ``f(c)``, ``f'(c)`` and ``curve``, half of ``f''(c)``, (N,) each.
-        third: bound of the rest in parts of ``|Y|^3``.
-        error: error of the three terms beyond that of arithmetic.
+    u: the value.
+    V: (2, N) range of ``f(u)``.
+    terms: ``f(c)``, ``f'(c)`` and ``curve``, half of ``f''(c)``, (N,) each.
+    third: bound of the remainder relative to ``|Y|^3``.
+    error: relative error of the three terms beyond that of arithmetic.
     """
     value, slope, curve = terms
     at, moved = places(len(u.on)), u.rad + u.curved
@@ -322,7 +320,7 @@ def _taylor(
     s = steep * u.s + bent * ((2 * u.rad + u.curved) * u.curved + (2 * moved + u.s) * u.s)
     s = s + third * (reach * reach * reach)
     far = moved + u.s
-    # Underflow takes less than _TINY from each power of what moved.
+    # Underflow takes less than _TINY from each power of the shifted value.
     s = s + (error + _TINY * (1 + bent + third)) * (1 + far + far * far)
     s = s + _TAYLOR * (np.abs(value) + steep * u.size + bent * (u.size * u.size))
     return settled(u.on, P, s, V)
@@ -376,7 +374,7 @@ def atan(u: Polynomial) -> Polynomial:
 
 
 def ramp(u: Polynomial) -> Polynomial:
-    """Return max(u, 0): with any number k from 0 to 1 it exceeds k u by 0 to max(-k lo, (1 - k) hi)."""
+    """Return max(u, 0): for any k from 0 to 1 it exceeds k u by 0 to max(-k lo, (1 - k) hi)."""
     low, high = u.V
     part = np.where(low >= 0, 1.0, np.where(high <= 0, 0.0, high / (high - low)))
     part = np.clip(part, 0.0, 1.0)
@@ -395,7 +393,7 @@ def step(u: Polynomial) -> Polynomial:
 
 
 def _together(u: Polynomial, v: Polynomial) -> tuple[tuple[int, ...], FloatArray, FloatArray]:
-    """Return the variables of two values, and the coefficients of both in these."""
+    """Return the variables of two values, and the coefficients of both in these variables."""
     if u.on == v.on:
         return u.on, u.P, v.P
     on = tuple(sorted({*u.on, *v.on}))
@@ -416,12 +414,12 @@ def _add_square(P: FloatArray, a: FloatArray, at: Places, by: FloatArray | float
 
 
 def _out(V: FloatArray) -> FloatArray:
-    """Return ends (2, N) moved outwards by one number."""
+    """Return ends (2, N) moved outwards by one double."""
     return np.nextafter(V, _ENDS)
 
 
 def _near(V: FloatArray, least: float = 1e-280) -> FloatArray:
-    """Return ends (2, N) from a library, moved outwards by its error, in parts of their sizes and of a least one."""
+    """Return ends (2, N) from a library, moved outwards by its relative error, with a least size."""
     return V + _SIDES * (_LIBRARY * (np.abs(V) + least))
 
 
@@ -433,12 +431,12 @@ def _ends_of_product(U: FloatArray, V: FloatArray) -> FloatArray:
 
 
 def _ends_of_inverse(V: FloatArray) -> FloatArray:
-    """Return the ends of the inverse of a range; NaN for one with 0 in it."""
+    """Return the ends of the inverse of a range; NaN for a range that contains 0."""
     return _out(np.where((V[0] > 0) | (V[1] < 0), 1 / V[::-1], np.nan))
 
 
 def _ends_of_wave(V: FloatArray, function: Callable[[FloatArray], FloatArray]) -> FloatArray:
-    """Return the range of sine or cosine, by the Lipschitz constant of 1 about the middle and the second derivative."""
+    """Return the range of sine or cosine, from the Lipschitz constant 1 about the middle and the second derivative."""
     middle = 0.5 * (V[0] + V[1])
     radius = np.nextafter(np.maximum(V[1] - middle, middle - V[0]), np.inf)
     value = function(middle)

@@ -1,7 +1,7 @@
 """Program of a case that a proof bounds, its fingerprint, and the proven claim in words.
 
-The tasks, their weights and senses, poses, limits and dimensions are those of the case. A
-:class:`.proof_file.Statement` names one of the few programs that a case has.
+Tasks, weights, senses, poses, limits and dimensions come from the case. A :class:`.proof_file.Statement` names one of
+the few programs that a case has.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from .proof_file import ProofError, Statement
 
 #: Significant digits of bounds in claims.
 _DIGITS = 10
-#: Points at which a fingerprint takes a program's values, and the number of its sums.
+#: Number of points at which a fingerprint evaluates a program, and number of its sums.
 _POINTS, _SUMS = 3, 4
-#: Difference of the sums of one program in two processes: far more than rounding, far less than any change of a case.
+#: Relative difference of the sums of one program in two processes: far above rounding, far below any change of a case.
 _SAME = 1e-9
 
 
 def has_modes(model: Model) -> bool:
-    """Return whether a robot has several working modes that signs tell apart."""
+    """Return whether a robot has several working modes that signs distinguish."""
     return any(each.is_mode for each in model.signs)
 
 
@@ -44,10 +44,10 @@ def has_both_senses(case: Case) -> bool:
 
 
 def check_minimum(case: Case) -> None:
-    """Refuse a case whose smallest F is no bound of one program.
+    """Refuse a case whose smallest F is not the bound of one program.
 
     Raises:
-        InputError: it has several tasks, or its F is the least of several poses.
+        InputError: the case has several tasks, or its F is the least of several poses.
     """
     if len(case.tasks) > 1:
         raise InputError("above: is for a case with one task")
@@ -56,7 +56,7 @@ def check_minimum(case: Case) -> None:
 
 
 def program_of(case: Case, statement: Statement) -> Nlp:
-    """Formulate the program of a case that a statement names.
+    """Formulate the program of a case that a proof statement names.
 
     Raises:
         InputError: the case has no such program.
@@ -70,29 +70,29 @@ def _program(case: Case, statement: Statement) -> Nlp:
     if statement.is_minimum:
         check_minimum(case)
     if len(statement.best) != (len(case.tasks) if _has_losses(case) else 0):
-        raise ProofError("the proof is for other tasks, or for another way to combine them, than the case's")
+        raise ProofError("the proof is for other tasks, or another combination of them, than this case's")
     if len(case.tasks) == 1:
         nlp = formulate(case)
         return replace(nlp, sense=Sense.MIN) if statement.is_minimum else nlp
     weights = scaled_weights(case)
     if case.method is Method.AVERAGE:
-        raise InputError("averaged tasks have no single program whose optimum could be proved")
+        raise InputError("averaged tasks have no common program whose optimum could be proved")
     if case.method is Method.WEIGHTED_SUM:
         return formulate_weighted(case, weights)
-    # The level's size is for local solvers alone: the bounded functions do not depend on it.
+    # The level's size matters only to local solvers: the bounded functions do not depend on it.
     return formulate_worst(case, weights, statement.best or [0.0] * len(weights), 1.0)
 
 
 def _has_losses(case: Case) -> bool:
-    """Return whether the worst case of the tasks is that of their losses."""
+    """Return whether the worst case of the tasks refers to their losses."""
     return len(case.tasks) > 1 and case.method is Method.WORST_CASE and has_both_senses(case)
 
 
 def fingerprint(nlp: Nlp) -> str:
-    """Return a text that tells programs from each other: sizes, and sums of their values at a few points.
+    """Return a text that distinguishes programs: sizes, and sums of their values at a few points.
 
-    The same case may give graphs whose constants differ in the last bit, from one process to another, so that no hash
-    of the graph would do. A proof does not rest on it: the check shows every claim for the program that it has built.
+    The same case may give graphs whose constants differ in the last bit between processes, so that a hash of the graph
+    is not suitable. A proof does not depend on it: the check proves every claim for the program that it builds itself.
     """
     nlp = with_all_pairs(nlp)
     program = nlp.program
@@ -103,12 +103,12 @@ def fingerprint(nlp: Nlp) -> str:
     values = [function(x, nlp.arguments).full().ravel() for x in points]
     size = nlp.n
     if nlp.in_home_mode:
-        # Unknowns that follow in closed form are no variables of the tree's boxes.
+        # Unknowns with a closed form are no variables of the tree's boxes.
         form = standard_form(nlp)
         size, function = form.n, ca.Function("form", [form.x], [form.expressions])
         values += [function(form.point_of(x)).full().ravel() for x in points]
     numbers = np.concatenate([*values, nlp.arguments, nlp.lower, nlp.upper, nlp.g_lower, nlp.g_upper])
-    # Each number counts by its size and by its sign; one that is not finite by a constant.
+    # A number counts by its size and by its sign; if it is not finite, by a constant.
     known = np.isfinite(numbers)
     parts = np.where(known, numbers / (1 + np.abs(np.where(known, numbers, 0.0))), np.where(numbers > 0, 2.0, -2.0))
     sums = rng.normal(size=(_SUMS, numbers.size)) @ parts
@@ -116,7 +116,7 @@ def fingerprint(nlp: Nlp) -> str:
 
 
 def is_same_program(one: str, other: str) -> bool:
-    """Return whether two fingerprints are of the same program, to rounding."""
+    """Return whether two fingerprints belong to the same program, up to rounding."""
     first, second = one.split(), other.split()
     if first[:3] != second[:3] or len(first) != len(second):
         return False
@@ -128,29 +128,29 @@ def is_same_program(one: str, other: str) -> bool:
         return False
 
 
-def hold_statement(case: Case, statement: Statement, *, above: float | None, all_assemblies: bool) -> None:
-    """Refuse the statement of a proof unless it is the one that a user asks for.
+def check_statement(case: Case, statement: Statement, *, above: float | None, all_assemblies: bool) -> None:
+    """Refuse a proof whose statement is not the requested one.
 
     Args:
         case: the case.
-        statement: of the proof.
-        above: the value above which F is claimed to be; None where a bound of the case's optimum is asked for.
-        all_assemblies: whether all working modes are asked for, and not home's alone.
+        statement: statement of the proof.
+        above: requested lower bound of F; None to request a bound of the case's optimum.
+        all_assemblies: If true, request a proof for all working modes; otherwise for the home working mode only.
 
     Raises:
-        ProofError: it is another one.
+        ProofError: the statement is another one.
         InputError: the case has no such statement.
     """
     if above is not None:
         check_minimum(case)
     if statement.is_minimum and above is None:
-        raise ProofError("the proof bounds the smallest F, and the case asks for the largest: see --above")
+        raise ProofError("the proof bounds the smallest F, but the case asks for the largest: see --above")
     if above is not None and case.tasks[0].sense is Sense.MAX and not statement.is_minimum:
-        raise ProofError("the proof bounds the largest F, and --above asks for the smallest")
+        raise ProofError("the proof bounds the largest F, but --above asks for the smallest")
     if statement.in_home_mode and all_assemblies:
-        raise ProofError("the proof covers home's working mode alone, and --all-assemblies asks for all")
+        raise ProofError("the proof covers only home's working mode, but --all-assemblies asks for all modes")
     if statement.in_home_mode and not has_modes(case.model):
-        raise ProofError("the proof is for home's working mode, and the robot has none")
+        raise ProofError("the proof is for home's working mode, but this robot has no distinct working modes")
 
 
 def claim_words(case: Case, statement: Statement, bound: float | None, unit: str = "") -> str:
@@ -158,19 +158,19 @@ def claim_words(case: Case, statement: Statement, bound: float | None, unit: str
 
     Args:
         case: the case.
-        statement: of the proof.
+        statement: statement of the proof.
         bound: upper bound of the maximised value, minus F for a minimum; None where there is no feasible point.
-        unit: of what is optimised.
+        unit: unit of the objective.
     """
     where = f"within the limits of {case.name}"
     if case.limits_over:
-        where += ", taken at the stated pose alone,"
+        where += ", taken at the stated pose only,"
     if has_modes(case.model):
         where += " in home's working mode" if statement.in_home_mode else " in every working mode"
     if bound is None:
         return f"there is no feasible point {where}"
     measure = case.tasks[0].measure
-    if measure:  # the tree bounds squares
+    if measure:  # the tree bounds its square
         words, count = measure.replace("_", " "), case.pose_count
         over = f"over all actuators{' and loads' if measure != 'actuator_speed' else ''}"
         over += f", at {count} poses" if count > 1 else ""
@@ -183,7 +183,7 @@ def claim_words(case: Case, statement: Statement, bound: float | None, unit: str
 
 
 def root_below(square: float) -> float:
-    """Return a number not above the root of another one; 0 for a negative one."""
+    """Return a number that is at most the square root of another one; 0 for a negative one."""
     return math.nextafter(math.sqrt(max(square, 0.0)), 0.0)
 
 
@@ -194,7 +194,7 @@ def _has_minimum(case: Case, statement: Statement) -> bool:
 
 
 def _objective_words(case: Case, statement: Statement) -> str:
-    """Return the bounded number of a statement in words, with the tasks and their weights."""
+    """Return the bounded objective of a statement in words, with the tasks and their weights."""
     names = [f"F({task.name!r})" for task in case.tasks]
     if len(names) == 1:
         return f"that of task {case.tasks[0].name!r}"
@@ -214,17 +214,17 @@ def _objective_words(case: Case, statement: Statement) -> str:
 
 
 def _pose_words(case: Case) -> str:
-    """Return how F is taken over the poses of a case; empty for one pose."""
+    """Return in words how F is combined over the poses of a case; empty for one pose."""
     over = {OverPoses.SUM: "summed over", OverPoses.MEAN: "in the mean over", OverPoses.WORST: "at the worst of"}
     return f", {over[case.over_poses]} {case.pose_count} poses" if case.pose_count > 1 else ""
 
 
 def outward(value: float, *, up: bool) -> str:
-    """Return a proven bound as text, rounded to the side on which it holds."""
+    """Return a proven bound as text, rounded to the safe side."""
     context = Context(prec=_DIGITS, rounding=ROUND_CEILING if up else ROUND_FLOOR)
     return f"{float(context.create_decimal_from_float(value)):.{_DIGITS}g}"
 
 
 def exact(value: float) -> str:
-    """Return a number of a premise as text that is this double and no other."""
+    """Return a number of a premise as text that identifies this double."""
     return repr(value).removesuffix(".0")

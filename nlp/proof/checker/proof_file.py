@@ -1,25 +1,27 @@
-"""Proofs as files: JSON of one format for all claims.
+"""Proof files: one JSON format for all claims.
 
-A file holds the case as text, the premises as the proof states them, and its claims. A claim has a name, a reason, and
-the data of the reason: a bound, a tree of boxes (compressed, in base64, with its digest), or single points. The check
-takes all premises from the case and from its own arguments; those in the file tell a proof for other ones at once.
-Reading a file unpacks no tree: :mod:`.packed`.
+A file has the case as text, the premises of the proof, and its claims. A claim has a name, a reason, and the data of
+the reason: a bound, a tree of boxes (compressed, in base64, with its digest), or single points. The check takes all
+premises from the case and from its own arguments; premises in the file only serve to refuse a proof for other ones at
+once. Reading a file unpacks no tree: see :mod:`.packed`.
 
 A proof of a program's optimum has one claim. A claim is proved by one of
 
     program     a tree of :mod:`.tree` for a program, whose value is at most the bound wherever it is feasible
     regular     a tree of boxes of poses, each regular or outside of the workspace
-    singular    the opposite: two poses, or a pose of each of two machines, with determinants of opposite signs
-    boxes       a tree of boxes on each of which a number is not below (above) its bound
+    singular    the opposite: two poses, or a pose of each of two robots within the tolerance, with determinants of
+                opposite signs
+    boxes       a tree of boxes; on each of them a quantity is not below (above) its bound
     lengths     the bounds of the lengths of a leg, from which a limit on its stroke follows
 
-and, where it is about every machine within a tolerance on joint centres, also by
+and, for a claim about every robot within a joint-centre tolerance, also by
 
-    one machine         two directions, and two lemmas: lengths of a leg of one machine at two poses
+    one machine         two directions, and two lemmas: lengths of a leg of one robot at two poses
 
-Lemmas are further claims on which others rest: lengths of ``one machine``, each proved by a tree for a program, and
+Lemmas are further claims on which others depend: lengths of ``one machine``, each proved by a tree for a program, and
 
-    second order        a bound of the terms of second order in the errors, by which a number of all machines is bounded
+    second order        a bound of the terms of second order in the errors, for a quantity of all robots within the
+                        tolerance
 """
 
 from __future__ import annotations
@@ -38,28 +40,28 @@ from ...system.strictjson import json_tree, object_of
 from .packed import LARGEST_TREES, PackedTree, TreeBudget, digest_of, packed_text
 
 _FORMAT: Final = "screwsynth-proof"
-#: Largest proof file, bytes, and largest size of the case's text in it, which may hold the files that the case names.
+#: Largest size of a proof file in bytes, and of the text of its case, which may contain the files that the case names.
 LARGEST_PROOF, LARGEST_CASE = 2**26, 2**23
-#: Largest number of characters of a name, of a claim's reason, and of a fingerprint; and of claims of each kind.
+#: Largest number of characters of a name, a claim's reason, and a fingerprint; and largest number of claims of a kind.
 _LONGEST, _MOST_CLAIMS = 4_000, 20_000
 #: Name of the only claim of a proof about a program.
 OPTIMUM = "optimum"
-#: Poses of a workspace: ranges of the position, kind, ranges of the angles, axis.
+#: Poses of a workspace: ranges of the position, kind of rotation, ranges of the angles, axis.
 Poses = tuple[str | tuple[float | tuple[float, ...], ...], ...]
 
 
 class ProofError(InputError):
-    """A text that is no proof, or a proof that does not hold for the case."""
+    """A text that is no proof, or a proof that is not valid for the case."""
 
 
 @dataclass(frozen=True)
 class Statement:
-    """Which of a case's programs a proof is about; everything else follows from the case.
+    """Program of a case that a proof is about; everything else follows from the case.
 
     Attributes:
-        is_minimum: whether the smallest F of a task that the case maximises is bounded.
-        in_home_mode: whether home's working mode alone is covered.
-        best: of tasks of both senses in their worst case, the value of F of each from which its loss is measured.
+        is_minimum: whether the proof bounds the smallest F of a task that the case maximises.
+        in_home_mode: whether the proof covers only the home working mode.
+        best: value of F of each task from which its loss is measured, for the worst case of tasks of both senses.
     """
 
     is_minimum: bool = False
@@ -69,22 +71,21 @@ class Statement:
 
 @dataclass(frozen=True)
 class ProofClaim:
-    """A claim that is proved.
+    """A proved claim.
 
     Attributes:
-        name: in the words of the command.
-        sense: ``min`` or ``max`` for a number over a workspace, else empty.
-        reason: how it is proved, in the words of this module's docstring.
-        bound: bound of the number in the unit of its search: of the maximised value of a program (minus F for a
-            minimum), of a distance, of a singular value or a condition number, or, for errors of a pose, of their part
-            of first order for legs that are one unit of length off; None without a number, and for a program without a
-            feasible point.
+        name: name of the claim, in the words of the command.
+        sense: ``min`` or ``max`` for a quantity over a workspace, else empty.
+        reason: kind of the proof, in the words of this module's docstring.
+        bound: bound of the quantity in the unit of its search: the maximised value of a program (minus F for a
+            minimum), a distance, a singular value or a condition number, or, for a pose error, its first-order part for
+            leg errors of one unit of length; None without a quantity, and for a program without a feasible point.
         graph: fingerprint of the program; empty for other reasons.
         tree: nodes in bytes; empty for a claim without a tree, and for one with a packed tree.
-        sides: two poses (6,) with determinants of opposite signs, after each those of a machine's m joint centres'
-            errors (3 m,) where these are not 0; two directions (3,) of a leg, in the world frame and in the platform
+        sides: two poses (6,) with determinants of opposite signs, each followed by the m joint-centre errors (3 m,) of
+            its robot where these are not 0; or two directions (3,) of a leg, in the world frame and in the platform
             frame; empty for other reasons.
-        packed: tree of a file, which is unpacked where the claim is checked; None for a claim that was not read.
+        packed: tree of a file, to be unpacked when the claim is checked; None for a claim that was not read.
     """
 
     name: str
@@ -100,7 +101,7 @@ class ProofClaim:
         """Return the nodes in bytes.
 
         Raises:
-            DamagedProofError: those of a file cannot be unpacked.
+            DamagedProofError: the nodes of a file cannot be unpacked.
         """
         return self.tree if self.packed is None or self.tree else self.packed.unpacked()
 
@@ -111,7 +112,7 @@ class ProofClaim:
 
 @dataclass(frozen=True)
 class Unproved:
-    """A claim without a proof, and the reason."""
+    """A claim without a proof, with the reason."""
 
     name: str
     sense: str
@@ -120,14 +121,14 @@ class Unproved:
 
 @dataclass(frozen=True)
 class Premises:
-    """What a proof about a workspace says of its premises; everything else follows from the case.
+    """Premises of a proof about a workspace, as stated in its file; everything else follows from the case.
 
     Attributes:
-        workspace: the poses, from :func:`workspace_numbers`.
+        workspace: poses of the workspace, from :func:`workspace_premise`.
         legs: (12, 3) joint centres of six straight legs, base before platform; empty for another robot.
-        quantities: measures that were asked for.
+        quantities: names of the requested quantities.
         leg_error: largest error of a leg's length.
-        joint_centre: largest error of each joint centre in the machines that the claims are about; 0 for the exact one.
+        joint_centre: largest error of each joint centre for the claims; 0 for the exact robot.
     """
 
     workspace: Poses
@@ -139,16 +140,16 @@ class Premises:
 
 @dataclass(frozen=True)
 class PathPremises:
-    """What a proof about a path says of its premises; everything else follows from the case.
+    """Premises of a proof about a path, as stated in its file; everything else follows from the case.
 
     Attributes:
-        file: name of the path's file, which tells tables from programs.
-        text: of the file.
-        of_case: whether the path is that of the case, in its place; else it was given beside the case.
-        between, angles, unit, start, offsets: choices that the file leaves open, as
-            :class:`~screwsynth.nlp.path.options.PathOptions` has them; ``between`` by its value.
-        legs, joint_centre: as in :class:`Premises`.
-        with_angles: whether angles of joints are replaced by closed forms; no premise, but a help for the check.
+        file: name of the path's file; its ending distinguishes tables from programs.
+        text: text of the file.
+        of_case: If true, the path belongs to the case, at its place; otherwise it was given separately.
+        between, angles, unit, start, offsets: options of reading that the file leaves open, see
+            :class:`~screwsynth.nlp.path.options.PathOptions`; ``between`` by its value.
+        legs, joint_centre: joint centres and their largest error, see :class:`Premises`.
+        with_angles: whether closed forms replace joint angles; not a premise, but a help for the check.
     """
 
     file: str
@@ -164,11 +165,11 @@ class PathPremises:
     with_angles: bool
 
     def __post_init__(self) -> None:
-        # What is read cannot be copied.
+        # The mapping of read offsets cannot be copied.
         object.__setattr__(self, "offsets", dict(self.offsets))
 
 
-#: By the word of a file, what its claims are about.
+#: Premises of the claims, by the word in the file.
 _PREMISES: dict[Literal["program", "workspace", "path"], type[Statement] | type[Premises] | type[PathPremises]] = {
     "program": Statement,
     "workspace": Premises,
@@ -181,12 +182,11 @@ class Proof:
     """Proofs of claims about a case.
 
     Attributes:
-        case: the case file's text.
-        name: the case's name.
-        premises: the program of the case that the one claim is about, or what claims about a workspace or a path rest
-            on.
-        claims: the claims that are proved.
-        lemmas: claims that others rest on.
+        case: text of the case file.
+        name: name of the case.
+        premises: program of the case for its only claim, or premises of claims about a workspace or a path.
+        claims: proved claims.
+        lemmas: claims on which others depend.
         unproved: claims without a proof.
     """
 
@@ -201,9 +201,9 @@ class Proof:
         """Return the JSON text.
 
         Raises:
-            ProofError: the proof is larger than one that is read.
+            ProofError: the proof is larger than a checker accepts.
         """
-        # Claims of one search have one tree, which is unpacked once.
+        # Claims of one search share a tree, which is unpacked once.
         size = sum(map(len, {each.tree for each in (*self.claims, *self.lemmas)}))
         if size > LARGEST_TREES:
             raise ProofError(
@@ -217,7 +217,7 @@ class Proof:
         return json.dumps(asdict(file), indent=1, allow_nan=False) + "\n"
 
 
-def workspace_numbers(workspace: Workspace) -> Poses:
+def workspace_premise(workspace: Workspace) -> Poses:
     """Return a workspace as texts and numbers: ranges of the position, kind, ranges of the angles, axis."""
     position, angles = (tuple(map(ends_of, values)) for values in (workspace.position, workspace.turns.angles))
     return position, workspace.turns.kind.value, angles, tuple(workspace.turns.axis)
@@ -225,7 +225,7 @@ def workspace_numbers(workspace: Workspace) -> Poses:
 
 @dataclass(frozen=True)
 class _ClaimTable:
-    """A claim as the file has it."""
+    """A claim as stored in the file."""
 
     name: str
     sense: str
@@ -239,7 +239,7 @@ class _ClaimTable:
 
 @dataclass(frozen=True)
 class _File:
-    """A proof as its file has it."""
+    """A proof as stored in a file."""
 
     format: Literal["screwsynth-proof"]
     schema: int
@@ -263,11 +263,11 @@ def read_proof(text: str | bytes, source: str) -> Proof:
     """Read a proof from its JSON text; its trees stay packed.
 
     Args:
-        text: the JSON text, or its bytes.
-        source: its name, for messages.
+        text: JSON text or its bytes.
+        source: name of the text, for messages.
 
     Raises:
-        ProofError: the text is no proof of a version that is read, or a value is not allowed.
+        ProofError: the text is no proof of a supported version, or a value is not allowed.
     """
     try:
         table = json_tree(text)
@@ -281,11 +281,11 @@ def read_proof(text: str | bytes, source: str) -> Proof:
             raise ValueError(f"premises.text: has {len(premises.text)} characters, and at most {LARGEST_CASE} are read")
         kinds = [(each.name, each.reason) for each in found.claims]
         if is_program and (kinds != [(OPTIMUM, "program")] or found.lemmas or found.not_on_paper):
-            raise ValueError(f"a proof about a program has one claim, {OPTIMUM}")
+            raise ValueError(f"claims: expected one claim, {OPTIMUM}, in a proof about a program")
     except CaseError as error:
         raise ProofError(str(error)) from None
     except ValueError as error:
-        raise ProofError(f"{source}: is no proof as certify, workspace and path write it: {error}") from None
+        raise ProofError(f"{source}: is not a proof by certify, workspace or path: {error}") from None
     budget, tables = TreeBudget(), (*found.claims, *found.lemmas)
     every = tuple(_claim_of(each, source, number, budget) for number, each in enumerate(tables))
     count = len(found.claims)
@@ -293,10 +293,10 @@ def read_proof(text: str | bytes, source: str) -> Proof:
 
 
 def _check_texts(found: _File, quantities: tuple[str, ...]) -> None:
-    """Refuse texts that are longer than any that is written, and names that stand twice.
+    """Refuse texts that are longer than in any written proof, and names that occur twice.
 
     Raises:
-        ValueError: there is one.
+        ValueError: there is such a text or name.
     """
     if len(found.case) > LARGEST_CASE:
         raise ValueError(f"case: has {len(found.case)} characters, and at most {LARGEST_CASE} are read")

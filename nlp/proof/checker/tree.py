@@ -1,34 +1,34 @@
-"""Trees of boxes as bytes: nodes in preorder, each a byte for its kind, then its indices and numbers.
+"""Trees of boxes as bytes: nodes in preorder, each a byte for its kind, followed by its indices and numbers.
 
     half i             bisection of variable i at 0.5 lower + 0.5 upper: the lower half's tree, then the upper half's
-    cut i v            the same at v
+    cut i v            bisection of variable i at v
     above i v, below i v    cut of variable i at v: the part above (below) v is a leaf, whose reason follows; then the
                        tree of the other part
     face i, face' i    variable i is monotone: the tree of the box's upper (lower) face, which must lie on the root's
-    bounded            what the tree claims holds in the box: no feasible point has a value above the bound, or the
+    bounded            the claim of the tree holds in the box: no feasible point has a value above the bound, or the
                        claim about poses
     infeasible k       condition k holds nowhere in the box; without k in a tree of shared variables
     monotone i         no maximum lies in the box, because every function rises along variable i
-    outside            no pose of the box is one of the workspace
+    outside            no pose of the box belongs to the workspace
 
 The leaves therefore cover the root by construction, and a tree with too few or too many bytes is no proof. Expressions
-are counted from 0, the functions first and then the conditions. Numbers are doubles, little-endian.
+are counted from 0, first the functions and then the conditions. Numbers are little-endian doubles.
 
-Where the limbs of a form share no variable, a tree may begin with the byte ``LIMBS``. For each limb then follow its
-bound and its tree, over its own variables, and the sum of the bounds must not exceed the proven one. A limb with the
-bound minus infinity has no feasible point, and then the trees of the others are bare leaves without a bound.
+If the limbs of a form share no variable, a tree may begin with the byte ``LIMBS``. Then follow, for each limb, its
+bound and its tree over its own variables; the sum of the bounds must not exceed the proven bound. A limb with the bound
+minus infinity has no feasible point; the trees of the other limbs are then single leaves without a bound.
 
-Where the limbs share variables, a tree may begin with the byte ``SHARED``. Then come the nodes ``half``, ``infeasible``
-and ``bounded``; the root is the box of the shared variables. An infeasible leaf says that no point of the box keeps the
-conditions on shared variables alone. After the byte of a bounded leaf there is for each limb its bound ``b_k``, and
-where that is finite its tilt ``t_k``, a quadratic function of the shared variables: g, then the upper triangle of Q by
+If the limbs share variables, a tree may begin with the byte ``SHARED``. Then follow the nodes ``half``, ``infeasible``
+and ``bounded``; the root is the box of the shared variables. An infeasible leaf claims that no point of the box
+satisfies the conditions on shared variables. A bounded leaf is followed, for each limb, by its bound ``b_k``, and if
+that is finite by its tilt ``t_k``, a quadratic function of the shared variables: g, then the upper triangle of Q by
 rows. The claims of a bounded leaf over its box S of the shared variables s are
 
     phi_k(s, o) - t_k(s) <= b_k          for each limb, all of its own variables o, where its conditions hold,
     phi_0(s) + sum t_k(s) <= T - sum b_k    where the conditions on s hold, with T the proven bound.
 
-Together they bound ``phi_0 + sum phi_k`` by T. A limb with the bound minus infinity has no feasible point over S; then
-nothing is claimed of the others, whose bounds must be infinite.
+Together they bound ``phi_0 + sum phi_k`` by T. A limb with the bound minus infinity has no feasible point over S; the
+bounds of the other limbs must then be infinite, and claim nothing.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ _VALUE = struct.Struct("<d")
 
 
 class Node(enum.IntEnum):
-    """Kinds of node, as in this module's docstring, and what a tree of limbs begins with."""
+    """Kinds of node, see this module's docstring, and first bytes of trees of limbs."""
 
     HALF = 1
     ABOVE = 2
@@ -70,13 +70,13 @@ class Node(enum.IntEnum):
     OUTSIDE = 12
 
 
-#: Largest number of parts of boxes that wait while others are read: the depth of a tree. Bisections of a search end at
-#: least widths, so that those of hundreds of variables are not as deep.
+#: Largest depth of a tree, in waiting parts of boxes. Bisections of a search end at least widths, so that searches with
+#: hundreds of variables stay below it.
 _DEEPEST = 10_000
-#: Numbers in a block of a tree, with those that stand for the objects of each leaf, least number of leaves in it, and
-#: number of ends that are read ahead.
+#: Numbers in a block of a tree, including an allowance for the objects of each leaf; least number of leaves in a block;
+#: and number of ends that are read ahead.
 _BLOCK, _OBJECTS, _FEWEST, _AHEAD = 2**20, 32, 64, 2**20
-#: Kinds whose node has the faces of a box.
+#: Kinds of nodes for faces of a box.
 FACES = (Node.FACE_UPPER, Node.FACE_LOWER)
 
 #: Ends (n,) of a box, or (n, L) of several.
@@ -87,12 +87,12 @@ Block = TypeVar("Block")
 
 
 def node_bytes(kind: Node, *indices: int, value: float | None = None) -> bytes:
-    """Return the bytes of a node up to those of its children."""
+    """Return the bytes of a node before those of its children."""
     return bytes([kind, *indices]) + (b"" if value is None else _VALUE.pack(value))
 
 
 def halves(lower: FloatArray, upper: FloatArray, i: int, value: float | None = None) -> tuple[Box, Box]:
-    """Return the ends of both parts of a box with ends (n,), cut along variable i at a value or in the middle."""
+    """Return the ends of both parts of a box with ends (n,), bisected along variable i at a value or in the middle."""
     at = 0.5 * lower[i] + 0.5 * upper[i] if value is None else value
     return (lower, with_end(upper, i, at)), (with_end(lower, i, at), upper)
 
@@ -105,7 +105,7 @@ def with_end(ends: FloatArray, i: int, value: float) -> FloatArray:
 
 
 class TreeReader:
-    """A reader of nodes from a tree's bytes; ``at`` is the number of bytes read."""
+    """A reader of nodes from a tree's bytes; ``at`` is the number of bytes read so far."""
 
     def __init__(self, tree: bytes, at: int = 0) -> None:
         self._tree, self.at = tree, at
@@ -114,7 +114,7 @@ class TreeReader:
         """Return the next bytes.
 
         Raises:
-            ProofError: there are not as many.
+            ProofError: fewer bytes remain.
         """
         self.at += count
         if self.at > len(self._tree):
@@ -125,7 +125,7 @@ class TreeReader:
         """Return the next byte, an index.
 
         Raises:
-            ProofError: it is not allowed.
+            ProofError: the index is not allowed.
         """
         (number,) = self.read(1)
         if number not in allowed:
@@ -140,7 +140,7 @@ class TreeReader:
         """Refuse further bytes.
 
         Raises:
-            ProofError: there are some.
+            ProofError: further bytes remain.
         """
         if self.at != len(self._tree):
             raise ProofError("the tree goes on after every box is closed")
@@ -149,10 +149,10 @@ class TreeReader:
         """Read the nodes of the tree of a box with ends (n,), and yield its leaves and faces.
 
         Args:
-            lower: lower ends.
-            upper: upper ends.
-            inner: kinds of nodes with children that the tree may have; others are leaves, of which the bytes after the
-                first are to be read before the next one is asked for.
+            lower: (n,) lower ends.
+            upper: (n,) upper ends.
+            inner: allowed kinds of nodes with children. Other kinds are leaves; the caller must read the bytes after
+                the first byte of a leaf before it asks for the next one.
 
         Raises:
             ProofError: the bytes are no such tree.
@@ -181,23 +181,23 @@ class TreeReader:
             else:
                 value = self.number()
                 if not np.isfinite(value):
-                    raise ProofError("the tree cuts at a number that is not finite")
+                    raise ProofError("the tree cuts a box at a number that is not finite")
                 (reason,) = self.read(1)
                 parts = halves(low, high, i, min(max(value, low[i]), high[i]))
                 closed, rest = parts if kind == Node.BELOW else parts[::-1]
                 yield reason, -1, *closed
-                # Nothing is left where the whole box is on the closed side.
+                # Nothing remains if the whole box is on the closed side.
                 waiting += [rest] if (value <= high[i] if kind == Node.BELOW else value >= low[i]) else []
 
 
 def ahead(blocks: Iterator[Block], size: Callable[[Block], int]) -> Iterator[Block]:
-    """Yield blocks of a tree after reading on, as far as their ends of boxes are not too many.
+    """Yield blocks of a tree, after reading ahead as many as the allowed number of box ends.
 
-    So nothing is shown of a tree of usual size that ends too early or too late.
+    A tree of usual size that ends too early or too late is thus refused before any proof.
 
     Args:
         blocks: the blocks.
-        size: returns the number of ends of a block.
+        size: function that returns the number of ends of a block.
     """
     waiting, kept = deque[Block](), 0
     for block in blocks:
@@ -210,9 +210,9 @@ def ahead(blocks: Iterator[Block], size: Callable[[Block], int]) -> Iterator[Blo
 
 
 def read_claims(reader: TreeReader, form: StandardForm) -> Iterator[dict[tuple[Node, int], Box]]:
-    """Yield the claims of a tree, in blocks, by kind of node and condition or variable (or 0): ends (n, L) of boxes.
+    """Yield the claims of a tree in blocks, as box ends (n, L) by kind of node and by condition or variable (or 0).
 
-    The boxes of all blocks cover the form's.
+    The boxes of all blocks cover the box of the form.
 
     Raises:
         ProofError: the bytes are no tree.
@@ -228,7 +228,7 @@ def read_claims(reader: TreeReader, form: StandardForm) -> Iterator[dict[tuple[N
             elif kind == Node.MONOTONE:
                 index = reader.index(range(form.n), "variable")
             elif kind not in (Node.BOUNDED, *FACES) or (kind in FACES) != (i >= 0):
-                raise ProofError(f"the tree holds {kind} where a reason must stand")
+                raise ProofError(f"the tree has {kind} where a reason is expected")
             claims.setdefault((Node(kind), index), []).append((lower, upper))
         yield {
             key: (np.array([low for low, _ in some]).T, np.array([up for _, up in some]).T)
@@ -237,13 +237,13 @@ def read_claims(reader: TreeReader, form: StandardForm) -> Iterator[dict[tuple[N
 
 
 def blocks_of(leaves: Iterator[Leaf], numbers: int) -> Iterator[Iterator[Leaf]]:
-    """Yield the leaves of a tree in blocks, each to be taken whole before the next one.
+    """Yield the leaves of a tree in blocks; each block must be consumed before the next one.
 
-    A few bytes of a tree are a leaf, and all leaves of a large tree are more than a memory holds.
+    A leaf takes only a few bytes of a tree, and all leaves of a large tree exceed the memory.
 
     Args:
         leaves: the leaves.
-        numbers: that are kept of each.
+        numbers: number of values to keep for each leaf.
     """
     count = max(_BLOCK // (numbers + _OBJECTS), _FEWEST)
     for first in leaves:
@@ -254,10 +254,10 @@ class SharedLeaves(NamedTuple):
     """L leaves of a tree of m shared variables, with K limbs.
 
     Attributes:
-        lower, upper: (m, L) ends of their boxes.
-        bounds: (K, L) of the limbs; all infinite for an infeasible leaf, which claims nothing of any limb.
-        g: (K, m, L) and
-        Q: (K, m, m, L) symmetric, of their tilts; 0 for infinite bounds.
+        lower, upper: (m, L) ends of the boxes of the leaves.
+        bounds: (K, L) bounds of the limbs; all infinite for an infeasible leaf, which makes no claim about a limb.
+        g: (K, m, L) linear coefficients of the tilts; 0 for infinite bounds.
+        Q: (K, m, m, L) symmetric matrices of the tilts; 0 for infinite bounds.
     """
 
     lower: FloatArray
@@ -283,10 +283,10 @@ def leaf_bytes(bounds: FloatArray, g: FloatArray, Q: FloatArray) -> bytes:
 
 
 def read_shared(tree: bytes, lower: FloatArray, upper: FloatArray, limbs: int) -> Iterator[SharedLeaves]:
-    """Yield the leaves of a tree of shared variables in blocks, whose boxes together cover that with ends (m,).
+    """Yield the leaves of a tree of shared variables in blocks; together their boxes cover the box with ends (m,).
 
     Raises:
-        ProofError: the bytes are no such tree, or a number is NaN or infinite where it must not be.
+        ProofError: the bytes are no such tree, or a number is NaN, or infinite where this is not allowed.
     """
     reader, m = TreeReader(tree, 1), len(lower)
     every = reader.walk(lower, upper, frozenset({Node.HALF}))
@@ -294,17 +294,17 @@ def read_shared(tree: bytes, lower: FloatArray, upper: FloatArray, limbs: int) -
         leaves = []
         for kind, _, low, high in block:
             if kind not in (Node.INFEASIBLE, Node.BOUNDED):
-                raise ProofError(f"the tree holds {kind} where a node of shared variables must stand")
+                raise ProofError(f"the tree has {kind} where a node of shared variables is expected")
             leaves.append((low, high, *_numbers_of_leaf(reader if kind == Node.BOUNDED else None, limbs, m)))
         yield SharedLeaves(*(np.stack(each, axis=-1) for each in zip(*leaves, strict=True)))
     reader.finish()
 
 
 def _numbers_of_leaf(reader: TreeReader | None, K: int, m: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return bounds and tilts of a bounded leaf, which come next, or those of an infeasible one.
+    """Return bounds and tilts of a bounded leaf from the next bytes, or those of an infeasible leaf.
 
     Raises:
-        ProofError: a number is NaN or infinite where it must not be.
+        ProofError: a number is NaN, or infinite where this is not allowed.
     """
     rows, columns = np.triu_indices(m)
     bounds, g, Q = np.full(K, np.inf), np.zeros((K, m)), np.zeros((K, m, m))
@@ -318,5 +318,5 @@ def _numbers_of_leaf(reader: TreeReader | None, K: int, m: int) -> tuple[FloatAr
     is_empty = bool((bounds == -np.inf).any())
     known = np.isinf(bounds) if is_empty else np.isfinite(bounds)
     if not (known.all() and np.isfinite(g).all() and np.isfinite(Q).all()):
-        raise ProofError("a leaf of the tree has a bound or a tilt that is no number")
+        raise ProofError("a leaf of the tree has a bound or a tilt that is NaN, or infinite where it must be finite")
     return bounds, g, Q

@@ -2,8 +2,8 @@
  *
  * The tape is interpreted over LANES boxes at once, so that an instruction is fetched once for all of them and its
  * loops become vector instructions; the boxes are then examined one by one. docs/certificate.md explains the formulas.
- * tests/reference has them in NumPy, in the same order, in the modules that the headers name. The headers of kernel/ have
- * an idea each and belong to this one translation unit, so that the compiler sees all of it: values, univariate, forms,
+ * tests/reference has them in NumPy, in the same order, in the modules that the headers name. Each header of kernel/ has
+ * one idea, and all belong to this one translation unit, so that the compiler sees everything: values, univariate, forms,
  * runs, rank; quadratic, contraction, models, quotients, examination, tangents, firstpass, blocks.
  *
  * Rounding is to nearest. Never compile this with -ffast-math, which would drop the tests for NaN that keep boxes open;
@@ -22,8 +22,8 @@ typedef struct {
     int count;
 } Borrowed;
 
-/* An array that a call borrows: where its address goes, its items, the size of each, whether they are written, and
- * whether None may be in its place. */
+/* An array that a call borrows: destination of its address, number and size of its items, whether they are written, and
+ * whether None is allowed. */
 typedef struct {
     void *to;
     Py_ssize_t items;
@@ -36,7 +36,7 @@ typedef struct {
 #define MAY_READ(to, items) {&(to), items, sizeof *(to), 0, 1}
 #define MAY_WRITE(to, items) {&(to), items, sizeof *(to), 1, 1}
 
-/* Borrows the memory of the objects of a tuple, which must be contiguous. 0 where one is not as expected. */
+/* Borrows the memory of the objects of a tuple, which must be contiguous. Returns 0 if an object is not as expected. */
 static int borrow(Borrowed *all, PyObject *tuple, const Array *arrays, size_t count)
 {
     int good = PyTuple_Size(tuple) == (Py_ssize_t)count;
@@ -56,7 +56,7 @@ static int borrow(Borrowed *all, PyObject *tuple, const Array *arrays, size_t co
 
 #define BORROW(tuple, ...) borrow(&all, tuple, (Array[]){__VA_ARGS__}, COUNT(((Array[]){__VA_ARGS__})))
 
-/* Reads a tape; None is one without instructions. */
+/* Reads a tape; None is an empty tape. */
 static int read_tape(Borrowed *all, PyObject *tuple, Tape *tape)
 {
     PyObject *arrays;
@@ -68,7 +68,7 @@ static int read_tape(Borrowed *all, PyObject *tuple, Tape *tape)
     return borrow(all, arrays, both, COUNT(both));
 }
 
-/* Gets the memory that was counted, for a call whose arguments are good; 0 with an exception otherwise. */
+/* Allocates the counted memory for a call with valid arguments; otherwise returns 0 with an exception. */
 static int is_ready(int good, Room *room)
 {
     *room = (Room){good ? calloc(room->used, sizeof(double)) : NULL, 0};
@@ -79,7 +79,7 @@ static int is_ready(int good, Room *room)
     return room->at != NULL;
 }
 
-/* Makes a call where its arguments are good: counts its memory first. */
+/* Makes a call with valid arguments; it counts the memory first. */
 #define CALL(good, call)                                                                                               \
     if (good)                                                                                                          \
         call;                                                                                                          \
@@ -89,7 +89,7 @@ static int is_ready(int good, Room *room)
         Py_END_ALLOW_THREADS                                                                                           \
     }
 
-/* Returns what a call borrowed, and its result. */
+/* Releases the borrowed memory of a call, and returns its result. */
 static PyObject *finish_call(Borrowed *all, Room room)
 {
     for (int i = 0; i < all->count; i++)
@@ -206,7 +206,7 @@ static PyObject *rank(PyObject *module, PyObject *args)
     return finish_call(&all, room);
 }
 
-/* The arguments are those of borrow and of the calls of PyArg_ParseTuple above; the package has one caller of each. */
+/* Arguments: see borrow and the calls of PyArg_ParseTuple above; each method has one caller in the package. */
 static PyMethodDef methods[] = {
     {"rank", rank, METH_VARARGS, "Judge the rank of a matrix over B boxes."},
     {"models", models, METH_VARARGS, "Write upper bounds of B quadratic models, or the ends of points that can reach levels."},

@@ -1,4 +1,4 @@
-"""The C kernel: searches for proofs need it, and nothing else does."""
+"""The C kernel, which only searches for proofs need."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ def kernel() -> ModuleType:
     """Return the C kernel.
 
     Raises:
-        InputError: it was not built.
+        InputError: the kernel was not built.
     """
     try:
         return import_module("screwsynth.nlp.proof.enclosure._bounds")
     except ImportError:
         raise InputError(
-            "nothing can be proved here: the C kernel was not built when the package was installed; "
+            "proofs are not available: the C kernel was not built when the package was installed; "
             "install a C compiler, then the package again (pip install --force-reinstall --no-deps .)"
         ) from None

@@ -4,9 +4,9 @@ On the box ``x_i = c_i + r_i e_i``, ``|e_i| <= 1``, the kernel has two enclosure
 
     v(t e) in c + t sum_i a_i e_i + t^2 [p, q] +- s        and        lo <= v <= hi,
 
-where ``c`` is its value at the centre, ``a`` its scaled gradient there, ``[p, q]`` holds 0 and all terms of second
-order, and ``s`` bounds the rounding errors. The terms of second order shrink with ``t^2``, so that the integral of a
-gradient's form along a ray has a third of their width. A value that may be undefined somewhere in the box, or that
+with the value ``c`` and the scaled gradient ``a`` at the centre, an interval ``[p, q]`` that contains 0 and all
+second-order terms, and a bound ``s`` of the rounding errors. Second-order terms shrink with ``t^2``, so the integral of
+a gradient's form along a ray has a third of their width. A value that may be undefined somewhere in the box, or that
 overflows, is *poisoned*: its ``s`` and its ends are infinite, and so are those of every value computed from it.
 ``docs/certificate.md`` has the rules and their sources.
 """
@@ -24,9 +24,9 @@ from ....models import FloatArray
 from .engine import kernel
 from .tape import Tape, compile_tape
 
-#: Four times the rounding unit 2^-53: an end of an interval moves outwards by this part of itself per operation.
+#: Relative outward shift of an end of an interval per operation: four times the rounding unit 2^-53.
 ULP = 2.0**-51
-#: More than underflow can cost an operation. Additions are exact there.
+#: Upper bound of the underflow error of an operation. Additions are exact there.
 TINY = 1e-300
 
 
@@ -34,9 +34,9 @@ class Forms(NamedTuple):
     """R expressions over B boxes, each in ``c + a.e + [-r, r]``.
 
     Attributes:
-        c: (B, R) values at the centres, and the middles of the terms of second order.
+        c: (B, R) values at the centres, plus the middles of the second-order terms.
         a: (B, R, n) linear parts, scaled by the half widths of the boxes.
-        r: (B, R) bounds of the rest, with rounding; infinite where a value may be undefined.
+        r: (B, R) bounds of the remainder, with rounding; infinite where a value may be undefined.
     """
 
     c: FloatArray
@@ -49,7 +49,7 @@ class Forms(NamedTuple):
 
     @property
     def sizes(self) -> FloatArray:
-        """Bounds (B, R) of the sizes of the expressions."""
+        """Bounds (B, R) of the absolute values of the expressions."""
         return np.asarray(np.abs(self.c) + np.abs(self.a).sum(axis=2) + self.r)
 
 
@@ -58,10 +58,10 @@ class Encloser:
 
     Args:
         z: (n, 1) symbols of the coordinates.
-        expressions: (R, 1) of them.
+        expressions: (R, 1) expressions of the coordinates.
 
     Raises:
-        UncoveredError: an expression holds an operation without a rule.
+        UncoveredError: an expression has an operation without an interval rule.
     """
 
     def __init__(self, z: SX, expressions: SX) -> None:
@@ -72,9 +72,9 @@ class Encloser:
         return self._forms(lower, upper, 1)
 
     def second(self, lower: FloatArray, upper: FloatArray) -> Forms:
-        """Return the forms of second order over boxes with ends (n, B): ``e_i e_j``, i <= j, follow row by row.
+        """Return second-order forms over boxes with ends (n, B); terms ``e_i e_j``, i <= j, follow row by row.
 
-        Each ``e_i^2`` is ``1/2 + 1/2 e`` with e in [-1, 1].
+        Each ``e_i^2`` is written as ``1/2 + 1/2 e`` with e in [-1, 1].
         """
         c, a, r = self._forms(lower, upper, 2)
         n = len(lower)
@@ -83,7 +83,7 @@ class Encloser:
         return Forms(c + a[:, :, squares].sum(axis=2), a, r)
 
     def _forms(self, lower: FloatArray, upper: FloatArray, order: int) -> Forms:
-        """Return the forms of an order."""
+        """Return the forms of first or second order."""
         n, count = lower.shape
         c, r = (np.empty((self.tape.outputs, count)) for _ in range(2))
         a = np.empty((self.tape.outputs, n if order == 1 else n * (n + 3) // 2, count))
@@ -93,7 +93,12 @@ class Encloser:
 
 
 class Ends(NamedTuple):
-    """Least and largest ``e_i``, (n, B) each, of the points that can reach a level; low > high where none can."""
+    """Ranges of the ``e_i`` of points that can reach a level.
+
+    Attributes:
+        low: (n, B) smallest ``e_i``; above ``high`` if no point can reach the level.
+        high: (n, B) largest ``e_i``.
+    """
 
     low: FloatArray
     high: FloatArray
@@ -105,10 +110,10 @@ class QuadraticModel:
 
     Attributes:
         middle: (B,) upper bound of the function at the centre.
-        b: (n, B).
-        H: (n, n, B) symmetric.
-        w: (n, B).
-        slope_lo, slope_hi: (n, B) interval gradient times ``r_i``.
+        b: (n, B) linear coefficients.
+        H: (n, n, B) symmetric matrices.
+        w: (n, B) coefficients of the absolute values.
+        slope_lo, slope_hi: (n, B) ends of the interval gradient times ``r_i``.
         rounding: (B,) bound of the rounding errors of all sums.
     """
 
@@ -127,12 +132,12 @@ class QuadraticModel:
         return bound
 
     def ends_reaching(self, level: float | FloatArray) -> Ends:
-        """Return the ends of the ``e_i`` for which the model can reach a level, one or (B,), for any other ``e_j``."""
+        """Return the ranges of each ``e_i`` in which the model can reach a level, a number or (B,)."""
         low, high = np.empty(self.b.shape), np.empty(self.b.shape)
         self._call(None, np.full(self.middle.size, level), low, high)
         return Ends(low, high)
 
     def _call(self, *results: FloatArray | None) -> None:
-        """Call the kernel, which writes results."""
+        """Call the kernel, which writes the results."""
         arrays = (self.middle, self.b, self.H, self.w, self.slope_lo, self.slope_hi, self.rounding)
         kernel().models(len(self.b), (*(np.ascontiguousarray(each) for each in arrays), *results), self.middle.size)

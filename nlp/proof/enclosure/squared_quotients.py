@@ -1,17 +1,17 @@
-"""Functions that are sums of squared quotients, taken apart for the kernel.
+"""Sums of squared quotients, split into parts with accurate enclosures for the kernel.
 
 The work rate of a row in a twist is ``N / |d|``, with N and ``D = |d|^2`` polynomials in the joint coordinates. Its
 square is
 
     N^2 / D = rho (2 N - rho D) + E^2 / D,    E = N - rho D,    for any number rho, with D > 0.
 
-With ``rho = N / D`` at the centre of a box, the first part is linear in N and D, whose models are accurate, and E is 0
+With ``rho = N / D`` at the centre of a box, the first part is linear in N and D, which have accurate models, and E is 0
 at the centre. Enclosures of the quotient and its derivatives, operation by operation, are tens of times as wide on
-large boxes: there the terms of second order of each factor are bounded by themselves.
+large boxes, because the second-order terms of each factor are bounded separately.
 
-For a minimum of F, the first part alone is a tangent from below: ``N^2 / D >= 2 rho N - rho^2 D``. It has neither
-quotient nor square, so that its form of second order is accurate on large boxes. ``rho`` is ``N / D`` at a point where
-the sum of squares is small; any other one gives a bound that holds too.
+For a minimum of F, the first part is a tangent from below: ``N^2 / D >= 2 rho N - rho^2 D``. It has neither quotient
+nor square, so its second-order form is accurate on large boxes. ``rho`` is ``N / D`` at a point with a small sum of
+squares; the bound is valid for any ``rho``.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ class Quotient(NamedTuple):
     """A term ``sign * N^2 / D`` of a function.
 
     Attributes:
-        N, D: (1, 1).
+        N, D: (1, 1) numerator before squaring, and denominator.
         sign: 1 or -1.
-        function: number of the function.
+        function: index of the function.
     """
 
     N: SX
@@ -41,11 +41,11 @@ class Quotient(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """Expressions of which squared quotients are taken apart.
+    """Expressions with squared quotients split off.
 
     Attributes:
-        expressions: (E, 1) functions without their quotients, then what goes with them, then N and D of each quotient.
-        quotients: the terms that are missing in the functions.
+        expressions: (E, 1) functions without their quotients, then other expressions, then N and D of each quotient.
+        quotients: terms that were split off from the functions.
     """
 
     expressions: SX
@@ -53,12 +53,12 @@ class Rows(NamedTuple):
 
     @property
     def functions(self) -> tuple[int, ...]:
-        """Number of the function of each quotient."""
+        """Index of the function of each quotient."""
         return tuple(each.function for each in self.quotients)
 
 
 def _taken_apart(form: StandardForm, signs: tuple[int, ...], more: tuple[SX, ...] = ()) -> Rows | None:
-    """Return the functions of a form without their squared quotients of some signs; None without any."""
+    """Return the functions of a form with squared quotients of given signs split off; None if there are none."""
     rests, found = [SX(0) for _ in form.functions], list[Quotient]()
     for j, function in enumerate(form.functions):
         for term in terms_of(function):
@@ -72,18 +72,18 @@ def _taken_apart(form: StandardForm, signs: tuple[int, ...], more: tuple[SX, ...
 
 
 def search_rows(form: StandardForm, *, apart: bool) -> Rows:
-    """Return the expressions of a form, with the squared quotients of its functions taken apart if so wanted."""
+    """Return the expressions of a form; if ``apart`` is true, with squared quotients of its functions split off."""
     rows = _taken_apart(form, (1, -1), tuple(each.expression for each in form.conditions)) if apart else None
     return rows or Rows(form.expressions, ())
 
 
 def tangent_rows(form: StandardForm) -> Rows | None:
-    """Return the functions of a form for tangents, without terms ``-N^2 / D``; None where no function has any."""
+    """Return the functions of a form for tangents, without terms ``-N^2 / D``; None if no function has such a term."""
     return _taken_apart(form, (-1,))
 
 
 def as_quotient(term: SX, function: int) -> Quotient | None:
-    """Return a term as a squared quotient; None for another one."""
+    """Return a term as a squared quotient; None for other terms."""
     term, factor = factored_terms(term)[0]
     if not (term.is_op(ca.OP_DIV) and term.dep(0).is_op(ca.OP_SQ)) or term.dep(1).is_constant() or factor == 0:
         return None

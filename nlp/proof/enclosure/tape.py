@@ -1,8 +1,8 @@
 """A function's expression graph as a tape: a flat list of operations on registers, for any arithmetic.
 
-CasADi lists the operations of an ``SX`` function one by one. :func:`compile_tape` writes that list in a dozen
-operations, and the others by exact identities of real numbers (``tan = sin / cos``, ``2 x = x * 2``, a whole power as
-products), so that an arithmetic needs few rules. An operation without an identity is refused by its name.
+CasADi lists the operations of an ``SX`` function one by one. :func:`compile_tape` writes this list with a dozen
+operations, and expresses others by exact identities of real numbers (``tan = sin / cos``, ``2 x = x * 2``, an integer
+power by products), so that an arithmetic needs few rules. An operation without an identity raises an error.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 class Op(enum.IntEnum):
     """Operations on registers ``r``: ``r[to] = ...`` from ``r[a]``, ``r[b]`` and the constant ``k``.
 
-    The numbers are those of ``kernel/values.h``.
+    The values are those of ``kernel/values.h``.
     """
 
     CONSTANT = 0  # k
@@ -59,9 +59,9 @@ class Tape:
     Attributes:
         op: (N,) :class:`Op` of each instruction.
         to: (N,) register written, or the index of the result for an output.
-        a, b: (N,) registers read, or the index of the variable for an input; 0 where there is none.
+        a, b: (N,) registers read, or the index of the variable for an input; 0 if there is none.
         k: (N,) constants.
-        first, last: (N,) span of variables: the written value depends on no others than ``first <= i < last``.
+        first, last: (N,) span of variables: the written value depends only on variables ``first <= i < last``.
         inputs: number of variables.
         outputs: number of results.
         registers: number of registers.
@@ -83,25 +83,25 @@ class Tape:
 
     @cached_property
     def head(self) -> tuple[tuple[NDArray[np.int32], FloatArray], int, int, int]:
-        """The tape as the C kernel reads it: code, constants, and numbers of instructions, registers and results."""
+        """Tape for the C kernel: code, constants, and numbers of instructions, registers and results."""
         code = np.stack([self.op, self.to, self.a, self.b, self.first, self.last], axis=1).astype(np.int32)
         return (np.ascontiguousarray(code), self.k), len(self), self.registers, self.outputs
 
 
 _NAMES = {getattr(ca, name): name[3:].lower() for name in dir(ca) if name.startswith("OP_")}
-#: Operations between two looks at whether to stop: about a tenth of a second.
+#: Number of operations between two checks for an interrupt, about a tenth of a second.
 _LOOK = 2048
-#: The largest whole power that is written as products.
+#: Largest integer power that is written as products.
 _LARGEST_POWER = 64
 
 
 class _Value:
-    """A number in formulas: what an operation gives, or the constant ``k``. An instruction that reads it writes it.
+    """Result of an operation, or a constant, in formulas. It is written when an instruction first reads it.
 
     Attributes:
         op, a, b, k: the operation.
-        register: where it goes; -1 for any that is free.
-        reach: the variables that it depends on, as bits; -1 until it is written.
+        register: register of the result; -1 for any free register.
+        reach: variables that the result depends on, as bits; -1 until it is written.
     """
 
     __slots__ = ("a", "b", "is_constant", "k", "op", "reach", "register")
@@ -143,13 +143,13 @@ def _asin(a: _Value) -> _Value:
 
 
 def _fmax(a: _Value, b: _Value) -> _Value:
-    """Return ``b + ramp(a - b)``. A constant is b, so that ``fmax(0, x)`` is a ramp of x and nothing else."""
+    """Return ``b + ramp(a - b)``. A constant becomes b, so that ``fmax(0, x)`` is only a ramp of x."""
     a, b = (b, a) if a.is_constant else (a, b)
     return b + _Value(Op.RAMP, a - b)
 
 
 def _power(a: _Value, b: _Value) -> _Value:
-    """Return a whole power, or half of one, as products, a root and a quotient."""
+    """Return an integer or half-integer power as products, a square root and a quotient."""
     if not b.is_constant:
         raise UncoveredError("the operation 'pow'")
     if not ((2 * b.k).is_integer() and 0 < abs(b.k) <= _LARGEST_POWER):
@@ -163,8 +163,8 @@ def _power(a: _Value, b: _Value) -> _Value:
     return _constant(1.0) / product if b.k < 0 else product
 
 
-#: CasADi's operations by those of a tape: identities that are exact for real numbers. No double is pi; pi / 2 is
-#: twice the arc tangent of 1.
+#: CasADi's operations by operations of a tape, with identities that are exact for real numbers. As pi is not a double,
+#: pi / 2 is twice the arc tangent of 1.
 _FORMULAS: dict[int, Callable[[_Value, _Value], _Value]] = {
     ca.OP_ADD: lambda a, b: a + b,
     ca.OP_SUB: lambda a, b: a - b,
@@ -185,13 +185,13 @@ _FORMULAS: dict[int, Callable[[_Value, _Value], _Value]] = {
     ca.OP_HYPOT: _hypot,
     ca.OP_ASIN: lambda a, _: _asin(a),
     ca.OP_ACOS: lambda a, _: -_asin(a) + _Value(Op.ATAN, _constant(1.0)) * _constant(2.0),
-    # Off the negative x-axis.
+    # Valid off the negative x-axis.
     ca.OP_ATAN2: lambda a, b: _Value(Op.ATAN, a / (_hypot(a, b) + b)) * _constant(2.0),
     ca.OP_FMAX: _fmax,
     ca.OP_FMIN: lambda a, b: -_fmax(-a, -b),
     ca.OP_LE: lambda a, b: _Value(Op.STEP, b - a),
     ca.OP_FABS: lambda a, _: _Value(Op.RAMP, a) * _constant(2.0) - a,
-    # Where it is not 0.
+    # Valid if the operand is not 0.
     ca.OP_SIGN: lambda a, _: _Value(Op.STEP, a) * _constant(2.0) + _constant(-1.0),
     ca.OP_POW: _power,
     ca.OP_CONSTPOW: _power,
@@ -202,7 +202,7 @@ class _TapeWriter:
     """A tape under construction.
 
     Args:
-        registers: number of registers of the CasADi function; those beyond them are free.
+        registers: number of registers of the CasADi function; higher registers are free.
     """
 
     def __init__(self, registers: int) -> None:
@@ -226,7 +226,7 @@ class _TapeWriter:
         self._rows.append((Op.INPUT, register, index, 0, 0.0, value.reach))
 
     def put_formula(self, register: int, op: int, operands: list[int]) -> None:
-        """Set a register of the CasADi function to the result of an operation on some."""
+        """Set a register of the CasADi function to the result of an operation on registers."""
         if op not in _FORMULAS:
             raise UncoveredError(f"the operation {_NAMES.get(op, str(op))!r}")
         self.put(register, _FORMULAS[op](self._values[operands[0]], self._values[operands[-1]]))
@@ -237,7 +237,7 @@ class _TapeWriter:
         self._rows.append((Op.OUTPUT, place, read, read, 0.0, reach))
 
     def _read(self, value: _Value) -> tuple[int, int]:
-        """Return a value's register and reach, after writing it where it is not there yet."""
+        """Return a value's register and reach; the value is written first if necessary."""
         if value.reach < 0:
             self._write(value)
         return value.register, value.reach
@@ -254,7 +254,7 @@ class _TapeWriter:
 
     def finish(self, inputs: int, outputs: int) -> Tape:
         """Return the tape."""
-        # Expressions without an entry have no instructions.
+        # An empty expression has no instructions.
         *codes, k, reach = zip(*self._rows, strict=True) if self._rows else [()] * 6
         least = [(each & -each).bit_length() - 1 if each else 0 for each in reach]
         columns = (*codes, least, [each.bit_length() for each in reach])
@@ -269,11 +269,11 @@ def compile_tape(function: ca.Function) -> Tape:
     """Compile a function of one vector.
 
     Args:
-        function: made of ``SX``, with one dense input (n, 1) and any number of dense outputs; their elements, column by
-            column, are the results in order.
+        function: function of ``SX``, with one dense input (n, 1) and any number of dense outputs; their elements,
+            column by column, are the results.
 
     Raises:
-        UncoveredError: the function holds an operation without a rule, or a constant that is not finite.
+        UncoveredError: the function has an operation without an interval rule, or a constant that is not finite.
     """
     writer = _TapeWriter(function.sz_w())
     offset = np.cumsum([0, *(function.numel_out(i) for i in range(function.n_out()))])

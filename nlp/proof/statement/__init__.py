@@ -1,6 +1,6 @@
-"""Statement of claims: programs in standard form, and claims about a workspace.
+"""Claims as searches and checker share them: nonlinear programs in standard form, and claims about a workspace.
 
 The modules import each other in this order: ``form``, ``standard_form`` and ``limb_separation`` for certificates;
-``machine`` (a robot with its dimensions), ``claims``, ``posed_layout`` (a case as expressions of the pose) and
-``tolerance`` (every machine) for workspaces.
+``fixed_robot`` (a robot with fixed dimensions), ``claims``, ``posed_layout`` (a case as expressions of the pose) and
+``tolerance`` (robots within the joint-centre tolerance) for workspaces.
 """

@@ -1,4 +1,4 @@
-"""Claims about a workspace: ranks, limits of a case, lengths of legs, F of each task, measures of the robot."""
+"""Claims about a workspace: ranks, limits of a case, leg lengths, F of each task, measures of the robot."""
 
 from __future__ import annotations
 
@@ -26,24 +26,24 @@ from ...case.workspace import TurnKind, Turns, Workspace
 from ...errors import InputError, nearest
 from ...program.layout import Layout
 
-#: Names of the claims that J, and that the constraint wrenches alone, have full rank.
+#: Names of the claims that J has full rank, and that the constraint wrenches have full rank.
 REGULAR, CONSTRAINTS = "regular", "constraints regular"
 #: Key of the claims that limbs reach every pose.
 REACH = "reach"
-#: First part of the keys of ranges that a case states for dependent coordinates of the pose.
+#: First part of the keys of a case's ranges for dependent coordinates of the pose.
 WORKSPACE = "workspace"
-#: Ends of a range by sense.
+#: Ends of a range, by sense.
 _ENDS = {Sense.MIN: "lower", Sense.MAX: "upper"}
-#: Names of the measures that are no quantities of a robot.
+#: Names of the measures of J, which are not quantities of a robot file.
 SPECTRAL = (SmallestSingularValue.key, ConditionNumber.key)
-#: Names of the measures that are coordinates of actuators.
+#: Names of the measures that are actuator coordinates.
 ACTUATED = ("actuator_length", "actuator_angle")
-#: Keys of limits whose expressions are not searched as they are, because another search has better bounds.
+#: Keys of limits that are not bounded as expressions, because special searches have better bounds.
 _OWN_SEARCHES = (LegClearance.key, *SPECTRAL, ActuatorForce.key, ActuatorSpeed.key, ActuatorPower.key)
 
 
 class ClaimKind(enum.Enum):
-    """What a claim is about, which decides its rule."""
+    """Subject of a claim, which selects the rule for its proof."""
 
     RANK = "rank of J, or of the constraint wrenches"
     EXPRESSION = "expression of the pose"
@@ -56,22 +56,24 @@ class ClaimKind(enum.Enum):
 
 @dataclass(frozen=True, eq=False)
 class Claim:
-    """A number whose smallest or largest value over the workspace is to be proved.
+    """Claim about the smallest or the largest value of a quantity over the workspace.
 
     Attributes:
-        name: in the words of a case.
-        sense: whether the smallest or the largest value is meant.
-        expression: (1, 1) in the symbols of the layout, of this kind; it grows with the number.
-        reading: how the expression, or the number of another kind, reads in results.
-        key: dotted key, below ``limits``, of the number in the case; empty where the number has no limit.
-        limit: largest or smallest value allowed of the expression; None where the number has no limit.
-        kind: what the claim is about.
-        legs: index of the leg whose length, or lengths, the number is; of the two legs of a clearance; else empty.
-        weights: of the longest and of the shortest length of this leg, where they are combined.
-        length: by which moments are divided in a spectrum, length.
-        motor: the actuator and its number, of claims about motors.
-        uncovered: reason for a claim about the exact machine where others are meant; else empty.
-        is_coordinate: whether the number is a dependent coordinate of the pose, which is often 0.
+        name: name of the quantity, in the terms of case files.
+        sense: ``MIN`` for the smallest value, ``MAX`` for the largest.
+        expression: (1, 1) expression in the symbols of the layout that grows with the quantity; only for claims of the
+            kind ``EXPRESSION``.
+        reading: conversion of the expression's value to the quantity in results.
+        key: dotted key of the limit below ``limits`` in the case; empty without a limit.
+        limit: largest or smallest allowed value of the expression; None without a limit.
+        kind: subject of the claim.
+        legs: index of the leg of a length or a stroke; indices of the two legs of a clearance; else empty.
+        weights: factors of the longest and of the shortest length of the leg, if they are combined.
+        length: length that divides moments in a singular value or condition number.
+        motor: actuator and its quantity, for a claim about an actuator.
+        uncovered: reason for a claim that covers only the design instead of all robots within the tolerance; else
+            empty.
+        is_coordinate: whether the quantity is a dependent coordinate of the pose, which is often 0.
     """
 
     name: str
@@ -90,21 +92,21 @@ class Claim:
 
     @property
     def label(self) -> tuple[str, str]:
-        """Name and sense, which tell claims apart; a rank has no sense."""
+        """Name and sense, which identify a claim; the sense of a rank is empty."""
         return self.name, "" if self.kind is ClaimKind.RANK else self.sense.value
 
 
-#: Claims that J, and that the constraint wrenches alone, have full rank, by name.
+#: Claims that J, and that the constraint wrenches, have full rank, by name.
 RANKS = {name: Claim(name, Sense.MIN, kind=ClaimKind.RANK) for name in (REGULAR, CONSTRAINTS)}
-#: Errors of the platform's position and rotation, for machines within their tolerances.
+#: Errors of the platform's position and rotation, for robots within their tolerances.
 ERRORS = (
     Claim("position error", Sense.MAX, reading=LENGTH, kind=ClaimKind.ERROR),
     Claim("rotation error", Sense.MAX, reading=Reading(Dimension.ANGLE), kind=ClaimKind.ERROR),
 )
 
 
-def one_machine_name(claim: str) -> str:
-    """Return the name of the lengths from which a claim about one machine at two poses follows."""
+def one_robot_name(claim: str) -> str:
+    """Return the name of the lemmas for a claim about the same robot at two poses."""
     return f"{claim}, lengths of one machine"
 
 
@@ -112,8 +114,8 @@ def dependent_claims(robot: RobotInstance, workspace: Workspace) -> Iterator[Cla
     """Yield the smallest and the largest value of each dependent coordinate of the pose, with its stated range.
 
     Args:
-        robot: at one pose of the workspace.
-        workspace: with its dependent coordinates.
+        robot: robot at one pose of the workspace.
+        workspace: box of poses, with the dependent coordinates.
     """
     turns = workspace.turns
     stated = [*workspace.position, *turns.angles]
@@ -128,7 +130,7 @@ def dependent_claims(robot: RobotInstance, workspace: Workspace) -> Iterator[Cla
 
 
 def _turn(R: SX, turns: Turns, k: int) -> tuple[SX, Reading]:
-    """Return a coordinate of a rotation (3, 3), and how it reads."""
+    """Return coordinate k of a rotation (3, 3), and its conversion for results."""
     if turns.kind is TurnKind.ROLL_PITCH_YAW:
         angles = ca.atan2(R[2, 1], R[2, 2]), ca.asin(-R[2, 0]), ca.atan2(R[1, 0], R[0, 0])
         return angles[k], Reading(Dimension.ANGLE)
@@ -153,10 +155,10 @@ def length_claims(case: Case) -> Iterator[Claim]:
 
 
 def searched_claims(case: Case, quantities: Sequence[str] = ()) -> Iterator[Claim]:
-    """Yield the claims about clearances of legs and about spectra, first those of the case's limits.
+    """Yield the claims about leg clearances, singular values and condition numbers; limits of the case come first.
 
-    The smallest singular value, or the largest condition number, is yielded where it is among the quantities and the
-    case does not limit it; moments about the platform's origin are then divided by the characteristic length.
+    The smallest singular value, or the condition number, is also yielded if it is among the quantities; moments about
+    the platform's origin are then divided by the characteristic length.
     """
     limited = dict[str, float]()
     for limit in case.limits:
@@ -175,7 +177,7 @@ def searched_claims(case: Case, quantities: Sequence[str] = ()) -> Iterator[Clai
     for measure in dict.fromkeys(quantities):
         if measure in SPECTRAL and limited.get(measure) != length:
             asked = _spectrum(measure, length)
-            # A limit on it divides moments by a length of its own, and has the shorter name.
+            # A limit may divide moments by another length, and its claim has the shorter name.
             yield replace(asked, name=f"{measure} with the characteristic length") if measure in limited else asked
 
 
@@ -189,15 +191,15 @@ def claims_of(layout: Layout, quantities: Sequence[str] = (), *, with_objective:
     """Return the claims about a case over its workspace.
 
     Args:
-        layout: the case as symbols of the pose.
-        quantities: names of measures of the robot that are asked for beside the case's limits.
-        with_objective: whether F of each task is one of the numbers.
+        layout: the case as expressions of the pose.
+        quantities: names of requested measures of the robot, in addition to the case's limits.
+        with_objective: If true, include F of each task.
 
     Raises:
-        InputError: the robot has no measure of a name.
+        InputError: the robot has no measure of a given name.
     """
     found = [*_of_limits(layout), *_of_legs(layout, quantities)]
-    # A measure with its limit is claimed once.
+    # A measure with a limit has one claim.
     named = {(each.name, each.sense) for each in found}
     found += [each for each in _of_quantities(layout, quantities) if (each.name, each.sense) not in named]
     return [*found, *_of_tasks(layout)] if with_objective else found
@@ -205,7 +207,7 @@ def claims_of(layout: Layout, quantities: Sequence[str] = (), *, with_objective:
 
 def _of_limits(layout: Layout) -> Iterator[Claim]:
     """Yield a claim for each side of each limit at a pose."""
-    # At one pose the limit on a leg's dead length says less than over all poses.
+    # The limit on a leg's dead length is stronger over all poses than at one pose.
     own = (*_OWN_SEARCHES, "leg_length", f"{Actuator.key}.") if layout.robots[0].legs else _OWN_SEARCHES
     for item in (*layout.constraints, *layout.constant_limits):
         constraint = item.constraint
@@ -217,9 +219,9 @@ def _of_limits(layout: Layout) -> Iterator[Claim]:
 
 
 def _of_legs(layout: Layout, names: Sequence[str]) -> Iterator[Claim]:
-    """Yield the smallest and the largest length of each leg, with their limits: the lengths that its actuator needs."""
+    """Yield the smallest and the largest length of each leg, with their limits: the stroke that its actuator needs."""
     limit = next((each for each in layout.case.limits if isinstance(each, LegLength)), None)
-    # A robot given joint by joint has measures of its own beside them.
+    # A robot given joint by joint also has measures of its robot file.
     is_asked = LegLength.key in names or any(isinstance(each, LegLength | Actuator) for each in layout.case.limits)
     for i, leg in enumerate(layout.robots[0].legs if is_asked or not layout.case.model.structure else ()):
         for sense in (Sense.MIN, Sense.MAX):
@@ -230,14 +232,14 @@ def _of_legs(layout: Layout, names: Sequence[str]) -> Iterator[Claim]:
 
 
 def _of_quantities(layout: Layout, names: Sequence[str]) -> Iterator[Claim]:
-    """Yield the smallest and the largest value of measures of the robot, at each of their owners."""
+    """Yield the smallest and the largest value of measures of the robot, for each limb or joint that has them."""
     known = {quantity.name: k for k, quantity in enumerate(layout.case.model.quantities)}
-    # Loads and motions ask for the ranges of the actuators too.
+    # Loads and motions also request the ranges of the actuators.
     loading = layout.case.loading
     own = [name for name in ACTUATED if name in known] if loading.loads or loading.motion else []
     for name in dict.fromkeys((*names, *own)):
         if name == LegLength.key and layout.robots[0].legs:
-            continue  # among the claims already
+            continue  # already among the claims
         if name not in known:
             raise InputError(f"--quantity {name}: no measure of this robot; {nearest(name, known)}")
         quantity, values = layout.case.model.quantities[known[name]], layout.robots[0].quantities[known[name]]
@@ -250,7 +252,7 @@ def _of_tasks(layout: Layout) -> Iterator[Claim]:
     """Yield the smallest and the largest F of each task."""
     for j, task in enumerate(layout.case.tasks):
         if task.measure:
-            continue  # F of its motion is not what the case is about
+            continue  # a motion is not an objective of the case
         name = "F" if len(layout.case.tasks) == 1 else f"F of {task.name}"
         for sense in (Sense.MIN, Sense.MAX):
             yield Claim(name, sense, layout.robots[0].F[j], NOT_NEGATIVE)

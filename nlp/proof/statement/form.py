@@ -1,11 +1,11 @@
-"""A program in standard form: functions, the least of which is maximised over a box, and conditions.
+"""Nonlinear program in standard form: the smallest of some functions is maximised over a box under conditions.
 
-A form may lack variables of the program that follow from the others; its lift returns them.
+A form may lack variables of the program that follow from others; its lift returns them.
 
-CasADi writes the derivative of ``fmax(a, b)`` by a as ``(b <= a) / ((a <= b) + (b <= a))``, which is 1, 0, or a half
-where both are equal. Enclosed term by term, the divisor may be 0. Here the sum of the two comparisons is written as 1.
-The derivative is then 1 where both are equal, and as it was elsewhere. Bounds use integrals of derivatives along lines,
-and any number from 0 to 1 is a generalised derivative there. Values that jump have no such derivative.
+CasADi writes the derivative of ``fmax(a, b)`` by a as ``(b <= a) / ((a <= b) + (b <= a))``, which is 1, 0, or 1/2 where
+both are equal. An enclosure of the divisor may contain 0. So the sum of the two comparisons is written as 1 here. The
+derivative is then 1 where both are equal, and unchanged elsewhere. Bounds use integrals of derivatives along lines, and
+any value from 0 to 1 is a generalised derivative there. Expressions with jumps have no such derivative.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from .signs import is_nowhere_positive
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Difference of a variable from what replaces it, in radians and in parts of a slide's range, above which the point is
-#: another solution of the loops. Where the two solutions meet, a point that keeps the loops to 1e-9 is so far off one.
+#: Difference of a variable from its closed form, in radians or parts of a slide's range, above which the point is
+#: another solution of the loops. Near a double solution, loops closed to 1e-9 allow differences of this size.
 _SAME = 1e-4
-#: Operations whose value jumps. Their derivative is written as 0, so that its integral along a line is not the change.
+#: Operations with jumps. Their derivative is written as 0, so its integral along a line is not the change.
 _JUMPS = {ca.OP_LE: "the comparison 'le'", ca.OP_SIGN: "the operation 'sign'"}
 
 
@@ -41,9 +41,9 @@ class Kind(enum.Enum):
     """Origin of a condition."""
 
     LIMIT = "a constraint of the program"
-    LOOP = "an equation of a robot's loops, or a number that it bounds"
-    ASSEMBLY = "a sign or reach of a robot's assembly, which is no constraint of the program"
-    FOLLOWS = "follows from another one: it excludes boxes, and has no multiplier of its own"
+    LOOP = "a loop equation of the robot, or a bound that follows from it"
+    ASSEMBLY = "a sign or reach of the assembly mode, which is not a constraint of the program"
+    FOLLOWS = "a redundant condition that follows from others: it excludes boxes, and has no multiplier"
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,10 +51,10 @@ class Condition:
     """A condition ``expression <= 0``, or ``expression = 0``.
 
     Attributes:
-        name: in the words of a case.
-        expression: (1, 1).
-        is_equation: whether it must be 0.
-        kind: its origin.
+        name: name of the condition, in the terms of case files.
+        expression: (1, 1) expression.
+        is_equation: whether the expression must be 0; else at most 0.
+        kind: origin of the condition.
     """
 
     name: str
@@ -64,20 +64,20 @@ class Condition:
 
     @property
     def is_of_joints(self) -> bool:
-        """Whether it states how joints hold together."""
+        """Whether it is a condition on closed loops or on the assembly mode."""
         return self.kind in (Kind.LOOP, Kind.ASSEMBLY)
 
 
 class Lift(NamedTuple):
-    """What replaces variables of a program in a form without them.
+    """Closed forms of variables of a program that a form does not have.
 
     Attributes:
-        x: (n,) symbols of all variables.
-        places: places of the variables that are replaced.
-        values: (k, 1) expressions of the form's variables that replace them.
-        is_angle: for each of them, whether whole turns make no difference.
-        ranges: (k,) half range of each, in which differences of slides are measured.
-        signs: (s, 1) expressions of all variables that are at most 0 where the joints hold together.
+        x: (n,) symbols of all variables of the program.
+        places: indices of the replaced variables.
+        values: (k, 1) closed forms of the replaced variables, in the form's variables.
+        is_angle: whether each replaced variable is an angle, so that full turns make no difference.
+        ranges: (k,) half range of each replaced variable; differences of slides are relative to it.
+        signs: (s, 1) expressions of all variables that are at most 0 in the assembly mode of the form.
     """
 
     x: SX
@@ -93,13 +93,13 @@ class StandardForm:
     """A maximisation over a box.
 
     Attributes:
-        nlp: the program that it states, whose epigraph variable it does not have.
-        x: (n,) symbols.
+        nlp: the nonlinear program; the form does not have its epigraph variable.
+        x: (n,) symbols of the variables.
         lower, upper: (n,) ends of the box.
-        functions: ``phi_j``, the least of which is maximised.
-        conditions: ``h_k``, numbered after the functions where both are counted.
-        places: places of its variables in the program, where they are not the first ones.
-        lift: what replaces variables of the program that this form does not have; None where it has them all.
+        functions: functions ``phi_j``; the smallest is maximised.
+        conditions: conditions ``h_k``; in a common numbering they follow the functions.
+        places: indices of the form's variables in the program; None if they are the first ones.
+        lift: closed forms of variables of the program that this form does not have; None if it has them all.
     """
 
     nlp: Nlp
@@ -118,33 +118,33 @@ class StandardForm:
 
     @property
     def sign(self) -> float:
-        """Factor from the program's objective to the value that is maximised: -1 for a minimum."""
+        """Factor from the program's objective to the maximised value: -1 for a minimum."""
         return -self.nlp.sign
 
     @property
     def power(self) -> int:
-        """Power of the program's objective to which the values that are maximised are proportional."""
+        """Power of the program's objective to which the maximised value is proportional."""
         return power_of(self.nlp)
 
     @property
     def size(self) -> float:
-        """Size of these values."""
+        """Typical size of the maximised value."""
         return float(self.nlp.objective_size**self.power)
 
     def objective_of(self, value: float) -> float:
-        """Return the program's objective of a value that is maximised, no larger than it is where that is a square."""
-        found = self.sign * value + 0.0  # no minus zero
+        """Return the program's objective for a maximised value; a square root is rounded down."""
+        found = self.sign * value + 0.0  # no negative zero
         if self.power == 1 or not math.isfinite(found):
             return found
         return math.nextafter(math.sqrt(max(found, 0.0)), 0.0)
 
     def value_of(self, objective: float) -> float:
-        """Return the value that is maximised of the program's objective."""
+        """Return the maximised value for the program's objective."""
         return self.sign * objective**self.power
 
     @cached_property
     def ceiling(self) -> float:
-        """A bound of the value that is maximised without a search: 0 for minus a sum of squares, else infinite."""
+        """Bound of the maximised value without a search: 0 for a negative sum of squares, else infinite."""
         return 0.0 if any(is_nowhere_positive(each, self.x) for each in self.functions) else math.inf
 
     @property
@@ -159,34 +159,34 @@ class StandardForm:
 
     @property
     def follows(self) -> tuple[bool, ...]:
-        """Whether each of the R expressions is a condition that follows from others."""
+        """Whether each of the R expressions is a redundant condition that follows from others."""
         return (*(False for _ in self.functions), *(each.kind is Kind.FOLLOWS for each in self.conditions))
 
     @cached_property
     def expressions(self) -> SX:
-        """(R, 1) functions, then conditions."""
+        """The R expressions (R, 1): functions, then conditions."""
         return ca.densify(ca.vertcat(*self.functions, *[condition.expression for condition in self.conditions]))
 
     @cached_property
     def jacobian(self) -> SX:
-        """(R, n) derivatives, dense: structural zeros are written out."""
+        """Derivatives (R, n), dense: structural zeros are written out."""
         return ca.densify(without_ties(ca.jacobian(self.expressions, self.x), self.x))
 
     @cached_property
     def dependence(self) -> NDArray[np.bool_]:
-        """(R, n) whether an expression depends on a variable."""
+        """Whether each expression depends on each variable, (R, n)."""
         return dependence_of(self.expressions, self.x)
 
     def value_at(self, x: FloatArray) -> float:
-        """Return the value that is maximised at a point (n,), as computed in doubles."""
+        """Return the maximised value at a point (n,), in double precision."""
         return float(np.min(self._functions_at(x)))
 
     def point_of(self, x: FloatArray) -> FloatArray:
-        """Return the form's variables (n,) of those of the program (m,)."""
+        """Return the form's variables (n,) at a point (m,) of the program."""
         return np.asarray(x, dtype=np.float64)[self._index]
 
     def program_variables(self, point: FloatArray) -> FloatArray:
-        """Return the program's variables (m,), an epigraph variable left out, at a point (n,) of the form."""
+        """Return the program's variables (m,), without an epigraph variable, at a point (n,) of the form."""
         if self.lift is None:
             return np.array(point, dtype=np.float64)
         x = np.zeros(self.lift.x.numel())
@@ -194,7 +194,7 @@ class StandardForm:
         return x
 
     def keeps_signs(self, x: FloatArray) -> bool:
-        """Return whether a point (m,) of the program is one of the form's assembly, as computed in doubles."""
+        """Return whether a point (m,) of the program is in the form's assembly mode, in double precision."""
         lift = self.lift
         if lift is not None:
             index = list(lift.places)
@@ -206,7 +206,7 @@ class StandardForm:
 
     @property
     def _index(self) -> list[int]:
-        """Places of the variables in the program."""
+        """Indices of the variables in the program."""
         return list(range(self.n) if self.places is None else self.places)
 
     @cached_property
@@ -225,13 +225,13 @@ class StandardForm:
 
 
 def power_of(nlp: Nlp) -> int:
-    """Return the power of a program's objective to which the values of its standard form are proportional."""
+    """Return the power of a program's objective to which the maximised value of its standard form is proportional."""
     epigraph = nlp.program.places.epigraph
     return 1 if epigraph is None else epigraph.power
 
 
 def dependence_of(expressions: SX, x: SX) -> NDArray[np.bool_]:
-    """Return whether each of some expressions (R, 1) depends on each variable, (R, n)."""
+    """Return whether each expression (R, 1) depends on each variable, (R, n)."""
     return np.asarray(ca.DM(ca.jacobian_sparsity(expressions, x), 1).full() > 0)
 
 
@@ -242,10 +242,10 @@ def _kernel(x: SX, expressions: Sequence[SX]) -> Kernel[FloatArray]:
 
 
 def refuse_jumps(expressions: SX, x: SX) -> None:
-    """Refuse expressions of x (n, 1) whose values jump. Derivatives of theirs may: those of continuous values do.
+    """Check that expressions of x (n, 1) have no jumps. Jumps in derivatives are allowed.
 
     Raises:
-        UncoveredError: there is such an expression.
+        UncoveredError: an expression has a jump.
     """
     function = ca.Function("values", [x], [expressions])
     for k in range(function.n_instructions()):
@@ -260,9 +260,9 @@ def without_ties(expressions: SX, x: SX) -> SX:
     if not any(function.instruction_id(k) == ca.OP_LE for k in range(count)):
         return expressions
     work: list[SX] = [SX(0)] * function.sz_w()
-    # Operands of the comparison that a value is, by their hashes.
+    # Operands of comparisons, by the hashes of the nodes.
     compared: dict[int, tuple[int, int]] = {}
-    # A hash is the address of a node, which another node may get once nothing holds the first one.
+    # A hash is the address of a node; the nodes are kept alive, so that no other node gets the same address.
     held: list[SX] = []
     results = [SX(0)] * expressions.nnz()
     for k in range(count):

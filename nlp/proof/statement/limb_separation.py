@@ -1,9 +1,9 @@
-"""Separation of a form into limbs, read off its expressions: parts of a sum with variables of their own.
+"""Separation of a form into limbs, from its expressions: terms of a sum that share only some variables.
 
     phi(x) = phi_0(s) + sum_k phi_k(s, o_k),   conditions on (s) or on (s, o_k)
 
-``s`` are shared variables and ``o_k`` those of part k alone. For a design with free joint coordinates the parts are the
-limbs, and the pose is shared; for several poses with free numbers of their own the parts are the poses, and the
+``s`` are shared variables and ``o_k`` are variables of part k only. For a design with free joint coordinates the parts
+are the limbs, and the pose is shared; for several poses with free coordinates the parts are the poses, and the
 dimensions are shared. A part is called a limb in both cases.
 """
 
@@ -20,7 +20,7 @@ from casadi import SX
 from ....models import frozen_array
 from .form import StandardForm, dependence_of
 
-#: Largest number of terms of a sum that are told apart; a longer one counts as one term.
+#: Largest number of terms of a sum that are separated; a longer sum counts as one term.
 _MOST_TERMS = 4096
 
 
@@ -29,8 +29,8 @@ class Limb:
     """A part of a separated form.
 
     Attributes:
-        own: places of its own variables in the whole form.
-        form: the part as a form in its own right, over the shared variables and then its own ones.
+        own: indices, in the whole form, of the variables that only this limb has.
+        form: form of the limb; its variables are the shared ones, then its own.
     """
 
     own: tuple[int, ...]
@@ -42,10 +42,10 @@ class Separation:
     """A form as shared variables and limbs.
 
     Attributes:
-        shared: places of the shared variables in the whole form.
-        common: the part with shared variables alone, as a form over them; None without shared variables.
-        constant: the value of the terms without a variable.
-        limbs: at least two.
+        shared: indices of the shared variables in the whole form.
+        common: form of the terms and conditions with only shared variables; None without shared variables.
+        constant: sum of the constant terms.
+        limbs: limbs, at least two.
     """
 
     shared: tuple[int, ...]
@@ -55,7 +55,7 @@ class Separation:
 
 
 def separate(form: StandardForm) -> Separation | None:
-    """Return the separation of a form; None where it has several functions, or no parts smaller than itself."""
+    """Return the separation of a form; None if it has several functions, or no parts smaller than the whole form."""
     if len(form.functions) != 1:
         return None
     terms = terms_of(form.functions[0])
@@ -93,10 +93,10 @@ def _part(form: StandardForm, terms: Sequence[SX], places: Sequence[int], chosen
 
 
 def _smallest_groups(n: int, links: Sequence[frozenset[int]], terms: int) -> list[frozenset[int]]:
-    """Return the own variables of each limb of the separation whose largest part is smallest.
+    """Return the own variables of each limb, for the separation with the smallest largest part.
 
-    A variable of at most so many terms is own, for every such number; own variables of one term or one condition belong
-    to one limb. None are returned where no separation has parts that are smaller than the whole.
+    For each number N, variables of at most N terms are candidates for own variables; candidates in a common term or
+    condition belong to one limb. The list is empty if no separation has parts smaller than the whole.
 
     Args:
         n: number of variables.
@@ -115,7 +115,7 @@ def _smallest_groups(n: int, links: Sequence[frozenset[int]], terms: int) -> lis
 
 
 def _connected(own: frozenset[int], links: Sequence[frozenset[int]]) -> list[frozenset[int]]:
-    """Return the sets of own variables that no link connects with each other."""
+    """Return the connected sets of own variables, by their links."""
     groups = [frozenset((i,)) for i in own]
     for link in links:
         touched = [group for group in groups if group & link]
@@ -125,7 +125,7 @@ def _connected(own: frozenset[int], links: Sequence[frozenset[int]]) -> list[fro
 
 
 def terms_of(expression: SX) -> list[SX]:
-    """Return the terms of a sum (1, 1), constant factors multiplied in."""
+    """Return the terms of a sum (1, 1), with constant factors multiplied in."""
     return [each if factor == 1 else factor * each for each, factor in factored_terms(expression)]
 
 

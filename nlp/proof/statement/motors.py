@@ -1,4 +1,4 @@
-"""Claims about the actuators of a robot over a workspace: their forces under each load, their speeds and powers."""
+"""Claims about the actuators of a robot over a workspace: forces under each load, speeds and powers."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ from ...case.forces import dimension_of_force, dimension_of_speed
 from ...case.limits.constraint import Reading
 from ...case.limits.forces import ActuatorForce, ActuatorLimit, ActuatorPower, ActuatorSpeed
 from ...case.loads import Motion
-from ...case.motors import Motor, MotorNumber
+from ...case.motors import ActuatorQuantity, Motor
 from ...case.task import Sense
 from ...program.layout import Layout
 from .claims import ACTUATED, Claim, ClaimKind
 
 
 def motor_claims(case: Case) -> Iterator[Claim]:
-    """Yield the claims about a case's actuators, with its limits: those of an actuator and a load after each other.
+    """Yield the claims about a case's actuators with their limits, grouped by actuator and load.
 
-    Names are those of the limits' constraints at a pose. Of a limit on all actuators and one on a single actuator the
-    tighter counts.
+    Names are the same as for constraints at a pose. If one limit concerns all actuators and another one a single
+    actuator, the tighter one counts.
     """
     yield from _tightest(_claims(case))
 
 
 def in_motion(case: Case) -> Case:
-    """Return a case that states a motion, for limits on speeds and powers of a path, whose own motion is meant."""
+    """Return a case with a motion, for limits on speeds and powers along a path, which defines the actual motion."""
     return replace(case, loading=case.loading._replace(motion=case.loading.motion or Motion(1.0)))
 
 
 def actuator_coordinates(layout: Layout) -> dict[str, SX]:
-    """Return the known coordinates (1, 1) of actuators by their names: lengths of legs, or positions from home."""
+    """Return the known actuator coordinates (1, 1) by name: leg lengths, or displacements from home."""
     model, robot = layout.case.model, layout.robots[0]
     found = {} if model.actuators else {leg.name: ca.norm_2(leg.span) for leg in robot.legs}
     for quantity, values in zip(model.quantities, robot.quantities, strict=True):
@@ -47,18 +47,18 @@ def actuator_coordinates(layout: Layout) -> dict[str, SX]:
 
 
 def in_path_motion(case: Case) -> Case:
-    """Return a case whose actuators have powers in the motion of a path, where forces are known."""
+    """Return a case with actuator powers in the motion of a path, if forces are known."""
     return case if statics_hindrance(case.model) else in_motion(case)
 
 
 def speed_claims(case: Case) -> Iterator[Claim]:
-    """Yield the claims about the speed of each actuator of a case, with its limits; their motion is another's."""
+    """Yield the claims about the speed of each actuator of a case, with its limits; a path defines the motion."""
     for k, joint in enumerate(driven_joints(case.model)):
         yield from _tightest(_speeds(case, k, joint))
 
 
 def _tightest(claims: Iterable[Claim]) -> Iterator[Claim]:
-    """Yield claims, of several with the same label the one with the tightest limit."""
+    """Yield claims; among claims with the same label only the one with the tightest limit."""
     found: dict[tuple[str, str], Claim] = {}
     for each in claims:
         known = found.setdefault(each.label, each)
@@ -68,7 +68,7 @@ def _tightest(claims: Iterable[Claim]) -> Iterator[Claim]:
 
 
 def _claims(case: Case) -> Iterator[Claim]:
-    """Yield the claims for each limit on an actuator, and those of numbers without any."""
+    """Yield the claims for each limit on an actuator, and for quantities without a limit."""
     loading = case.loading
     for k, joint in enumerate(driven_joints(case.model) if loading.loads or loading.motion else ()):
         kinds = ActuatorForce, ActuatorPower
@@ -76,28 +76,28 @@ def _claims(case: Case) -> Iterator[Claim]:
         reading = Reading(dimension_of_force(joint))
         yield from _speeds(case, k, joint) if loading.motion is not None else ()
         for load in loading.cases:
-            motor = Motor(MotorNumber.FORCE, k, joint.name, load.name)
+            motor = Motor(ActuatorQuantity.FORCE, k, joint.name, load.name)
             for limit in forces:
                 low, high = (limit.min, limit.max) if isinstance(limit, ActuatorForce) else (None, None)
-                if low is None and high is not None:  # a largest force alone is one in both senses
+                if low is None and high is not None:  # a largest force without a smallest one limits both directions
                     yield _claim(motor, " backwards", Sense.MIN, reading, limit, "max", -high)
                 else:
                     yield _claim(motor, " smallest", Sense.MIN, reading, limit, "min", low)
                 yield _claim(motor, "", Sense.MAX, reading, limit)
             for limit, part in itertools.product(powers if loading.motion is not None else (), ("", " backwards")):
-                power = Motor(MotorNumber.POWER, k, joint.name, load.name, is_backwards=bool(part))
+                power = Motor(ActuatorQuantity.POWER, k, joint.name, load.name, is_backwards=bool(part))
                 yield _claim(power, part, Sense.MAX, Reading(Dimension.POWER), limit)
 
 
 def _speeds(case: Case, k: int, joint: DrivenJoint) -> Iterator[Claim]:
-    """Yield the claim about the speed of an actuator for each limit on it, or without one."""
+    """Yield the claim about the speed of an actuator for each of its limits, or without a limit."""
     for limit in _limits(case, ActuatorSpeed, joint.name):
-        motor = Motor(MotorNumber.SPEED, k, joint.name)
+        motor = Motor(ActuatorQuantity.SPEED, k, joint.name)
         yield _claim(motor, "", Sense.MAX, Reading(dimension_of_speed(joint)), limit)
 
 
 def _limits(case: Case, kind: type[ActuatorLimit], actuator: str) -> list[ActuatorLimit | None]:
-    """Return the limits of a kind on an actuator, that for all and one of its own; None for a number without any."""
+    """Return the limits of a kind on an actuator: for all actuators and for this one; None stands for no limit."""
     found: list[ActuatorLimit | None] = []
     found += [each for each in case.limits if isinstance(each, kind) and each.actuator in ("", actuator)]
     return found or [None]
@@ -112,7 +112,7 @@ def _claim(
     end: str = "max",
     value: float | None = None,
 ) -> Claim:
-    """Return the claim about a number of an actuator; its limit is the largest one, if no value is given."""
+    """Return the claim about a quantity of an actuator; without a value its limit is the end of the limit."""
     if end == "max" and value is None:
         value = getattr(limit, "max", None)
     key = "" if limit is None or value is None else f"{limit.name}.{end}"

@@ -1,6 +1,6 @@
-"""A case over its workspace as expressions of the pose, and the program of one expression over it.
+"""A case over its workspace as expressions of the pose, and the nonlinear program of one expression.
 
-Some unknowns of a robot follow in closed form: then its limbs must reach every pose, and the case lacks these unknowns.
+Closed forms replace some unknowns of a robot; they require that its limbs reach every pose.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ....models.rotation import turn_about
 from ...case.case import Case
 from ...case.limits.constraint import Reading
 from ...case.limits.limits import Limits
-from ...case.pose import HERE, Pose, Rotation, Value
+from ...case.pose import NO_DISPLACEMENT, Pose, Rotation, Value
 from ...case.task import Sense
 from ...case.workspace import TurnKind, Workspace
 from ...program.layout import Layout, StatedPoseSymbols, assemble, lay_out
@@ -27,20 +27,20 @@ from ...program.places import SymbolTable
 from ...program.sampling import starting_points
 from .claims import REACH, Claim
 
-#: Number of points from which the size of an expression is taken.
+#: Number of points at which the size of an expression is sampled.
 _POINTS = 33
-#: Poses at which an equation is tested, and its largest residual, of order 1, where it holds by itself.
+#: Number of poses at which an equation is tested, and its largest residual, of order 1, if it holds at every pose.
 _TESTS, _IDENTITY = 32, 1e-11
 _SEED = 0
 
 
 def at_one_pose(case: Case, position: Sequence[Value], rotation: Rotation) -> Case:
-    """Return the exact machine of a case at one pose, without a workspace."""
+    """Return the case of the design at one pose, without a workspace."""
     return replace(
         case,
         position=position,
         rotation=rotation,
-        displacements=(HERE,),
+        displacements=(NO_DISPLACEMENT,),
         further=(),
         worst_everywhere=False,
         workspace=None,
@@ -49,7 +49,7 @@ def at_one_pose(case: Case, position: Sequence[Value], rotation: Rotation) -> Ca
 
 
 def posed_layout(case: Case, workspace: Workspace) -> Layout:
-    """Return a case with fixed dimensions, whose own poses are not used, as symbols of one pose of a workspace."""
+    """Return a case with fixed dimensions as expressions of one pose of a workspace; its stated poses are not used."""
     turns = workspace.turns
     if turns.kind is not TurnKind.ROLL_PITCH_YAW:
         axis = turns.axis if turns.kind is TurnKind.AXIS else None
@@ -65,7 +65,9 @@ def posed_layout(case: Case, workspace: Workspace) -> Layout:
         ]
         about = [turn_about(k, ca.cos(angle), ca.sin(angle)) for k, angle in enumerate(angles)]
         turned = about[2] @ about[1] @ about[0]
-        return StatedPoseSymbols(turned, position.symbols, position.places, position.symbols, None, [], (HERE,))
+        return StatedPoseSymbols(
+            turned, position.symbols, position.places, position.symbols, None, [], (NO_DISPLACEMENT,)
+        )
 
     return lay_out(one, one.tasks, add_turns)
 
@@ -74,9 +76,9 @@ def extreme_program(layout: Layout, expression: SX, sense: Sense) -> Nlp:
     """Return the program that maximises or minimises an expression over the poses, without the case's limits.
 
     Args:
-        layout: from :func:`posed_layout`.
-        expression: (1, 1) in its symbols.
-        sense: whether the largest or the smallest value is sought.
+        layout: layout from :func:`posed_layout`.
+        expression: (1, 1) expression in the symbols of the layout.
+        sense: ``MAX`` for the largest value, ``MIN`` for the smallest.
     """
     bare = tuple(item for item in layout.constraints if not any(item.constraint.keys))
     program = assemble(replace(layout, constraints=bare, constant_limits=(), families=()), expression, sense)
@@ -92,10 +94,9 @@ def varies(layout: Layout, expressions: Sequence[SX]) -> list[bool]:
 
 
 def reach_claims(case: Case, closed: ClosedForm, workspace: Workspace) -> tuple[Layout, tuple[Claim, ...]]:
-    """Return the claims that limbs reach every pose, one for each unknown in closed form, and the case they are about.
+    """Return the claims that limbs reach every pose, one for each closed form, and the case as expressions of the pose.
 
-    The case is one of symbols of the pose, without loops, signs and limits: where a limb does not reach, its loop has
-    no value.
+    The case has no loops, signs and limits: out of reach, a closed form has no value.
     """
     layout = _bare_layout(case, closed.model, workspace)
     return layout, reach_claims_on(layout, closed.reaches)
@@ -111,11 +112,11 @@ def reach_claims_on(layout: Layout, reaches: Sequence[Reach]) -> tuple[Claim, ..
 
 
 def closed_layout(case: Case, closed: ClosedForm, workspace: Workspace) -> Layout:
-    """Return a case as symbols of the pose, with unknowns in closed form: all of its limbs reach every pose.
+    """Return a case as expressions of the pose, with closed forms in place of unknowns; limbs must reach every pose.
 
-    Loop equations that hold at every pose by themselves are left out; with unknowns all are kept. A Delta that is held
-    without rotation is such a robot: the second rod of a limb closes with the first. A bound for a robot without an
-    equation holds for the robot with it, too: it is one over more poses.
+    If no unknown remains, loop equations that hold at every pose are left out. A Delta robot without rotation is an
+    example: the second rod of a limb closes with the first. A bound without an equation is also valid with it, because
+    it covers more poses.
     """
     model = closed.model
     if not model.unknowns and model.closure:
@@ -124,7 +125,7 @@ def closed_layout(case: Case, closed: ClosedForm, workspace: Workspace) -> Layou
         scaled = _on(layout, [ca.vertcat(*[each.scaled for each in model.closure])])
         function = ca.Function("closure", [nlp.program.x, nlp.program.p], [ca.densify(each) for each in scaled])
         found = [function(x, nlp.arguments).full().ravel() for x in starting_points(nlp, _TESTS, _SEED)]
-        # A limb that does not reach a pose has no value there.
+        # Out of reach, the closed form of a limb is NaN.
         holds = np.nanmax(np.abs(found), axis=0, initial=0.0) <= _IDENTITY
         holds &= np.isfinite(found).sum(axis=0) >= _TESTS // 2
         model = replace(model, closure=tuple(each for each, kept in zip(model.closure, ~holds, strict=True) if kept))
@@ -132,7 +133,7 @@ def closed_layout(case: Case, closed: ClosedForm, workspace: Workspace) -> Layou
 
 
 def _bare_layout(case: Case, model: Model, workspace: Workspace) -> Layout:
-    """Return a case as symbols of the pose, without conditions on it."""
+    """Return a case as expressions of the pose, without its limits."""
     return posed_layout(replace(case, model=without_loops(model), limits=Limits()), workspace)
 
 
@@ -142,7 +143,7 @@ def without_loops(model: Model) -> Model:
 
 
 def _on(layout: Layout, expressions: list[SX]) -> list[SX]:
-    """Return expressions of a model's symbols as those of a layout."""
+    """Return expressions of a model's symbols in the symbols of a layout."""
     robot, own = layout.robots[0], Substitution.identity(layout.case.model)
     unknowns = ca.vertcat(
         SX(0, 1), *[layout.table.variables_vector[k] for at_pose in layout.places.unknowns for k in at_pose]

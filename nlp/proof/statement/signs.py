@@ -1,7 +1,4 @@
-"""Signs of expressions: a sum of squares is at least 0, whatever a search of boxes proves of it.
-
-The rule follows the operations of an expression over the real numbers; nothing is evaluated.
-"""
+"""Signs of expressions by their operations: a sum of squares is at least 0, without a search of boxes."""
 
 from __future__ import annotations
 
@@ -13,7 +10,7 @@ from casadi import SX
 
 
 class _Signs(NamedTuple):
-    """Signs that a value can have beside 0."""
+    """Signs that a value can have, apart from 0."""
 
     negative: bool = True
     positive: bool = True
@@ -41,10 +38,10 @@ _RULES: Mapping[int, Callable[[_Signs, _Signs], _Signs]] = {
 
 
 def is_nowhere_positive(expression: SX, x: SX) -> bool:
-    """Return whether the operations of an expression (1, 1) of x (n, 1) leave it at most 0 wherever it has a value."""
+    """Return whether the operations of an expression (1, 1) of x (n, 1) make it at most 0 wherever it is defined."""
     function = ca.Function("signs", [x], [expression])
     work = [_Signs()] * function.sz_w()
-    found = _Signs(negative=False, positive=False)  # of an expression that is 0 by its structure
+    found = _Signs(negative=False, positive=False)  # for an expression that is structurally 0
     for k in range(function.n_instructions()):
         op, source, target = function.instruction_id(k), function.instruction_input(k), function.instruction_output(k)
         if op == ca.OP_OUTPUT:
@@ -53,7 +50,7 @@ def is_nowhere_positive(expression: SX, x: SX) -> bool:
             work[target[0]] = _Signs()
         elif op == ca.OP_CONST:
             value = function.instruction_constant(k)
-            # A constant that is no number has any sign.
+            # A NaN constant may have any sign.
             work[target[0]] = _Signs(not value >= 0, not value <= 0)
         elif op == ca.OP_MUL and source[0] == source[1]:
             work[target[0]] = _Signs(negative=False)

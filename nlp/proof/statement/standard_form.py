@@ -1,27 +1,28 @@
-"""Standard form of a program for the search of its whole box: maximise the least of some functions under conditions.
+"""Standard form of a nonlinear program for global searches: maximise the smallest of some functions under conditions.
 
     maximise  min_j phi_j(x)   over  lower <= x <= upper,   h_k(x) <= 0 or h_k(x) = 0
 
-A minimum becomes a maximum of ``-F``. The worst case of several tasks is an epigraph in the program: a variable
-``level`` with one constraint for each task. Here it is the least of the tasks' own functions again, without that
-variable. The program's arguments are put in as doubles, and a proof is about the graph with these constants.
+A minimum becomes a maximum of ``-F``. The program states the worst case of several tasks by an epigraph: a variable
+``level`` with one constraint for each task. Here it is the smallest of the tasks' functions again, without ``level``.
+The program's arguments become double constants, and a proof is about the expression graph with these constants.
 
-A limit on the smallest singular value is one on an estimate of the smallest eigenvalue of ``A = J'J`` that takes
-thousands of operations. An enclosure of it is of use on small boxes alone. The estimate is from below, so that where it
-is at least ``s^2``
+A limit on the smallest singular value is a limit on an estimate of the smallest eigenvalue of ``A = J'J`` with
+thousands of operations. Its enclosure is useful only on small boxes. The estimate is a lower bound; if it is at least
+``s^2``,
 
     M = A - s^2 I   has no negative eigenvalue.
 
-So no principal minor of M is negative. Minors are polynomials in J, whose terms cancel in forms of second order. By
-interlacing a box with two eigenvalues of M below 0, where the determinant is positive, has smaller minors that are
-negative. A limit c on the condition number has the like, with ``A_ii / c^2`` in the place of ``s^2``: the largest
-eigenvalue is at most ``c^2`` times the smallest one, and no entry ``A_ii`` is larger. The largest entry of one point is
-taken, which is the eigenvalue itself where the motion i is a principal one, as of many robots at symmetric poses.
+So no principal minor of M is negative. Minors are polynomials in J with terms that cancel in second-order forms. If two
+eigenvalues of M are negative in a box, the determinant is positive, but smaller minors are negative, by interlacing.
+A limit c on the condition number gives the same conditions with ``A_ii / c^2`` in place of ``s^2``: the largest
+eigenvalue is at most ``c^2`` times the smallest one, and every entry ``A_ii`` is at most the largest eigenvalue. i is
+the index of the largest entry at one point; the entry equals the eigenvalue if motion i is a principal motion, as for
+many robots at symmetric poses.
 
-In home's working mode an unknown that follows from dimensions and pose in closed form is an expression of the others
-(:mod:`screwsynth.models.joints.model.elimination`). The form keeps, in its place, the condition that the limb reaches
-the pose. The remaining equations are kept, such as those of the freedoms that a limb takes from the platform. Equations
-that are zero everywhere and the range of an unknown are left out, which never makes the feasible set smaller.
+In the home working mode, closed forms replace unknowns that follow from dimensions and pose
+(:mod:`screwsynth.models.joints.model.elimination`). The form has the condition that the limb reaches the pose instead.
+The remaining equations are kept, such as those for degrees of freedom that a limb removes. Equations that are zero
+everywhere and ranges of unknowns are left out, which never makes the feasible set smaller.
 """
 
 from __future__ import annotations
@@ -49,22 +50,22 @@ from .form import Condition, Kind, Lift, StandardForm
 
 __all__ = ["Condition", "Kind", "StandardForm", "is_in_home_mode", "standard_form"]
 
-#: Orders of the principal minors. Those of 4 and 5 exclude boxes twice as wide as the determinant alone; smaller ones
-#: gain nothing more, as few poses have so many small singular values.
+#: Orders of the principal minors. Minors of order 4 and 5 exclude boxes twice as wide as the determinant does; smaller
+#: minors exclude few more, as few poses have so many small singular values.
 _ORDERS: tuple[int, ...] = (4, 5, 6)
-#: Those for condition numbers, whose bound of the largest eigenvalue is no number, and part by which two of its entries
-#: are one but for rounding.
+#: Orders for condition numbers, for which the bound of the largest eigenvalue is an expression; and relative difference
+#: of two entries that counts as rounding.
 _ORDERS_OF_RATIO, _SAME = (1, 2, 3, 4), 1e-9
-#: Part of itself by which s^2 is smaller than stated: rounding of its numbers.
+#: Relative reduction of s^2, for rounding.
 _ROUNDING = 1e-9
 _SIZE = 6
-#: Points of the box at which a condition is tested, and how many of them have to be within reach.
+#: Number of points of the box at which a condition is tested, and least number of them within reach.
 _TESTS, _LEAST = 24, 4
-#: Largest value of a condition that is 0 everywhere: conditions of loops are of order 1.
+#: Largest value of a condition that counts as 0; conditions of loops are of order 1.
 _ZERO = 1e-10
-#: Smallest reach of a limb, 1 at home, at points of the box, with which an unknown is replaced by a root.
+#: Smallest reach of a limb, 1 at home, at points of the box, for which a root replaces an unknown.
 _NEAR = 0.02
-#: By how much the reach of a limb, 1 at home, may be exceeded: rounding.
+#: Violation of the reach of a limb, 1 at home, that counts as rounding.
 _BEYOND = 1e-12
 _SEED = 0
 
@@ -87,7 +88,7 @@ def standard_form(nlp: Nlp) -> StandardForm:
             kind = Kind.LOOP if each.name in loops else Kind.LIMIT
             stated += _conditions(each.name, g[k], float(nlp.g_lower[k]), float(nlp.g_upper[k]), kind)
     found = [*_of_singular_values(nlp), *_of_joints(nlp)]
-    # Numbers take the place of arguments; what then depends on no variable says nothing of a robot's joints.
+    # Arguments become constants; a condition that then depends on no variable is dropped.
     values = ca.Function("values", [program.x, program.p], [each.expression for each in found]).call([x, arguments])
     numbered = [replace(each, expression=value) for each, value in zip(found, values, strict=True)]
     stated += [each for each in numbered if not each.is_of_joints or any(ca.which_depends(each.expression, x, 1, True))]
@@ -103,22 +104,22 @@ def standard_form(nlp: Nlp) -> StandardForm:
 
 
 def is_in_home_mode(nlp: Nlp, x: FloatArray) -> bool | None:
-    """Return whether a robot is in home's working mode at a point (n,); None where it has no sign of a mode."""
+    """Return whether a robot is in the home working mode at a point (n,); None if its mode has no signs."""
     if not nlp.n or not any(each.is_mode for each in nlp.program.model.signs):
         return None
     return standard_form(replace(nlp, in_home_mode=True)).keeps_signs(x)
 
 
 def _ends_of_names(nlp: Nlp) -> list[str]:
-    """Return the end of the names of constraints of each pose."""
+    """Return the suffix of the names of each pose's constraints."""
     count = len(nlp.program.robots)
     return [f" pose {k + 1}" for k in range(count)] if count > 1 else [""] * count
 
 
 def _function_of_epigraph(expression: SX, level: SX, sign: float) -> SX:
-    """Return the function that bounds the level in a constraint ``expression >= 0``, which is linear in the level.
+    """Return the function that bounds the level in a constraint ``expression >= 0`` that is linear in the level.
 
-    Of one that is linear in the square of the level, it is the function that bounds the square.
+    If the constraint is linear in the square of the level, the function bounds the square.
     """
     without = ca.substitute(expression, level, 0)
     slope = ca.jacobian(expression, level)
@@ -139,13 +140,12 @@ def _conditions(name: str, expression: SX, low: float, high: float, kind: Kind) 
 
 
 def _of_joints(nlp: Nlp) -> Iterator[Condition]:
-    """Yield conditions of a robot's joints beside the program's constraints, in its symbols.
+    """Yield conditions on a robot's joints in addition to the program's constraints, in its symbols.
 
-    First the loop equations that the program leaves out, and distances that follow, with bounds of a closed loop. They
-    follow from those of the program near its answer, but not in the whole box: there joints that are assembled in no
-    way at all may fulfil the program's equations. Numbers in the place of arguments leave rounding error in them, so
-    that an exact equation could hold nowhere. Then the signs of the assembly: where joints do not hold together it is
-    no robot. Those of home's working mode count where the program says so.
+    First come loop equations that the program leaves out, and distances that follow from them, with a tolerance for
+    rounding. They follow from the program's equations near a solution, but not in the whole box, where joints that do
+    not fit together may satisfy the program's equations. Then come the signs of the assembly mode; signs of the home
+    working mode count if the program requires it.
     """
     model, names = nlp.program.model, {constraint.name for constraint in nlp.program.constraints}
     poses = list(zip(_ends_of_names(nlp), nlp.program.robots, strict=True))
@@ -180,7 +180,7 @@ def _of_singular_values(nlp: Nlp) -> Iterator[Condition]:
 
 
 def _largest_at_start(nlp: Nlp, values: SX) -> int:
-    """Return the index of the largest of some expressions (k, 1) of a program at its start; of the first of several."""
+    """Return the index of the largest of some expressions (k, 1) of a program at its start; the first of equal ones."""
     program = nlp.program
     found = ca.Function("values", [program.x, program.p], [ca.densify(values)])(nlp.start, nlp.arguments)
     sizes = np.nan_to_num(np.array(found).ravel())
@@ -188,7 +188,7 @@ def _largest_at_start(nlp: Nlp, values: SX) -> int:
 
 
 def _principal_minors(A: SX, orders: Sequence[int]) -> Iterator[tuple[tuple[int, ...], SX]]:
-    """Yield the places and values of principal minors, by expansion along rows, each minor computed once."""
+    """Yield the indices and values of principal minors, by expansion along rows; each minor is computed once."""
 
     @cache
     def minor(rows: tuple[int, ...], columns: tuple[int, ...]) -> SX:
@@ -207,14 +207,14 @@ def _principal_minors(A: SX, orders: Sequence[int]) -> Iterator[tuple[tuple[int,
 
 
 class _Replaced(NamedTuple):
-    """What replaces variables of a form.
+    """Closed forms for variables of a form.
 
     Attributes:
-        solved: the expressions, by the place of the variable.
-        conditions: reach, and the equation and side of variables that have two solutions and stay.
-        reaches: (r, 1) not negative where all limbs reach the poses.
-        stated: names of the equations of the robot that these conditions state.
-        edges: unknowns of each pose that have one solution at a point of the box at which limbs hardly reach the pose.
+        solved: closed forms, by index of the variable.
+        conditions: conditions on the reach, and equation and side of unknowns with two solutions that stay variables.
+        reaches: (r, 1) expressions that are not negative where all limbs reach the poses.
+        stated: names of the robot's equations that these conditions replace.
+        edges: unknowns of each pose with one solution at a point of the box where limbs hardly reach the pose.
     """
 
     solved: dict[int, Solved]
@@ -225,10 +225,10 @@ class _Replaced(NamedTuple):
 
 
 def without_unknowns(form: StandardForm) -> StandardForm:
-    """Return the form of a program that keeps to home's working mode without the unknowns that follow in closed form.
+    """Return a form in the home working mode with closed forms in place of unknowns.
 
-    It is the same form where none does. An unknown stays a variable where its two solutions meet in the box: roots have
-    infinite slopes there.
+    The form is unchanged if no unknown has a closed form. An unknown stays a variable if its two solutions meet in the
+    box, where roots have infinite slopes.
     """
     nowhere = [frozenset[int]() for _ in form.nlp.program.robots]
     found = _replaced(form, nowhere)
@@ -263,11 +263,11 @@ def without_unknowns(form: StandardForm) -> StandardForm:
 
 
 def _replaced(form: StandardForm, held: Sequence[frozenset[int]]) -> _Replaced:
-    """Return what replaces unknowns of a form.
+    """Return the closed forms for unknowns of a form.
 
     Args:
         form: the form.
-        held: indices of the unknowns, at each pose, that stay variables where they have two solutions.
+        held: indices of the unknowns, at each pose, that stay variables if they have two solutions.
     """
     nlp, program = form.nlp, form.nlp.program
     # The pose does not depend on an epigraph variable, which a form lacks.
@@ -302,7 +302,7 @@ def _replaced(form: StandardForm, held: Sequence[frozenset[int]]) -> _Replaced:
 
 
 def _edges(form: StandardForm, unknowns: Sequence[int], reaches: Sequence[SX]) -> frozenset[int]:
-    """Return the unknowns at whose reach (1, 1) the box has points, as far as random ones show it."""
+    """Return the unknowns with random points of the box at the edge of their reach (1, 1)."""
     shares = np.random.default_rng(_SEED).uniform(0, 1, (_TESTS, form.n))
     shares[_TESTS // 2 :] = np.round(shares[_TESTS // 2 :])
     values = _values_at(form.x, reaches, form.lower + shares * (form.upper - form.lower))
@@ -319,7 +319,7 @@ def _values_at(x: SX, expressions: Sequence[SX], points: FloatArray) -> FloatArr
 def _at_pose(nlp: Nlp, each: Eliminated, given: list[SX]) -> list[SX]:
     """Return value, sine, cosine, reach, equation and slope of an unknown at a robot's dimensions and pose.
 
-    Those that the unknown does not have are 0.
+    Entries that the unknown does not have are 0.
     """
     symbols = Substitution.identity(nlp.program.model).all
     solved, root = each.solved, each.root
@@ -330,9 +330,9 @@ def _at_pose(nlp: Nlp, each: Eliminated, given: list[SX]) -> list[SX]:
 
 
 def _at_size(nlp: Nlp, place: int) -> float:
-    """Return the factor of a limb's reach by an unknown, 1 at home with typical dimensions, in the size of a case.
+    """Return the factor that scales a limb's reach by an unknown to 1 at home with typical dimensions.
 
-    The reach of a slide is one over the square of a length.
+    The reach of a slide is scaled by the square of a length.
     """
     model, unknown = nlp.program.model, nlp.program.model.unknowns[place]
     if unknown.dimension is Dimension.ANGLE:
@@ -343,14 +343,14 @@ def _at_size(nlp: Nlp, place: int) -> float:
 
 
 def _numbers(expression: SX) -> tuple[float, ...] | None:
-    """Return the numbers of an expression, column by column; None where it depends on symbols."""
+    """Return the values of a constant expression, column by column; None if it depends on symbols."""
     return tuple(ca.DM(expression).full().ravel(order="F").tolist()) if expression.is_constant() else None
 
 
 def _idle(form: StandardForm, may_go: Sequence[int], reaches: SX) -> set[int]:
-    """Return the indices of some conditions that hold wherever reaches (r, 1) are not negative, at random points.
+    """Return indices of conditions that hold at random points wherever reaches (r, 1) are not negative.
 
-    One that is left out by mistake would make the feasible set larger, and so the bound, but not wrong.
+    A condition that is left out by mistake makes the feasible set larger and the bound weaker, but not wrong.
     """
     conditions = form.conditions
     points = np.random.default_rng(_SEED).uniform(form.lower, form.upper, (_TESTS, form.n))

@@ -1,7 +1,8 @@
-"""Every machine within a tolerance on joint centres: its robot, the case in symbols of pose and errors, and claims.
+"""Robots within the joint-centre tolerance: model with errors, case as expressions of pose and errors, and claims.
 
-A machine is the design with the centre of each joint off by a vector of at most the tolerance. Numbers of machines are
-expressions of the errors, and of the pose in the coordinates of a search: three of position, three of rotation.
+A robot within the tolerance is the design with each joint centre displaced by a vector of at most the tolerance. Its
+quantities are expressions of these errors, and of the pose in the coordinates of a search: three of position, three of
+rotation.
 """
 
 from __future__ import annotations
@@ -25,15 +26,16 @@ from ...case.limits.constraint import LENGTH, BoundedConstraint, Constraint, Rea
 from ...case.limits.joints import BaseJointAngle, JointAngle, MountingPose, unit_axes
 from ...case.limits.limit import Limit
 from ...case.limits.limits import Limits
-from ...case.pose import HERE, Free, Pose, Rotation, Value
+from ...case.pose import NO_DISPLACEMENT, Free, Pose, Rotation, Value
 from ...case.task import Sense
 from ...program.layout import Layout, StatedPoseSymbols, lay_out
 from ...program.places import SymbolTable
-from .claims import Claim, claims_of, one_machine_name
-from .machine import joint_centres
+from .claims import Claim, claims_of, one_robot_name
+from .fixed_robot import joint_centres
 from .posed_layout import at_one_pose, reach_claims_on, without_loops
 
-#: Part of a derivative below which its size is smoothed, and place of the pose in its ranges at which it is taken.
+#: Part of the norm of a derivative below which the norm is smoothed; and relative place in the ranges of the pose at
+#: which the norm is taken.
 _PART, _PLACE = 0.03, 0.75
 #: Operations that are smooth wherever their derivatives have values.
 _SMOOTH = (
@@ -44,11 +46,11 @@ _SMOOTH = (
 
 
 class BuiltModel(NamedTuple):
-    """A robot with errors of its joint centres.
+    """A robot with joint-centre errors.
 
     Attributes:
-        model: without unknowns in closed form; the errors are its last parameters.
-        names: of the centres.
+        model: model with closed forms in place of unknowns; the errors are its last parameters.
+        names: names of the joint centres.
         reaches: edges of the reach of limbs with errors.
     """
 
@@ -58,32 +60,34 @@ class BuiltModel(NamedTuple):
 
 
 def built_model(model: Model, *, extended: bool = False, with_angles: bool = True) -> BuiltModel:
-    """Return a robot with errors of its joint centres.
+    """Return a robot with joint-centre errors as parameters.
 
     Args:
         model: the robot.
-        extended: whether closed forms have values out of reach too.
-        with_angles: whether angles have closed forms.
+        extended: If true, closed forms also have values out of reach.
+        with_angles: If true, closed forms replace joint angles too.
 
     Raises:
-        RobotError: its joint centres are not known, or it cannot be assembled with errors.
+        RobotError: the joint centres are not known, or the robot cannot be assembled with errors.
     """
     displaced = _displaced(model)
     closed = closed_form(displaced.model, extended=extended, with_angles=with_angles)
     if _kinds_of(closed_form(model, with_angles=with_angles).model) != _kinds_of(closed.model):
-        raise RobotError("", "errors of joint centres take freedoms from the robot: its limbs or loops change")
+        raise RobotError(
+            "", "joint-centre errors remove degrees of freedom (overconstrained robot): its limbs or loops change"
+        )
     return BuiltModel(closed.model, tuple(each.name for each in displaced.centres), closed.reaches)
 
 
 def _kinds_of(model: Model) -> tuple[object, ...]:
-    """Return what is the same for all machines of a robot: unknowns, members, rows, equations and ranks."""
+    """Return the structure that joint-centre errors must not change: unknowns, members, rows, equations and ranks."""
     members = [(item.rank, item.screws.shape, item.is_pinned) for item in model.members]
     rows, equations = [item.label for item in model.wrenches], [item.name for item in model.closure]
     return [item.name for item in model.unknowns], members, rows, equations, model.generic
 
 
 def _displaced(model: Model) -> DisplacedRobot:
-    """Return a robot with errors of its joint centres as parameters; raises as :func:`built_model` does."""
+    """Return a robot with joint-centre errors as parameters; raises the errors of :func:`built_model`."""
     if not model.structure:
         if not model.built or model.members or model.unknowns:
             raise RobotError("", "the joint centres of this robot are not known")
@@ -94,17 +98,17 @@ def _displaced(model: Model) -> DisplacedRobot:
     try:
         return displaced_robot(model, definition_of(model))
     except RobotError as error:
-        raise RobotError("", f"the robot cannot be assembled with errors of its joint centres: {error}") from None
+        raise RobotError("", f"the robot cannot be assembled with joint-centre errors: {error}") from None
 
 
 class PoseCoordinates(NamedTuple):
     """Coordinates of the poses of a workspace.
 
     Attributes:
-        values: three of position, and three of rotation: the range of the tangent of half an angle, or of a component
-            of a Cayley vector, where it varies, and else the angle.
-        rotation: returns the rotation (3, 3) with three coordinates (3, 1).
-        ball: largest squared size of a Cayley vector; infinite where rotations are no ball.
+        values: three values of position and three of rotation; a varying rotation is the range of the tangent of half
+            an angle or of a component of a Cayley vector, a fixed one an angle.
+        rotation: function that returns the rotation (3, 3) with coordinates (3, 1).
+        ball: largest squared norm of a Cayley vector; infinite if rotations are not in a ball.
     """
 
     values: Sequence[Value]
@@ -113,7 +117,7 @@ class PoseCoordinates(NamedTuple):
 
 
 def coordinate_layout(case: Case, at: PoseCoordinates) -> Layout:
-    """Return a case, whose own poses are not used, as symbols of one pose in the coordinates of a search."""
+    """Return a case as expressions of one pose in the coordinates of a search; poses of the case are not used."""
     one = at_one_pose(case, tuple(at.values[:3]), Rotation(None, 0.0))
 
     def add_pose(pose: Pose, prefix: str, table: SymbolTable) -> StatedPoseSymbols:
@@ -125,18 +129,20 @@ def coordinate_layout(case: Case, at: PoseCoordinates) -> Layout:
         turn = ca.vertcat(*turns)
         ball = Constraint(f"{prefix}turn", ca.sumsqr(turn), Reading(Dimension.NUMBER))
         held = [BoundedConstraint(ball, -math.inf, at.ball)] if at.ball < math.inf else []
-        return StatedPoseSymbols(at.rotation(turn), placed.symbols, placed.places, placed.symbols, None, held, (HERE,))
+        return StatedPoseSymbols(
+            at.rotation(turn), placed.symbols, placed.places, placed.symbols, None, held, (NO_DISPLACEMENT,)
+        )
 
     return lay_out(one, one.tasks, add_pose)
 
 
-class MachineLayout(NamedTuple):
-    """Every machine of a case as symbols of one pose.
+class ToleranceLayout(NamedTuple):
+    """All robots within the tolerance of a case, as expressions of one pose and of joint-centre errors.
 
     Attributes:
-        layout: whose first variables are the errors, 3 for each centre; the others are those of the pose.
-        built: the robot.
-        tolerance: largest size of each error, length.
+        layout: the case; its first variables are the errors, 3 for each centre, then coordinates of the pose.
+        built: the robot with joint-centre errors.
+        tolerance: largest norm of each error, length.
     """
 
     layout: Layout
@@ -145,26 +151,26 @@ class MachineLayout(NamedTuple):
 
     @property
     def errors(self) -> SX:
-        """Symbols (3 m, 1) of the errors."""
+        """Symbols (3 m, 1) of the joint-centre errors."""
         return self.layout.table.variables_vector[: 3 * len(self.built.names)]
 
     @property
     def pose(self) -> SX:
-        """Symbols (n, 1) of the pose, and of unknowns."""
+        """Symbols (n, 1) of the pose and of the unknowns."""
         return self.layout.table.variables_vector[3 * len(self.built.names) :]
 
     def of(self, expression: SX, errors: SX, pose: SX) -> SX:
-        """Return an expression (k, 1) with other symbols or numbers in the place of these."""
+        """Return an expression (k, 1) with other symbols or values for the errors and the pose."""
         table = self.layout.table
         function = ca.Function("numbers", [table.variables_vector, table.arguments_vector], [expression])
         numbers = ca.vertcat(SX(0, 1), *[SX(each) for each in table.values])
         return function.call([ca.vertcat(errors, pose), numbers])[0]
 
     def near_zero(self, expression: SX, design: Layout) -> FloatArray:
-        """Return small sizes (m,) for the derivatives g_j of an expression (1, 1) by the errors of the centres.
+        """Return smoothing terms (m,) for the norms of the derivatives g_j of an expression (1, 1) by centre errors.
 
-        ``sqrt(|g_j|^2 + size^2)`` is at least ``|g_j|``, little more where that is large, and smooth where it is 0.
-        Each is a part of ``|g_j|`` at one pose of the design.
+        ``sqrt(|g_j|^2 + term^2)`` is at least ``|g_j|``, close to it where ``|g_j|`` is large, and smooth where it is
+        0. Each term is a small part of ``|g_j|`` at one pose of the design.
         """
         at = ca.DM([each.lower + _PLACE * (each.upper - each.lower) for each in design.table.bounds])
         slopes = ca.densify(ca.gradient(expression, self.errors))
@@ -172,28 +178,28 @@ class MachineLayout(NamedTuple):
         return np.asarray(_PART * np.nan_to_num(np.linalg.norm(values, axis=1), posinf=0.0))
 
     def claims(self, quantities: Sequence[str], *, with_objective: bool = True) -> tuple[list[Claim], list[Claim]]:
-        """Return the claims that limbs reach every pose, and those about numbers, which rest on them.
+        """Return the claims that limbs reach every pose, and the claims about quantities, which depend on the reach.
 
         Raises:
-            InputError: the robot has no measure of a name.
+            InputError: the robot has no measure of a given name.
         """
         reaches = reach_claims_on(self.layout, self.built.reaches)
         return list(reaches), claims_of(self.layout, quantities, with_objective=with_objective)
 
 
-def machine_layout(case: Case, built: BuiltModel, tolerance: float, at: PoseCoordinates) -> MachineLayout:
-    """Return every machine within a tolerance of a case with fixed dimensions as symbols of one pose."""
+def tolerance_layout(case: Case, built: BuiltModel, tolerance: float, at: PoseCoordinates) -> ToleranceLayout:
+    """Return all robots within a tolerance of a case with fixed dimensions, as expressions of one pose and errors."""
     parameters = {name: case.parameters[name] for name in case.parameters}
     size = Free(-tolerance, tolerance)
     own = {item.name: (size, size, size) for item in built.model.parameters if item.name not in parameters}
-    # The mounting axes of joints are those of the design.
+    # Joints keep the mounting axes of the design.
     limits = Limits(*(_mounted(case, each) for each in case.limits))
-    machines = replace(case, model=built.model, parameters=parameters | own, limits=limits, joint_centre_tolerance=None)
-    return MachineLayout(coordinate_layout(machines, at), built, tolerance)
+    robots = replace(case, model=built.model, parameters=parameters | own, limits=limits, joint_centre_tolerance=None)
+    return ToleranceLayout(coordinate_layout(robots, at), built, tolerance)
 
 
 def _mounted(case: Case, limit: Limit[Any]) -> Limit[Any]:
-    """Return a limit on angles of joints with the mounting axes of the design as numbers; another one as it is."""
+    """Return a limit on joint angles with the design's mounting axes as constants; other limits unchanged."""
     if not (case.model.legs and isinstance(limit, JointAngle) and isinstance(limit.about, MountingPose)):
         return limit
     home, legs = limit.about, joint_centres(case)
@@ -206,17 +212,17 @@ def _mounted(case: Case, limit: Limit[Any]) -> Limit[Any]:
 
 
 def design_layout(case: Case, model: Model, at: PoseCoordinates) -> Layout:
-    """Return the design, a case with a model without unknowns, as symbols of one pose: those of its machines.
+    """Return the design, a case with a model without unknowns, as expressions of one pose.
 
-    Equations of loops are left out, which hold at every pose by themselves: a bound without one is over more poses.
+    Loop equations that hold at every pose are left out; a bound without an equation covers more poses.
     """
     return coordinate_layout(replace(case, model=without_loops(model)), at)
 
 
 def is_smooth(number: SX) -> bool:
-    """Return whether derivatives of an expression (1, 1) bound its change: it has smooth operations alone.
+    """Return whether an expression (1, 1) has only smooth operations, so that derivatives bound its change.
 
-    The angle of a vector jumps by a turn, where its derivatives are smooth, unless its sine is a length.
+    The angle of a vector jumps by a full turn although its derivatives are smooth, unless its sine is a norm.
     """
     function, last = ca.Function("number", ca.symvar(number), [number]), dict[int, int]()
     for k in range(function.n_instructions()):
@@ -229,17 +235,17 @@ def is_smooth(number: SX) -> bool:
 
 
 def second_order_name(claim: str) -> str:
-    """Return the name of the bound of the terms of second order by which a number of machines is bounded."""
+    """Return the name of the bound of the second-order terms of a claim about robots within the tolerance."""
     return f"{claim}, terms of second order"
 
 
 class Directions(NamedTuple):
-    """Vectors that stand for a leg's direction over a workspace.
+    """Fixed vectors near a leg's direction over a workspace.
 
     Attributes:
-        claim: name of the claim that they serve.
-        base: (3,) in the world frame.
-        platform: (3,) in the platform frame.
+        claim: name of the claim that uses them.
+        base: (3,) vector in the world frame, for the base joint.
+        platform: (3,) vector in the platform frame, for the platform joint.
     """
 
     claim: str
@@ -247,20 +253,20 @@ class Directions(NamedTuple):
     platform: FloatArray
 
 
-def length_of_one_machine(machines: MachineLayout, leg: int, sense: Sense, about: Directions) -> Claim:
-    """Return the claim about the length of a leg less ``f.c_p - e.c_b``, which is the same at every pose.
+def length_of_one_robot(robots: ToleranceLayout, leg: int, sense: Sense, about: Directions) -> Claim:
+    """Return the claim about the length of a leg minus ``f.c_p - e.c_b``, which is the same at every pose.
 
-    In the difference of two lengths of one machine, with errors e and f of the leg's joints on base and platform, the
-    part with the fixed vectors c_p and c_b cancels; little is left of it where the leg's direction changes little.
+    e and f are the errors of the leg's joints on base and platform. In the difference of two lengths of one robot, the
+    part with the fixed vectors c_p and c_b cancels. If the leg's direction changes little, little error remains.
 
     Args:
-        machines: among whose errors are two for each leg.
+        robots: robots within the tolerance, with two joint-centre errors for each leg.
         leg: index of the leg.
-        sense: whether the smallest or the largest value is meant.
-        about: c_b and c_p.
+        sense: ``MIN`` for the smallest length, ``MAX`` for the largest.
+        about: the vectors c_b and c_p.
     """
-    places = (3 * machines.built.names.index(each) for each in machines.built.model.legs[leg].centres)
-    e, f = (machines.errors[k : k + 3] for k in places)
+    places = (3 * robots.built.names.index(each) for each in robots.built.model.legs[leg].centres)
+    e, f = (robots.errors[k : k + 3] for k in places)
     same = ca.dot(f, SX(about.platform.tolist())) - ca.dot(e, SX(about.base.tolist()))
-    length = ca.norm_2(machines.layout.robots[0].legs[leg].span)
-    return Claim(one_machine_name(about.claim), sense, length - same, LENGTH, legs=(leg,))
+    length = ca.norm_2(robots.layout.robots[0].legs[leg].span)
+    return Claim(one_robot_name(about.claim), sense, length - same, LENGTH, legs=(leg,))

@@ -1,8 +1,8 @@
-"""How far each coordinate of a pose can move alone, and each two together, before the first limit.
+"""Free travel from a pose along each coordinate, and along each pair, up to the first limit.
 
-A coordinate moves along a path of one segment, which is judged as a programmed path is. The first point known that
-refutes a claim tells where to judge next: just before it, and else half-way. So each end is proved, and just beyond it
-a claim is refuted, or stays open. Two coordinates move within a box about the pose, a part of the ranges of both.
+A coordinate moves along a path of one segment, which is judged as a tool path. The next range ends just before the
+first known point that refutes a claim; without one it is bisected. So each end is proved, and just beyond it a claim is
+refuted or open. A pair of coordinates moves in a box about the pose, a scaled copy of the ranges of both.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ from ...interruption import is_requested, one_call, one_search, why_stopped, wit
 from ...path.options import Between
 from ...path.orientation import ORDERS, roll_pitch_yaw
 from ...path.path import Kind, ProgrammedPath
-from .alone import AXES, box_about, coordinates_alone
 from .edge_samples import EdgeSamples
 from .judge import judge_workspace
 from .judgement import Judgement
+from .local_coordinates import AXES, box_about, local_coordinates
 from .path_judge import judge_path
 from .range_values import AxisRange, PairRange, RangeEnd, RangeStop
 from .robot.pose_box import pose_box
@@ -40,32 +40,32 @@ from .robot.posed_robot import NotJudgedError, build_problem
 from .verdict import Outcome, Verdict
 
 _T = TypeVar("_T")
-#: Seconds for all judgements where the caller does not say; the part of the time that one takes at most, so that a
-#: shorter motion is tried where it does not end, and that a search takes of it.
+#: Default time limit of all judgements, in seconds; largest part of the time for one judgement, so that a shorter range
+#: is judged if it does not end; largest part of a judgement's time for one search.
 TIME_LIMIT, _EACH, _PART = 120.0, 1 / 32, 0.5
-#: Largest angle moved by, where none is asked for, and largest angle of a pose.
+#: Default of the largest rotation from the pose, and largest angle of a pose.
 LARGEST_ANGLE, _WIDEST = math.radians(90), math.radians(148)
-#: Accuracy of an end, as a part of the largest range, where the first point that refutes its claim is computed, and of
-#: another one; of a range that a limit over all of it cuts, and of two coordinates together, as a part of their ranges.
+#: Accuracy of an end, relative to the largest range: if the first point that refutes a claim is computed, if the range
+#: is bisected, and if a limit concerns the whole range; accuracy of a pair, relative to the ranges.
 TOLERANCE, HALVED, _WHOLE, PAIRED = 1e-6, 1e-4, 1e-3, 0.01
-#: Gap of numbers, of which verdicts alone are asked for, a motion that is none, as a part of the largest
-#: one, and parts of an accuracy that are a short step.
+#: Gap of quantities, of which only the outcome matters; relative motion that counts as none; and number of accuracies
+#: that make a short step.
 _GAP, _STILL, _SHORT = 0.5, 1e-12, 10
 
 
 @dataclass(frozen=True, eq=False)
 class AxisRanges:
-    """How far a platform can move from a pose.
+    """Free travel of a platform from a pose.
 
     Attributes:
         case: the case, its dimensions fixed.
         start: (6,) the pose: position, length, and roll, pitch and yaw, radians.
-        most: largest length and angle, radians, that a coordinate is moved by.
-        stops: claims that are not proved at the pose itself; the ranges are empty where there are any.
-        axes: ranges of the independent coordinates alone.
-        pairs: of each two of them.
-        others: coordinates that follow from these, and move with them.
-        reason: why the work ended before all axes and pairs were judged; else empty.
+        most: largest length, and largest angle in radians, by which a coordinate moves.
+        stops: claims that are not proved at the pose itself; with any, there are no ranges.
+        axes: ranges of the independent coordinates.
+        pairs: ranges of pairs of independent coordinates.
+        others: names of the dependent coordinates.
+        reason: reason for work that ended before all axes and pairs were judged; else empty.
     """
 
     case: Case
@@ -79,7 +79,7 @@ class AxisRanges:
 
 
 class _Found(NamedTuple):
-    """A part of the largest range that is proved, one that is not, and the claim that fails at that."""
+    """Largest proved part of a range, smallest part that is not proved, and the claim that fails there."""
 
     proved: float
     failed: float | None
@@ -87,14 +87,20 @@ class _Found(NamedTuple):
 
 
 class _Failed(NamedTuple):
-    """The first part known of a range that is not proved, its claim, and whether that is where it fails first."""
+    """Smallest known part of a range that is not proved.
+
+    Attributes:
+        part: part of the largest range.
+        stop: claim that is not proved there.
+        is_first: whether the claim is proved at every smaller part.
+    """
 
     part: float
     stop: RangeStop
     is_first: bool = False
 
 
-#: Judges a part of the largest range: None where it is proved.
+#: Judges a part of the largest range; None if it is proved.
 _Judge = Callable[[float], _Failed | None]
 
 
@@ -108,25 +114,25 @@ def axis_ranges(
     time_limit: float | None = TIME_LIMIT,
     progress: Callable[[str], None] | None = None,
 ) -> AxisRanges:
-    """Prove how far each coordinate of a pose can move alone, and each two together, before the first limit.
+    """Prove the free travel from a pose along each coordinate, and along each pair, up to the first limit.
 
     Args:
-        case: with fixed dimensions; its tasks and its workspace are not used.
+        case: case with fixed dimensions; tasks and workspace are not used.
         start: (6,) the pose: position, length, and roll, pitch and yaw, radians; the case's first pose if left out.
-        axes: names of the coordinates that are asked for; those that the platform cannot change are left out.
-        most: largest length and angle, radians, that a coordinate is moved by; the size of the robot, and a right angle
-            if left out.
-        time_limit: seconds for all judgements.
-        progress: called with what is done next.
+        axes: names of the requested coordinates; dependent coordinates are left out.
+        most: largest length, and largest angle in radians, by which a coordinate moves; if left out, the size of the
+            robot and 90 degrees.
+        time_limit: seconds for all judgements together; None for no limit.
+        progress: function that is called with the name of the next step.
 
     Raises:
         CaseError: a dimension of the robot is free, or the pose does not determine its driven joints.
-        InputError: the pose is free or none, no coordinate has a name, or the largest ranges are not positive.
+        InputError: the pose is free or not valid, a coordinate's name is unknown, or a largest motion is not positive.
     """
     check_determined_joints(case.model, "path", case.source)
     here = _of_case(case) if start is None else np.array(start, dtype=np.float64)
     _check(here, axes)
-    # The workspace says nothing here, but a judged machine has one.
+    # The workspace has no effect here, but a judgement needs one.
     case = replace(case, workspace=box_about(here, {0: (here[0] - 1.0, here[0] + 1.0)}))
     case.fixed_parameters("a range is judged with fixed dimensions")
     case.require_motion()
@@ -136,7 +142,7 @@ def axis_ranges(
     report = progress or (lambda _: None)
     with within(time_limit, _EACH):
         report("the pose")
-        alone, others = coordinates_alone(case, here, most[0])
+        alone, others = local_coordinates(case, here, most[0])
         nothing = AxisRanges(case, here, most, (), others=tuple(AXES[k] for k in others))
         if not alone:
             return nothing
@@ -160,15 +166,15 @@ def axis_ranges(
 
 
 def _until_requested(items: Iterable[_T]) -> Iterator[_T]:
-    """Return items until the work is to stop."""
+    """Yield items until the work is requested to stop."""
     return itertools.takewhile(lambda _: not is_requested(), items)
 
 
 def _check(start: FloatArray, axes: Sequence[str]) -> None:
-    """Refuse what is no pose, and names of no coordinates.
+    """Check a pose and names of coordinates.
 
     Raises:
-        InputError: it is refused.
+        InputError: the pose is not valid, or a coordinate's name is unknown.
     """
     if start.shape != (6,) or not np.isfinite(start).all():
         raise InputError("the pose must be six finite numbers: x, y, z, roll, pitch, yaw")
@@ -190,22 +196,22 @@ def _of_case(case: Case) -> FloatArray:
     fixed = [each for each in values if not isinstance(each, Free)]
     if len(fixed) < len(values) or axis is None:
         name = case.source or case.name
-        raise InputError(f"{name}: pose: has free numbers, and ranges are about one pose: state it with --start")
+        raise InputError(f"{name}: pose: has free coordinates; ranges begin at one fixed pose: state it with --start")
     half = fixed[3] / 2
     turn = roll_pitch_yaw(np.array([[math.cos(half), *(math.sin(half) * axis)]]))[0]
-    # A sum with zero has no negative zero.
+    # Adding zero removes negative zeros.
     return np.array([*fixed[:3], *turn]) + 0.0
 
 
 def _range(case: Case, start: FloatArray, k: int, most: float, *, has_whole: bool) -> AxisRange:
-    """Return how far a coordinate can move alone.
+    """Return the free travel along one coordinate.
 
     Args:
-        case: the machine.
+        case: the robot with fixed dimensions.
         start: (6,) the pose.
         k: index of the coordinate.
-        most: largest motion.
-        has_whole: whether limits on strokes need the lengths over the whole range.
+        most: largest motion, length or radians.
+        has_whole: whether limits on strokes need the leg lengths over the whole range.
     """
     ways = [-most, most] if k < 3 else [max(-most, -_WIDEST - start[k]), min(most, _WIDEST - start[k])]
 
@@ -246,7 +252,7 @@ def _range(case: Case, start: FloatArray, k: int, most: float, *, has_whole: boo
 
 
 def _samples(case: Case, start: FloatArray, ranges: Sequence[AxisRange]) -> EdgeSamples | None:
-    """Return measurements at poses within all ranges; None of a robot with loops that are no formulas."""
+    """Return samples of limits within all ranges; None for a robot with loops without closed forms."""
     ends = {AXES.index(each.axis): (each.lower.value, each.upper.value) for each in ranges}
     ends = {k: (low, high) for k, (low, high) in ends.items() if low < high}
     if len(ends) < 2:
@@ -259,7 +265,7 @@ def _samples(case: Case, start: FloatArray, ranges: Sequence[AxisRange]) -> Edge
 
 
 def _pair(case: Case, start: FloatArray, samples: EdgeSamples | None, *ranges: AxisRange) -> PairRange:
-    """Return how far two coordinates can move at once, as a part of their ranges."""
+    """Return the free travel along two coordinates together, as a part of their ranges."""
     one, other = ranges
 
     def judge(part: float) -> _Failed | None:
@@ -285,11 +291,11 @@ def _pair(case: Case, start: FloatArray, samples: EdgeSamples | None, *ranges: A
 
 
 def _largest(judge: _Judge, tolerance: float, guess: float = 1.0) -> _Found:
-    """Return the largest part of a range that is proved, to a tolerance, looking next to a guess of it first."""
+    """Return the largest proved part of a range, to a tolerance; the search begins at a guess."""
     failed: float | None = None
     stop: RangeStop | None = None
     proved = 0.0
-    # Both sides of the guess lie within the tolerance.
+    # The two first parts are on both sides of the guess, within the tolerance.
     step = 0.8 * tolerance
     part = 1.0 if guess >= 1 else max(guess - 0.5 * step, 0.5 * guess)
     while True:
@@ -297,15 +303,15 @@ def _largest(judge: _Judge, tolerance: float, guess: float = 1.0) -> _Found:
         if first is None:
             proved = part
         elif not (is_requested() and first.stop.outcome is Outcome.OPEN and failed is not None):
-            # A judgement that was stopped says nothing where a claim is known to fail.
+            # A known failed claim is kept: a stopped judgement is no evidence.
             failed, stop = first.part, first.stop
-        # Just before a point that is known to refute, claims may hold all the way; steps must not be short, though.
+        # All claims may hold up to just before a known refuting point. Short steps would take too many judgements.
         is_sharp = first is not None and first.is_first and (before is None or before - first.part > _SHORT * TOLERANCE)
         least = TOLERANCE if is_sharp else tolerance
         if part == proved == 1 or (failed is not None and failed - proved <= least):
             return _Found(proved, failed, stop)
         if is_requested():
-            # Between what is proved and what fails nothing is known.
+            # The range between the proved part and the failed part was not judged.
             stop = None if stop is None else RangeStop.of(stop, outcome=Outcome.OPEN, reason=why_stopped())
             return _Found(proved, failed, stop)
         if failed is None:
@@ -317,7 +323,7 @@ def _largest(judge: _Judge, tolerance: float, guess: float = 1.0) -> _Found:
 
 
 def _judged(case: Case, start: FloatArray, *ends: FloatArray) -> Judgement:
-    """Judge a machine on lines from a pose to others, one after the other."""
+    """Judge a robot on straight motions from a pose to other poses in turn."""
     count = len(ends)
     path = ProgrammedPath(
         "the pose", np.stack([start, *ends]), np.ones(count, dtype=np.int32),
@@ -325,14 +331,14 @@ def _judged(case: Case, start: FloatArray, *ends: FloatArray) -> Judgement:
         np.zeros(0, dtype=np.uint8), ORDERS["rpy"], Between.ANGLES,
     )  # fmt: skip
     with one_search():
-        return judge_path(case, path, gap=_GAP, time_limit=None, limits_alone=True)
+        return judge_path(case, path, gap=_GAP, time_limit=None, limits_only=True)
 
 
 def _failures(judged: Judgement) -> Iterator[_Failed]:
-    """Yield the claims that are not proved, with the part of the path at which each fails, the first one first.
+    """Yield the claims that are not proved, in the order of the parts of the path at which they fail.
 
-    A refuted claim comes before an open one at the same place. Of claims over several points, and of boxes, the place
-    is the end.
+    At the same place a refuted claim comes before an open one. Claims about several points, and claims about boxes,
+    fail at the end.
     """
     found = []
     for each in (verdict for verdict in judged.verdicts if verdict.fails):
@@ -353,5 +359,5 @@ def _failures(judged: Judgement) -> Iterator[_Failed]:
 
 
 def _is_over_poses(each: Verdict) -> bool:
-    """Return whether a limit is about several poses at once, such as that on a stroke."""
+    """Return whether a limit concerns several poses together, such as a stroke."""
     return each.key.startswith(f"{Actuator.key}.")

@@ -1,4 +1,4 @@
-"""Poses on the edges of boxes about a pose, at which limits are measured: where a proof is tried first."""
+"""Limits at sampled poses on the edges of a box: a first guess of the largest box that can be proved."""
 
 from __future__ import annotations
 
@@ -12,32 +12,32 @@ from ....models.joints.model.closedform import closed_form
 from ...case.case import Case
 from .numbers.expressions import Expressions
 from .numbers.extremes import goal_of
-from .numbers.machines import Machines
+from .numbers.within_tolerance import RobotsWithinTolerance
 from .ranks.singular_pose import DeterminantSigns
 from .robot.posed_robot import Problem
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Points of each side of a box, and factors of the box at each of which they are measured, at once.
+#: Number of points on each side of a box, and of scale factors of the box that are evaluated together.
 _EDGE, _PARTS = 9, 65
 
 
 class EdgeSamples:
-    """Limits and the sign of the determinant at single poses: a guess of where a box of poses fails, and no proof.
+    """Limits and the sign of the determinant at sampled poses: a guess of where a box of poses fails, not a proof.
 
     Args:
-        case: the machine.
-        start: (6,) the pose: position, length, and roll, pitch and yaw, radians.
-        problem: the machine over a box of poses, none of whose coordinates follows from others.
+        case: the robot with fixed dimensions.
+        start: (6,) pose at the centre: position, length, and roll, pitch and yaw, radians.
+        problem: the robot over a box of poses, without dependent coordinates.
     """
 
     def __init__(self, case: Case, start: FloatArray, problem: Problem) -> None:
-        machines = Machines(case, closed_form(case.model), problem)
-        reaches, claims = machines.symbols.claims([], with_objective=False)
+        robots = RobotsWithinTolerance(case, closed_form(case.model), problem)
+        reaches, claims = robots.symbols.claims([], with_objective=False)
         limited = [each for each in (*reaches, *claims) if each.limit is not None]
-        numbers = ca.vertcat(*map(machines.number, limited)) if limited else ca.SX(0, 1)
-        self._problem, self._start, self._values = machines.family, start, Expressions(machines.family, numbers)
+        numbers = ca.vertcat(*map(robots.number, limited)) if limited else ca.SX(0, 1)
+        self._problem, self._start, self._values = robots.family, start, Expressions(robots.family, numbers)
         goals = [goal_of(each) for each in limited]
         self._least = np.array([(goal.limit or 0.0) - goal.slack for goal in goals])
         matrix = problem.locked
@@ -51,7 +51,7 @@ class EdgeSamples:
         """Return the smallest factor of a box of two coordinates at which a pose on its edge fails; at most 1.
 
         Args:
-            moves: (2, 2, 6) from the pose to both ends of each coordinate.
+            moves: (2, 2, 6) changes of the pose to both ends of each coordinate.
         """
         (a, b), (c, d) = moves
         along = np.linspace(0.0, 1.0, _EDGE)[:, None]
@@ -68,7 +68,7 @@ class EdgeSamples:
         return high
 
     def _fails(self, y: FloatArray) -> NDArray[np.bool_]:
-        """Return whether a limit fails at poses (P, 6), or the determinant has another sign than at the start."""
+        """Return whether a limit is violated at poses (P, 6), or the determinant has another sign than at the start."""
         z = y[:, list(self._problem.free)]
         with np.errstate(all="ignore"):
             fails = ~(self._values.values(self._problem.exact(z)) >= self._least).all(axis=1)
@@ -78,5 +78,5 @@ class EdgeSamples:
 
 
 def coordinates_of(poses: FloatArray) -> FloatArray:
-    """Return coordinates (P, 6) of a search, with the tangents of half angles, of poses with angles."""
+    """Return poses (P, 6) with angles as coordinates of a search, with tangents of half angles."""
     return np.hstack([poses[:, :3], np.tan(0.5 * poses[:, 3:])])

@@ -1,7 +1,7 @@
-"""A machine at single poses with its joints in home's assembly, as ``evaluate`` shows it.
+"""Single poses of a robot in the home assembly mode, as ``evaluate`` computes them.
 
-A pose refutes a claim only where the machine violates it in this assembly. Searches follow closed loops over boxes, by
-Newton's method, or take them as conditions, and may find the pose in another one.
+A pose refutes a claim only if the robot violates the claim in the home assembly mode. Searches that treat the loop
+equations as conditions may find the pose in another assembly mode.
 """
 
 from __future__ import annotations
@@ -25,51 +25,53 @@ from ...evidence.state import evaluate
 from ...program.layout import Layout, robot_length
 from ...program.nlp import Nlp
 from ..statement.claims import REACH, Claim, claims_of
-from ..statement.machine import JointErrors
+from ..statement.fixed_robot import JointErrors
 from ..statement.posed_layout import extreme_program
 from ..statement.tolerance import coordinate_layout
-from .numbers.machines import Machines
+from .numbers.within_tolerance import RobotsWithinTolerance
 from .robot.pose_box import PoseBox, pose_coordinates
 from .verdict import Outcome, Verdict, slack_of
 
-#: Reasons for a claim that poses of other assemblies leave open.
-_ELSEWHERE = "poses beyond the limit are known only in other assemblies of the joints than home's"
-_WIDER = "the bound holds in every assembly of the joints, and the value reached is one of home's"
+#: Reasons for a claim that stays open because of other assembly modes.
+_ELSEWHERE = "violations of the limit are known only in other assembly modes than home"
+_WIDER = "the bound covers every assembly mode, the best known value is in the home assembly mode"
 #: Relative difference of two values in one assembly mode, and part of the quantity's size below which values are 0.
 _SAME, _SMALL = 1e-6, 1e-6
 
 
 class Homes:
-    """The design of a case, and machines within its tolerance, at single poses in the assembly of home.
+    """Design of a case, and robots within its tolerance, at single poses in the home assembly mode.
 
     Args:
-        case: with fixed dimensions.
-        box: the poses.
+        case: case with fixed dimensions.
+        box: box of poses.
         quantities: names of measures of the robot.
-        machines: every machine within the tolerance; None where only the design is meant.
+        robots: robots within the tolerance; None if only the design is judged.
 
     Attributes:
-        case, box, machines: as given.
+        case, box, robots: arguments of the constructor.
     """
 
-    def __init__(self, case: Case, box: PoseBox, quantities: Sequence[str], machines: Machines | None) -> None:
-        self.case, self.box, self.machines, self._quantities = case, box, machines, quantities
+    def __init__(
+        self, case: Case, box: PoseBox, quantities: Sequence[str], robots: RobotsWithinTolerance | None
+    ) -> None:
+        self.case, self.box, self.robots, self._quantities = case, box, robots, quantities
 
     @cached_property
     def _layout(self) -> Layout:
-        """The case as symbols of errors of joint centres, and of the numbers of a pose."""
-        if self.machines is not None:
-            return self.machines.symbols.layout
+        """The case as expressions of joint-centre errors and of the coordinates of a pose."""
+        if self.robots is not None:
+            return self.robots.symbols.layout
         return coordinate_layout(self.case, pose_coordinates(self.box))
 
     @cached_property
     def _nlp(self) -> Nlp:
-        """The program that has the closed loops at a pose as constraints."""
+        """Nonlinear program with the loop equations at a pose as constraints."""
         return extreme_program(self._layout, SX(0), Sense.MIN)
 
     @cached_property
     def _claims(self) -> dict[tuple[str, Sense], tuple[Claim, ca.Function]]:
-        """The numbers, with their values, by name and sense; the first of two."""
+        """Claims with functions for their values, by name and sense; the first one of two with one label."""
         program, found = self._nlp.program, {}
         for each in reversed(claims_of(self._layout, self._quantities)):
             value = ca.Function("value", [program.x, program.p], [ca.densify(each.expression)])
@@ -77,19 +79,19 @@ class Homes:
         return found
 
     def is_singular(self, y: FloatArray, errors: JointErrors | None, *, constraints: bool) -> bool:
-        """Return whether J, or the constraint wrenches alone, lose their rank at a pose (6,), as ``evaluate`` shows it.
+        """Return whether J, or the constraint wrenches, lose their rank at a pose (6,), as ``evaluate`` reports it.
 
         Args:
             y: coordinates of the pose.
-            errors: of the joint centres of another machine than the design.
-            constraints: whether the constraint wrenches are meant.
+            errors: joint-centre errors of a robot within the tolerance; None for the design.
+            constraints: If true, test the constraint wrenches instead of J.
         """
         if not self.case.model.unknowns:
             return True
         x = self._closed(y, errors)
         if x is None:
             return False
-        # Where nested loops lose their rank, the actuators' motions have no value, and say nothing of constraints.
+        # Where nested loops lose their rank, motions of the actuators are undefined and do not define constraints.
         if constraints and self._nlp.program.model.nested and is_passive_singular(self._nlp, x):
             return False
         try:
@@ -102,7 +104,7 @@ class Homes:
         return found is None or generic is None or found.constraint_rank < generic.constraints
 
     def shown(self, each: Verdict) -> Verdict:
-        """Return an extreme with its value in home's assembly, and open where only another one refutes it."""
+        """Return a verdict with the value in the home assembly mode; open if only another assembly mode refutes it."""
         if not self.case.model.unknowns or each.pose is None or each.key == REACH:
             return each
         x = self._closed(self.box.coordinates(each.pose), each.errors)
@@ -125,18 +127,18 @@ class Homes:
         return replace(opened if is_other else each, reached=reached)
 
     def _size_of(self, claim: Claim) -> float:
-        """Return the typical size of a claim's quantity: the robot's for lengths; for F, F without cancellation."""
+        """Return the typical size of a claim's quantity: the robot's size for lengths, F without cancellation for F."""
         if claim.reading.dimension is Dimension.LENGTH:
             return robot_length(self.case) ** claim.reading.power
         return self._nlp.objective_size if claim.name.partition(" ")[0] == "F" else 1.0
 
     def _closed(self, y: FloatArray, errors: JointErrors | None) -> FloatArray | None:
-        """Return the point of the program with closed loops at a pose (6,) of a machine; None without one."""
+        """Return the point of the program with closed loops at a pose (6,) of a robot; None if they do not close."""
         nlp = self._nlp
         x, inner = nlp.start.copy(), set(nlp.program.places.inner)
         given = y[list(self.box.free)]
-        if self.machines is not None:
-            family = self.machines.family
+        if self.robots is not None:
+            family = self.robots.family
             own = np.zeros(family.errors.numel()) if errors is None else errors.vectors.ravel()
             given = np.concatenate([own, given])
         x[[k for k in range(nlp.n) if k not in inner]] = given

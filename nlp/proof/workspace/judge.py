@@ -1,6 +1,6 @@
 """Judgement of a robot over a box of poses.
 
-Expressions of the pose are bounded by the search of ``certify`` or by that of boxes; the choice is in ``expressions``.
+Expressions of the pose are bounded by the search of ``certify`` or by the search of boxes; ``expressions`` chooses.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from ...case.workspace import Workspace
 from ...interruption import one_call, within
 from ..enclosure.engine import kernel
 from ..statement.claims import REACH, REGULAR, SPECTRAL, Claim, claims_of, dependent_claims
-from ..statement.machine import check_leg_error, has_straight_legs, workspace_of_case
+from ..statement.fixed_robot import check_leg_error, has_straight_legs, workspace_of_case
 from ..statement.posed_layout import closed_layout, posed_layout, reach_claims
-from ..statement.tolerance import Directions, coordinate_layout, length_of_one_machine
+from ..statement.tolerance import Directions, coordinate_layout, length_of_one_robot
 from .home_poses import Homes
 from .judgement import Judgement
 from .judging import Judging
 from .numbers.bound_search import Minimum
 from .numbers.extremes import GAP, NumberSearch, prove_extreme, verdict_of
-from .numbers.machines import Machines
 from .numbers.pose_error import pose_errors
 from .numbers.searched import Subject, motor_extremes
+from .numbers.within_tolerance import RobotsWithinTolerance
 from .ranks.ranks import RankProgress, prove_ranks
 from .robot.pose_box import pose_box, pose_coordinates
 from .robot.posed_robot import NotJudgedError, Problem, build_problem
@@ -35,15 +35,15 @@ from .verdict import Outcome, Verdict, not_judged
 if TYPE_CHECKING:
     from .proof_record import ProofRecord
 
-#: Seconds for all searches together where no time is stated: those of singular values have no other end in six
-#: dimensions. Of the time left, each takes half at most.
+#: Default time limit of all searches together, in seconds: singular values in six dimensions need one. Each search
+#: takes at most half of the time left.
 TIME_LIMIT = 60.0
 _PART = 0.5
-#: Gap of the recorded search of a limit that is known to hold: it is made finer where the limit needs it.
+#: First gap of the recorded search of a limit that is known to be satisfied; the search reduces it if necessary.
 _AS_NEEDED = 1.0
-#: Reason for numbers of a robot that does not have all poses.
+#: Reason for quantities of a robot that may not reach all poses.
 _OUT_OF_REACH = "not proved: a robot within the joint-centre tolerance may not reach every pose"
-#: Called before each number with its name, the number of those done, and of all of its kind.
+#: Called before each quantity with its name, the count of completed ones, and the count of all of its kind.
 Progress = Callable[[str, int, int], None]
 
 
@@ -64,31 +64,32 @@ def judge_workspace(
     progress: Progress | None = None,
     record: ProofRecord | None = None,
 ) -> Judgement:
-    """Prove, for every pose of a case's workspace, that its robot is regular and keeps its limits, or find a pose.
+    """Judge a robot over a box of poses: prove full rank and all limits, or give a pose that refutes them.
 
     Args:
-        case: a case with fixed dimensions.
-        workspace: the poses; those of the case if left out.
+        case: case with fixed dimensions.
+        workspace: box of poses; the workspace of the case if left out.
         quantities: names of measures of the robot whose smallest and largest values are requested.
-        gap: allowed distance of a bound from the best known value, as a part of it.
-        time_limit: seconds for all searches together, which then stop with the bounds reached; None for no limit. A
-            search takes at most half of the time left, and those of actuators even shares of it.
+        gap: largest relative gap between the bound and the best known value.
+        time_limit: seconds for all searches together; None for no limit. At the limit, searches stop with their present
+            bounds. A search takes at most half of the time left; searches of actuators take equal shares of it.
         jobs: number of threads.
-        with_limits: whether numbers are bounded at all, and not regularity alone.
-        with_objective: whether F of each task is bounded, and numbers of actuators without a limit are.
-        until_fault: whether the work ends at the first rank or limit that is not proved.
-        leg_error: largest error of a leg's length, length. With it, or with a tolerance of the case for joint centres,
-            the errors of the platform's pose are bounded, where F is.
-        rank_progress: called during the search for singular poses.
-        progress: called before each number.
+        with_limits: If false, judge only ranks.
+        with_objective: If true, bound F of each task, and quantities of actuators without a limit.
+        until_fault: If true, stop at the first rank or limit that is not proved.
+        leg_error: largest leg-length error, length. With it, or with a joint-centre tolerance, pose errors are bounded
+            if ``with_objective`` is true.
+        rank_progress: function that is called during the search for singular poses.
+        progress: function that is called before each quantity.
         record: record of the searches for a proof.
 
     Raises:
         CaseError: the case has no workspace, or a free dimension.
-        InputError: the robot has no such measure, the leg error is negative or not for it, or there is no C kernel.
+        InputError: the robot has no measure of a given name, the leg error is negative or does not apply to this robot,
+            or there is no C kernel.
     """
     workspace = workspace_of_case(case if workspace is None else replace(case, workspace=workspace))
-    kernel()  # before any work where it is missing
+    kernel()  # fails at once if it is missing
     check_leg_error(case, leg_error)
     search = NumberSearch(gap, jobs, record)
     with within(time_limit, _PART):
@@ -102,7 +103,7 @@ class _OverBox(Judging):
     """A judgement over a box of poses.
 
     Attributes:
-        with_objective, leg_error, progress, rank_progress: as in :func:`judge_workspace`.
+        with_objective, leg_error, progress, rank_progress: arguments of :func:`judge_workspace`.
     """
 
     with_objective, leg_error = True, 0.0
@@ -115,19 +116,19 @@ class _OverBox(Judging):
         super().__init__(case, workspace, measures, search, until_fault=until_fault)
         self._box, self._closed = pose_box(workspace), closed_form(case.model)
         self._names = [name for name in measures if name not in SPECTRAL]
-        # All robots within the tolerance; None without one. The design, or these, over the box; None where not judged.
-        self._machines: Machines | None = None
+        # All robots within the tolerance; None without a tolerance.
+        self._robots: RobotsWithinTolerance | None = None
         self._problem: Problem | None = None
         self._reason = ""
         try:
             design = build_problem(case, self._closed.model, self._box)
             if case.joint_centre_tolerance:
-                self._machines = Machines(case, self._closed, design)
-            self._problem = design if self._machines is None else self._machines.family
+                self._robots = RobotsWithinTolerance(case, self._closed, design)
+            self._problem = design if self._robots is None else self._robots.family
         except NotJudgedError as error:
             self._reason = str(error)
-        self._homes = Homes(case, self._box, self._names, self._machines)
-        # Proves a claim about a leg length more finely: the last one that proved claims.
+        self._homes = Homes(case, self._box, self._names, self._robots)
+        # Proves a claim about a leg length with a smaller gap; set by the search that proved the leg lengths.
         self._prove: Callable[[Claim, NumberSearch], Verdict] | None = None
 
     def ranks(self) -> Iterator[Verdict]:
@@ -141,37 +142,37 @@ class _OverBox(Judging):
         )
 
     def shown(self, verdict: Verdict) -> Verdict:
-        """Return a verdict on a number with its value in the home assembly mode."""
+        """Return a verdict with the value of the quantity in the home assembly mode."""
         return verdict if verdict.is_rank else self._homes.shown(verdict)
 
     def subject(self, shortest: float) -> Subject:
-        """Return the robot of which the other numbers are."""
+        """Return the robot for the searches of the other quantities."""
         return Subject(self.case, self._closed.model, self._problem, self._reason, shortest)
 
     def actuators(self, subject: Subject) -> Iterator[Verdict]:
-        """Yield the verdicts on actuators, and on errors of the pose."""
+        """Yield the verdicts on actuators, and on pose errors."""
         yield from motor_extremes(subject, with_all=self.with_objective, record=self.search.record)
         if has_straight_legs(self.case.model) and self.with_objective:
             yield from pose_errors(subject, self.leg_error, self.search.record)
 
     def expressions(self) -> Iterator[Verdict]:
         """Yield the verdicts on expressions of the pose."""
-        if self._machines is not None:
-            yield from self._within_tolerance(self._machines)
+        if self._robots is not None:
+            yield from self._within_tolerance(self._robots)
         elif self.workspace.dependent:
             yield from self._followed(self._problem)
         else:
             yield from self._of_design()
 
-    def _within_tolerance(self, machines: Machines) -> Iterator[Verdict]:
+    def _within_tolerance(self, robots: RobotsWithinTolerance) -> Iterator[Verdict]:
         """Yield the verdicts on expressions of all robots within the tolerance."""
-        reaches, claims = machines.symbols.claims(self._names, with_objective=self.with_objective)
-        dependent = dependent_claims(machines.symbols.layout.robots[0], self.workspace)
-        yield from self._proved([*reaches, *dependent], machines.extreme)
+        reaches, claims = robots.symbols.claims(self._names, with_objective=self.with_objective)
+        dependent = dependent_claims(robots.symbols.layout.robots[0], self.workspace)
+        yield from self._proved([*reaches, *dependent], robots.extreme)
         if any(each.fails and each.key == REACH for each in self.verdicts.values()):
             yield from (verdict_of(claim, Minimum(reason=_OUT_OF_REACH)) for claim in claims)
         else:
-            yield from self._proved(claims, machines.extreme)
+            yield from self._proved(claims, robots.extreme)
 
     def _of_design(self) -> Iterator[Verdict]:
         """Yield the verdicts on expressions of the design."""
@@ -180,7 +181,7 @@ class _OverBox(Judging):
             layout, reaches = reach_claims(case, closed, workspace)
             yield from self._proved(reaches, partial(prove_extreme, layout))
         is_reached = not any(each.fails for each in self.verdicts.values() if not each.is_rank)
-        # Without unknowns there are fewer coordinates. Where a limb does not reach, its loop has to be kept.
+        # Closed forms reduce the number of coordinates. If a limb may not reach a pose, its loop equations are kept.
         is_closed = closed.reaches and is_reached
         layout = closed_layout(case, closed, workspace) if is_closed else posed_layout(case, workspace)
         claims = claims_of(layout, self._names, with_objective=self.with_objective)
@@ -191,7 +192,7 @@ class _OverBox(Judging):
     def _followed(self, design: Problem | None) -> Iterator[Verdict]:
         """Yield the verdicts on expressions of a design with dependent coordinates, in the home assembly mode.
 
-        No other search keeps to the poses that the robot can take.
+        Only this search is restricted to poses that the robot can reach.
         """
         if design is None:
             layout = coordinate_layout(self.case, pose_coordinates(self._box))
@@ -201,34 +202,34 @@ class _OverBox(Judging):
             ]
             yield from (verdict_of(claim, Minimum(reason=self._reason)) for claim in claims)
             return
-        machines = Machines(self.case, self._closed, design)
-        reaches, claims = machines.symbols.claims(self._names, with_objective=self.with_objective)
-        # The range of a dependent coordinate is part of the answer, however wide its limits are.
-        every = [*reaches, *dependent_claims(machines.symbols.layout.robots[0], self.workspace), *claims]
+        robots = RobotsWithinTolerance(self.case, self._closed, design)
+        reaches, claims = robots.symbols.claims(self._names, with_objective=self.with_objective)
+        # The range of a dependent coordinate is a result, however wide its limits are.
+        every = [*reaches, *dependent_claims(robots.symbols.layout.robots[0], self.workspace), *claims]
         limited = [claim for claim in (*reaches, *claims) if claim.limit is not None]
-        decided = (each for each in machines.followed(limited, self.search.gap) if each.outcome is not Outcome.OPEN)
-        yield from self._proved(every, machines.extreme, decided)
+        decided = (each for each in robots.followed(limited, self.search.gap) if each.outcome is not Outcome.OPEN)
+        yield from self._proved(every, robots.extreme, decided)
 
     def _in_home(self, design: Problem, *, is_reached: bool) -> Iterator[Verdict]:
         """Yield the verdicts on expressions of a design with loops that are decided in the home assembly mode.
 
-        Loop equations as conditions of a program hold in every assembly mode, and F has no bound where one of these is
-        singular. The loops are followed here, and the design is the only robot within no tolerance.
+        Loop equations as constraints of a program hold in every assembly mode, and F is unbounded if one of these modes
+        is singular. This search follows the loops in the home assembly mode.
         """
-        machines = Machines(self.case, self._closed, design)
-        claims = machines.symbols.claims(self._names, with_objective=self.with_objective)[1]
-        limited = machines.followed([claim for claim in claims if claim.limit is not None], self.search.gap)
+        robots = RobotsWithinTolerance(self.case, self._closed, design)
+        claims = robots.symbols.claims(self._names, with_objective=self.with_objective)[1]
+        limited = robots.followed([claim for claim in claims if claim.limit is not None], self.search.gap)
         yield from (each for each in limited if each.outcome is not Outcome.OPEN)
         for claim in claims if is_reached and self._closed.model.unknowns else ():
             if claim.limit is None:
-                yield machines.extreme(claim, replace(self.search, record=None))
+                yield robots.extreme(claim, replace(self.search, record=None))
 
     def _proved(
         self, claims: Sequence[Claim], prove: Callable[[Claim, NumberSearch], Verdict], decided: Iterable[Verdict] = ()
     ) -> Iterator[Verdict]:
-        """Yield the verdicts on claims; those that are decided are searched again for the proof record alone."""
+        """Yield the verdicts on claims; decided claims are searched again only for the proof record."""
         self._prove = prove
-        # What is proved of the design says nothing of other robots within the tolerance.
+        # A proof for the design does not cover other robots within the tolerance.
         uncovered = self._reason if self.case.joint_centre_tolerance else ""
         known = {(each.name, each.sense, each.key): each for each in decided}
         for done, claim in enumerate(replace(each, uncovered=uncovered) for each in claims):
@@ -243,14 +244,14 @@ class _OverBox(Judging):
             yield replace(verdict, claim=claim)
 
     def finer(self, claim: Claim, gap: float, about: Directions | None) -> Verdict | None:
-        """Return the verdict on a leg length with a finer gap."""
-        search, machines = replace(self.search, gap=gap), self._machines
-        if self._prove is None or (about is not None and machines is None):
+        """Return the verdict on a leg length with a smaller gap."""
+        search, robots = replace(self.search, gap=gap), self._robots
+        if self._prove is None or (about is not None and robots is None):
             return None
-        if about is None or machines is None:
+        if about is None or robots is None:
             return self._prove(claim, search)
         (leg,), record = claim.legs, search.record
-        of_one = length_of_one_machine(machines.symbols, leg, claim.sense, about)
+        of_one = length_of_one_robot(robots.symbols, leg, claim.sense, about)
         if record is not None:
             record.directions[of_one.name] = about
         return self._prove(of_one, search)

@@ -15,14 +15,14 @@ from .verdict import Fault, Outcome, Verdict
 
 @dataclass(frozen=True, eq=False)
 class Judgement:
-    """Verdicts on a robot over a domain; with a joint-centre tolerance, on every robot within it.
+    """Verdicts on a robot over a domain; with a joint-centre tolerance, on every robot within the tolerance.
 
     Attributes:
         case: the case, its dimensions fixed.
-        workspace: box of poses, with its dependent coordinates; of a path, a box that holds it.
-        verdicts: verdicts on ranks, then on numbers: reach of limbs, limits, leg lengths, measures, tasks, actuators.
+        workspace: box of poses, with its dependent coordinates; for a tool path, a box that contains the path.
+        verdicts: verdicts on ranks, then on quantities: reach of limbs, limits, leg lengths, measures, F, actuators.
         tool_path: the tool path; None for a box of poses.
-        knots: places of the path with the robot's joints there; None where none are requested.
+        knots: knots of the path with the robot's joint coordinates; None if none were requested.
     """
 
     case: Case
@@ -44,12 +44,12 @@ class Judgement:
 
     @property
     def dependent(self) -> tuple[str, ...]:
-        """Names of the coordinates of the pose that follow from the others."""
+        """Names of the dependent coordinates of the pose."""
         return self.workspace.dependent_names
 
     @property
     def ranks(self) -> tuple[Verdict, ...]:
-        """Verdicts on the rank of J, and on that of the constraint wrenches of a robot that has them."""
+        """Verdicts on the rank of J, and on the rank of the constraint wrenches if the robot has any."""
         return tuple(each for each in self.verdicts if each.is_rank)
 
     @property
@@ -59,17 +59,17 @@ class Judgement:
 
     @property
     def constraints(self) -> Verdict | None:
-        """Verdict on the claim that the constraint wrenches alone keep their rank; None for a robot without any."""
+        """Verdict on the claim that the constraint wrenches keep their rank; None for a robot without them."""
         return next((each for each in self.verdicts if each.name == CONSTRAINTS), None)
 
     @property
     def extremes(self) -> tuple[Verdict, ...]:
-        """Verdicts on numbers."""
+        """Verdicts on the smallest and largest values of quantities."""
         return tuple(each for each in self.verdicts if not each.is_rank)
 
     @property
     def faults(self) -> dict[tuple[str, Sense], Fault]:
-        """First known points of a path that refute limits, where they are not those of the verdicts, by label."""
+        """First known points of a path that refute limits, by label; only those before the point of the verdict."""
         return {(each.name, each.sense): each.fault for each in self.verdicts if each.fault is not None}
 
     @property
@@ -79,10 +79,10 @@ class Judgement:
 
     @property
     def is_proved(self) -> bool:
-        """Whether all ranks and limits are proved, and the distance that knots of a path keep."""
+        """Whether all ranks and limits are proved, and the requested distance of the knots' motion from the path."""
         return not any(each.fails for each in self.verdicts) and (self.knots is None or not self.knots.reason)
 
     @property
     def is_refuted(self) -> bool:
-        """Whether a pose is known that is singular or violates a limit."""
+        """Whether a pose is known that is singular or violates a limit of the case."""
         return any(each.outcome is Outcome.REFUTED for each in self.verdicts)

@@ -1,4 +1,4 @@
-"""Steps of a judgement that are the same over every domain: ranks first, then numbers, each from earlier verdicts."""
+"""Steps of a judgement over any domain: ranks first, then quantities, which use earlier verdicts."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ class Judging(ABC):
 
     Args:
         case: the case, its dimensions fixed.
-        workspace: box of the domain's poses, with its dependent coordinates.
+        workspace: box that contains the domain's poses, with the dependent coordinates.
         measures: names of measures of the robot whose smallest and largest values are requested.
         search: gap, threads and record of the searches.
-        until_fault: whether the work ends at the first rank or limit that is not proved.
+        until_fault: If true, stop at the first rank or limit that is not proved.
 
     Attributes:
         case, workspace, measures, search, until_fault: the arguments.
-        has_numbers: whether numbers can be judged.
-        verdicts: the verdicts so far, by claim. A finer verdict on a claim takes the place of the one before.
+        has_numbers: whether quantities can be judged.
+        verdicts: verdicts so far, by claim. A finer verdict replaces an earlier verdict on the same claim.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class Judging(ABC):
         self.verdicts: dict[Claim, Verdict] = {}
 
     def judgement(self, *, with_numbers: bool = True) -> Judgement:
-        """Return the judgement; of ranks alone where numbers are left out."""
+        """Return the judgement; without numbers it has only the verdicts on ranks."""
         for each in self.ranks():
             self.verdicts[each.claim] = each
         if with_numbers and self.has_numbers and not self._is_over():
@@ -67,11 +67,11 @@ class Judging(ABC):
         return Judgement(self.case, self.workspace, tuple(map(self.shown, self.verdicts.values())))
 
     def _is_over(self) -> bool:
-        """Return whether a claim fails after which nothing else is judged."""
+        """Return whether a claim has failed that ends the judgement."""
         return self.until_fault and any(each.fails for each in self.verdicts.values())
 
     def _numbers(self) -> Iterator[Verdict]:
-        """Yield the verdicts on numbers; leg lengths that a stroke needs more finely come again before it."""
+        """Yield the verdicts on quantities; leg lengths that a stroke needs with a smaller gap come again before it."""
         yield from self.expressions()
         lengths = [each for each in self.verdicts.values() if each.name.startswith(_LENGTH)]
         subject = self.subject(min((each.bound for each in lengths if each.sense is Sense.MIN), default=0.0))
@@ -82,7 +82,7 @@ class Judging(ABC):
     def _finer_length(
         self, claims: Sequence[Claim], leg: int, sense: Sense, gap: float, about: Directions | None
     ) -> Verdict | None:
-        """Return a leg length that is proved more finely; None where the work is requested to stop."""
+        """Return the verdict on a leg length with a smaller gap; None if the work is requested to stop."""
         if is_requested():
             return None
         claim = next(each for each in claims if each.legs == (leg,) and each.sense is sense)
@@ -90,7 +90,7 @@ class Judging(ABC):
 
     @abstractmethod
     def ranks(self) -> Iterator[Verdict]:
-        """Yield the verdict on the rank of J, and that on the constraint wrenches of a robot that has them."""
+        """Yield the verdict on the rank of J, and on the rank of the constraint wrenches if the robot has any."""
 
     @abstractmethod
     def expressions(self) -> Iterator[Verdict]:
@@ -98,19 +98,19 @@ class Judging(ABC):
 
     @abstractmethod
     def subject(self, shortest: float) -> Subject:
-        """Return the robot of which the other numbers are; none of its legs is shorter than a length."""
+        """Return the robot for the searches of the other quantities, with a lower bound of its leg lengths."""
 
     @abstractmethod
     def actuators(self, subject: Subject) -> Iterator[Verdict]:
-        """Yield the verdicts on actuators under loads and in motions, and on errors of the pose."""
+        """Yield the verdicts on actuator forces, speeds and powers, and on pose errors."""
 
     @abstractmethod
     def finer(self, claim: Claim, gap: float, about: Directions | None) -> Verdict | None:
-        """Return the verdict on a leg length with a finer gap; None where there is none.
+        """Return the verdict on a leg length with a smaller gap; None if there is none.
 
-        With directions it is the length less the part of its errors along them, which no pose changes.
+        With directions, the length is reduced by the part of the errors along them, which is the same at every pose.
         """
 
     def shown(self, verdict: Verdict) -> Verdict:
-        """Return a verdict as the judgement has it."""
+        """Return a verdict as the judgement reports it."""
         return verdict

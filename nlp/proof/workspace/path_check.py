@@ -1,4 +1,4 @@
-"""A machine along a path of a file or of its case: read, and judged."""
+"""Verification of a robot along a tool path that is read from a file or from the case."""
 
 from __future__ import annotations
 
@@ -22,25 +22,25 @@ def check_path(
     time_limit: float | None = TIME_LIMIT,
     progress: Callable[[str], None] | None = None,
 ) -> Judgement:
-    """Judge a machine at every point of a path: regular, and within every limit of the case.
+    """Verify a robot at every point of a tool path: no singularity and no violated limit of the case.
 
     Args:
-        case: the machine; its dimensions are fixed.
-        path: a path, or the name of its file: a program of G-code, or a table of poses whose name ends in ``.csv``.
+        case: the robot with fixed dimensions, and its limits.
+        path: the tool path, or its file: a G-code program, or a table of poses whose name ends in ``.csv``.
             None for the path of the case.
-        options: choices that the file leaves open; those of the case's own path are the case's if left out.
-        gap: largest relative gap of a number without a limit.
-        time_limit: seconds of all searches; None for no limit.
-        progress: called with what is done next.
+        options: choices that the file leaves open. Left out, the path of the case has the case's options.
+        gap: largest relative gap of a quantity without a limit.
+        time_limit: seconds for all searches together; None for no limit.
+        progress: function that is called with the name of the next step.
 
     Returns:
         A verdict on each claim: proved at every point, refuted with a point and its pose, or open with the reason.
-        ``is_proved`` says whether all are proved.
+        ``is_proved`` says whether all ranks and limits are proved.
 
     Raises:
         CaseError: a dimension of the robot is free, or the case has no path.
-        InputError: the file cannot be read or holds what is not read, the path has angles that are not covered, or
-            there is no C kernel.
+        InputError: the file cannot be read or has words that are not supported, the rotations of the path are not
+            covered, or there is no C kernel.
     """
     if path is None:
         path = path_of_case(case, options)

@@ -1,7 +1,7 @@
-"""Closed forms of the joints of a machine along a path, on which joints may turn all round.
+"""Closed forms of a robot's passive joints along a tool path.
 
-The formula of an angle jumps where the joint has turned by half a turn from home; the joint itself goes on. Where a
-joint comes near to that on a path, all angles are followed as unknowns, which have no jumps.
+The formula of a joint angle jumps at half a turn from home, where the joint itself moves on continuously. If a joint
+comes near half a turn on a path, all joint angles become unknowns of the loop equations, which have no jumps.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from ...path.path import ProgrammedPath
 from ...path.sampling import spread_points
 from .robot.pose_box import PoseNumbers
 
-#: Number of points of a path at which joints are computed, and angle from home from which on they are followed.
+#: Number of points of a path at which joints are computed, and angle from home at which angles become unknowns.
 _POINTS, _FAR = 512, math.radians(150)
 
 
 def closed_form_along(case: Case, path: ProgrammedPath) -> ClosedForm:
-    """Return a robot with fixed dimensions without those unknowns that have a closed form all along a path."""
+    """Return a robot with fixed dimensions, its unknowns replaced by closed forms where these hold all along a path."""
     closed = closed_form(case.model)
     left = {each.name for each in closed.model.unknowns}
     names = [each.name for each in case.model.unknowns if each.dimension is Dimension.ANGLE and each.name not in left]
@@ -41,9 +41,9 @@ def closed_form_along(case: Case, path: ProgrammedPath) -> ClosedForm:
 
 
 def unknowns_at(case: Case, closed: ClosedForm, pose: PoseNumbers) -> FloatArray | None:
-    """Return the positions of a robot's unknowns at a pose to which a way of poses from home leads; None without one.
+    """Return the robot's unknowns at a pose in the home assembly mode, angles within half a turn from home.
 
-    Angles are within half a turn from home.
+    None if no motion from home to the pose is known.
     """
     try:
         found = inverse(case, pose.position[None], pose.rotation[None])

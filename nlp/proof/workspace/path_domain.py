@@ -1,4 +1,4 @@
-"""A robot along a tool path: boxes of the path's pieces, the box of all its poses, and the dependent coordinates."""
+"""Domain of a judgement along a tool path: boxes of its pieces, a box of all its poses, dependent coordinates."""
 
 from __future__ import annotations
 
@@ -23,22 +23,21 @@ from .robot.path_cover import PathCover
 from .robot.pose_box import PoseBox, pose_box
 from .robot.posed_robot import NotJudgedError, Problem, build_problem
 
-#: Part of the robot's size, or of the sizes of positions, by which the box of all poses is wider than a path that stays
-#: at one.
+#: Relative width of the box of all poses if the path stays at one pose.
 _ROOM = 1e-9
-#: Parts of a robot's size, or angle, by which a coordinate moves that stands still but for rounding.
+#: Largest change of a coordinate, in parts of the robot's size or as an angle, that counts as rounding.
 _STILL = 1e-9
 
 
 def covered(path: ProgrammedPath, size: float) -> tuple[PathCover, PoseBox, Workspace]:
-    """Return the boxes of a path, the box of all its poses, and a workspace about it.
+    """Return the boxes of a path's pieces, the box of all its poses, and the workspace with this box.
 
     Args:
-        path: the path.
+        path: the tool path.
         size: characteristic size of the robot, length.
 
     Raises:
-        InputError: it has no motion, or its rotations are not covered.
+        InputError: the path has no motion, or its rotations are not covered.
     """
     if not len(path):
         raise InputError(f"{path.source}: has no motion")
@@ -72,22 +71,22 @@ def design_along(case: Case, closed: ClosedForm, box: PoseBox, cover: PathCover)
     """Return the design along a path.
 
     Raises:
-        NotJudgedError: it is not judged, or its loops are not closed at the first point.
+        NotJudgedError: the robot cannot be judged, or its loops are not closed at the first point.
     """
     first = cover.points(cover.pieces[:1], 0.0)[0]
     near = partial(unknowns_at, case, closed, box.pose(first))
     design = replace(build_problem(case, closed.model, box, first, near), cover=cover)
-    # An equation of a number that hardly changes counts as one that follows from others, but must hold.
+    # An equation whose coordinate hardly changes counts as dependent on others, but must hold.
     if not np.array_equal(design.start[design.stated], first[[design.free[j] for j in design.stated]]):
         raise NotJudgedError("its loops could not be closed at the first point of the path")
     return design
 
 
 def with_dependent(case: Case, box: PoseBox, workspace: Workspace) -> tuple[PoseBox, Workspace]:
-    """Return the box of a path, and the workspace about it, with the coordinates that the robot cannot choose.
+    """Return the box of a path and its workspace, with the dependent coordinates of the robot.
 
     Raises:
-        NotJudgedError: the path moves one of these, or its rotations are not those of three angles.
+        NotJudgedError: the path moves a dependent coordinate, or its rotations are not given by three angles.
     """
     if workspace.turns.kind is not TurnKind.ROLL_PITCH_YAW:
         return box, workspace
@@ -105,17 +104,19 @@ def with_dependent(case: Case, box: PoseBox, workspace: Workspace) -> tuple[Pose
         names, chosen = (
             " and ".join(found.names[k] for k in which) for which in (moved, [k for k in range(6) if k not in places])
         )
-        raise NotJudgedError(f"the path moves {names}, which this robot cannot choose: of the pose it chooses {chosen}")
+        raise NotJudgedError(
+            f"the path moves {names}, which this robot does not control: its independent coordinates are {chosen}"
+        )
     wide = pose_box(found)
     lower, upper = box.lower.copy(), box.upper.copy()
     lower[places], upper[places] = wide.lower[places], wide.upper[places]
     lower, upper = frozen_array(lower, (6,)), frozen_array(upper, (6,))
-    # Ranges of rounding are no limits.
+    # Ranges as narrow as rounding errors are not limits.
     still = [sum(ends_of(each)) / 2 if k in places else each for k, each in enumerate(stated)]
     found = replace(found, position=still[:3], turns=replace(found.turns, angles=tuple(still[3:])))
     return replace(box, lower=lower, upper=upper, dependent=tuple(places)), found
 
 
 def _values(low: FloatArray, high: FloatArray) -> list[Value]:
-    """Return ranges, or fixed numbers where both ends are one."""
+    """Return ranges, or fixed values where both ends are equal."""
     return [Free(a, b) if b > a else a for a, b in zip(low.tolist(), high.tolist(), strict=True)]

@@ -1,4 +1,4 @@
-"""The first point of a path, in the order of the program, at which a number is beyond its limit."""
+"""First point of a tool path at which a quantity violates its limit."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from .robot.pose_box import PoseNumbers
 from .robot.posed_robot import Problem
 from .verdict import Fault, Outcome, Verdict
 
-#: Points at which the first one beyond a limit is looked for: of all segments together, and least and most of each one.
+#: Number of sampled points: of all segments together, and least and most of one segment.
 _ALL_SAMPLES, _LEAST_SAMPLES, _MOST_SAMPLES = 50_000, 5, 129
-#: Bisections between two of them.
+#: Number of bisections between two sampled points.
 _STEPS = 80
 
 
 def pose_at(problem: Problem, cover: PathCover, place: Place) -> PoseNumbers:
-    """Return the pose at a place, of the design where coordinates follow from others."""
+    """Return the pose at a place of a path; if the robot has dependent coordinates, the pose of the design."""
     piece = np.array([[place.segment, place.parameter, place.parameter]])
     if not problem.box.dependent:
         return problem.box.pose(cover.points(piece, 0.0)[0])
@@ -36,16 +36,16 @@ def pose_at(problem: Problem, cover: PathCover, place: Place) -> PoseNumbers:
 
 
 def refuted(verdicts: Sequence[Verdict]) -> dict[int, Verdict]:
-    """Return the refuted ones of verdicts, by their places."""
+    """Return the refuted verdicts, by index."""
     return {k: each for k, each in enumerate(verdicts) if each.outcome is Outcome.REFUTED}
 
 
 def first_faults(numbers: Number, wrong: Mapping[int, Verdict], cover: PathCover) -> dict[Claim, Fault]:
-    """Return the first known points of the design that are beyond limits, where they are before those of worst values.
+    """Return the first known points at which the design violates limits, if they are before the points of worst values.
 
     Args:
-        numbers: numbers of claims.
-        wrong: verdicts that refute some of these claims, by the places of the numbers.
+        numbers: quantities of claims.
+        wrong: verdicts that refute some of these claims, by index of the quantity.
         cover: boxes of the path.
     """
     problem, found = numbers.problem, dict[Claim, Fault]()
@@ -70,18 +70,18 @@ def first_faults(numbers: Number, wrong: Mapping[int, Verdict], cover: PathCover
 
 
 class _Sampled:
-    """Values of the design at points of segments, whose loops are followed from the middle of each to its ends.
+    """Values of the design at points of segments, with loops closed from the middle of each segment to its ends.
 
     Args:
-        numbers: whose values they are.
-        cover: of the path.
-        pieces: (B, 3) the segments.
-        near: (B, n) closed points in their middles.
+        numbers: quantities to evaluate.
+        cover: boxes of the path.
+        pieces: (B, 3) segments.
+        near: (B, n) points with closed loops in the middles of the segments.
     """
 
     def __init__(self, numbers: Number, cover: PathCover, pieces: FloatArray, near: FloatArray) -> None:
         self._numbers, self._cover, self._pieces = numbers, cover, pieces
-        # An odd number: the middle is one of them.
+        # With an odd count the middle is among the samples.
         count = min(max(_ALL_SAMPLES // len(cover.pieces), _LEAST_SAMPLES), _MOST_SAMPLES) | 1
         self._parts, middle = np.linspace(0.0, 1.0, count).tolist(), count // 2
         self._points = [near] * count
@@ -90,24 +90,24 @@ class _Sampled:
         self._values = np.stack([self._values_at(z) for z in self._points], axis=1)
 
     def _closed(self, near: FloatArray, pieces: FloatArray, part: float) -> FloatArray:
-        """Return closed points at a part of pieces, from others near by; NaN where one is lost."""
+        """Return points with closed loops at one part of pieces, from near points; NaN where Newton's method fails."""
         problem, z = self._numbers.problem, near.copy()
         z[:, problem.of_path] = problem.path_points(self._cover, pieces, part)
         return self._numbers.closed(z)
 
     def _values_at(self, z: FloatArray) -> FloatArray:
-        """Return values (B, K) at closed points; NaN where there are none."""
+        """Return values (B, K) at points with closed loops; NaN where they are not closed."""
         found, known = np.full((len(z), self._numbers.count), np.nan), np.isfinite(z).all(axis=1)
         found[known] = self._numbers.values(z[known])
         return found
 
     def first(self, k: int, least: float, worst: Place | None) -> tuple[Place, float] | None:
-        """Return the first place known at which a number is less than a value, and the number; None without one.
+        """Return the first known place at which a quantity is less than its limit, and its value; None without one.
 
         Args:
-            k: index of the number.
-            least: the value.
-            worst: a place at which the number is less, which may be between two points; None where none is known.
+            k: index of the quantity.
+            least: the limit.
+            worst: known place with a violation, possibly between two samples; None without one.
         """
         beyond = [(row, self._parts[sample]) for row, sample in np.argwhere(self._values[:, :, k] < least)[:1].tolist()]
         begin, end = (int(self._pieces[row, 0]) for row in (0, -1))
@@ -116,7 +116,7 @@ class _Sampled:
         if not beyond:
             return None
         row, high = min(beyond)
-        # The last point before, at which the number is not less.
+        # The last sample before, without a violation.
         sample = max(int(np.searchsorted(self._parts, high)) - 1, 0)
         low = min(self._parts[sample], high)
         beside = [self._points[each][row : row + 1] for each in (min(sample + 1, len(self._parts) - 1), sample)]
@@ -126,7 +126,7 @@ class _Sampled:
             return float(self._values_at(self._closed(z, piece, part))[0, k])
 
         value = value_at(high)
-        if not value < least:  # as where the loops are lost on the way
+        if not value < least:  # for example where the loops cannot be closed between the samples
             return None
         for _ in range(_STEPS if low < high else 0):
             half = 0.5 * (low + high)

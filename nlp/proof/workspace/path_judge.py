@@ -1,7 +1,7 @@
 """Judgement of a robot along a tool path.
 
-Claims are those about a box of poses. Boxes cover pieces of the path, which are halved along it, and values are those
-of its points. The robot stands for every robot within the case's joint-centre tolerance.
+The claims are the same as over a box of poses. Boxes cover pieces of the path, which are bisected, and values are taken
+at points of the path. With a joint-centre tolerance, the claims cover every robot within the tolerance.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import casadi as ca
 
 from ...case.case import Case
 from ...case.checks import check_determined_joints
-from ...case.motors import MotorNumber
+from ...case.motors import ActuatorQuantity
 from ...case.workspace import Workspace
 from ...errors import UncoveredError
 from ...interruption import one_call, within
@@ -30,9 +30,9 @@ from .judging import Judging
 from .numbers.bound_search import Minimum, Number
 from .numbers.expressions import Expressions
 from .numbers.extremes import NumberSearch, verdict_of
-from .numbers.machines import Machines
 from .numbers.motors import Motors
 from .numbers.searched import Subject, motor_extremes
+from .numbers.within_tolerance import RobotsWithinTolerance
 from .path_closing import closed_form_along
 from .path_domain import covered, design_along, with_dependent
 from .path_faults import first_faults, refuted
@@ -44,12 +44,12 @@ from .robot.path_cover import PathCover
 from .robot.posed_robot import NotJudgedError
 from .verdict import Fault, Verdict, not_judged
 
-#: Seconds after which a judgement stops where no time is stated.
+#: Default time limit of a judgement, in seconds.
 TIME_LIMIT = 600.0
-#: Part of the time left that a search takes at most, and gap of a number without a limit, as a part of it.
+#: Largest part of the time left for one search, and relative gap of a quantity without a limit.
 _PART, GAP = 0.5, 1e-3
-#: Reason for numbers with an operation that no rule bounds.
-_NO_RULE = "the check has no rule for it"
+#: Reason for quantities with an operation without an interval rule.
+_NO_RULE = "no interval rule for one of its operations"
 
 
 @one_call
@@ -60,26 +60,26 @@ def judge_path(
     gap: float = GAP,
     time_limit: float | None = TIME_LIMIT,
     sampling: Sampling | None = None,
-    limits_alone: bool = False,
+    limits_only: bool = False,
     progress: Callable[[str], None] | None = None,
     record: ProofRecord | None = None,
 ) -> Judgement:
     """Judge a robot at every point of a path.
 
     Args:
-        case: the robot, whose own poses and workspace are not used.
-        path: in the case's unit of length.
-        gap: largest relative gap of a number without a limit.
-        time_limit: seconds of all searches; None for no limit.
-        sampling: distance that knots of the path keep; None for no knots.
-        limits_alone: whether numbers of actuators without a limit are left out.
-        progress: called with the name of the next step.
+        case: the robot and its limits; poses and workspace of the case are not used.
+        path: the tool path, in the case's unit of length.
+        gap: largest relative gap of a quantity without a limit.
+        time_limit: seconds for all searches together; None for no limit.
+        sampling: rule for the knots of the path; None for no knots.
+        limits_only: If true, leave out quantities of actuators without a limit.
+        progress: function that is called with the name of the next step.
         record: record of the searches for a proof.
 
     Raises:
         CaseError: a dimension of the robot is free, or limits need a motion that neither the case nor the path states.
-        InputError: the path has rotations that are not covered, there is no C kernel, or knots are too many, or of a
-            robot of which the positions of actuators are not known.
+        InputError: rotations of the path are not covered, there is no C kernel, or there are too many knots; or knots
+            are requested for a robot whose actuator positions are not known.
     """
     cover, box, workspace = covered(path, robot_length(case))
     case = replace(case, workspace=workspace)
@@ -95,17 +95,17 @@ def judge_path(
         if sampling is not None:
             report("knots")
             knots = knots_of(moving, path, cover, workspace, sampling)
-        closed, machines, reason = closed_form_along(moving, path), None, ""
+        closed, robots, reason = closed_form_along(moving, path), None, ""
         try:
             box, workspace = with_dependent(moving, box, workspace)
             moving = replace(moving, workspace=workspace)
-            machines = Machines(moving, closed, design_along(moving, closed, box, cover))
+            robots = RobotsWithinTolerance(moving, closed, design_along(moving, closed, box, cover))
         except NotJudgedError as error:
             reason = str(error)
-        judging = _AlongPath(moving, workspace, machines, cover, NumberSearch(gap, record=record))
+        judging = _AlongPath(moving, workspace, robots, cover, NumberSearch(gap, record=record))
         judging.is_timed, judging.with_all, judging.reason, judging.report = (
             path.is_timed,
-            not limits_alone,
+            not limits_only,
             reason,
             report,
         )
@@ -117,49 +117,54 @@ class _AlongPath(Judging):
     """A judgement along a path.
 
     Args:
-        case: the case, in a motion.
-        workspace: box that holds the path.
-        machines: all robots within the tolerance; None where they are not judged.
+        case: the case, with a motion.
+        workspace: box that contains the path.
+        robots: robots within the tolerance; None if they are not judged.
         cover: boxes of the path.
-        search: gap of numbers without a limit.
+        search: gap, threads and record of the searches.
 
     Attributes:
         is_timed: whether the path states times.
-        with_all: whether numbers of actuators without a limit are judged too.
-        reason: why the robot is not judged; else empty.
-        report: called with the name of the next step.
+        with_all: whether quantities of actuators without a limit are judged too.
+        reason: reason for a robot that is not judged; else empty.
+        report: function that is called with the name of the next step.
     """
 
     is_timed, with_all, reason = False, True, ""
     report: Callable[[str], None]
 
     def __init__(
-        self, case: Case, workspace: Workspace, machines: Machines | None, cover: PathCover, search: NumberSearch
+        self,
+        case: Case,
+        workspace: Workspace,
+        robots: RobotsWithinTolerance | None,
+        cover: PathCover,
+        search: NumberSearch,
     ) -> None:
         super().__init__(case, workspace, search=search)
-        self._machines, self._cover = machines, cover
+        self._within_tolerance, self._cover = robots, cover
         self._faults: dict[Claim, Fault] = {}
         if search.record is not None:
             search.record.pieces = cover.pieces
-        self.has_numbers = machines is not None
+        self.has_numbers = robots is not None
 
     @property
-    def _robots(self) -> Machines:
-        """All robots within the tolerance.
+    def _robots(self) -> RobotsWithinTolerance:
+        """Robots within the tolerance.
 
         Raises:
-            NotJudgedError: they are not judged.
+            NotJudgedError: the robots are not judged.
         """
-        if self._machines is None:
+        if self._within_tolerance is None:
             raise NotJudgedError(self.reason)
-        return self._machines
+        return self._within_tolerance
 
     def ranks(self) -> Iterator[Verdict]:
         """Yield the verdicts on ranks."""
-        if self._machines is None:
+        if self._within_tolerance is None:
             yield not_judged(REGULAR, self.reason)
             return
-        family, cover = self._machines.family, self._cover
+        family, cover = self._within_tolerance.family, self._cover
         for name, matrix in ((REGULAR, family.locked), (CONSTRAINTS, family.unactuated)):
             if matrix is not None:
                 self.report(name)
@@ -172,26 +177,26 @@ class _AlongPath(Judging):
     def expressions(self) -> Iterator[Verdict]:
         """Yield the verdicts on expressions of the pose."""
         self.report("limits")
-        machines = self._robots
+        robots = self._robots
         measures = (*ACTUATED, "leg_length") if self.with_all else ()
         names = [item.name for item in self.case.model.quantities if item.name in measures]
-        reaches, claims = machines.symbols.claims(names, with_objective=False)
-        claims += dependent_claims(machines.symbols.layout.robots[0], self.workspace)
+        reaches, claims = robots.symbols.claims(names, with_objective=False)
+        claims += dependent_claims(robots.symbols.layout.robots[0], self.workspace)
         for group in (reaches, claims):
             found = self._searched(group)
             wrong = list(refuted(found).values())
             if wrong:
-                numbers = Expressions(machines.family, ca.vertcat(*[machines.number(each.claim) for each in wrong]))
+                numbers = Expressions(robots.family, ca.vertcat(*[robots.number(each.claim) for each in wrong]))
                 self._keep_faults(numbers, dict(enumerate(wrong)))
             yield from found
 
     def subject(self, shortest: float) -> Subject:
-        """Return the robot of which the other numbers are."""
-        machines = self._robots
-        return Subject(self.case, machines.model, machines.family, "", shortest)
+        """Return the robot for the searches of the other quantities."""
+        robots = self._robots
+        return Subject(self.case, robots.model, robots.family, "", shortest)
 
     def actuators(self, subject: Subject) -> Iterator[Verdict]:
-        """Yield the numbers of actuators, in the path's own motion where its times are stated."""
+        """Yield the verdicts on actuators; a path with times defines its motion."""
         for each in refuted(list(self.verdicts.values())).values():
             if each.claim.kind in (ClaimKind.CLEARANCE, ClaimKind.SPECTRUM):
                 self._keep_faults(subject.number(each.claim), {0: each})
@@ -199,23 +204,25 @@ class _AlongPath(Judging):
         if not self.is_timed:
             yield from self._motors(subject)
             return
-        # Powers are those in the path's motion, whether the case states another one or none.
+        # A path with times defines the motion for powers, whether or not the case states another one.
         speeds, case = speeds_on_path(self._robots, self._cover, self.search.gap, self.search.record), subject.case
         yield from speeds.verdicts
         moving = in_path_motion(case)
         if speeds.number is not None:
             self._keep_faults(speeds.number, refuted(speeds.verdicts))
-            subject = replace(subject, case=moving, machines=speeds.number.problem)
+            subject = replace(subject, case=moving, family=speeds.number.problem)
         else:
             subject = replace(subject, case=replace(moving, loading=moving.loading._replace(motion=None)))
         yield from self._motors(subject, {each.motor.actuator: each.bound for each in speeds.verdicts if each.motor})
         if speeds.number is None:
-            powers = [each for each in motor_claims(moving) if each.motor and each.motor.number is MotorNumber.POWER]
+            powers = [
+                each for each in motor_claims(moving) if each.motor and each.motor.number is ActuatorQuantity.POWER
+            ]
             reason = speeds.verdicts[0].reason
             yield from (verdict_of(each, Minimum(reason=reason)) for each in powers if each.limit is not None)
 
     def finer(self, claim: Claim, gap: float, about: Directions | None) -> Verdict | None:
-        """Return the verdict on a leg length with a finer gap; None with directions."""
+        """Return the verdict on a leg length with a smaller gap; None with directions."""
         search = replace(self.search, gap=gap)
         return None if about is not None else self._robots.searched([claim], search, is_enough=False)[0]
 
@@ -228,26 +235,26 @@ class _AlongPath(Judging):
         self._faults |= first_faults(numbers, wrong, self._cover)
 
     def _motors(self, subject: Subject, speeds: Mapping[str, float] | None = None) -> Iterator[Verdict]:
-        """Yield the verdicts on forces, powers and speeds in any direction, and keep the faults of these."""
+        """Yield the verdicts on actuator forces, powers and speeds in any direction, and keep their faults."""
         found = list(motor_extremes(subject, with_all=self.with_all, speeds=speeds, record=self.search.record))
         yield from found
         for _, group in itertools.groupby(refuted(found).values(), lambda each: each.motor and each.motor.place):
             wrong = list(group)
-            if subject.machines is not None:
-                numbers = Motors(subject.machines, subject.case, [each.claim for each in wrong])
+            if subject.family is not None:
+                numbers = Motors(subject.family, subject.case, [each.claim for each in wrong])
                 self._keep_faults(numbers, dict(enumerate(wrong)))
 
     def _searched(self, claims: Sequence[Claim]) -> list[Verdict]:
-        """Return the verdicts on numbers by one search; those without rules are open."""
-        machines, search, reason = self._robots, self.search, _NO_RULE
-        covered = [claim for claim in claims if machines.is_covered(claim)]
+        """Return the verdicts on quantities by one search; quantities without interval rules stay open."""
+        robots, search, reason = self._robots, self.search, _NO_RULE
+        covered = [claim for claim in claims if robots.is_covered(claim)]
         found = dict[Claim, Verdict]()
         try:
-            found = dict(zip(covered, machines.searched(covered, search) if covered else [], strict=True))
-            # A number that cannot be decided ends the search of all.
+            found = dict(zip(covered, robots.searched(covered, search) if covered else [], strict=True))
+            # A quantity that cannot be decided ends the common search.
             limited = [each for each in covered if each.limit is not None and len(covered) > 1]
             for claim in (each for each in limited if found[each].reason == TOO_SMALL):
-                (found[claim],) = machines.searched([claim], search)
-        except UncoveredError as error:  # of an equation of loops
+                (found[claim],) = robots.searched([claim], search)
+        except UncoveredError as error:  # from a loop equation
             reason = str(error)
         return [found.get(claim) or verdict_of(claim, Minimum(reason=reason)) for claim in claims]

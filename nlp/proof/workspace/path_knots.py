@@ -1,7 +1,7 @@
-"""Knots of a path, at equal steps or so that actuators that move linearly between them keep the platform near it.
+"""Knots of a tool path: at equal steps, or so close that linear actuator motion keeps a given distance from the path.
 
-Pieces of the path are divided until the bounds of :mod:`.path_tubes` are within the distance, about as few as they can
-be: a bound falls with the square of a piece's length.
+Pieces of the path are divided until the bounds of :mod:`.path_tubes` are within the distance. A bound falls with the
+square of a piece's length, which gives the number of parts.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from ...evidence.inverse import InversePoses, inverse
 from ...interruption import is_requested, one_search, why_stopped
 from ...path.path import ProgrammedPath
 from ..boxes.search import joined, some
-from .numbers.machines import Machines
+from .numbers.within_tolerance import RobotsWithinTolerance
 from .path_motion import coordinates_of
 from .path_tubes import Tubes
 from .ranks.krawczyk import ROUNDING
@@ -36,37 +36,37 @@ from .robot.posed_robot import NotJudgedError, Problem, build_problem
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Parts of the size of positions, and angle, by which the box of all poses is larger than the path.
+#: Margin of the box of all poses about the path, in parts of the size of positions, or as an angle.
 _ROOM = 0.01
-#: Errors of the coordinates in a table, in parts of the robot's length, or radians: those of loops are closed to 1e-10.
+#: Errors of tabulated coordinates, in parts of the robot's length, or radians; loops are closed to 1e-10.
 _NOISE = 1e-9
-#: Room of the box about a piece beyond what is first found to be needed.
+#: Factor of the margin of the box about a piece over the first estimate.
 _WIDER = 1.1
-#: Largest number of parts of a piece at once, factor of their number, and least length of a piece in its parameter.
+#: Largest number of parts of a piece at once, factor of this number, and least length of a piece in its parameter.
 _PARTS, _MORE, _LEAST = 4, 1.02, 2.0**-30
-#: Number of pieces that are examined at once, and of those of which nothing is known; and largest number of knots.
+#: Number of pieces that are examined at once: all pieces, and pieces without a bound; and largest number of knots.
 _BLOCK, _FEW, _MOST = 2048, 128, 5_000_000
 #: Number of knots whose joints are computed at once.
 _JOINTS = 2**16
-#: Number of steps of a path without a stated one.
+#: Number of steps of a path if no step is given.
 _STEPS = 1000
-#: Largest turn between two knots at steps of lengths, radians: that of each angle.
+#: Largest change of each angle between two knots at equal steps, radians.
 _TURN = np.radians(1.0)
 
 
 class Knots(NamedTuple):
-    """Places of a path in its order: the beginning of the first segment, then at least the end of each.
+    """Places of a path in order: the start of the first segment, and at least the end of every segment.
 
     Attributes:
-        segments: (K,) segments that end at, or hold, each place.
-        parameters: (K,) along them.
-        coordinates: (K, a) of the actuators there, radians or length; NaN where the machine does not reach the pose.
-            Those that turn have no jumps.
-        actuators, measures: (a,) their names, and the quantities that the coordinates are.
-        within: largest distance asked for of the platform's origin from the path; None where none is.
-        deviation: proven largest distance of the platform's origin from the path while actuators move linearly between
-            the knots; None where none is asked for, or proved.
-        reason: for which none is proved; else empty.
+        segments: (K,) segment that ends at, or contains, each place.
+        parameters: (K,) parameter of each place on its segment.
+        coordinates: (K, a) actuator coordinates, radians or length, without jumps of a turn; NaN where the robot does
+            not reach the pose.
+        actuators, measures: (a,) names of the actuators, and names of their coordinates' quantities.
+        within: largest requested distance of the platform's origin from the path; None without one.
+        deviation: proved largest distance of the platform's origin from the path while actuators move linearly between
+            the knots; None if no distance is requested or proved.
+        reason: reason for a distance that is not proved; else empty.
     """
 
     segments: NDArray[np.intp]
@@ -80,16 +80,16 @@ class Knots(NamedTuple):
 
     @property
     def turning(self) -> NDArray[np.bool_]:
-        """Whether each actuator turns (a,)."""
+        """Whether each actuator is revolute (a,)."""
         return np.array([each == "actuator_angle" for each in self.measures])
 
 
 class Sampling(NamedTuple):
-    """What knots are to keep, of which one is given; else the steps are a thousandth of the path.
+    """Rule for knots: a step or a distance; with neither, the step is a thousandth of the path.
 
     Attributes:
-        step: largest length of the way of the position between two knots, at turns of at most one degree.
-        within: largest distance, length, of the platform's origin from the path while actuators move linearly.
+        step: largest path length of the position between two knots; the angles change by at most one degree each.
+        within: largest distance of the platform's origin from the path, length, while actuators move linearly.
     """
 
     step: float | None = None
@@ -100,14 +100,14 @@ def knots_of(case: Case, path: ProgrammedPath, cover: PathCover, workspace: Work
     """Return knots of a path.
 
     Args:
-        case: with fixed dimensions.
-        path: the path.
-        cover: its boxes.
-        workspace: that holds it.
-        sampling: what they are to keep.
+        case: case with fixed dimensions.
+        path: the tool path.
+        cover: boxes of the path.
+        workspace: box that contains the path.
+        sampling: rule for the knots.
 
     Raises:
-        InputError: there are too many.
+        InputError: there are too many knots.
     """
     if sampling.within is not None:
         return knots_within(case, path, cover, workspace, sampling.within)
@@ -118,19 +118,18 @@ def stepped_knots(case: Case, path: ProgrammedPath, step: float) -> Knots:
     """Return knots at equal steps along each segment.
 
     Args:
-        case: with fixed dimensions.
-        path: the path.
-        step: largest length of the way of the position between two knots. The three angles change by at most one
-            degree each.
+        case: case with fixed dimensions.
+        path: the tool path.
+        step: largest path length of the position between two knots. The angles change by at most one degree each.
 
     Raises:
-        InputError: there are too many.
+        InputError: there are too many knots.
     """
     turns = np.abs(np.diff(path.knots[:, 3:], axis=0)).max(axis=1)
     parts = np.maximum(np.ceil(np.maximum(path.lengths / step, turns / _TURN) * (1 - 1e-12)), 1.0)
     if not parts.sum() <= _MOST:
         raise InputError(
-            f"{path.source}: steps of {step:g} make {parts.sum():.3g} knots; at most {_MOST:,} are written"
+            f"{path.source}: steps of {step:g} make {parts.sum():.3g} knots; at most {_MOST:,} are allowed"
         )
     count = parts.astype(int)
     segments = np.repeat(np.arange(len(path)), count)
@@ -139,9 +138,9 @@ def stepped_knots(case: Case, path: ProgrammedPath, step: float) -> Knots:
 
 
 def _with_joints(case: Case, path: ProgrammedPath, segments: NDArray[np.intp], ends: FloatArray) -> Knots:
-    """Return knots at the beginning and at the ends (P,) of pieces."""
+    """Return knots at the start and at the ends (P,) of pieces."""
     segments, ends = np.concatenate([segments[:1], segments]), np.concatenate([[0.0], ends])
-    # Each pose is reached from the one before. Where formulas close the loops, a part of them needs less memory.
+    # Loops are closed from one pose to the next. With closed forms, blocks of poses need less memory.
     block = len(ends) if closed_form(case.model).model.unknowns else _JOINTS
     found = list[InversePoses]()
     q = np.zeros((0, 0))
@@ -158,19 +157,19 @@ def _with_joints(case: Case, path: ProgrammedPath, segments: NDArray[np.intp], e
 
 
 def knots_within(case: Case, path: ProgrammedPath, cover: PathCover, workspace: Workspace, within: float) -> Knots:
-    """Return knots so that linear motions of the actuators between them keep the platform's origin near the path.
+    """Return knots between which linear actuator motion keeps the platform's origin within a distance of the path.
 
     Args:
-        case: with fixed dimensions.
-        path: the path.
-        cover: its boxes.
-        workspace: that holds it.
-        within: the largest distance, length.
+        case: case with fixed dimensions.
+        path: the tool path.
+        cover: boxes of the path.
+        workspace: box that contains the path.
+        within: largest distance of the platform's origin from the path, length.
     """
     every, pieces, reason = cover.pieces, None, ""
     try:
         with one_search():
-            division = _Division(*_machine(case, cover, workspace), cover, within, path.lines, _are_turning(case))
+            division = _Division(*_robot_about(case, cover, workspace), cover, within, path.lines, _are_turning(case))
             pieces, reason = division.run()
     except (NotJudgedError, UncoveredError) as error:
         reason = str(error)
@@ -179,36 +178,38 @@ def knots_within(case: Case, path: ProgrammedPath, cover: PathCover, workspace: 
     if pieces is None or reason:
         return knots._replace(reason=reason)
     if not division.has_joints(pieces, knots):
-        return knots._replace(reason="the joints at the knots are not surely those of the motion between them")
+        return knots._replace(reason="not proved: joint positions at the knots belong to the motion between them")
     return knots._replace(deviation=float(pieces.far.max()))
 
 
-def _machine(case: Case, cover: PathCover, workspace: Workspace) -> tuple[Problem, SX]:
-    """Return the design about a path, whose pose may leave it in every direction, and its actuators' coordinates.
+def _robot_about(case: Case, cover: PathCover, workspace: Workspace) -> tuple[Problem, SX]:
+    """Return the design near a path, with all six coordinates of the pose, and its actuator coordinates.
 
     Raises:
-        NotJudgedError: they are not known, or not as many as the platform's freedoms.
+        NotJudgedError: the actuator coordinates are not known, or there are not as many as degrees of freedom.
     """
     if workspace.turns.kind is not TurnKind.ROLL_PITCH_YAW:
-        raise NotJudgedError("its rotations are not roll, pitch and yaw below 149 degrees that change linearly")
+        raise NotJudgedError(
+            "rotations of the path must be roll, pitch and yaw that change linearly and stay below 149 degrees"
+        )
     ends = [ends_of(value) for value in (*workspace.position, *workspace.turns.angles)]
     size = max(abs(end) for pair in ends[:3] for end in pair)
     rooms = [_ROOM * (size or 1.0)] * 3 + [_ROOM] * 3
     free = [Free(low - room, high + room) for (low, high), room in zip(ends, rooms, strict=True)]
     opened = replace(workspace, position=free[:3], turns=replace(workspace.turns, angles=tuple(free[3:])))
-    # Independent ones are those that the path moves, and not those with the narrowest rooms.
+    # Independent coordinates are chosen among those that the path moves.
     chosen = independent_coordinates(case, workspace) or range(6)
     others = (DependentCoordinate(k, free[k].lower, free[k].upper) for k in range(6) if k not in chosen)
     opened = with_dependent(case, replace(opened, dependent=tuple(others)))
     case = replace(case, workspace=opened, joint_centre_tolerance=None)
     closed, first = closed_form(case.model), cover.points(cover.pieces[:1], 0.0)[0]
     problem = replace(build_problem(case, closed.model, pose_box(opened), first), cover=cover)
-    machines = Machines(case, closed, problem)
-    coordinates = coordinates_of(machines)
+    robots = RobotsWithinTolerance(case, closed, problem)
+    coordinates = coordinates_of(robots)
     if coordinates.numel() != len(problem.independent):
         freedoms = len(problem.independent)
         raise NotJudgedError(
-            f"it has {coordinates.numel()} actuators for {freedoms} freedoms, so that these do not agree"
+            f"it has {coordinates.numel()} actuators for {freedoms} degrees of freedom; both numbers must agree"
         )
     return problem, coordinates
 
@@ -222,10 +223,10 @@ class _Pieces(NamedTuple):
     """B pieces of a path.
 
     Attributes:
-        along: (B, 3) their segments, and the ends of the parameter.
-        near: (B, n) closed points near them.
-        lower, upper: (B, k) ends between which each pose has one closed point only; NaN where none are known.
-        far: (B,) proven distance of the platform from the path; infinite without one.
+        along: (B, 3) segment of each piece, and both ends of the parameter.
+        near: (B, n) points with closed loops near the pieces.
+        lower, upper: (B, k) box in which the loops close at exactly one point for each pose; NaN if none is known.
+        far: (B,) proved distance of the platform from the path; infinite without one.
     """
 
     along: FloatArray
@@ -236,21 +237,21 @@ class _Pieces(NamedTuple):
 
 
 class _Proved(NamedTuple):
-    """Pieces that are proved, and which ones of those examined they are."""
+    """Proved pieces, with their indices among the examined ones."""
 
     which: NDArray[np.intp]
     pieces: _Pieces
 
 
 class _Division:
-    """Pieces of a path, divided until the platform stays near all of them.
+    """Division of a path into pieces until the platform provably stays within a distance of all of them.
 
     Args:
-        problem: the machine about the path.
-        coordinates: of its actuators.
-        cover: of the path.
-        within: the largest distance.
-        lines: (N,) of the program, of the segments.
+        problem: the robot near the path.
+        coordinates: (a, 1) actuator coordinates.
+        cover: boxes of the path.
+        within: largest distance, length.
+        lines: (N,) line of the G-code program of each segment.
         turning: (a,) whether the coordinate of each actuator is an angle.
     """
 
@@ -269,19 +270,19 @@ class _Division:
         self._start = self._unproved(cover.pieces, whole_workspace(problem).near)
 
     def _unproved(self, along: FloatArray, near: FloatArray) -> _Pieces:
-        """Return pieces of which nothing is known."""
+        """Return pieces without any proved bound."""
         unknown = np.full((len(along), len(self._D)), np.nan)
         return _Pieces(along, near, unknown, unknown, np.full(len(along), np.inf))
 
     def run(self) -> tuple[_Pieces, str]:
-        """Return all pieces in order, and why some are not proved, or nothing."""
+        """Return all pieces in order, and the reason for unproved pieces; empty without any."""
         waiting, found, reason = [self._start], [some(self._start, np.arange(0))], ""
         while waiting and not reason:
             pieces, *rest = _cut(waiting.pop(), _BLOCK)
             waiting += rest
             proved, near, lost = self._examined(pieces)
             found.append(proved)
-            # Of those where nothing is known, some come first: where nothing can be known, they soon are too short.
+            # Some pieces without a bound come first: if no bound exists there, they soon become too short.
             waiting += [each for each in (near, *reversed(_cut(lost, _FEW))) if len(each.far)]
             along = np.concatenate([near.along, lost.along])
             lengths = along[:, 2] - along[:, 1]
@@ -290,14 +291,14 @@ class _Division:
             elif lengths.min(initial=1.0) < _LEAST:
                 k, s = along[int(np.argmin(lengths)), :2].tolist()
                 where = f"in line {self._lines[int(k)]}, {s:.7g} of its segment"
-                reason = f"it is not proved {where}, however near each other knots are"
+                reason = f"it cannot be proved {where} with any distance between knots"
             elif sum(len(each.far) for each in (*found, *waiting)) > _MOST:
                 reason = f"more than {_MOST:,} knots are needed"
         every = joined([*found, *waiting])
         return some(every, np.lexsort(every.along.T[[1, 0]])), reason
 
     def _examined(self, pieces: _Pieces) -> tuple[_Pieces, _Pieces, _Pieces]:
-        """Return the pieces that are proved, and parts of the others: of those with a distance, and those without."""
+        """Return the proved pieces, parts of unproved pieces with a bound, and parts of pieces without a bound."""
         along, tubes = pieces.along, self._tubes
         with np.errstate(all="ignore"):
             boxes = tubes.boxes(along, pieces.near)
@@ -324,19 +325,19 @@ class _Division:
         errors: tuple[FloatArray, FloatArray],
         close: NDArray[np.intp],
     ) -> _Proved:
-        """Return the pieces that are proved.
+        """Return the proved pieces.
 
         Args:
-            along: (B, 3) the pieces.
-            boxes: that hold them.
-            moved: (B, n) how far coordinates move in these boxes.
-            errors: middles and half widths (B, a) of those of the actuators' coordinates.
-            close: those that may be proved.
+            along: (B, 3) pieces.
+            boxes: boxes that contain the pieces.
+            moved: (B, n) largest motion of the coordinates in these boxes.
+            errors: middles and half widths (B, a) of errors of the actuator coordinates.
+            close: indices of the pieces that may be proved.
         """
         D = self._D
         if not close.size:
             return _Proved(close, self._unproved(along[close], boxes.near[close]))
-        # The platform moves about the piece, in a box with room for it.
+        # The box about the piece needs room for the motion of the platform.
         room = _WIDER * moved[close][:, self._own]
         wide = self._tubes.boxes(along[close], boxes.near[close], room)
         moved = self._tubes.moved(wide, *(each[close] for each in errors))
@@ -348,7 +349,7 @@ class _Division:
         return _Proved(kept, _Pieces(along[kept], boxes.near[kept], lower, upper, far[good]))
 
     def _divided(self, along: FloatArray, near: FloatArray, count: NDArray[np.intp]) -> _Pieces:
-        """Return as many equal parts of each piece as are given."""
+        """Return equal parts of each piece, a given number of each."""
         which = np.repeat(np.arange(len(along)), count)
         place = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
         k, low, high = along[which].T
@@ -356,8 +357,8 @@ class _Division:
         return self._unproved(np.stack([k, *ends], axis=1), near[which])
 
     def has_joints(self, pieces: _Pieces, knots: Knots) -> bool:
-        """Return whether the coordinates at knots are those of the machine that is meant at the ends of all pieces."""
-        # The end of each piece, and the beginning of the first.
+        """Return whether the coordinates at knots are in the proved assembly mode at the ends of all pieces."""
+        # The end of each piece, and the start of the first.
         ends = np.concatenate([pieces.along[:1, [0, 1, 1]], pieces.along[:, [0, 2, 2]]])
         near = np.concatenate([pieces.near[:1], pieces.near])
         turns: FloatArray | None = None
@@ -365,7 +366,7 @@ class _Division:
             rows = slice(begin, begin + _BLOCK)
             boxes = self._tubes.boxes(ends[rows], near[rows])
             low, high = boxes.lower[:, self._D], boxes.upper[:, self._D]
-            # Each knot's closed point is that of the pieces on its both sides.
+            # The pieces on both sides of a knot must have the same joint positions there.
             places = np.arange(len(ends))[rows]
             for side in (np.maximum(places - 1, 0), np.minimum(places, len(pieces.far) - 1)):
                 if not ((pieces.lower[side] <= low) & (high <= pieces.upper[side])).all():
@@ -381,16 +382,16 @@ class _Division:
 
 
 def _cut(pieces: _Pieces, count: int) -> list[_Pieces]:
-    """Return so many pieces, and the others, if there are any."""
+    """Return the first pieces, a given number, and the other pieces if there are any."""
     every = np.arange(len(pieces.far))
     return [some(pieces, each) for each in (every[:count], every[count:]) if len(each)]
 
 
 def _both(place: NDArray[np.intp], count: NDArray[np.intp]) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-    """Return the numbers of the parts' beginnings and of their ends, with those of all parts."""
+    """Return indices of the starts and of the ends of parts, each with the indices of the parts."""
     return [(place, count), (place + 1, count)]
 
 
 def _distance(moved: FloatArray) -> FloatArray:
-    """Return the distances (B,) that the platform's origin moves, the first three of coordinates (B, n)."""
+    """Return the distances (B,) that the platform's origin moves; it is the first three of coordinates (B, n)."""
     return np.asarray(np.sqrt((moved[:, :3] ** 2).sum(axis=1)) * (1 + ROUNDING))

@@ -1,4 +1,4 @@
-"""Speeds of actuators along a path that states its times: proven largest sizes, in place of those by [motion]."""
+"""Proved largest actuator speeds along a tool path with times; they replace the speeds that [motion] implies."""
 
 from __future__ import annotations
 
@@ -18,38 +18,46 @@ from ..statement.claims import Claim
 from ..statement.motors import actuator_coordinates, speed_claims
 from .numbers.bound_search import Minimum, smallest_values
 from .numbers.extremes import goal_of, verdict_of
-from .numbers.machines import Machines
 from .numbers.path_speeds import PathSpeeds, with_rates
+from .numbers.within_tolerance import RobotsWithinTolerance
 from .proof_record import ProofRecord
 from .robot.path_cover import PathCover
 from .robot.posed_robot import NotJudgedError
 from .verdict import Verdict
 
-#: Number of places at which the width of a bound over machines is taken.
+#: Number of places at which the width of a bound over the robots within the tolerance is sampled.
 _POINTS, _SEED = 64, 0
 
 
 class SpeedsOnPath(NamedTuple):
-    """Largest speeds of actuators, and what they were searched with: None where nothing is known of them."""
+    """Verdicts on the largest actuator speeds.
+
+    Attributes:
+        claims: claims about the speeds.
+        verdicts: verdict on each claim.
+        number: the speeds as searched; None if they are not known.
+    """
 
     claims: Sequence[Claim]
     verdicts: Sequence[Verdict]
     number: PathSpeeds | None
 
 
-def speeds_on_path(machines: Machines, cover: PathCover, gap: float, record: ProofRecord | None = None) -> SpeedsOnPath:
-    """Return the largest speed of each actuator of all machines along a path with times.
+def speeds_on_path(
+    robots: RobotsWithinTolerance, cover: PathCover, gap: float, record: ProofRecord | None = None
+) -> SpeedsOnPath:
+    """Return the largest speed of each actuator along a path with times, over all robots within the tolerance.
 
     Args:
-        machines: all machines that are meant.
-        cover: of the path.
-        gap: as a part of a speed.
+        robots: robots within the tolerance.
+        cover: boxes of the path.
+        gap: allowed relative gap of a speed.
         record: record of the search for a proof.
     """
-    claims, number = list(speed_claims(machines.case)), None
+    claims, number = list(speed_claims(robots.case)), None
     recorder = None if record is None else TreeRecord()
     try:
-        number = PathSpeeds(with_rates(machines.family, cover), coordinates_of(machines))
+        number = PathSpeeds(with_rates(robots.family, cover), coordinates_of(robots))
         goals = [
             goal_of(claim, wider, gap, is_enough=False)
             for claim, wider in zip(claims, _wider(number, cover).tolist(), strict=True)
@@ -61,16 +69,16 @@ def speeds_on_path(machines: Machines, cover: PathCover, gap: float, record: Pro
         every = [Minimum(reason=str(error))] * len(claims)
     found = []
     for claim, each in zip(claims, every, strict=True):
-        problem = machines.family.problem
+        problem = robots.family.problem
         pose = problem.box.pose(problem.pose_of(each.at)) if math.isfinite(each.value) else None
         found.append(verdict_of(claim, each, pose))
     return SpeedsOnPath(claims, found, number)
 
 
 def _wider(number: PathSpeeds, cover: PathCover) -> FloatArray:
-    """Return by how much bounds at places are beyond the values of the design there, (K,): no smaller boxes help.
+    """Return by how much bounds over all robots within the tolerance exceed values of the design at one place, (K,).
 
-    They are those of all machines.
+    Smaller boxes do not reduce this difference.
     """
     problem = number.problem
     if not problem.names or problem.problem.dependent:
@@ -80,14 +88,14 @@ def _wider(number: PathSpeeds, cover: PathCover) -> FloatArray:
     return np.asarray(np.nan_to_num(beyond, posinf=0.0).max(axis=0))
 
 
-def coordinates_of(machines: Machines) -> SX:
-    """Return the coordinates (a, 1) of all actuators in those of machines: lengths of legs, or from home.
+def coordinates_of(robots: RobotsWithinTolerance) -> SX:
+    """Return the coordinates (a, 1) of all actuators, as expressions: leg lengths, or displacements from home.
 
     Raises:
-        NotJudgedError: they are not known.
+        NotJudgedError: the position of an actuator is not known.
     """
-    layout, family = machines.symbols.layout, machines.family
+    layout, family = robots.symbols.layout, robots.family
     found = actuator_coordinates(layout)
     if not found or len(found) < len(driven_joints(layout.case.model)):
-        raise NotJudgedError("the positions of its actuators are not known")
-    return machines.symbols.of(ca.vertcat(*found.values()), family.errors, family.problem.z)
+        raise NotJudgedError("the positions of the robot's actuators are not known")
+    return robots.symbols.of(ca.vertcat(*found.values()), family.errors, family.problem.z)

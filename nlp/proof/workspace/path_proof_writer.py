@@ -18,19 +18,19 @@ if TYPE_CHECKING:
     from .judgement import Judgement
     from .proof_record import Key, ProofRecord
 
-#: Reason of claims of kinds without a record, and of a pose that is singular but for rounding.
+#: Reasons for claims without a proof: their kind has no record, or the singular pose is only computed.
 _NO_RECORD = "claims of this kind along a path have no proof record"
-_COMPUTED = "a computed pose has no proof"
+_COMPUTED = "a pose that is only computed in floating point has no proof"
 
 
 def path_proof_of(case: Case, judged: Judgement, record: ProofRecord, text: str, premises: PathPremises) -> Proof:
-    """Return the proof of what is proved along a path, or refuted by two places, and the claims that have none.
+    """Return the proof of the claims along a path that are proved, or refuted by two places; and the other claims.
 
     Args:
-        case: the case that was judged, as it was read.
+        case: the case before the judgement, as read from its file.
         judged: the verdicts.
-        record: record of their searches.
-        text: the case file's text.
+        record: record of the searches.
+        text: text of the case file.
         premises: premises about the path.
     """
     premises = replace(premises, with_angles=closed_form_along(case, judged.path).has_angles)
@@ -51,11 +51,11 @@ class _Writer:
 
     Args:
         judged: the verdicts.
-        record: record of their searches.
+        record: record of the searches.
 
     Attributes:
-        ranks, numbers: the verdicts by their labels; of two of one label the first.
-        proved: the claims so far.
+        ranks, numbers: verdicts by label; the first one of two with one label.
+        proved: claims with a proof so far, by label.
     """
 
     def __init__(self, judged: Judgement, record: ProofRecord) -> None:
@@ -65,10 +65,10 @@ class _Writer:
         self.proved: dict[Key, ProofClaim] = {}
 
     def proof(self, each: Claim) -> ProofClaim:
-        """Return a claim with its proof; one that rests on others comes after them.
+        """Return a claim with its proof; a claim that depends on others comes after them.
 
         Raises:
-            ProofError: it has none, with the reason.
+            ProofError: the claim has no proof; the message is the reason.
         """
         if each.kind is ClaimKind.RANK:
             return self._rank(each.name)
@@ -76,7 +76,7 @@ class _Writer:
             raise ProofError(NOT_JUDGED)
         found = self.numbers[each.label]
         if each.kind is ClaimKind.EXPRESSION:
-            # A bound is shown although it is not as fine as it was to be: others rest on lengths of legs.
+            # A bound counts even if its gap is too wide: other claims depend on leg lengths.
             is_bounded = found.limit is None and found.outcome is not Outcome.REFUTED
             if found.outcome is not Outcome.PROVED and not is_bounded:
                 raise ProofError(words_of(found))
@@ -94,7 +94,7 @@ class _Writer:
         return ProofClaim(*each.label, "boxes", bound_on_record(each, found), tree=tree)
 
     def _rank(self, name: str) -> ProofClaim:
-        """Return the claim that J, or the constraint wrenches, keep their rank, or the opposite."""
+        """Return the claim that J, or the constraint wrenches, keep their rank; or that they lose it."""
         found = self.ranks.get((name, ""))
         if found is None:
             raise ProofError(NOT_JUDGED)
@@ -106,10 +106,10 @@ class _Writer:
         return ProofClaim(name, "", "regular", tree=self._record.nodes(self._record.tree(name)))
 
     def _need_lengths(self, leg: str) -> None:
-        """Refuse a claim where the lengths of the leg that it rests on have no proof.
+        """Refuse a claim whose leg lengths have no proof.
 
         Raises:
-            ProofError: they have none.
+            ProofError: a length has no proof.
         """
         if any((f"leg_length limb {leg}", sense) not in self.proved for sense in ("min", "max")):
             raise ProofError(NO_LENGTHS)

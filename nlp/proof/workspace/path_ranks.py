@@ -1,4 +1,4 @@
-"""Ranks of the matrices of a robot along a tool path: proved piece by piece, or refuted at a place."""
+"""Ranks of a robot's matrices along a tool path: proved piece by piece, or refuted at a place."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ from .robot.posed_model import RankMatrix
 from .robot.posed_robot import Problem
 from .verdict import EVERYWHERE, Outcome, Verdict, not_judged
 
-#: Singular value, in parts of the largest, that counts as 0 at a point of a path, steps in the search of it, and powers
-#: of two of a piece's width at which it begins.
+#: Relative singular value that counts as 0 at a point of a path; number of steps of the search for it, and powers of
+#: two of a piece's width at which the search begins.
 _SINGULAR, _STEPS, _FAR = 1e-9, 80, 16
-#: Parts of a way over which rows must have values.
+#: Number of parts between two places on each of which the rows must be defined.
 _PARTS = 64
-#: Parts of each segment at which a change of sign is looked for.
+#: Parameters of each segment at which signs of the determinant are compared.
 _SAMPLES = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
 def rank_along(
     problem: Problem, matrix: RankMatrix, name: str, cover: PathCover, recorder: TreeRecord | None = None
 ) -> Verdict:
-    """Return the verdict on the rank of a matrix along a path; the search is recorded for a proof."""
+    """Return the verdict on the rank of a matrix along a path, and record the search for a proof."""
     change = _sign_change(problem, matrix, cover)
     if change is not None:
         place, sides = change
@@ -45,7 +45,7 @@ def rank_along(
         with one_search():
             rule = RankRule(problem, matrix, recorder, lambda *_: None)
             search = rule.search(Order.NEWEST)
-            # One piece that is too small leaves the claim open or refutes it, however many others there are.
+            # One piece that is too small to bisect leaves the claim open or refutes it: the search can stop.
             reason = effort.run(search, lambda: TOO_SMALL if search.state.small else None)
     except UncoveredError as error:
         return replace(not_judged(name, str(error)), seconds=effort.seconds)
@@ -59,7 +59,7 @@ def rank_along(
     first = np.lexsort(pieces.T[[1, 0]])[:1]
     place, value = _most_singular(problem, matrix, cover, pieces[first[0]], loop_boxes_of(some(boxes, first)))
     is_singular = value <= _SINGULAR
-    words = f"its smallest singular value is {value:.1e} of the largest there"
+    words = f"its smallest singular value is {value:.1e} times the largest one there"
     words = words if math.isfinite(value) else reason
     outcome = Outcome.REFUTED if is_singular else Outcome.OPEN
     return Verdict(
@@ -75,7 +75,7 @@ def rank_along(
 
 
 def rank_at_start(problem: Problem, matrix: RankMatrix, cover: PathCover) -> Verdict:
-    """Return the verdict on the rank of J of a structure that is singular everywhere, as at the first point."""
+    """Return the verdict on J of a structure that is singular everywhere, from the first point of the path."""
     place = Place(int(cover.pieces[0, 0]), 0.0)
     is_singular = SingularPose(problem, matrix).smallest(problem.start) <= _SINGULAR
     outcome = Outcome.REFUTED if is_singular else Outcome.OPEN
@@ -84,9 +84,9 @@ def rank_at_start(problem: Problem, matrix: RankMatrix, cover: PathCover) -> Ver
 
 
 def _sign_change(problem: Problem, matrix: RankMatrix, cover: PathCover) -> tuple[Place, tuple[Place, Place]] | None:
-    """Return the first place between whose neighbours the determinant is proved to have opposite signs, and these.
+    """Return the first place with a proved change of sign of the determinant, and its two neighbours.
 
-    The rows surely have values all the way between them.
+    The rows are provably defined everywhere between the two neighbours.
     """
     if matrix.matrix.shape != (6, 6) or matrix.nullity or problem.dependent or problem.names:
         return None
@@ -116,7 +116,7 @@ def _sign_change(problem: Problem, matrix: RankMatrix, cover: PathCover) -> tupl
 def _most_singular(
     problem: Problem, matrix: RankMatrix, cover: PathCover, piece: FloatArray, box: LoopBoxes
 ) -> tuple[Place, float]:
-    """Return the place in a piece with its box, and near it, with the smallest singular value, and the value."""
+    """Return the place in or near a piece with the smallest singular value, and this value."""
     newton, stated = SingularPose(problem, matrix), problem.stated
     chosen = [problem.free[j] for j in stated]
 
@@ -127,7 +127,7 @@ def _most_singular(
             z = problem.loops.all_closed(z[:, None], list(problem.dependent))[:, 0]
         return newton.smallest(z) if np.isfinite(z).all() else math.inf
 
-    # Where the value falls with the square of the distance, pieces are left far from the least one too.
+    # If the value falls with the square of the distance, pieces far from the smallest value stay open too.
     wide, middle = piece[2] - piece[1], 0.5 * (piece[1] + piece[2])
     away = wide * 2.0 ** np.arange(_FAR)
     near = np.clip(np.concatenate([[middle], middle - away, middle + away]), 0.0, 1.0)

@@ -1,7 +1,7 @@
-"""Numbers of a machine at points of a path, for pictures: they show what happens there, and prove nothing.
+"""Quantities of a robot at sampled points of a tool path, for pictures; they prove nothing.
 
-Of all machines within a tolerance the design is shown. Limits on strokes are about the whole path, and have no value at
-a point.
+With a joint-centre tolerance the design is shown. Limits on strokes concern the whole path and have no value at a
+point.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 from ....models import FloatArray, axis_angle_from_matrix
 from ....models.joints.model.closedform import ClosedForm
 from ...case.case import Case
-from ...case.motors import Motor, MotorNumber
+from ...case.motors import ActuatorQuantity, Motor
 from ...case.task import Sense
 from ...case.workspace import TurnKind
 from ...errors import InputError, UncoveredError
@@ -30,9 +30,9 @@ from ..statement.claims import Claim, searched_claims
 from ..statement.motors import in_motion, motor_claims, speed_claims
 from .judgement import Judgement
 from .numbers.expressions import Expressions
-from .numbers.machines import Machines
 from .numbers.motors import Motors
 from .numbers.searched import Subject
+from .numbers.within_tolerance import RobotsWithinTolerance
 from .path_closing import closed_form_along
 from .path_domain import covered
 from .robot.path_cover import Place
@@ -42,38 +42,43 @@ from .robot.posed_robot import NotJudgedError, build_problem
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Number of points on a path.
+#: Largest number of points on a path.
 MOST_POINTS = 2000
-#: Margin below which a limit counts as violated: beyond rounding.
+#: Margin below which a limit counts as violated; a margin nearer to 0 may be rounding.
 _VIOLATED = -1e-9
 
 
 class SampledNumber(NamedTuple):
-    """A number of a claim at points (P,) of a path, radians for angles; NaN where the robot is not assembled."""
+    """Quantity of a claim at P points of a path.
+
+    Attributes:
+        claim: the claim.
+        values: (P,) values, radians for angles; NaN where the loops cannot be closed.
+    """
 
     claim: Claim
     values: FloatArray
 
     @property
     def limit(self) -> float | None:
-        """The limit, radians for an angle; None without one."""
+        """Limit of the claim, radians for an angle; None without one."""
         return None if self.claim.limit is None else self.claim.reading.from_value(self.claim.limit)
 
 
 @dataclass(frozen=True, eq=False)
 class PathSamples:
-    """A machine at P points of a path.
+    """A robot at P points of a path.
 
     Attributes:
-        points: the points.
-        poses: of the platform.
-        joints: positions of all joints; None where those of the actuators are not known.
-        speeds: (P, a) of the actuators, radians or length per second; NaN where the path has no time.
-        numbers: of all claims with limits at a pose, and of actuators.
-        left_out: keys of limits that have no values here.
-        keys: of the limits that have.
-        margins: (K, P) the smallest distance from each of these limits, in parts of the distance between a number's two
-            limits, or else of the limit; below 0 beyond it.
+        points: points of the path.
+        poses: poses of the platform.
+        joints: positions of all joints; None if the positions of the actuators are not known.
+        speeds: (P, a) speeds of the actuators, radians or length per second; NaN where the path has no time.
+        numbers: quantities of all claims with limits at a pose, and of actuators.
+        left_out: keys of limits that have no values at single points.
+        keys: keys of the K limits that have values.
+        margins: (K, P) smallest margin of each of these limits, relative to the distance between the two limits of a
+            quantity, or to the limit if there is one; negative for a violation.
     """
 
     points: Points
@@ -87,7 +92,7 @@ class PathSamples:
 
     @property
     def least(self) -> FloatArray:
-        """The smallest of all margins (P,); NaN where the robot is not assembled, or without a limit."""
+        """Smallest of all margins (P,); NaN where the loops cannot be closed, or without a limit."""
         return np.asarray(np.fmin.reduce(self.margins, axis=0, initial=np.inf) if len(self.keys) else self._none)
 
     @property
@@ -106,7 +111,7 @@ class PathSamples:
 
     @property
     def is_apart(self) -> NDArray[np.bool_]:
-        """Whether the joints are not known at each point (P,): out of reach, or where loops could not be followed."""
+        """Whether the joints are not known at each point (P,): it is out of reach, or the loops could not be closed."""
         return np.zeros(len(self._none), dtype=bool) if self.joints is None else ~self.joints.closed
 
     @property
@@ -115,10 +120,10 @@ class PathSamples:
 
 
 def samples_of(judged: Judgement, most: int = MOST_POINTS) -> PathSamples:
-    """Return a judged machine at points of its path, among them all places that a verdict names.
+    """Return a robot at points of its path, which include all places of the verdicts.
 
     Args:
-        judged: the verdicts.
+        judged: the verdicts along the path.
         most: number of points that are spread over the path.
     """
     path, case = judged.path, replace(judged.case, joint_centre_tolerance=None)
@@ -152,12 +157,12 @@ def places_of(judged: Judgement) -> list[Place]:
 def _numbers(
     judged: Judgement, poses: Poses, joints: InversePoses | None
 ) -> tuple[tuple[SampledNumber, ...], tuple[str, ...]]:
-    """Return the numbers of claims at poses, and the keys of limits without values."""
+    """Return the quantities of claims at poses, and the keys of limits without values."""
     case, closed = judged.case, closed_form_along(judged.case, judged.path)
     motors, lost = list(motor_claims(case)), list[Claim]()
-    if judged.path.is_timed:  # then speeds are those of the path, and powers of [motion] are not asked for
-        lost = [each for each in motors if each.motor and each.motor.number is MotorNumber.POWER]
-        motors = [each for each in motors if each.motor and each.motor.number is MotorNumber.FORCE]
+    if judged.path.is_timed:  # the path defines speeds then, and powers from [motion] are not shown
+        lost = [each for each in motors if each.motor and each.motor.number is ActuatorQuantity.POWER]
+        motors = [each for each in motors if each.motor and each.motor.number is ActuatorQuantity.FORCE]
     claims = [*searched_claims(case), *motors]
     keys = [each.key for each in (*claims, *lost) if each.limit is not None]
     if joints is None and closed.model.unknowns:
@@ -170,16 +175,16 @@ def _numbers(
     at = np.array([box.coordinates(PoseNumbers(p, R, *turn)) for p, R, turn in pairs])
     try:
         problem = build_problem(case, closed.model, box, at[0])
-        machines = Machines(case, closed, problem)
+        robots = RobotsWithinTolerance(case, closed, problem)
     except NotJudgedError:
         return (), tuple(dict.fromkeys(keys))
     z = np.hstack([at[:, list(problem.free)], _unknowns(closed, joints, len(at))])
     if joints is not None:
         z[~joints.closed] = np.nan
     found, left_out = [], [each.key for each in lost if each.limit is not None]
-    posed = [each for each in machines.symbols.claims((), with_objective=False)[1] if each.limit is not None]
+    posed = [each for each in robots.symbols.claims((), with_objective=False)[1] if each.limit is not None]
     if posed:
-        numbers = Expressions(problem, ca.vertcat(*map(machines.number, posed)))
+        numbers = Expressions(problem, ca.vertcat(*map(robots.number, posed)))
         found += list(_read(posed, numbers.values(z)))
     subject = Subject(case, closed.model, problem)
     for group in _groups(claims):
@@ -191,7 +196,7 @@ def _numbers(
 
 
 def _own_speeds(case: Case, speeds: FloatArray) -> Iterator[SampledNumber]:
-    """Yield the sizes of speeds (P, a) of actuators in the path's own motion; NaN where it has no time."""
+    """Yield the absolute speeds (P, a) of actuators in the motion of the path; NaN where the path has no time."""
     for claim in speed_claims(case) if speeds.shape[1] else ():
         k = claim.motor.place if claim.motor else 0
         yield SampledNumber(claim, np.array([claim.reading.from_value(each) for each in np.abs(speeds[:, k]).tolist()]))
@@ -205,17 +210,17 @@ def _unknowns(closed: ClosedForm, joints: InversePoses | None, count: int) -> Fl
 
 
 def _groups(claims: Sequence[Claim]) -> Iterator[list[Claim]]:
-    """Yield the claims whose numbers are computed together: those of one actuator."""
+    """Yield groups of claims that are computed together: all claims about one actuator are one group."""
     for whose, group in itertools.groupby(claims, lambda each: each.motor and each.motor.place):
         own = list(group)
         yield from [own] if whose is not None else ([each] for each in own)
 
 
 def _values(subject: Subject, group: Sequence[Claim], z: FloatArray) -> FloatArray:
-    """Return the numbers (P, K) of claims, smallest ones, and minus the largest ones.
+    """Return the quantities (P, K) of claims, with the sign changed for largest values.
 
     Raises:
-        NotJudgedError, UncoveredError: they are not known.
+        NotJudgedError, UncoveredError: a quantity has no values.
     """
     number = Motors(subject.problem, subject.case, group) if group[0].motor else subject.number(group[0])
     with np.errstate(all="ignore"):
@@ -226,7 +231,7 @@ def _values(subject: Subject, group: Sequence[Claim], z: FloatArray) -> FloatArr
 
 
 def _read(claims: Sequence[Claim], values: FloatArray) -> Iterator[SampledNumber]:
-    """Yield numbers as people read them, from values (P, K) that are the smallest ones, and minus the largest ones."""
+    """Yield quantities in their usual sign, from values (P, K) with the sign changed for largest values."""
     for claim, column in zip(claims, values.T, strict=True):
         read = claim.reading.from_value
         own = (-claim.sense.sign * column).tolist()
@@ -249,11 +254,11 @@ def _margins(numbers: Sequence[SampledNumber], count: int) -> tuple[tuple[str, .
 _OTHER = {Sense.MIN: Sense.MAX, Sense.MAX: Sense.MIN}
 
 
-def motor_numbers(numbers: Sequence[SampledNumber], kind: MotorNumber) -> dict[str, list[SampledNumber]]:
-    """Return the numbers of actuators of a kind, by load; the load of a speed is empty."""
+def motor_numbers(numbers: Sequence[SampledNumber], kind: ActuatorQuantity) -> dict[str, list[SampledNumber]]:
+    """Return the actuator quantities of a kind, by load; the load of a speed is empty."""
     found: dict[str, list[SampledNumber]] = {}
     for each in numbers:
-        motor = each.claim.motor or Motor(MotorNumber.COORDINATE)
+        motor = each.claim.motor or Motor(ActuatorQuantity.COORDINATE)
         if motor.number is kind:
             found.setdefault(motor.load, []).append(each)
     return found

@@ -1,4 +1,7 @@
-"""Trees of searches along a path as bytes: one for each segment, over the places from its index to the next one."""
+"""Trees of searches along a tool path, as bytes of a proof record.
+
+Each segment has one tree over the places of the path from the segment's index to the next integer.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def record_halves(record: TreeRecord, pieces: FloatArray) -> None:
-    """Record pieces (B, 3) of a path that are halved: index of the segment, and ends of the parameter."""
+    """Record the bisection of pieces (B, 3) of a path: index of the segment, and both ends of the parameter."""
     for k, low, high in pieces.tolist():
         middle = 0.5 * (low + high)
         at = _node(k + low, k + high, k + middle)
@@ -22,29 +25,28 @@ def record_halves(record: TreeRecord, pieces: FloatArray) -> None:
 
 
 def tree_of_path(record: TreeRecord, pieces: FloatArray) -> bytes:
-    """Return the tree of a search.
+    """Return the trees of a search along a path as bytes, one after the other.
 
     Args:
         record: record of the search.
-        pieces: (M, 3) those with which it began: equal parts of each segment, in the order of the path.
+        pieces: (M, 3) first pieces of the search: equal parts of each segment, in the order of the path.
     """
     parts = list[bytes]()
     for piece, following in zip(pieces.tolist(), [*pieces[1:].tolist(), [np.inf, 0.0, 0.0]], strict=True):
         k, low, high = piece
         if following[0] == k:
-            # Of the rest of the segment the first part is cut off.
+            # The first part of the rest of the segment is cut off.
             parts.append(_node(k + low, k + 1.0, k + high))
         parts.append(record.tree_below(_key(k, low, high), with_open=True))
     return b"".join(parts)
 
 
 def _node(low: float, high: float, at: float) -> bytes:
-    """Return the node of a range that is cut at a place."""
+    """Return the node of a range of places that is cut at one of them."""
     if 0.5 * low + 0.5 * high == at:
         return node_bytes(Node.HALF, 0)
     return node_bytes(Node.CUT, 0, value=at)
 
 
 def _key(k: float, low: float, high: float) -> bytes:
-    """Return the key of a piece."""
     return np.array([k, low, high]).tobytes()

@@ -1,24 +1,24 @@
-"""The platform between two points of a path while its actuators move linearly: how far it surely is from the path.
+"""Proved distance of the platform from its path while actuators move linearly between two points of the path.
 
-Let s be the parameter of a piece of the path, from 0 to h. The linear interpolation of a coordinate ``q_k`` of an
-actuator less the coordinate is ``theta q_k''`` at some point of the piece, ``theta = s (h - s) / 2 <= h^2 / 8``, the
-same for all k, and the error of the two numbers that are interpolated.
+Let s be the parameter of a piece of the path, from 0 to h. Linear interpolation of an actuator coordinate ``q_k``
+differs from ``q_k(s)`` by ``theta q_k''`` at some point of the piece, with ``theta = s (h - s) / 2 <= h^2 / 8`` for
+all k, and by the errors of the two interpolated values.
 
-**Theorem.** Let X be the independent coordinates of the pose, and ``X(s)`` the piece. Let B be a box that holds the
-piece and all that is within V of it, coordinate by coordinate. Let every pose in B have one closed point of the passive
-joints in some box, so that q is a function of X. Let ``|q_X^-1 e| < V`` at every point of B for all ``e = theta y +
-d``, where y is in a box that holds ``q''`` over the piece, and d in one of the errors of numbers. Then actuators that
-move linearly between the coordinates of the ends move the platform along a curve that is within V of the piece: at
-every s, its pose X^ is within V of ``X(s)``.
+**Theorem.** Let X be the independent coordinates of the pose, and ``X(s)`` the piece. Let B be a box that contains the
+piece and all poses within V of it, coordinate by coordinate. Let the loops close for every pose in B at exactly one
+point of a box of passive joint coordinates, so that q is a function of X. Let ``|q_X^-1 e| < V`` at every point of B
+for all ``e = theta y + d``, where y is in a box that contains ``q''`` over the piece, and d in a box that contains the
+errors of the interpolated values. Then actuators that move linearly between the coordinates at the ends move the
+platform along a curve within V of the piece: at every s, its pose X^ is within V of ``X(s)``.
 
-*Proof.* At s let e be the interpolated coordinates less ``q(X(s))``. The solution of ``dX/dt = q_X(X)^-1 e`` from
-``X(s)`` moves by less than ``t V`` while it is in B, so it does not leave B until t = 1, where ``q = q(X(s)) + e``.
-This end X^ depends continuously on s, as e does, and at the ends of the piece e is 0 but for rounding: so the X^ are
-one continuous motion of the machine with these coordinates, and the only one, as q_X is regular in B.
+*Proof.* At s let e be the interpolated coordinates minus ``q(X(s))``. The solution of ``dX/dt = q_X(X)^-1 e`` from
+``X(s)`` moves by less than ``t V`` while it is in B, so it does not leave B before t = 1, where ``q = q(X(s)) + e``.
+This end X^ depends continuously on s, as e does, and at the ends of the piece e is 0 except for rounding. So the X^ are
+one continuous motion of the robot with these coordinates, and the only one, as q_X is regular in B.
 
-Columns of ``q_X^-1`` are those of Z in ``(L_z, q_z) Z = (0, 1)`` with the loop equations L and all coordinates z, so
-that robots with loops are no special case. Derivatives along the path follow as in :mod:`.numbers.path_speeds`, once
-more.
+Columns of ``q_X^-1`` are columns of Z in ``(L_z, q_z) Z = (0, 1)`` with the loop equations L and all coordinates z, so
+robots with loops need no special case. Derivatives along the path follow as in :mod:`.numbers.path_speeds`, with one
+more differentiation.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ from .robot.posed_robot import Problem
 
 
 class Tubes:
-    """A machine near pieces of a path: bounds of its coordinates' derivatives, and of its motions.
+    """A robot near pieces of a path: bounds of derivatives of its actuator coordinates, and of its motions.
 
     Args:
-        problem: with the six numbers of the pose as coordinates, of which some may follow from others.
-        coordinates: (a, 1) of the actuators.
-        cover: of the path.
+        problem: the robot with all six coordinates of the pose, some of them possibly dependent.
+        coordinates: (a, 1) actuator coordinates.
+        cover: boxes of the path.
     """
 
     def __init__(self, problem: Problem, coordinates: SX, cover: PathCover) -> None:
@@ -73,7 +73,7 @@ class Tubes:
         self._values = _Matrices(z, [coordinates])
 
     def boxes(self, pieces: FloatArray, near: FloatArray, room: FloatArray | float = 0.0) -> LoopBoxes:
-        """Return boxes that hold pieces (B, 3) with room (B, f) about them, with the dependent coordinates."""
+        """Return boxes that contain pieces (B, 3) with a margin (B, f), and their dependent coordinates."""
         ends = np.full((2, len(pieces), len(self._problem.start)), np.nan)
         ends[:, :, :6] = self._cover.boxes(pieces)
         ends[:, :, self._D] = np.nan
@@ -83,9 +83,9 @@ class Tubes:
         return self._examiner.examine(boxes).boxes if self._D else boxes
 
     def bends(self, pieces: FloatArray, boxes: LoopBoxes) -> tuple[FloatArray, FloatArray]:
-        """Return middles and half widths (B, a) of the coordinates' second derivatives along pieces.
+        """Return middles and half widths (B, a) of the second derivatives of actuator coordinates along pieces.
 
-        They are infinite or NaN where nothing is known.
+        They are infinite or NaN where no bound is known.
         """
         slow, fast = (each[:, self._own] for each in self._cover.derivatives(pieces))
         lower, upper = np.hstack([boxes.lower, slow]), np.hstack([boxes.upper, fast])
@@ -102,11 +102,11 @@ class Tubes:
         return _middles(found)
 
     def moved(self, boxes: LoopBoxes, middle: FloatArray, half: FloatArray) -> FloatArray:
-        """Return how far the coordinates (B, n) move at most for changes of the actuators' coordinates.
+        """Return the largest motions (B, n) of the coordinates for changes of the actuator coordinates.
 
         Args:
-            boxes: in which they move.
-            middle: (B, a) of the changes, or less in the same directions.
+            boxes: boxes in which the coordinates move.
+            middle: (B, a) middles of the changes, which any factor from 0 to 1 may scale.
             half: (B, a) half widths of the changes.
         """
         (slopes,) = self._slopes.over(boxes.lower, boxes.upper)
@@ -117,7 +117,7 @@ class Tubes:
         return np.asarray((along + np.einsum("nab,ba->bn", found.size, half)) * (1 + ROUNDING))
 
     def values(self, boxes: LoopBoxes) -> tuple[FloatArray, FloatArray]:
-        """Return the ends (B, a) of the actuators' coordinates over boxes."""
+        """Return the lower and upper ends (B, a) of the actuator coordinates over boxes."""
         (found,) = self._values.over(boxes.lower, boxes.upper)
         middle, half = _middles(found)
         return middle - half, middle + half
@@ -128,7 +128,7 @@ class _Matrices:
 
     Args:
         z: (n, 1) coordinates.
-        matrices: of expressions.
+        matrices: matrices of expressions.
     """
 
     def __init__(self, z: SX, matrices: list[SX]) -> None:
@@ -136,7 +136,7 @@ class _Matrices:
         self._encloser = Encloser(z, ca.vertcat(SX(0, 1), *[ca.vec(ca.densify(each)) for each in matrices]))
 
     def over(self, lower: FloatArray, upper: FloatArray) -> list[Quadratics]:
-        """Return the matrices over boxes with ends (B, n), NaN where nothing is known."""
+        """Return forms of the matrices over boxes with ends (B, n); NaN where no form is known."""
         known = np.asarray(np.isfinite(lower + upper).all(axis=1))
         low, high = (np.where(known[:, None], each, 0.0) for each in (lower, upper))
         forms = self._encloser(low.T, high.T)
@@ -149,7 +149,7 @@ class _Matrices:
 
 
 def _constant(values: FloatArray, terms: int) -> Quadratics:
-    """Return constant matrices (n, m, B) in forms with so many terms."""
+    """Return constant matrices (n, m, B) as forms with a number of terms."""
     n, m, count = values.shape
     return Quadratics(values, np.zeros((n, m, terms, count)), np.zeros((n, m, 0, count)), np.zeros(values.shape))
 

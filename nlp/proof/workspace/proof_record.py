@@ -19,9 +19,9 @@ from .verdict import slack_of
 
 #: Name and sense of a claim.
 Key = tuple[str, str]
-#: Part of itself by which the bound of a number that is the same at every pose moves outwards, as that of a search.
+#: Relative outward shift of the bound of a quantity that is the same at every pose.
 _FOLDED = 1e-12
-#: Part of a gap, and part of itself, by which the bound of a search of boxes moves outwards.
+#: Outward shift of the bound of a search of boxes: part of its gap, and part of the bound.
 _ROOM, _OUTWARDS = 0.25, 1e-6
 
 
@@ -30,12 +30,12 @@ class ProofRecord:
     """Records of the searches of one judgement.
 
     Attributes:
-        programs: bounds of numbers by the rules of ``certify``, with their trees.
-        boxes: trees of other searches, by name of the claim.
+        programs: bounds of quantities that the search of ``certify`` proved, with their trees.
+        boxes: trees of searches of boxes, by name of the claim.
         firsts: bounds of the first-order pose error, for leg-length errors of one unit, by name.
-        rests: bounds of the terms of second order of numbers of all robots within a tolerance.
+        rests: bounds of the second-order terms of quantities of all robots within the tolerance.
         directions: fixed directions of a leg, by the name of the leg lengths of one robot at two poses.
-        pieces: (M, 3) pieces of a path with which its searches begin; None for a box of poses.
+        pieces: (M, 3) first pieces of the searches along a path; None for a box of poses.
     """
 
     programs: dict[Key, ProofClaim] = field(default_factory=dict)
@@ -47,7 +47,7 @@ class ProofRecord:
     _nodes: dict[TreeRecord, bytes] = field(default_factory=dict)
 
     def nodes(self, tree: TreeRecord) -> bytes:
-        """Return the tree of a search of boxes that is over, open ones being leaves."""
+        """Return the tree of a completed search of boxes as bytes; open boxes are leaves."""
         if tree not in self._nodes:
             pieces = self.pieces
             self._nodes[tree] = tree.tree(with_open=True) if pieces is None else tree_of_path(tree, pieces)
@@ -58,12 +58,12 @@ class ProofRecord:
         return self.boxes.setdefault(name, TreeRecord())
 
     def constant(self, claim: Claim, nlp: Nlp, value: float) -> None:
-        """Record a number that does not depend on the pose."""
+        """Record a quantity that does not depend on the pose."""
         bound = -nlp.sign * value
         self._keep(claim, nlp, bound + _FOLDED * abs(bound), bytes([Node.BOUNDED]))
 
     def program(self, claim: Claim, found: Certificate, tree: TreeRecord) -> None:
-        """Record a search of a number, if it has a bound, open boxes being leaves, that keeps the number's limit."""
+        """Record the search of a quantity if its bound keeps the limit; open boxes are leaves."""
         is_bounded = found.status in (CertificateStatus.PROVED, CertificateStatus.INCOMPLETE)
         sign = claim.sense.sign
         most = math.inf if claim.limit is None else sign * claim.limit + slack_of(claim.limit)
@@ -72,11 +72,11 @@ class ProofRecord:
             self._keep(claim, found.nlp, bound, tree.tree(with_open=True))
 
     def followed(self, claim: Claim, bound: float, reached: float, tree: TreeRecord) -> None:
-        """Record a search of boxes in which the loops are followed: the bound of a number, and its best value known."""
+        """Record a search of boxes that follows closed loops: the bound of a quantity, and its best known value."""
         sign, key = claim.sense.sign, (claim.name, claim.sense.value)
         if not math.isfinite(bound):
             return
-        # Forms of first order need smaller boxes for the same bound.
+        # First-order forms need smaller boxes for the same bound.
         room = _ROOM * abs(bound - reached) if math.isfinite(reached) else 0.0
         beyond = sign * bound + max(room, _OUTWARDS * abs(bound))
         most = math.inf if claim.limit is None else sign * claim.limit
@@ -84,7 +84,7 @@ class ProofRecord:
         self.programs.setdefault(key, ProofClaim(*key, "boxes", bound, tree=self.nodes(tree)))
 
     def _keep(self, claim: Claim, nlp: Nlp, bound: float, tree: bytes) -> None:
-        """Keep the best bound of a program; of two programs of one name the first, as the check has it."""
+        """Keep the best bound of a program. Of two programs with one name the first is kept, as in the checker."""
         found = ProofClaim(claim.name, claim.sense.value, "program", bound, fingerprint(nlp), tree)
         before = self.programs.setdefault((found.name, found.sense), found)
         if before.graph == found.graph and bound <= (before.bound or 0.0):

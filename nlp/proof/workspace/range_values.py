@@ -1,4 +1,4 @@
-"""Ranges of the coordinates of a pose, of each alone and of each two at once, with the claims that end them."""
+"""Ranges of the coordinates of a pose: each coordinate, each pair, and the claims that end the ranges."""
 
 from typing import Annotated, Any
 
@@ -11,19 +11,19 @@ from .verdict import Outcome
 
 
 class RangeStop(JsonObject):
-    """A claim that is not proved at a pose, or on the way to it.
+    """A claim that is not proved at a pose, or on the motion to it.
 
     Attributes:
         name: name of the claim.
-        outcome: outcome of the claim: refuted at the pose, or open on the way to it.
-        key: dotted key, below ``limits``, of the limit in the case; absent of a rank.
-        unit: unit of the limit, empty for a plain number; absent of a rank.
-        sense: kind of the limit, a smallest or a largest value; absent of a rank.
-        limit: the limit; absent of a rank.
-        value: value of the number at the pose; null where it is not known, and of a rank.
-        pose: the pose; null where none is known.
-        reason: reason for an open outcome, or how a singular pose was found; absent without one.
-        dimension: dimension of the number, in radians for an angle.
+        outcome: outcome of the claim: refuted at the pose, or open on the motion to it.
+        key: dotted key, below ``limits``, of the limit in the case; absent for a rank.
+        unit: unit of the limit, empty for a plain number; absent for a rank.
+        sense: kind of the limit, a smallest or a largest value; absent for a rank.
+        limit: the limit; absent for a rank.
+        value: value of the limited quantity at the pose; null if it is not known, and for a rank.
+        pose: the pose; null if none is known.
+        reason: reason for an open outcome, or how a singular pose was computed; absent without a reason.
+        dimension: dimension of the limited quantity, in radians for an angle.
     """
 
     name: str
@@ -47,9 +47,10 @@ class RangeEnd(JsonObject):
     """An end of a proved range.
 
     Attributes:
-        value: value up to which everything is proved.
-        failed: the first value known beyond it at which not everything is; absent at the end of the largest range.
-        stop: the claim that fails there; absent with ``failed``.
+        value: end of the range; all claims are proved up to this value.
+        failed: smallest known value beyond the end at which a claim is not proved; absent at the end of the largest
+            requested range.
+        stop: claim that is not proved at ``failed``; absent without ``failed``.
         dimension: dimension of the coordinate, in radians for an angle.
     """
 
@@ -60,12 +61,12 @@ class RangeEnd(JsonObject):
 
 
 class AxisRange(JsonObject):
-    """How far a coordinate can move alone.
+    """Free travel along one coordinate of the pose.
 
     Attributes:
         axis: name of the coordinate: ``x``, ``y``, ``z``, ``roll``, ``pitch`` or ``yaw``.
         unit: unit of the values in the case.
-        at: value at the pose.
+        at: value of the coordinate at the pose.
         lower: the lower end of the proved range about the pose.
         upper: the upper end of the range.
         dimension: dimension of the coordinate, in radians for an angle.
@@ -80,13 +81,13 @@ class AxisRange(JsonObject):
 
 
 class PairRange(JsonObject):
-    """How far two coordinates can move at once.
+    """Free travel along two coordinates together.
 
     Attributes:
-        axes: names of both.
-        factor: factor of their ranges for which everything is proved in the box of both, about the pose; at most 1.
-        failed: the smallest factor known at which not everything is; absent where the whole box is proved.
-        stop: the claim that fails there; absent with ``failed``.
+        axes: names of the two coordinates.
+        factor: scale factor, at most 1, of the box of both ranges about the pose in which all claims are proved.
+        failed: smallest known scale factor at which a claim is not proved; absent if the whole box is proved.
+        stop: claim that is not proved at ``failed``; absent without ``failed``.
     """
 
     axes: tuple[str, ...]

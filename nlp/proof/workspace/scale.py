@@ -1,4 +1,4 @@
-"""The largest factor by which a workspace can grow about its centre with everything proved."""
+"""Largest proved workspace: the factor by which a box of poses can grow about its centre."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ...case.case import Case
 from ...case.pose import Free
 from ...case.workspace import LARGEST_TURN, Workspace
 from ...interruption import is_requested, one_call, seconds_left, why_stopped, within
-from ..statement.machine import workspace_of_case
+from ..statement.fixed_robot import workspace_of_case
 from .judge import judge_workspace
 from .judgement import Judgement
 from .robot.pose_box import PoseNumbers, scaled
@@ -17,23 +17,23 @@ from .verdict import Outcome
 
 #: Accuracy of the factor.
 ACCURACY = 0.01
-#: Largest factor that is tried, and the smallest, which is tried first.
+#: Largest and smallest factor. The smallest is judged first.
 _MOST, _LEAST = 64.0, 2.0**-10
-#: Times as long as the longest proved box that a box may take, where an even share of the time is less.
+#: Time for one box, in times of the longest proved box, if an even share of the time is less.
 _LONGER = 8.0
 
 
 @dataclass(frozen=True, eq=False)
 class Scale:
-    """The largest box of poses that is proved.
+    """Largest proved box of poses.
 
     Attributes:
-        factor: everything is proved for the box that is larger by this factor; None where no such factor is found.
-        failed: the smallest factor known at which it is not; infinite without one.
-        refuted: whether something is refuted there, and not only open.
-        claim: the claim that fails there; empty without one.
-        pose: a pose of it; None without one.
-        reason: why the search ended before the factor was known to 1 %; empty where it is.
+        factor: scale factor of the largest proved box; None if no box was proved.
+        failed: smallest known scale factor of a box that is not proved; infinite without one.
+        refuted: whether a claim is refuted in the failed box, and not only open.
+        claim: claim that fails in the failed box; empty without one.
+        pose: pose of the failed claim; None without one.
+        reason: reason for a search that ended before the factor was known to 1 %; else empty.
     """
 
     factor: float | None
@@ -48,17 +48,17 @@ class Scale:
 def largest_scale(
     case: Case, *, time_limit: float | None = None, jobs: int | None = None, judged: Judgement | None = None
 ) -> Scale:
-    """Return the largest factor of a case's workspace for which J is regular and every limit holds, to 1 %.
+    """Return the largest scale factor of a case's workspace with full rank of J and all limits proved, to 1 %.
 
-    A box within a proven one is proved, so that the factor is found by bisection. The smallest box is judged first: it
-    takes little time, and where it fails, every box does.
+    The factor is found by bisection, as a box within a proved box is proved. The smallest box is judged first: it
+    takes little time, and if it fails, every box fails.
 
     Args:
-        case: a case with fixed dimensions.
-        time_limit: seconds for all searches together, of which each box but the first takes half of what is left at
-            most, so that a box that stays open leaves time for smaller ones; None for those of each judgement alone.
-        jobs: threads.
-        judged: verdicts on the workspace itself; proved or refuted, it is not judged again.
+        case: case with fixed dimensions.
+        time_limit: seconds for all searches together; None for the default time of each judgement. Each box but the
+            first takes at most half of the time left, so that an open box leaves time for smaller boxes.
+        jobs: number of threads.
+        judged: verdicts on the workspace at factor 1. It is not judged again if all are proved or one is refuted.
 
     Raises:
         CaseError: the case has no workspace, or a free dimension.
@@ -67,7 +67,7 @@ def largest_scale(
     proved, failed, fault, reason, longest = 0.0, math.inf, None, "", 0.0
     if judged is not None and judged.is_proved:
         proved = 1.0
-    elif judged is not None and judged.is_refuted:  # one that is open may be proved where limits alone are judged
+    elif judged is not None and judged.is_refuted:  # an open workspace may be proved if only limits are judged
         failed, fault = 1.0, judged
     most = largest_factor(workspace)
     with within(time_limit):
@@ -82,7 +82,7 @@ def largest_scale(
             if found.is_proved:
                 proved = factor
                 longest = 0.0 if left == math.inf else max(longest, left - seconds_left())
-            elif is_requested() and not found.is_refuted:  # a search that was stopped shows no fault
+            elif is_requested() and not found.is_refuted:  # a stopped search shows no failed claim
                 reason = why_stopped()
                 break
             else:
@@ -90,7 +90,7 @@ def largest_scale(
     known = proved or None
     if fault is None:
         return Scale(known, failed, False, "", None, reason)
-    # A refuted claim before an open one.
+    # Refuted claims are reported before open ones.
     worst = min((each for each in fault.verdicts if each.fails), key=lambda each: each.outcome is not Outcome.REFUTED)
     name = worst.name if worst.is_rank else f"{worst.name}: {worst.key}"
     is_refuted = worst.outcome is Outcome.REFUTED
@@ -98,7 +98,7 @@ def largest_scale(
 
 
 def _next(proved: float, failed: float, most: float) -> float | None:
-    """Return the next factor to try, at most the given one; None where the factor is known."""
+    """Return the next factor to judge, at most the given one; None if the factor is known."""
     if proved == 0:
         return _LEAST if failed > _LEAST else None
     if failed == math.inf:
@@ -107,26 +107,26 @@ def _next(proved: float, failed: float, most: float) -> float | None:
 
 
 def _trials(proved: float, failed: float) -> int:
-    """Return how many boxes are judged until the factor is known, at most: those of a bisection of its logarithm.
+    """Return the largest number of boxes until the factor is known, by bisection of its logarithm.
 
-    Below the first box, with nothing proved, there is no other.
+    Without a proved box it is 1: no box is smaller than the first.
     """
     return 1 if proved == 0 else 1 + math.ceil(math.log2(max(math.log(failed / proved) / ACCURACY, 1.0)))
 
 
 def _share(left: float, longest: float, trials: int) -> float:
-    """Return the seconds of the time left that a box may take.
+    """Return the seconds that the next box may take.
 
     Args:
-        left: the seconds left.
-        longest: that a proved box took: a larger one takes more.
-        trials: boxes that are judged from now on, at most.
+        left: seconds left.
+        longest: longest time of a proved box; a larger box takes more.
+        trials: largest number of boxes still to judge.
     """
     return left if trials == 1 else min(left / 2, max(left / trials, _LONGER * longest))
 
 
 def largest_factor(workspace: Workspace) -> float:
-    """Return the largest factor at which every angle has coordinates."""
+    """Return the largest scale factor at which the search has coordinates for every rotation of the box."""
     factors = [_MOST]
     for angle in workspace.turns.angles:
         if isinstance(angle, Free):

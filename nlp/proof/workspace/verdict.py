@@ -12,18 +12,18 @@ from ...case.motors import Motor
 from ...case.task import Sense
 from ...evidence.singularities import SingularityKind
 from ..statement.claims import RANKS, Claim, ClaimKind
-from ..statement.machine import JointErrors
+from ..statement.fixed_robot import JointErrors
 from .robot.path_cover import Place
 from .robot.pose_box import PoseNumbers
 
-#: Part of a limit by which a value may be beyond it and still count as on it: rounding.
+#: Relative violation of a limit that counts as rounding.
 _ON_LIMIT = 1e-9
 #: Reason for a structure that is singular at every pose.
 EVERYWHERE = SingularityKind.ARCHITECTURE.clause
 
 
 class Outcome(enum.Enum):
-    """Outcome of a claim about every pose; each value is the word in results."""
+    """Outcome of a claim about every pose; the values are the words in results."""
 
     PROVED = "proved"
     REFUTED = "refuted"
@@ -31,7 +31,13 @@ class Outcome(enum.Enum):
 
 
 class Fault(NamedTuple):
-    """A point of a path that refutes a limit: its place, the value, and the pose."""
+    """Point of a path that refutes a limit.
+
+    Attributes:
+        place: place on the path.
+        value: value of the quantity.
+        pose: pose of the platform.
+    """
 
     place: Place
     value: float
@@ -43,22 +49,22 @@ class Verdict:
     """Verdict on one claim about every pose of a domain.
 
     Attributes:
-        claim: the claim: a rank, or the smallest or the largest value of a number, with its limit.
-        outcome: outcome of the rank or the limit; of a number without a limit, whether the requested gap was reached.
-        bound: proven bound of the number: no pose has a smaller, or a larger, value. Radians for angles; infinite where
-            nothing is proved; NaN of a rank.
-        reached: smallest or largest known value of the number; NaN without one, and of a rank.
-        pose: pose with this value. Of a rank: a singular pose, or the centre of the widest open box. None without one.
+        claim: the claim: a rank, or the smallest or largest value of a quantity, with its limit.
+        outcome: outcome for the rank or the limit; for a quantity without a limit, whether the gap was reached.
+        bound: proved bound of the quantity over all poses. Radians for angles; infinite if nothing is proved; NaN for a
+            rank.
+        reached: smallest or largest known value of the quantity; NaN for a rank, or if no value is known.
+        pose: pose with this value. For a rank: a singular pose, or the centre of the widest open box. None without one.
         reason: reason for an open outcome, or how a singular pose was computed; else empty.
         boxes: number of examined boxes.
         open: number of open boxes at the end.
-        share: volume of the open boxes of a rank, as a part of the domain's.
+        share: fraction of the domain's volume that is in open boxes, for a rank.
         seconds: wall time.
-        place: place of the pose on a path; None on a box of poses.
-        errors: joint-centre errors of the robot with this value, or of the singular one; None for the exact robot.
-        sides: (2, 6) coordinates of two poses, or (2, 1) places of a path, segment plus parameter, at which the
-            determinant of the rows is proved to have opposite signs, where a rank is refuted so; else None.
-        fault: first known point of a path that refutes the limit; None where it is not before ``place``.
+        place: place of the pose on a path; None over a box of poses.
+        errors: joint-centre errors of the robot with this value, or of the singular robot; None for the design.
+        sides: proof of a refuted rank: (2, 6) coordinates of two poses, or (2, 1) places of a path (segment plus
+            parameter), at which the determinant has proved opposite signs; else None.
+        fault: first known point of a path that refutes the limit; None if it is not before ``place``.
     """
 
     claim: Claim
@@ -78,7 +84,7 @@ class Verdict:
 
     @property
     def name(self) -> str:
-        """Name of the claim, in the words of a case."""
+        """Name of the claim, in the terms of case files."""
         return self.claim.name
 
     @property
@@ -88,22 +94,22 @@ class Verdict:
 
     @property
     def dimension(self) -> Dimension:
-        """Dimension of the number."""
+        """Dimension of the quantity."""
         return self.claim.reading.dimension
 
     @property
     def key(self) -> str:
-        """Dotted key, below ``limits``, of the limit in the case; empty without one."""
+        """Dotted key of the limit below ``limits`` in the case; empty without a limit."""
         return self.claim.key
 
     @property
     def limit(self) -> float | None:
-        """The limit, radians for angles; None without one."""
+        """Value of the limit, radians for angles; None without a limit."""
         return None if self.claim.limit is None else self.claim.reading.from_value(self.claim.limit)
 
     @property
     def motor(self) -> Motor | None:
-        """Actuator and its quantity, of claims about actuators; else None."""
+        """Actuator and its quantity, for a claim about an actuator; else None."""
         return self.claim.motor
 
     @property
@@ -113,12 +119,12 @@ class Verdict:
 
     @property
     def fails(self) -> bool:
-        """Whether a rank or a limit is not proved; a number without a limit is information."""
+        """Whether a rank or a limit is not proved. Quantities without a limit do not count."""
         return (self.is_rank or self.claim.limit is not None) and self.outcome is not Outcome.PROVED
 
     @property
     def first_fault(self) -> Fault | None:
-        """First known point of a path that refutes the claim; None of other outcomes, and of a box of poses."""
+        """First known point of a path that refutes the claim; None for other outcomes, and over a box of poses."""
         if self.outcome is not Outcome.REFUTED:
             return None
         at = None if self.place is None or self.pose is None else Fault(self.place, self.reached, self.pose)
@@ -126,13 +132,13 @@ class Verdict:
 
 
 def slack_of(limit: float) -> float:
-    """Return how far a value may be beyond a limit and still count as on it: a part of the limit, for rounding.
+    """Return the violation of a limit that counts as rounding.
 
-    It is a part of the limit and not of the value: a value far from its limit decides it without any slack.
+    It is relative to the limit, not to the value: a value far from the limit needs no slack.
     """
     return _ON_LIMIT * abs(limit)
 
 
 def not_judged(name: str, reason: str) -> Verdict:
-    """Return the open verdict on a rank where no search was made."""
+    """Return the open verdict on a rank without a search."""
     return Verdict(RANKS[name], Outcome.OPEN, reason=reason, open=1, share=1.0)

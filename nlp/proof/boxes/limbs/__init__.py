@@ -1,5 +1,5 @@
-"""Searches of F decomposed into limbs.
+"""Searches of F by decomposition into limbs.
 
-The modules import each other in this order: ``independent`` (limbs that share no variable); ``decomposition`` (bounds
-of limbs that share some) and ``shared`` (their search).
+The modules import each other in this order: ``independent`` (limbs without shared variables); ``decomposition`` (bounds
+of limbs with shared variables) and ``shared`` (their search).
 """

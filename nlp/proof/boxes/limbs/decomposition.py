@@ -1,12 +1,12 @@
 """Lagrangian decomposition: bounds of a sum of limbs over boxes of shared variables, from upper models of the limbs.
 
-The sum of the limbs' bests over a box of the shared variables ``s`` is more than the best of the sum: each limb would
-choose another ``s``. So every limb's function is taken without a quadratic function ``t_k`` of ``s``, its *tilt*, and
-the sum of the tilts is added to the part that depends on ``s`` alone:
+The sum of the limbs' maxima over a box of the shared variables ``s`` exceeds the maximum of the sum, because the maxima
+are at different ``s``. So a quadratic function ``t_k`` of ``s``, the *tilt*, is subtracted from every limb's function,
+and the sum of the tilts is added to the common part, which depends only on ``s``:
 
     phi(s, o) <= sum_k max over the boxes of limb k of (phi_k - t_k) + max_s (phi_0 + sum_k t_k).
 
-This holds for any tilts. Those used are gradient and curvature, along ``s``, of the model of the limb at a good point
+This is valid for any tilts. Here a tilt has the gradient and curvature along ``s`` of the limb's model at a good point
 of its own variables, so that the rest of the limb hardly depends on ``s``.
 """
 
@@ -33,9 +33,9 @@ class OwnBoxes:
     """Lists of boxes of one limb's own variables, for B shared boxes.
 
     Attributes:
-        lower, upper: (d, N) ends of all lists, one after the other.
-        of: (N,) number of the shared box that a box belongs to, ascending.
-        count: number B of the shared boxes.
+        lower, upper: (d, N) ends of the boxes of all lists, one list after the other.
+        of: (N,) index of the shared box of each own box, ascending.
+        count: number B of shared boxes.
     """
 
     lower: FloatArray
@@ -45,7 +45,7 @@ class OwnBoxes:
 
     @cached_property
     def starts(self) -> NDArray[np.int64]:
-        """(B,) place of the first box of each list; none may be empty."""
+        """Index (B,) of the first box of each list; no list may be empty."""
         return np.flatnonzero(np.diff(self.of, prepend=-1))
 
     def some(self, which: NDArray[np.bool_] | NDArray[np.intp]) -> OwnBoxes:
@@ -59,7 +59,7 @@ class OwnBoxes:
         return OwnBoxes(self.lower[:, places], self.upper[:, places], of, chosen.size)
 
     def joined(self, parts: Sequence[OwnBoxes]) -> OwnBoxes:
-        """Return the lists of several, one after the other."""
+        """Return the lists of several objects, one after the other."""
         first = np.cumsum([0, *(part.count for part in parts)])
         return OwnBoxes(
             np.concatenate([part.lower for part in parts], axis=1),
@@ -70,7 +70,7 @@ class OwnBoxes:
 
     @property
     def width(self) -> FloatArray:
-        """(B,) sum of all sides of the boxes of each list."""
+        """Sum (B,) of all widths of the boxes of each list."""
         return np.asarray(np.bincount(self.of, (self.upper - self.lower).sum(axis=0), minlength=self.count))
 
     def bisect(self, which: NDArray[np.bool_], along: NDArray[np.intp]) -> OwnBoxes:
@@ -88,8 +88,8 @@ class Tilt(NamedTuple):
     """A function ``g.e + 1/2 e'Q e`` of the shared variables over B boxes, e in [-1, 1]^m.
 
     Attributes:
-        g: (m, B).
-        Q: (m, m, B) symmetric.
+        g: (m, B) gradients.
+        Q: (m, m, B) symmetric matrices.
     """
 
     g: FloatArray
@@ -98,19 +98,19 @@ class Tilt(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LimbBound:
-    """Bounds of one limb with d own variables over B boxes of shared variables and N boxes of its own ones.
+    """Bounds of one limb with d own variables over B boxes of shared variables and N boxes of own variables.
 
     Attributes:
-        own: the own boxes.
-        good: (d, B) a point of the own variables that is the best known.
-        models: of the limb over the N boxes.
-        tilt: what was taken off.
-        reached: (B,) lower bound, over the shared box, of the limb without its tilt at the good point.
-        value_of_good: (B,) value of the limb there, at the centre of the shared box; -inf where it is not known.
-        L: models of the N boxes without the tilt.
-        bounds: (N,) upper bounds of the limb without its tilt; -inf where no optimum may lie.
-        best: (B,) the largest bound of each list.
-        top: (B,) place of the box that has it.
+        own: boxes of the own variables.
+        good: (d, B) best known point of the own variables.
+        models: models of the limb over the N boxes.
+        tilt: tilt that is subtracted from the limb.
+        reached: (B,) lower bound, over the shared box, of the limb minus its tilt at the good point.
+        value_of_good: (B,) value of the limb at the good point and the centre of the shared box; -inf if unknown.
+        L: models of the limb minus its tilt over the N boxes.
+        bounds: (N,) upper bounds of the limb minus its tilt; -inf where no optimum may lie.
+        best: (B,) largest bound of each list.
+        top: (B,) index of the box with the largest bound.
     """
 
     own: OwnBoxes
@@ -126,7 +126,7 @@ class LimbBound:
 
 
 def first_largest_of_lists(values: FloatArray, own: OwnBoxes) -> NDArray[np.intp]:
-    """Return the place (B,) of the first largest value (N,) of each list; NaN counts as -inf."""
+    """Return the index (B,) of the first largest value (N,) of each list; NaN counts as -inf."""
     values = np.where(np.isnan(values), -np.inf, values)
     starts = own.starts
     largest = np.maximum.reduceat(values, starts)
@@ -137,17 +137,17 @@ def first_largest_of_lists(values: FloatArray, own: OwnBoxes) -> NDArray[np.intp
 def bound_limb(
     own: OwnBoxes, good: FloatArray, models: LimbModels, at_good: LimbModels, fall: QuadraticModel, m: int
 ) -> LimbBound:
-    """Return bounds of a limb whose first m variables are shared, with a tilt for each shared box.
+    """Return bounds of a limb, with a tilt for each shared box.
 
-    An own box in which the limb is nowhere as good as at the good point is dropped: no optimum lies in it.
+    An own box is dropped if the limb is nowhere as good in it as at the good point: no optimum lies in it.
 
     Args:
-        own: the own boxes.
-        good: (d, B) a point of the own variables for each of the B shared boxes.
-        models: of the limb over the N own boxes.
-        at_good: of the limb at the good points.
-        fall: upper models of minus the limb's function there.
-        m: number of shared variables.
+        own: boxes of the own variables.
+        good: (d, B) point of the own variables for each of the B shared boxes.
+        models: models of the limb over the N own boxes.
+        at_good: models of the limb at the good points.
+        fall: upper models of the negative limb at the good points.
+        m: number of shared variables, the first ones.
     """
     L, usable = models.L, models.is_possible & models.defined
     promise = np.where(usable, L.middle + np.abs(L.b[m:]).sum(axis=0), -np.inf)
@@ -161,9 +161,9 @@ def bound_limb(
     reached = np.where(np.isnan(reached), -np.inf, reached)
     rest = _add(L, Tilt(-tilt.g[:, own.of], -tilt.Q[:, :, own.of]))
     bounds = np.where(models.defined, rest.bound(), np.inf)
-    # The bound of the limb itself, and that of minus its tilt.
+    # The bound of the limb, and the bound of its negative tilt.
     apart = np.abs(tilt.g).sum(axis=0) + 0.5 * np.abs(tilt.Q).sum(axis=(0, 1))
-    # The two may cancel: their rounding is in parts of their sizes.
+    # The two may cancel: rounding is relative to their absolute values.
     other = models.bound + apart[own.of] + (np.abs(models.bound) + apart[own.of]) * (64 * ULP) + TINY
     bounds = np.fmin(bounds, other)
     is_possible = models.is_possible & ~(bounds < reached[own.of])
@@ -174,7 +174,7 @@ def bound_limb(
 
 
 def tilts_of(limbs: Sequence[LimbBound]) -> FloatArray:
-    """Return the sum of the tilts and bests of all limbs over B boxes as :meth:`Engine.limb_models` reads it."""
+    """Return the sum of the tilts and best values of all limbs over B boxes, as for :meth:`Engine.limb_models`."""
     best = np.array([limb.best for limb in limbs])
     g, Q = (np.array(each) for each in zip(*[limb.tilt for limb in limbs], strict=True))
     lost = 64 * ULP * (np.abs(g).sum(axis=(0, 1)) + np.abs(Q).sum(axis=(0, 1, 2)))
@@ -188,7 +188,7 @@ def _add(L: QuadraticModel, tilt: Tilt) -> QuadraticModel:
     m = len(tilt.g)
     b, H = L.b.copy(), L.H.copy()
     across = np.abs(tilt.Q).sum(axis=1)
-    # Sizes before the sum, which may cancel.
+    # Absolute values before the sum, which may cancel.
     sizes = np.abs(b[:m]) + np.abs(tilt.g) + np.abs(H[:m, :m]).sum(axis=1) + across
     margin = 64 * ULP * (sizes + np.abs(L.slope_lo[:m]) + np.abs(L.slope_hi[:m])) + TINY
     b[:m] += tilt.g

@@ -1,7 +1,7 @@
-"""Search of a form whose limbs share no variable: each limb's box by itself, and the sum of their bounds.
+"""Search of a form whose limbs share no variable: one search for each limb, and the sum of their bounds.
 
-The best of the sum is the sum of the limbs' bests. Each limb gets an equal part of the gap: it is closed where no box
-of it has a bound above the limb's value at the incumbent by more than this part.
+The maximum of the sum is the sum of the limbs' maxima. Each limb gets an equal part of the gap: it is closed when no
+bound of its boxes exceeds the limb's value at the incumbent by more than this part.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from ..optimum import optimum_search
 from ..symmetry import grouped
 from ..tree import TreeRecord
 
-#: Rounding of a sum of a few terms, in parts of their sizes: many times the largest possible.
+#: Rounding error of a sum of a few terms, relative to their absolute values; many times the largest possible one.
 _SUM = 1e-14
 
 
@@ -23,17 +23,17 @@ class IndependentSearch:
     """Searches of limbs without shared variables.
 
     Args:
-        separation: the limbs.
-        incumbent: the best point known, which the search improves.
-        jobs: threads.
-        recorder: records the limbs' trees for a proof.
+        separation: limbs of the form.
+        incumbent: best known point, which the search improves.
+        jobs: number of threads.
+        recorder: recorder of the limbs' trees for a proof.
     """
 
     def __init__(
         self, separation: Separation, incumbent: Incumbent, jobs: int | None, recorder: TreeRecord | None = None
     ) -> None:
         self._constant, limbs = separation.constant, separation.limbs
-        # A proof has a tree for each limb.
+        # A proof needs a tree for each limb, also for copies.
         groups = grouped([limb.form for limb in limbs]) if recorder is None else [[k] for k in range(len(limbs))]
         self._copies, self._incumbent = [len(group) for group in groups], incumbent
         self._searches = [
@@ -48,12 +48,12 @@ class IndependentSearch:
 
     @property
     def _is_infeasible(self) -> bool:
-        """Whether some limb has no feasible point."""
+        """Whether a limb has no feasible point."""
         return self._incumbent.x is None and any(each.left == 0 and each.bound == -math.inf for each in self._searches)
 
     @property
     def is_open(self) -> bool:
-        """Whether boxes are left to be examined; none are once a limb has no feasible point."""
+        """Whether boxes are left to be examined; False if a limb has no feasible point."""
         return not self._is_infeasible and any(each.is_open for each in self._searches)
 
     @property
@@ -84,11 +84,11 @@ class IndependentSearch:
         return next((each.fault for each in self._searches if each.fault), "")
 
     def step(self, target: float) -> None:
-        """Examine a block of boxes of the limb that is furthest from its part of the target."""
+        """Examine a block of boxes of the limb that exceeds its part of the target most."""
         values = [each.rule.incumbent.value for each in self._searches]
         every = [*(count * value for count, value in zip(self._copies, values, strict=True)), self._constant]
         room = target - math.fsum(every) if all(map(math.isfinite, values)) else -math.inf
-        # Twice, since the sum of the bounds is rounded up too.
+        # Twice, as the sum of the bounds is rounded up too.
         rounding = 2 * _SUM * math.fsum(map(abs, [*every, room]))
         part = (room - rounding) / sum(self._copies) if math.isfinite(room) else -math.inf
         openest = max(

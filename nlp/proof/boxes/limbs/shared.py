@@ -1,9 +1,8 @@
-"""Search of a form whose limbs share variables: bisection of shared boxes, and lists of own boxes for each limb.
+"""Search of a form whose limbs share variables: bisection of shared boxes, with lists of own boxes for each limb.
 
-The halves of a box of the shared variables inherit its limbs' lists. An own box is dropped where its bound and the
-largest bounds of all other limbs together do not exceed the threshold. Each step refines the lists of the limbs with
-the largest spread, or bisects the shared box, whichever is wider. See
-:mod:`screwsynth.nlp.proof.boxes.limbs.decomposition` for the bounds.
+The halves of a shared box inherit its limbs' lists. An own box is dropped if the sum of its bound and the largest
+bounds of all other limbs is at most the threshold. Each step bisects own boxes of the limbs with the largest spread, or
+the shared box if its spread is larger. :mod:`screwsynth.nlp.proof.boxes.limbs.decomposition` has the bounds.
 """
 
 from __future__ import annotations
@@ -34,23 +33,23 @@ if TYPE_CHECKING:
     from ..incumbent import Incumbent
 
 Result = TypeVar("Result")
-#: Weight of a model's linear part beside its curved part in the choice of a variable, as in the kernel.
+#: Weight of a model's linear part relative to its curved part in the choice of a variable, as in the kernel.
 _LINEAR = 0.3
-#: Own boxes are bisected where their bound is within this part of the limb's spread of the best.
+#: Own boxes are bisected if their bound is nearer to the best bound than this part of the limb's spread.
 _NEAR = 0.5
-#: Part of its side that a contraction of a box must gain.
+#: Smallest relative reduction of a side that makes a contraction of a box worthwhile.
 _WORTH = 0.1
-#: Rounding of sums of a few values, in parts of their sizes.
+#: Rounding error of sums of a few values, relative to their absolute values.
 _SUM = 1e-13
-#: Shared boxes that are examined at once: with long lists too, a step takes about half a second.
+#: Number of shared boxes examined at once: a step with long lists takes about half a second.
 _BLOCK = 256
-#: Own boxes of one list above which the shared box is bisected instead.
+#: Length of a list of own boxes above which the shared box is bisected instead.
 _LONGEST = 512
-#: Part of the widest limb's spread from which on a limb's list is refined too.
+#: Part of the largest spread above which a limb's list is refined too.
 _SPREAD = 0.25
-#: Part of the gap that is left between the bound at which a recorded search closes a box and the one that is proved.
+#: Part of the gap between the bound at which a recorded search closes a box and the bound of the proof.
 _RESERVE = 0.5
-#: How many times more the limbs' lists must promise than bisections of the shared box to be refined.
+#: Factor by which the expected gain of the limbs' lists must exceed that of the shared box.
 _PATIENCE = 1.0
 
 
@@ -60,10 +59,10 @@ class SharedSums:
 
     Attributes:
         limbs: bounds of each limb.
-        common: models of the part with shared variables alone, with all tilts and bests, and what is left of the boxes.
-        sums: (B,) upper bounds from these models: the limbs' bests, and the most that the common part adds to them.
-        bound: (B,) upper bounds: the lesser of these and of those that the boxes had before.
-        is_possible: (B,) whether the common conditions can hold and every limb has a box left.
+        common: models of the common part with all tilts and best values, and the contracted boxes.
+        sums: (B,) upper bounds from these models: the limbs' best values plus the maximum of the common part.
+        bound: (B,) upper bounds: the smaller of ``sums`` and of the boxes' earlier bounds.
+        is_possible: (B,) whether the common conditions may be satisfied and every limb has an open box.
     """
 
     limbs: list[LimbBound]
@@ -74,14 +73,14 @@ class SharedSums:
 
 
 class LeftOwn(NamedTuple):
-    """A limb's own boxes that are left.
+    """Remaining own boxes of a limb.
 
     Attributes:
         own: the boxes; a list may be empty.
-        spread: (B,) how much the bound of the best box of each list can change along its own variables.
-        good: (d, B) the best point known of the own variables.
-        is_near: (N,) whether a box is to be bisected where its list is refined.
-        along: (N,) the variable to bisect.
+        spread: (B,) possible change of the bound of the best box of each list along its own variables.
+        good: (d, B) best known point of the own variables.
+        is_near: (N,) whether a box is bisected if its list is refined.
+        along: (N,) index of the variable to bisect.
     """
 
     own: OwnBoxes
@@ -92,7 +91,12 @@ class LeftOwn(NamedTuple):
 
 
 class SharedColumns(NamedTuple):
-    """Columns of shared boxes: lists of each limb's own boxes, and the best point (B, d) of its own variables known."""
+    """Data of shared boxes.
+
+    Attributes:
+        own: lists of own boxes of each limb.
+        good: (B, d) best known point of the own variables of each limb.
+    """
 
     own: tuple[OwnBoxes, ...]
     good: tuple[FloatArray, ...]
@@ -119,15 +123,15 @@ def shared_search(
 
 
 class SharedRule(Rule[SharedColumns]):
-    """Rule of the maximum of limbs with shared variables.
+    """Rule for the maximum of limbs with shared variables.
 
     Args:
         form: the whole form.
-        separation: its limbs.
-        incumbent: the best point known, which the search improves.
-        jobs: threads, which share the limbs.
-        recorder: records the search for a proof, which has no rules for cuts of shared boxes nor for own boxes that are
-            dropped because of the other limbs: the search makes none then.
+        separation: limbs of the form.
+        incumbent: best known point, which the search improves.
+        jobs: number of threads, which share the limbs.
+        recorder: recorder of the search for a proof. The search then neither contracts shared boxes nor drops own boxes
+            because of other limbs, as proofs have no rules for this.
     """
 
     block = _BLOCK
@@ -145,9 +149,9 @@ class SharedRule(Rule[SharedColumns]):
         self._form, self._separation, self._incumbent = form, separation, incumbent
         self.common_form, self.names = separation.common, separation.common.names
         self._m, self._turn = len(separation.shared), 0
-        # Limbs are the parts that threads share: NumPy has a large part of their work, which cannot be cut into pieces.
+        # Threads share whole limbs, as a large part of a limb's work is in NumPy and cannot be divided.
         self._threads = Threads(jobs)
-        # Engines of long limbs take seconds, so that each is a step of its own, between which a search can end.
+        # Engines of long limbs take seconds to set up; each is one step, so that the search can end in between.
         self._engines, self._opposites = list[Engine](), list[Engine]()
         self._recorder = recorder
         if recorder is not None:
@@ -155,31 +159,31 @@ class SharedRule(Rule[SharedColumns]):
 
     @cached_property
     def _common(self) -> Engine:
-        """The part with shared variables alone."""
+        """Engine of the common part."""
         return Engine(self.common_form, 1, self._m)
 
     def examine(self, boxes: Boxes[SharedColumns]) -> BoxResults[SharedColumns]:
-        """Return bounds of shared boxes, and improve the incumbent; the first steps prepare one limb each."""
+        """Return bounds of shared boxes, and improve the incumbent; the first steps each set up one limb."""
         if len(self._engines) < len(self._separation.limbs):
             form = self._separation.limbs[len(self._engines)].form
-            # Minus a limb's function, for lower models.
+            # The negative function of a limb, for lower models.
             self._opposites.append(Engine(replace(form, functions=(-form.functions[0],)), 1, self._m))
             self._engines.append(Engine(form, 1, self._m))
             return BoxResults(boxes, -math.inf, 0)
         before = self._incumbent.value
         self._turn += 1
         with np.errstate(all="ignore"):
-            # A proof has no cuts of shared boxes, and no own boxes dropped for the sake of the other limbs.
+            # A proof has no contractions of shared boxes, and no own boxes dropped because of other limbs.
             below = self.target if self._recorder is None else -math.inf
             sums = self._sums(boxes, below)
             self._improve(boxes, sums)
             left, alive, emptied = self._branch(boxes, sums, below)
-        # What contraction or dropping of own boxes excluded may reach the threshold.
+        # Points that were excluded by contraction, or with own boxes, may have values up to the threshold.
         examined, reasons = sum(own.of.size + own.count for own in boxes.more.own), (sums, alive, emptied)
         return BoxResults(left, self.target, examined, is_better=self._incumbent.value > before, reasons=reasons)
 
     def record(self, boxes: Boxes[SharedColumns], found: BoxResults[SharedColumns], split: NDArray[np.intp]) -> None:
-        """Record bisections and leaves, with the room up to the target shared out among limbs and common part."""
+        """Record bisections and leaves; limbs and common part share the margin up to the target."""
         if self._recorder is None or found.reasons is None:
             return
         sums, alive, emptied = found.reasons
@@ -193,7 +197,7 @@ class SharedRule(Rule[SharedColumns]):
             self._recorder.add(keys[k], node_bytes(Node.HALF, i), *parts)
 
     def _of_limbs(self, function: Callable[[int], Result]) -> list[Result]:
-        """Return the results of a function for the number of each limb; NumPy's warnings are off in each thread."""
+        """Return the results of a function for the index of each limb; NumPy's warnings are off in each thread."""
 
         def quiet(k: int) -> Result:
             with np.errstate(all="ignore"):
@@ -202,7 +206,7 @@ class SharedRule(Rule[SharedColumns]):
         return self._threads.map(quiet, range(len(self._engines)))
 
     def _sums(self, boxes: Boxes[SharedColumns], below: float) -> SharedSums:
-        """Return bounds of shared boxes, and their parts in which the sum can exceed a value."""
+        """Return bounds of shared boxes, and the parts in which the sum can exceed a value."""
         limbs = self._of_limbs(lambda k: self._bound_limb(k, boxes))
         common = self._common.limb_models(boxes.lower.T, boxes.upper.T, tilts=tilts_of(limbs), threshold=below)
         bound, best = common.L.bound(), np.array([limb.best for limb in limbs])
@@ -216,14 +220,14 @@ class SharedRule(Rule[SharedColumns]):
         engine, own, good = self._engines[k], boxes.more.own[k], boxes.more.good[k].T
         place = np.concatenate([boxes.lower.T, good]), np.concatenate([boxes.upper.T, good])
         at_good, fall = engine.limb_models(*place), self._opposites[k].limb_models(*place).L
-        # Whatever the shared variables are, an own point with a lesser value than the good one is no maximum.
+        # For any values of the shared variables, own points with values below the good point are not optimal.
         least = np.where(at_good.holds & at_good.defined, -fall.bound(), -np.inf)
         lower = np.concatenate([boxes.lower.T[:, own.of], own.lower])
         upper = np.concatenate([boxes.upper.T[:, own.of], own.upper])
         return bound_limb(own, good, engine.limb_models(lower, upper, least[own.of]), at_good, fall, self._m)
 
     def _improve(self, boxes: Boxes[SharedColumns], sums: SharedSums) -> None:
-        """Improve the incumbent from the best centre, and now and then from the box with the largest bound."""
+        """Improve the incumbent from the best centre, and sometimes from the box with the largest bound."""
         values = sums.common.value
         places = [first_largest_of_lists(limb.models.value, limb.own) for limb in sums.limbs]
         for limb, place in zip(sums.limbs, places, strict=True):
@@ -247,16 +251,16 @@ class SharedRule(Rule[SharedColumns]):
     def _branch(
         self, boxes: Boxes[SharedColumns], sums: SharedSums, below: float
     ) -> tuple[Boxes[SharedColumns], NDArray[np.bool_], NDArray[np.bool_]]:
-        """Drop and contract boxes, and refine the lists of those that are not to be bisected.
+        """Drop and contract boxes, and refine the lists of boxes that are not bisected.
 
         Returns:
-            The parts that are left, of which boxes (B,), and whether each limb (K, B) has no box left, which only its
-            conditions bring about in a search that is recorded.
+            The remaining parts, a mask (B,) of their boxes, and whether each limb (K, B) has no open box; in a recorded
+            search only its conditions can cause this.
         """
         bounded = sums.bound <= self.target
         if self._recorder is not None:
-            # An inherited bound says nothing of the numbers of this box, which the proof needs; and a checker with
-            # other arithmetic needs room up to the threshold.
+            # The proof needs the values of this box, not an inherited bound; and the checker, with other arithmetic,
+            # needs a margin up to the threshold.
             room = max(self.target - self._incumbent.value, 0.0)
             bounded = sums.sums <= (self.target - _RESERVE * room if math.isfinite(room) else self.target)
         finite, count = np.isfinite(sums.bound), len(bounded)
@@ -273,7 +277,7 @@ class SharedRule(Rule[SharedColumns]):
         wider = (spread.sum(axis=0) > _PATIENCE * change.sum(axis=0)) & finite & (sizes.max(axis=0) < _LONGEST)
         refine = alive & (spread > 0).any(axis=0) & (wider | ~can_cut)
         cut = alive & ~refine & can_cut
-        # A box that collapsed, or one of whose lists did, has not been examined as what is left of it.
+        # A box is examined again if it, or a box of its lists, was moved or collapsed.
         moved = ((lower != boxes.lower.T) | (upper != boxes.upper.T)).any(axis=0)
         for before, each in zip(boxes.more.own, lists, strict=True):
             moved |= each.own.width < before.width
@@ -289,7 +293,7 @@ class SharedRule(Rule[SharedColumns]):
     def _shared_change(
         self, boxes: Boxes[SharedColumns], sums: SharedSums, lower: FloatArray, upper: FloatArray
     ) -> FloatArray:
-        """Return how much (m, B) the bound can change along each shared variable of the part that is left."""
+        """Return the possible change (m, B) of the bound along each shared variable of the remaining part."""
         m, M = self._m, sums.common.L
         change = _LINEAR * np.abs(M.b) + np.abs(M.H).sum(axis=0) + M.w
         for limb in sums.limbs:
@@ -301,7 +305,7 @@ class SharedRule(Rule[SharedColumns]):
 
 
 def _leaf(sums: SharedSums, k: int, emptied: NDArray[np.bool_], target: float) -> bytes:
-    """Return the node of closed box number k, in which some limbs (K,) may have no feasible point."""
+    """Return the node of closed box k; ``emptied`` marks the limbs (K,) without a feasible point."""
     limbs = sums.limbs
     if emptied.any():
         zero = np.zeros((len(limbs), len(limbs[0].tilt.g)))
@@ -317,11 +321,11 @@ def _leaf(sums: SharedSums, k: int, emptied: NDArray[np.bool_], target: float) -
 def contracted(
     form: StandardForm, boxes: Boxes[SharedColumns], sums: SharedSums
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Return what is left of B shared boxes, as ends (m, B), and whether anything is (B,).
+    """Return the remaining parts of B shared boxes, as ends (m, B), and whether each is not empty (B,).
 
-    That is the part where the common conditions can hold and the sum can exceed the threshold, collapsed on a face of
-    the whole box, or dropped, where the sum rises along a variable. The argument is that of the search of whole boxes:
-    no condition may stop a point, of the common part or of a limb.
+    Only the part remains where the common conditions may be satisfied and the sum can exceed the threshold. If the sum
+    increases along a variable, the box collapses to a face of the whole box, or is dropped. As in the search of whole
+    boxes, this requires that no condition of the common part or of a limb prevents the motion of a point.
     """
     finite, fits = np.isfinite(sums.bound), (sums.common.lower <= sums.common.upper).all(axis=0)
     lower = np.where(fits & finite, sums.common.lower, boxes.lower.T)
@@ -346,17 +350,17 @@ def contracted(
 
 
 def cut_own(limb: LimbBound, sums: FloatArray, threshold: float) -> LeftOwn:
-    """Return a limb's own boxes that can exceed a threshold together with the best of everything else.
+    """Return the own boxes of a limb that can exceed a threshold together with the best values of all other parts.
 
     Args:
-        limb: its bounds.
-        sums: (B,) upper bounds of the shared boxes, each the sum of the limbs' bests and of what the common part adds.
-            A lesser bound of the whole, from elsewhere, would say nothing of the other limbs.
-        threshold: the threshold.
+        limb: bounds of the limb.
+        sums: (B,) upper bounds of the shared boxes: sums of the limbs' best values and of the common part. Smaller
+            bounds from other sources are not valid here, as they do not bound the other limbs.
+        threshold: largest bound of a box that is closed.
     """
     own, L, found = limb.own, limb.L, limb.models
     m = len(L.b) - len(own.lower)
-    # The others give at most ``sums - best``, so this limb must give the rest.
+    # The other parts give at most ``sums - best``, so this limb must give the rest.
     level = threshold - (sums - limb.best)
     level = level - _SUM * (abs(threshold) + np.abs(sums) + np.abs(limb.best))
     level = np.fmax(np.where(np.isfinite(level), level, -np.inf), limb.reached)
@@ -381,7 +385,7 @@ def cut_own(limb: LimbBound, sums: FloatArray, threshold: float) -> LeftOwn:
     total = change.sum(axis=0)
     spread = np.where(np.isfinite(limb.best), total[limb.top], 0.0)
     is_near = (limb.bounds > (limb.best - _NEAR * total[limb.top])[own.of]) & (total > 0)
-    # The centre of the best box becomes the good point where its value is larger.
+    # The centre of the best box becomes the good point if its value is larger.
     best = first_largest_of_lists(found.value, own)
     good = np.where(found.value[best] > limb.value_of_good, centre[:, best], limb.good)
     left = OwnBoxes(lower[:, keep], upper[:, keep], own.of[keep], own.count)

@@ -1,8 +1,8 @@
-"""Check of a proof of a workspace or a path, without trust in who made it.
+"""Check of a proof about a workspace or a path, without trust in its author.
 
-Everything is built again from the case: the box of poses, the robot, the expressions of numbers, and the claims that
-there must be. Poses of a path come from its file. Trees of ``certify`` are checked by its checker. Every leaf of the
-other trees is shown again with affine forms (:mod:`.forms`), and signs of determinants with fractions.
+Everything is built again from the case: the box of poses, the robot, the expressions of quantities, and the expected
+claims. Poses of a path come from its file. Trees of ``certify`` are checked by its checker. Every leaf of the other
+trees is proved again with affine forms (:mod:`.forms`), and signs of determinants with fractions.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from ....errors import InputError, UncoveredError
 from ....path.path import ProgrammedPath
 from ....program.layout import Layout
 from ...statement.claims import ERRORS, REACH, Claim, ClaimKind
-from ...statement.machine import Legs, check_leg_error, workspace_of_case
+from ...statement.fixed_robot import Legs, check_leg_error, workspace_of_case
 from ...statement.motors import actuator_coordinates, in_path_motion
 from ...statement.posed_layout import extreme_program
-from ...statement.tolerance import Directions, length_of_one_machine, second_order_name
+from ...statement.tolerance import Directions, length_of_one_robot, second_order_name
 from ..check import check_proof
 from ..proof_file import PathPremises, Premises, Proof, ProofClaim, ProofError
 from ..tree import Node
@@ -48,42 +48,42 @@ from .path_root import PathRoot
 from .pose_boxes import BoxClaim, pose_root
 from .ranks import rank_claim
 from .statement import (
-    Machines,
     RobotClaims,
+    RobotsWithinTolerance,
     case_along_path,
     expected_along_path,
     expected_claims,
-    hold_premises,
-    hold_robot,
     leg_error_of,
     refuse_other_lemmas,
+    refuse_other_premises,
+    refuse_other_robot,
     robot_along_path,
     robot_claims,
 )
 
-#: Part of itself by which a root, or a sum of two lengths, is moved outwards: more than its rounding.
+#: Relative amount by which a root, or a sum of two lengths, is moved outwards: more than its rounding.
 _ROUNDING = 1e-15
-#: Part of a limit by which a bound may be beyond it and still count as on it: rounding, as in the search.
+#: Part of a limit by which a bound may exceed it and still counts as equal: rounding, as in the search.
 _ON_LIMIT = 1e-9
-#: Names of the errors of the pose, whose bounds to first order a proof states.
+#: Names of the pose errors; a proof states bounds of their first-order parts.
 _FIRSTS = tuple(each.name for each in ERRORS)
 #: Reasons of claims about a path.
 _ALONG_PATH = ("regular", "singular", "boxes", "lengths")
-#: The tree of one leaf.
+#: A tree with a single leaf.
 _WHOLE = bytes([Node.BOUNDED])
 
 
 @dataclass(frozen=True)
 class CheckedClaim:
-    """A claim that holds.
+    """A valid claim.
 
     Attributes:
-        name, sense: of the claim.
-        bound: proven bound of the number as it reads in results, radians for angles; None without a number.
-        limit: limit of the case that it keeps, read in the same way; None without one.
-        is_refuted: whether the opposite is shown: a singular pose.
-        by_machine: whether that is a pose of another machine within the tolerance.
-        dimension: of the number.
+        name, sense: name and sense of the claim.
+        bound: proven bound of the quantity as shown in results, radians for angles; None without a quantity.
+        limit: limit of the case that the quantity satisfies, in the same terms; None without one.
+        is_refuted: whether the opposite is proved: a singular pose.
+        by_machine: whether the singular pose is that of another robot within the tolerance.
+        dimension: dimension of the quantity.
     """
 
     name: str
@@ -92,20 +92,20 @@ class CheckedClaim:
     bound: float | None = None
     limit: float | None = None
     is_refuted: bool = False
-    by_machine: bool = False
+    is_within_tolerance: bool = False
 
 
 @dataclass(frozen=True)
 class VerifiedWorkspace:
-    """A proof of a workspace, or of a path, that holds.
+    """Result of the check of a valid proof of a workspace or a path.
 
     Attributes:
-        claims: what it proves.
-        numbers_at: assemblies that the claims about numbers cover, but for those of actuators under loads, which are
-            about home's as ranks are; empty for a robot without loops.
-        workspace: the poses, or a box about a path, with the dependent coordinates of the robot.
-        leaves: number of claims about boxes in it.
-        pieces: number of boxes that were evaluated to show them.
+        claims: proved claims.
+        numbers_at: assembly modes that claims about quantities cover; ranks, and actuators under loads, are about the
+            home assembly mode. Empty for a robot without loops.
+        workspace: poses, or a box about a path, with the dependent coordinates of the robot.
+        leaves: number of claims about boxes.
+        pieces: number of boxes evaluated for their proof.
     """
 
     claims: tuple[CheckedClaim, ...]
@@ -116,32 +116,32 @@ class VerifiedWorkspace:
 
 
 def check_workspace_proof(proof: Proof, case: Case, *, leg_error: float = 0.0) -> VerifiedWorkspace:
-    """Check a proof of a workspace, by showing each of its claims again.
+    """Check a proof of a workspace, by proving each of its claims again.
 
     Args:
         proof: the proof.
-        case: the case that it is about.
+        case: case of the proof.
         leg_error: largest error of a leg's length, length.
 
     Raises:
-        ProofError: the proof is for another case, or a claim could not be shown; the message names the claim.
+        ProofError: the proof is for another case, or a claim could not be proved; the message names the claim.
         CaseError: the case has no workspace, or a free dimension.
-        InputError: the error of legs is negative, or the robot is not six straight legs.
+        InputError: the leg error is negative, or the robot has not six straight legs.
     """
     check_leg_error(case, leg_error)
     return _check(proof, lambda: _Checker(proof, case, leg_error))
 
 
 def check_path_proof(proof: Proof, case: Case, path: ProgrammedPath) -> VerifiedWorkspace:
-    """Check a proof of a path, by showing each of its claims again.
+    """Check a proof of a path, by proving each of its claims again.
 
     Args:
-        proof: the proof, whose premises about the path are held to it already; see :func:`.path_premises.hold_path`.
-        case: the case that it is about.
+        proof: proof whose path premises were compared with the path, see :func:`.path_premises.check_path_premises`.
+        case: case of the proof.
         path: the path.
 
     Raises:
-        ProofError: the proof is for another case, or a claim could not be shown; the message names the claim.
+        ProofError: the proof is for another case, or a claim could not be proved; the message names the claim.
         CaseError: a dimension of the case is free, or limits need a motion that neither case nor path states.
         InputError: the path has no motion.
     """
@@ -155,12 +155,12 @@ def _check(proof: Proof, begun: Callable[[], _Checker]) -> VerifiedWorkspace:
     checker = begun()
     given = {(each.name, each.sense): each for each in proof.claims}
     expected = {each.label: each for each in checker.expected}
-    # What a proof does not claim may be more than the claims that have proofs at all.
+    # Claims that the proof lists as unproved may be more than the expected claims.
     named = [*given, *(key for each in proof.unproved if (key := (each.name, each.sense)) in expected)]
     if sorted(named) != sorted(expected) or len(given) != len(proof.claims):
         wrong = [*(set(expected) - set(named)), *(set(given) - set(expected))]
-        name = " ".join(min(wrong)).strip() if wrong else "one of them"
-        raise ProofError(f"the claims are not those of the case, each once: see {name}")
+        name = " ".join(min(wrong)).strip() if wrong else "a claim that occurs twice"
+        raise ProofError(f"the proof must have each claim of the case exactly once: see {name}")
     refuse_other_lemmas(proof.lemmas, checker.expected)
     claims = []
     for key in (each for each in expected if each in given):
@@ -172,20 +172,20 @@ def _check(proof: Proof, begun: Callable[[], _Checker]) -> VerifiedWorkspace:
 
 
 class _Checker:
-    """A check of claims one after the other; later ones use the bounds of earlier ones."""
+    """Check of claims one after another; later claims use the bounds of earlier ones."""
 
     def __init__(self, proof: Proof, case: Case, leg_error: float) -> None:
         workspace, premises = workspace_of_case(case), proof.premises
         if not isinstance(premises, Premises):
             raise ProofError("the proof is not about a workspace")
         robot = robot_claims(case, workspace, {each.name for each in proof.claims})
-        hold_premises(case, workspace, robot.legs, leg_error, premises)
+        refuse_other_premises(case, workspace, robot.legs, leg_error, premises)
         self._begin(proof, case, pose_root(workspace), robot, workspace)
         self._eps = leg_error_of(case, leg_error)
         try:
             self.expected: list[Claim] = expected_claims(case, robot, premises.quantities, leg_error)
         except InputError as error:
-            raise ProofError(f"the proof names a measure that the case does not have: {error}") from None
+            raise ProofError(f"the proof names a quantity that the case does not have: {error}") from None
 
     def _begin(self, proof: Proof, case: Case, root: Root, robot: RobotClaims, workspace: Workspace) -> None:
         """Begin the check of a proof about the poses of a root."""
@@ -212,8 +212,8 @@ class _Checker:
             (ClaimKind.SPECTRUM, "boxes"): self._singular,
             (ClaimKind.MOTOR, "boxes"): self._motor,
         }
-        if self._tolerance and self.robot.machines is None:
-            raise ProofError("errors of joint centres take freedoms from this robot")
+        if self._tolerance and self.robot.within_tolerance is None:
+            raise ProofError("joint-centre errors remove degrees of freedom from this overconstrained robot")
         if each.kind is ClaimKind.RANK and given.reason in ("regular", "singular"):
             return self._rank(each, given)
         if (each.kind, given.reason) not in rules:
@@ -229,31 +229,31 @@ class _Checker:
         return CheckedClaim(*each.label, each.reading.dimension, read(bound), kept)
 
     def _show(self, claim: BoxClaim, tree: bytes) -> None:
-        """Show a claim on every leaf of a tree."""
+        """Prove a claim on every leaf of a tree."""
         leaves, pieces = self._root.show_on_leaves(claim, tree)
         self.leaves += leaves
         self.pieces += pieces
 
     def _rank(self, each: Claim, given: ProofClaim) -> CheckedClaim:
         """Check that J, or the constraint wrenches, keep their rank, or that J is singular between two points."""
-        is_refuted, machines = given.reason == "singular", self.robot.machines
-        by_machine = is_refuted and any(len(side) > self._root.coordinates for side in given.sides)
-        if by_machine and machines is None:
-            raise ProofError("the claim is about the exact machine")
-        tolerance = self._tolerance if by_machine or not is_refuted else 0.0
-        # The errors of six straight legs have a bound in their rows that shows larger boxes.
-        has_errors = by_machine or self.robot.legs is None
-        built = machines.symbols.built if machines is not None and tolerance and has_errors else None
+        is_refuted, robots = given.reason == "singular", self.robot.within_tolerance
+        is_within_tolerance = is_refuted and any(len(side) > self._root.coordinates for side in given.sides)
+        if is_within_tolerance and robots is None:
+            raise ProofError("the claim is about the exact robot")
+        tolerance = self._tolerance if is_within_tolerance or not is_refuted else 0.0
+        # For six straight legs, bounds of the changes of rows prove larger boxes than error coordinates do.
+        has_errors = is_within_tolerance or self.robot.legs is None
+        built = robots.symbols.built if robots is not None and tolerance and has_errors else None
         claim = rank_claim(self._case, self.robot.model, self._root, each.name, tolerance, built)
         if is_refuted:
             claim.show_sign_change(self._root, given.sides)
         else:
             self._show(claim, given.unpacked())
             claim.finish()
-        return CheckedClaim(*each.label, is_refuted=is_refuted, by_machine=by_machine)
+        return CheckedClaim(*each.label, is_refuted=is_refuted, is_within_tolerance=is_within_tolerance)
 
     def _program(self, expression: SX, sense: Sense, given: ProofClaim, layout: Layout) -> float:
-        """Return the bound of an expression in the symbols of a layout that a tree of ``certify`` proves."""
+        """Return the bound of an expression in the symbols of a layout, from a tree of ``certify``."""
         nlp = extreme_program(layout, expression, sense)
         _stated(given)
         checked = check_proof(given, nlp)
@@ -262,18 +262,18 @@ class _Checker:
         return -nlp.sign * checked.bound
 
     def _number(self, claim: Claim, given: ProofClaim) -> float:
-        """Return the bound of a number that a tree of ``certify`` proves, of all machines with a lemma."""
+        """Return the bound of a quantity from a tree of ``certify``, and from a lemma for a tolerance."""
         layout = self.robot.place if claim.key == REACH else self.robot.layout
         if self.robot.dependent:
-            raise ProofError("dependent coordinates of the pose are followed over boxes")
-        if self.robot.machines is None:
+            raise ProofError("a quantity with dependent coordinates of the pose needs a tree of boxes")
+        if self.robot.within_tolerance is None:
             return self._program(claim.expression, claim.sense, given, layout)
         if claim.key != REACH and any(reach.label not in self._bounds for reach in self.robot.reaches):
-            raise ProofError("the reach of limbs of every machine has no proof")
-        return self._of_machines(self.robot.machines, claim, given)
+            raise ProofError("the claims about the reach of limbs within the tolerance have no proof")
+        return self._within_tolerance(self.robot.within_tolerance, claim, given)
 
     def _followed(self, claim: Claim, given: ProofClaim) -> float:
-        """Return the bound of a number that a tree of boxes proves, in which the loops are followed."""
+        """Return the bound of a quantity from a tree of boxes in which the loops are followed."""
         symbols = self.robot.followed
         if symbols is None:
             raise ProofError("'boxes' is no reason of this claim")
@@ -284,15 +284,15 @@ class _Checker:
         number.finish()
         return bound
 
-    def _of_machines(self, machines: Machines, claim: Claim, given: ProofClaim) -> float:
-        """Return the bound of a number over all machines that a tree of ``certify``, and a lemma, prove."""
-        if not machines.varies(claim):
-            return self._program(machines.number(claim, 0.0), claim.sense, given, machines.design)
+    def _within_tolerance(self, robots: RobotsWithinTolerance, claim: Claim, given: ProofClaim) -> float:
+        """Return the bound of a quantity over all robots within the tolerance, from a program's tree and a lemma."""
+        if not robots.varies(claim):
+            return self._program(robots.number(claim, 0.0), claim.sense, given, robots.design)
         lemma = self._lemma(second_order_name(claim.name), claim.sense)
         rest = _stated(lemma)
-        bound = self._program(machines.number(claim, rest), claim.sense, given, machines.design)
+        bound = self._program(robots.number(claim, rest), claim.sense, given, robots.design)
         try:
-            self._show(SecondOrderClaim(machines, claim.expression, rest), _WHOLE)
+            self._show(SecondOrderClaim(robots, claim.expression, rest), _WHOLE)
         except UncoveredError as error:
             raise ProofError(f"the check has no rule for {error}") from None
         except ProofError as error:
@@ -306,7 +306,7 @@ class _Checker:
         return self._lemmas[name, sense.value]
 
     def _length(self, leg: str, sense: Sense) -> float:
-        """Return the proven shortest or longest length of a leg, of all machines that are meant."""
+        """Return the proven shortest or longest length of a leg, over all robots within the tolerance."""
         key = f"leg_length limb {leg}", sense.value
         if key not in self._bounds:
             raise ProofError(f"the lengths of limb {leg} have no proof")
@@ -314,35 +314,35 @@ class _Checker:
         return math.sqrt(max(self._bounds[key], 0.0)) * (1 + outwards)
 
     def _of_legs(self) -> tuple[Legs, float]:
-        """Return the joint centres of six straight legs, and a length than which none of any machine is shorter."""
+        """Return the joint centres of six straight legs, and a lower bound of their lengths within the tolerance."""
         if self.robot.legs is None:
-            raise ProofError("the case's robot is not six straight legs")
+            raise ProofError("the robot of the case does not have six straight legs")
         return self.robot.legs, min(self._length(leg.name, Sense.MIN) for leg in self._case.model.legs)
 
     def _lengths(self, each: Claim, given: ProofClaim) -> float:
-        """Return the bound of a number made of the longest and the shortest length of a leg."""
-        senses, machines = (Sense.MAX, Sense.MIN), self.robot.machines
+        """Return the bound of a quantity from the longest and the shortest length of a leg."""
+        senses, robots = (Sense.MAX, Sense.MIN), self.robot.within_tolerance
         left, (leg,) = 0.0, each.legs
         if given.reason == "lengths":
             lengths = [self._length(self._case.model.legs[leg].name, sense) for sense in senses]
         else:
-            # Lengths of one machine at two poses, without the part along c_b and c_p of its errors.
+            # Lengths of one robot at two poses, without the parts of its errors along c_b and c_p.
             about = [np.array(side, dtype=float) for side in given.sides]
-            if machines is None:
-                raise ProofError("the claim is about the exact machine")
+            if robots is None:
+                raise ProofError("the claim is about the exact robot")
             if len(about) != 2 or any(side.shape != (3,) or not np.isfinite(side).all() for side in about):
                 raise ProofError("the claim has no two directions")
             directions = Directions(each.name, *about)
-            claims = [length_of_one_machine(machines.symbols, leg, sense, directions) for sense in senses]
-            lengths = [self._of_machines(machines, one, self._lemma(one.name, one.sense)) for one in claims]
-            # This part is the same at both poses, of as many lengths as are left.
+            claims = [length_of_one_robot(robots.symbols, leg, sense, directions) for sense in senses]
+            lengths = [self._within_tolerance(robots, one, self._lemma(one.name, one.sense)) for one in claims]
+            # This part is the same at both poses, so that it counts with the sum of the weights.
             left = abs(sum(each.weights)) * self._tolerance * sum(float(np.linalg.norm(side)) for side in about)
         parts = [weight * length for weight, length in zip(each.weights, lengths, strict=True)]
         off = left + 16 * _ROUNDING * (abs(parts[0]) + abs(parts[1]) + left)
         return sum(parts) + (off if each.sense is Sense.MAX else -off)
 
     def _clearance(self, each: Claim, given: ProofClaim) -> float:
-        """Return the bound of a distance between two legs, which are nearer by twice the tolerance."""
+        """Return the bound of a distance between two legs; errors reduce it by at most twice the tolerance."""
         bound, nearer = _stated(given), 2 * self._tolerance
         least = bound + nearer + _ROUNDING * (abs(bound) + nearer) if nearer else bound
         self._show(ClearanceClaim(self._posed, each.legs, least), given.unpacked())
@@ -361,27 +361,27 @@ class _Checker:
         return bound
 
     def _error(self, each: Claim, given: ProofClaim) -> float:
-        """Return the bound of an error of the pose: its part of first order by a tree, the whole from both parts."""
+        """Return the bound of a pose error: the first-order parts by trees, the whole error from both parts."""
         if len(self._firsts) < len(_FIRSTS):
-            raise ProofError("one of the two errors has no proof")
+            raise ProofError("the other of the two pose errors has no proof")
         position, rotation = (self._firsts[name] for name in _FIRSTS)
         is_rotation = each.reading is not LENGTH
         self._show(ErrorClaim(self._posed, self._firsts[each.name], is_rotation=is_rotation), given.unpacked())
         legs, shortest = self._of_legs()
-        # That of the design.
+        # The reach of the nominal design.
         shortest = (shortest + 2 * self._tolerance) * (1 - _ROUNDING)
         reach = float(np.linalg.norm(legs.platform, axis=1).max()) * (1 + _ROUNDING)
         whole = whole_errors(position, rotation, self._eps * (1 + _ROUNDING), shortest, reach)[is_rotation]
         if not math.isfinite(whole):
-            raise ProofError("the errors are too large for a bound of their part of second order")
+            raise ProofError("the errors are too large: their second-order part has no bound")
         return whole
 
     def _motor(self, each: Claim, given: ProofClaim) -> float:
-        """Return the bound of a number of an actuator; those with one tree are shown together."""
+        """Return the bound of an actuator quantity; quantities with one tree are proved together."""
         if rate_relations(self.robot.model.actuators).shape[0]:
-            raise ProofError("loops demand relations of the actuators' rates")
+            raise ProofError("the loops constrain the actuator rates; forces and speeds have no proof then")
         if each.label not in self._shown:
-            # Numbers of an actuator under one load have the tree of one search.
+            # Quantities of an actuator under one load share the tree of one search.
             motors = ((one, one.motor) for one in self.expected if one.label in self._given)
             same = {
                 one.label: (motor, one.sense, _stated(self._given[one.label]))
@@ -402,9 +402,9 @@ class _Checker:
 
     @cached_property
     def _loops(self) -> PosedLoops:
-        """The machines that are meant as expressions of the pose, of the closed loops, and of errors."""
-        machines = self.robot.machines
-        built = None if machines is None else machines.symbols.built
+        """Robots within the tolerance as expressions of the pose, with closed loops and joint-centre errors."""
+        robots = self.robot.within_tolerance
+        built = None if robots is None else robots.symbols.built
         return posed_loops(self._case, self.robot.model, self._root, self._tolerance, built)
 
     @cached_property
@@ -414,7 +414,7 @@ class _Checker:
 
 
 class _PathChecker(_Checker):
-    """A check of claims along a path."""
+    """Check of claims along a path."""
 
     def __init__(self, proof: Proof, case: Case, path: ProgrammedPath) -> None:
         premises = proof.premises
@@ -423,7 +423,7 @@ class _PathChecker(_Checker):
         case = case_along_path(case, path)
         root = PathRoot(case, path)
         robot = robot_along_path(case, root, with_angles=premises.with_angles)
-        hold_robot(case, robot.legs, premises)
+        refuse_other_robot(case, robot.legs, premises)
         self._is_timed = path.is_timed
         self._begin(proof, case, root, robot, root.workspace)
         self.expected = expected_along_path(case, robot, is_timed=path.is_timed)
@@ -431,7 +431,7 @@ class _PathChecker(_Checker):
             self._case = in_path_motion(case)
 
     def check(self, each: Claim, given: ProofClaim) -> CheckedClaim:
-        """Check one claim; poses of a tree of ``certify`` are in a box about some places of the path, not all."""
+        """Check one claim; trees of ``certify`` are refused, as their boxes do not cover the whole path."""
         if given.reason not in _ALONG_PATH:
             raise ProofError(f"'{given.reason}' is no reason of a claim about a path")
         return super().check(each, given)
@@ -443,12 +443,12 @@ class _PathChecker(_Checker):
             return None
         known, robot = actuator_coordinates(symbols.layout), self._loops.robot
         if motor.actuator not in known:
-            raise ProofError("the positions of the robot's actuators are not known")
+            raise ProofError("the robot has no expressions for its actuator coordinates")
         return symbols.of(known[motor.actuator], robot.of_errors, robot.varying)
 
 
 def _stated(given: ProofClaim) -> float:
-    """Return the bound of a claim, or refuse one without."""
+    """Return the bound of a claim, or refuse a claim without a bound."""
     if given.bound is None or not math.isfinite(given.bound):
         raise ProofError("the claim has no bound")
     return given.bound

@@ -1,15 +1,15 @@
-"""Closed loops over boxes: one, and only one, assembly between two ends at every value of the independent coordinates.
+"""Closed loops over boxes: existence and uniqueness of the assembly mode over all independent coordinates.
 
-Over a box with coordinates ``e_I`` and ``e_D`` from -1 to 1, independent and dependent ones, the loop equations are
-``0 = g + A_I e_I + A_D e_D + [-r, r]``. For a matrix Y near the inverse of A_D a closed point of the box has
+Over a box with coordinates ``e_I`` and ``e_D`` from -1 to 1, independent and dependent, the loop equations are
+``0 = g + A_I e_I + A_D e_D + [-r, r]``. For a matrix Y near the inverse of A_D, a closed point of the box has
 
     e_D = off - T e_I + [-rho, rho],      off = -Y g,    T = Y A_I,    rho >= |I - Y A_D| 1 + |Y| r.
 
-Where the right side is inside of the box for every e_I, the map ``e_D - Y g`` has a fixed point there (Brouwer), and
-its defect is 0. Where moreover ``|I - Y J_D|`` has a spectral radius below 1 for the derivatives over the box, there is
-only one: ``Y (g(z) - g(z'))`` is not 0 for two points with the same e_I. It is a continuous function of e_I.
+If the right side lies inside of the box for every e_I, the map ``e_D - Y g`` has a fixed point there (Brouwer): a
+closed point. If moreover ``|I - Y J_D|`` has a spectral radius below 1 for the derivatives over the box, the point is
+unique, as ``Y (g(z) - g(z'))`` is not 0 for two points with the same e_I. It is a continuous function of e_I.
 
-Points with closed loops are computed by Newton's method, and proved by a small box about them. Source: R. Krawczyk,
+Newton's method computes closed points, and a small box about each of them proves it. Source: R. Krawczyk,
 *Newton-Algorithmen zur Bestimmung von Nullstellen mit Fehlerschranken*, Computing 4 (1969).
 """
 
@@ -34,24 +34,24 @@ from .pose_boxes import box_words
 
 #: Largest residual of a closed loop; equations are of order 1, and Newton's method ends at rounding.
 _CLOSED = 1e-10
-#: Largest residual of further equations of a loop: in another assembly it is of order 0.1.
+#: Largest residual of further equations of a loop: in another assembly mode it is of order 0.1.
 _OTHER = 1e-6
-#: Steps of Newton's method at most, steps on a way between closed points, and from home's assembly to another pose.
+#: Largest number of Newton steps, steps on a path between closed points, and steps from home to another pose.
 _STEPS, _WAY, _FROM_HOME = 12, 8, 40
 #: Singular values below this part of the largest are zero.
 _ZERO = 1e-9
-#: Points about the start at which equations are looked at that follow from others, and their part of the workspace.
+#: Number of points about the start for the search of dependent equations, and their distance in parts of the workspace.
 _POINTS, _SPREAD, _SEED = 4, 0.5, 1
-#: Factor by which widths of dependent coordinates are made wider, and attempts.
+#: Factor by which widths of dependent coordinates grow, and number of attempts.
 _WIDER, _ATTEMPTS = 1.2, 4
 #: Smallest and largest half width of a dependent coordinate, in parts of its size.
 _LEAST, _MOST = 1e-9, 1.0
-#: Number of pairs of boxes that are compared at once, and of ends among which touching ones are looked for.
+#: Number of pairs of boxes that are compared at once, and number of ends in a search for touching boxes.
 _BLOCK, _ENDS = 512, 2**22
 
 
 class LoopPoints:
-    """Points at which some equations (k, 1) of a robot's loops hold."""
+    """Points at which selected equations (k, 1) of a robot's loops hold."""
 
     def __init__(self, robot: PosedRobot, equations: SX) -> None:
         self._size, self._values, self._slopes = robot.size, robot.function(equations), robot.slopes(equations)
@@ -70,14 +70,14 @@ class LoopPoints:
         steps: int = 1,
         zero: float | None = None,
     ) -> FloatArray:
-        """Return closed points (B, n) at the ends of ways from points, along which left sides fall to 0; NaN without.
+        """Return closed points (B, n) at the ends of paths along which left sides fall to 0; NaN where a path fails.
 
         Args:
-            z: the points.
-            moving: coordinates that follow from the others, by Newton's method.
-            to: (B, f) values that the others have at the ends; None for those at the points.
-            steps: of the way.
-            zero: of slopes, for :func:`.forms.inverses`; None for as many moving coordinates as equations, all needed.
+            z: (B, n) points where the paths begin.
+            moving: coordinates that Newton's method computes from the others.
+            to: (B, f) final values of the other coordinates; None to keep their values.
+            steps: number of steps of the path.
+            zero: threshold of slopes, see :func:`.forms.inverses`; None if the equations determine ``moving``.
         """
         z, others = z.copy(), [k for k in range(z.shape[1]) if k not in moving]
         to = z[:, others] if to is None else to
@@ -92,7 +92,7 @@ class LoopPoints:
                 if not np.nanmax(np.abs(g), initial=0.0) > 1e-3 * _CLOSED:
                     break
                 z[:, moving] -= self._size[moving] * (inverses(J[:, :, moving], zero) @ g[:, :, None])[:, :, 0]
-            # Beyond a fold there are no left sides that fall: steps from there may end in any assembly.
+            # The left sides cannot fall further beyond a fold: steps from there may end in any assembly mode.
             off = np.abs(self.at(z)[0] - left * first).max(axis=1, initial=0.0)
             z[(size > _CLOSED) & ~(off <= size / steps)] = np.nan
         z[~(np.abs(self.at(z)[0]).max(axis=1, initial=0.0) <= _CLOSED)] = np.nan
@@ -100,27 +100,27 @@ class LoopPoints:
 
 
 def start_of(robot: PosedRobot) -> FloatArray:
-    """Return closed loops (n,) in home's assembly, in the middle of the workspace or near it, or refuse the robot."""
+    """Return closed loops (n,) in the home assembly mode at or near the workspace centre, or refuse the proof."""
     points, centre, n = LoopPoints(robot, robot.equations), robot.centre[None], len(robot.centre)
     unknowns = list(range(len(robot.free), n))
-    # Slopes of equations that hold by themselves are rounding, along which there is no step.
+    # Slopes of dependent equations are rounding, and must not cause a step.
     is_closed = np.abs(points.at(centre)[0]).max(initial=0.0) <= _CLOSED
-    # Numbers of the pose move only where the unknowns alone do not close the loops.
+    # Pose coordinates move only if the unknowns cannot close the loops.
     for moving in [unknowns] * bool(unknowns) + [list(range(n))]:
         (found,) = centre if is_closed else points.closed(centre, moving, steps=_FROM_HOME, zero=_ZERO)
         if is_home(robot, found):
             return np.asarray(found)
-    raise ProofError("the loops could not be closed in the assembly of home in the middle of the workspace")
+    raise ProofError("no solution of the loop equations in the home assembly mode at the workspace centre")
 
 
 def is_home(robot: PosedRobot, z: FloatArray) -> bool:
-    """Return whether a closed point (n,) fulfils all loop equations, in home's working mode; not where it is NaN."""
+    """Return whether a closed point (n,) satisfies all loop equations in home's working mode; false for NaN."""
     loops, signs = robot.function(robot.loops, robot.signs)(z[None])
     return bool(np.isfinite(z).all() and (np.abs(loops) <= _OTHER).all() and (signs > 0).all())
 
 
 def needed_equations(robot: PosedRobot, start: FloatArray) -> list[int]:
-    """Return the equations that do not follow from others: by their rank at a few closed points."""
+    """Return the independent equations, by their rank at a few closed points."""
     if not robot.equations.numel():
         return []
     points, count, n = LoopPoints(robot, robot.equations), len(robot.free), len(start)
@@ -138,10 +138,10 @@ class Enclosed:
 
     Attributes:
         lower, upper: (B, n) ends of all coordinates; NaN where nothing is known.
-        off, T, rho: (B, k), (B, k, f) and (B, k) of the relation of the dependent coordinates.
-        near: (B, n) closed points at the centres, computed.
-        shares: (B, f) how much each independent coordinate moves the others.
-        is_known: (B,) whether there is one closed point, and only one, between the ends at each value of the others.
+        off, T, rho: (B, k), (B, k, f) and (B, k) coefficients of the relation for the dependent coordinates.
+        near: (B, n) computed closed points at the centres.
+        shares: (B, f) influence of each independent coordinate on the others.
+        is_known: (B,) whether there is exactly one closed point for all values of the independent coordinates.
     """
 
     lower: FloatArray
@@ -154,11 +154,11 @@ class Enclosed:
     is_known: NDArray[np.bool_]
 
     def only(self, which: NDArray[np.bool_]) -> Enclosed:
-        """Return those over some boxes."""
+        """Return the closed points over some boxes."""
         return Enclosed(*(each[which] for each in vars(self).values()))
 
     def boxes(self, which: NDArray[np.bool_]) -> ClosedBoxes:
-        """Return some of the boxes, with what tells whether they are of one assembly."""
+        """Return some of the boxes, with the points that show whether they belong to one assembly mode."""
         return ClosedBoxes(self.lower[which], self.upper[which], self.near[which])
 
 
@@ -167,7 +167,7 @@ class ClosedBoxes(NamedTuple):
 
     Attributes:
         lower, upper: (B, n) ends of all coordinates.
-        near: (B, n) closed points at the centres, computed.
+        near: (B, n) computed closed points at the centres.
     """
 
     lower: FloatArray
@@ -176,11 +176,11 @@ class ClosedBoxes(NamedTuple):
 
 
 class Assembly:
-    """The closed loops of a robot that change continuously from those at a start (n,), by k equations that count.
+    """Closed loops of a robot that change continuously from those at a start (n,), by k independent equations.
 
     Raises:
-        UncoveredError: an equation holds an operation without a rule.
-        ProofError: the equations leave an unknown free, or are singular at the start.
+        UncoveredError: an equation has an operation without a rule.
+        ProofError: the equations do not determine an unknown, or are singular at the start.
     """
 
     def __init__(self, robot: PosedRobot, equations: SX, start: FloatArray) -> None:
@@ -188,14 +188,14 @@ class Assembly:
         self.points = LoopPoints(robot, equations)
         self.dependent = self._determined(start) if self._count else []
         self.independent = [k for k in range(len(start)) if k not in self.dependent]
-        # Where numbers of the pose follow from others, the closed loops that were found may be beside a narrow box.
+        # Dependent pose coordinates of the start may lie outside of a narrow box.
         (middle,) = self.moved(start[None], robot.centre[None][:, self.independent])
         self.start = middle if is_home(robot, middle) else start
         columns = ca.jacobian(equations, robot.z)[:, self.dependent]
         self._arithmetic = robot.forms(ca.vertcat(SX(0, 1), equations, ca.vec(ca.densify(columns))))
 
     def _determined(self, start: FloatArray) -> list[int]:
-        """Return the coordinates that follow from others: dependent ones of the pose, and all unknowns."""
+        """Return the dependent coordinates: dependent ones of the pose, and all unknowns."""
         poses, count = len(self._robot.free), self._count
         unknowns = list(range(poses, len(start) - self._robot.errors))
         if count < len(unknowns):
@@ -207,11 +207,11 @@ class Assembly:
         return chosen
 
     def moved(self, z: FloatArray, to: FloatArray) -> FloatArray:
-        """Return the closed points (B, n) on the way from closed points to other independent coordinates (B, f)."""
+        """Return the closed points (B, n) at other independent coordinates (B, f), on paths from closed points."""
         return self.points.closed(z, self.dependent, to=to, steps=_WAY)
 
     def near(self, to: FloatArray) -> FloatArray:
-        """Return closed points (B, n) at independent coordinates (B, f), on the way from the start."""
+        """Return closed points (B, n) at independent coordinates (B, f), on paths from the start."""
         return self.moved(np.broadcast_to(self.start, (len(to), len(self.start))), to)
 
     def followed(self, forms: Forms, closed: Enclosed) -> Forms:
@@ -227,7 +227,7 @@ class Assembly:
     def enclosed(self, lower: FloatArray, upper: FloatArray, near: FloatArray | None = None) -> Enclosed:
         """Return the closed points over boxes of independent coordinates (B, f).
 
-        Those at the centres (B, n) are computed from the start where they are not given.
+        Closed points at the centres (B, n) are computed from the start if ``near`` is left out.
         """
         if near is None:
             near = self.near(middles(lower, upper)[0])
@@ -254,7 +254,7 @@ class Assembly:
         return found
 
     def _show(self, found: Enclosed, rows: NDArray[np.int64]) -> FloatArray:
-        """Add what is shown of closed points between the ends of some boxes, and return widths (N, k) that may do."""
+        """Store the proved closed points over some boxes, and return widths (N, k) that may succeed for the others."""
         free, D, k = self.independent, self.dependent, self._count
         low, high = found.lower[rows], found.upper[rows]
         values = self._arithmetic(low, high)
@@ -266,13 +266,13 @@ class Assembly:
         rho = ((size @ terms[:, :, None])[:, :, 0] + off_identity(Y, g.a[:, :, D]).sum(axis=2)) * UP
         reach = (np.abs(off) + np.abs(T).sum(axis=2) + rho) * UP
         centre, radius = (each[:, D] for each in middles(low, high))
-        # Derivatives, one column after the other, for coordinates from -1 to 1.
+        # Derivatives column by column, for coordinates from -1 to 1.
         least, most = (
             end.reshape(k, k, -1).transpose(2, 1, 0) * radius[:, None] for end in values.ends(slice(k, None))
         )
         J = 0.5 * (least + most)
         single, _, _ = AffineMatrix(J, np.zeros((len(J), 0, k, k)), 0.5 * (most - least)).contracted(Y)
-        # Ends may be nearer to the centre on one side, by rounding.
+        # By rounding, one end may be nearer to the centre than the other.
         room = np.nextafter(np.minimum(high[:, D] - centre, centre - low[:, D]), 0.0)
         good = np.asarray((reach * radius * UP < room).all(axis=1) & single & np.isfinite(reach).all(axis=1))
         kept = rows[good]
@@ -281,10 +281,10 @@ class Assembly:
         return np.asarray(np.maximum(_WIDER * reach * radius, _LEAST * self._size[D]))
 
     def holds(self, boxes: ClosedBoxes, which: NDArray[np.int64], near: FloatArray) -> NDArray[np.bool_]:
-        """Return whether boxes hold a closed point (N, n), which is shown in a small box about it."""
+        """Return whether boxes contain a closed point (N, n), by a proof in a small box about it."""
         D, at = self.dependent, near[:, self.independent]
         small = self.enclosed(at, at, near)
-        # Where the relation puts it: a coordinate that stands still has boxes that are no wider than this one.
+        # The relation gives a narrower place: for a constant coordinate, the boxes are not wider than the small one.
         centre, radius = (each[:, D] for each in middles(small.lower, small.upper))
         off, rest = radius * small.off, radius * (np.abs(small.T).sum(axis=2) + small.rho) * UP
         rest += PRODUCT * (np.abs(centre) + np.abs(off) + rest)
@@ -293,11 +293,11 @@ class Assembly:
         return np.asarray(small.is_known & inside.all(axis=1))
 
     def refuse_apart(self, boxes: ClosedBoxes) -> None:
-        """Refuse boxes whose closed loops are not shown to be those of one assembly, that of the start.
+        """Refuse boxes whose closed loops are not proved to belong to the assembly mode of the start.
 
-        Over each box the closed point changes continuously. A small box about one, which surely holds it, ties two
-        boxes with a common value of the independent coordinates where it lies between the ends of both: there their
-        closed points are the same. All must be reached in this way from the box that holds the start.
+        Over each box the closed point changes continuously. A small box that provably contains a closed point ties two
+        boxes with a common value of the independent coordinates, if it lies between the ends of both: their closed
+        points there are the same. Every box must be reached in this way from the box of the start.
         """
         lower, upper = boxes.lower[:, self.independent], boxes.upper[:, self.independent]
         start = np.broadcast_to(self.start, boxes.near.shape)
@@ -315,13 +315,13 @@ class Assembly:
         if not is_reached.all():
             box = box_words(lower[~is_reached][0], upper[~is_reached][0])
             raise ProofError(
-                f"the loops closed in the box {box} are not shown to be of the same assembly as the others"
+                f"the loops closed in the box {box} are not shown to be of the same assembly mode as the others"
             )
 
     def _reach(
         self, boxes: ClosedBoxes, is_reached: NDArray[np.bool_], border: NDArray[np.intp], pairs: NDArray[np.intp]
     ) -> None:
-        """Mark boxes that are tied to touching ones, by pairs of the numbers of a box of the border and of another."""
+        """Mark boxes tied to touching boxes of the border, by pairs of indices: one on the border, another one."""
         lower, upper = boxes.lower[:, self.independent], boxes.upper[:, self.independent]
         for begin in range(0, len(pairs), _BLOCK):
             block = pairs[begin : begin + _BLOCK]

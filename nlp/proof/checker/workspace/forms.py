@@ -1,6 +1,7 @@
-"""Affine forms of expressions over boxes, from polynomials with a ball, and of matrices, and their contractions.
+"""Affine forms of expressions and matrices over boxes, from polynomials with an error ball, and their contractions.
 
-Over a box of coordinates ``z_i = c_i + r_i e_i``, ``|e_i| <= 1``, an expression is ``c + sum_i a_i e_i`` and a rest.
+Over a box of coordinates ``z_i = c_i + r_i e_i``, ``|e_i| <= 1``, an expression is ``c + sum_i a_i e_i`` plus a
+remainder.
 """
 
 from __future__ import annotations
@@ -18,11 +19,11 @@ from .....models import FloatArray
 from ..arithmetic import PolynomialArithmetic
 from ..polynomials import UNIT, Polynomial, places
 
-#: Part of itself by which a sum of nonnegative products moves outwards: more than the rounding of fewer than 400 terms.
+#: Relative outward rounding of a sum of nonnegative products: more than the rounding of fewer than 400 terms.
 UP = 1 + 1024 * UNIT
-#: Rounding of a product of matrices with fewer than 400 terms, in parts of the product of sizes.
+#: Rounding of a product of matrices with fewer than 400 terms, relative to the product of absolute values.
 PRODUCT = 512 * UNIT
-#: Part by which the solution of a system is enlarged, so that it is a bound: its rounding is far below.
+#: Relative enlargement of the solution of a system that makes it a bound: its rounding is far below.
 ENLARGED = 1e-6
 #: Steps of the power method, and part of the largest singular value below which others are zero.
 _STEPS, _FLAT = 12, 1e-14
@@ -37,12 +38,12 @@ class AffineMatrix(NamedTuple):
 
     @property
     def rest(self) -> FloatArray:
-        """The rest (B, m, c), with the rounding of a product with M and A."""
+        """Remainder (B, m, c), including the rounding of a product with M and A."""
         return np.asarray(self.E + PRODUCT * (np.abs(self.M) + self.spread))
 
     @property
     def spread(self) -> FloatArray:
-        """Largest sizes (B, m, c) of the linear parts."""
+        """Largest absolute values (B, m, c) of the linear parts."""
         return np.asarray(np.abs(self.A).sum(axis=1))
 
     def part(self, rows: slice, columns: slice = slice(None)) -> AffineMatrix:
@@ -50,7 +51,7 @@ class AffineMatrix(NamedTuple):
         return AffineMatrix(self.M[:, rows, columns], self.A[:, :, rows, columns], self.E[:, rows, columns])
 
     def corners(self, count: int | None = None) -> FloatArray:
-        """Return the middles with the linear parts in the first coordinates, at corners of boxes (B, corners, m, c)."""
+        """Return the centres plus linear parts in the first coordinates, at corners of boxes (B, corners, m, c)."""
         A = self.A[:, :count]
         signs = np.array(list(itertools.product((-1.0, 1.0), repeat=A.shape[1])))
         moved = A.transpose(0, 2, 3, 1) @ signs.T
@@ -67,9 +68,9 @@ class AffineMatrix(NamedTuple):
     def contracted(
         self, C: FloatArray, moved: FloatArray | None = None
     ) -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
-        """Return where C (B, c, m) times the matrices has an inverse, bounds of ``|I - C M|``, and shares (B, n) of CA.
+        """Return where C (B, c, m) times the matrices is invertible, bounds of ``|I - C M|``, and shares (B, n) of CA.
 
-        ``moved`` (B, k, c, c) are bounds of parts of ``C A`` in another grouping; None for the size of each.
+        ``moved`` (B, k, c, c) has bounds of the terms of ``C A`` in another grouping; None to bound each term.
         """
         moved = np.abs(C[:, None] @ self.A) if moved is None else moved
         bound = (off_identity(C, self.M) + np.abs(C) @ self.rest + moved.sum(axis=1)) * UP
@@ -85,7 +86,7 @@ class Forms(NamedTuple):
     r: FloatArray
 
     def matrix(self, at: NDArray[np.intp], shape: tuple[int, int]) -> AffineMatrix:
-        """Return matrices (B, m, c) with these as entries at rows and columns (2, R), and 0 elsewhere."""
+        """Return matrices (B, m, c) with these forms as entries at rows and columns (2, R), and 0 elsewhere."""
         B, (rows, columns) = len(self.c), at
         M, A, E = np.zeros((B, *shape)), np.zeros((B, self.a.shape[2], *shape)), np.zeros((B, *shape))
         M[:, rows, columns], E[:, rows, columns] = self.c, self.r
@@ -100,7 +101,7 @@ class Values(NamedTuple):
     shape: tuple[int, int]
 
     def forms(self, which: slice = slice(None)) -> Forms:
-        """Return affine forms of some expressions: the square of a coordinate is 1/2, give or take 1/2."""
+        """Return affine forms of some expressions: the square of a coordinate lies within 1/2 +- 1/2."""
         values, (B, n) = self.polynomials[which], self.shape
         c, a, r = np.zeros((B, len(values))), np.zeros((B, len(values), n)), np.zeros((B, len(values)))
         for k, value in enumerate(values):
@@ -119,11 +120,12 @@ class Values(NamedTuple):
 
 
 class SparseMatrices(NamedTuple):
-    """Rows and columns (2, R) of the nonzero entries of matrices, one after the other, and shapes (m, c).
+    """Nonzero entries of matrices.
 
     Attributes:
-        at, shapes: of each matrix.
-        entries: (R, 1) their expressions, all together.
+        at: rows and columns (2, R) of the entries of each matrix.
+        shapes: shape (m, c) of each matrix.
+        entries: (R, 1) expressions of all entries, one matrix after another.
     """
 
     at: list[NDArray[np.intp]]
@@ -132,7 +134,7 @@ class SparseMatrices(NamedTuple):
 
     @classmethod
     def of(cls, matrices: Sequence[SX]) -> SparseMatrices:
-        """Return the entries of matrices."""
+        """Return the nonzero entries of matrices."""
         at = [np.array(each.sparsity().get_triplet(), dtype=np.intp) for each in matrices]
         entries = ca.vertcat(SX(0, 1), *[ca.vec(each.nz[:]) for each in matrices])
         return cls(at, [each.shape for each in matrices], entries)
@@ -144,7 +146,7 @@ class SparseMatrices(NamedTuple):
         return [part.matrix(at, shape) for part, at, shape in zip(parts, self.at, self.shapes, strict=True)]
 
 
-#: Returns polynomials of further inputs over boxes with ends (B, n).
+#: Function that returns polynomials of further inputs over boxes with ends (B, n).
 Given = Callable[[FloatArray, FloatArray], Sequence[Polynomial]]
 
 
@@ -152,12 +154,12 @@ class FormArithmetic:
     """Affine forms of a vector of expressions (R, 1) of symbols (n, 1).
 
     Args:
-        z: the symbols: coordinates of boxes, then further inputs.
-        expressions: the expressions.
-        given: returns polynomials of the further inputs; None without any.
+        z: (n, 1) symbols: coordinates of boxes, followed by further inputs.
+        expressions: (R, 1) expressions.
+        given: function that returns polynomials of the further inputs; None without any.
 
     Raises:
-        UncoveredError: an expression holds an operation without a rule.
+        UncoveredError: an expression has an operation without a rule.
     """
 
     def __init__(self, z: SX, expressions: SX, given: Given | None = None) -> None:
@@ -173,7 +175,7 @@ class FormArithmetic:
 
 @np.errstate(all="ignore")
 def contraction(B: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:
-    """Return which nonnegative matrices (B, k, k) have a spectral radius below 1, and v with ``B v < v`` there."""
+    """Return which nonnegative matrices (B, k, k) have a spectral radius below 1, and v with ``B v < v`` for these."""
     B = np.where(np.isfinite(B), B, np.inf)
     v, holds = np.ones(B.shape[:2]), np.zeros(len(B), dtype=bool)
     for _ in range(_STEPS):
@@ -187,9 +189,9 @@ def contraction(B: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:
 
 
 def inverses(matrices: FloatArray, zero: float | None = None) -> FloatArray:
-    """Return approximate left inverses (B, c, m) of matrices (B, m, c); NaN where there is none.
+    """Return approximate left inverses (B, c, m) of matrices (B, m, c); NaN where none exists.
 
-    Singular values below a part ``zero`` of the largest count as 0; None for rounding alone.
+    Singular values below the part ``zero`` of the largest count as 0; None for the rounding threshold.
     """
     good = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
     found = np.full_like(np.swapaxes(matrices, 1, 2), np.nan)
@@ -202,20 +204,20 @@ def inverses(matrices: FloatArray, zero: float | None = None) -> FloatArray:
 
 
 def off_identity(C: FloatArray, M: FloatArray) -> FloatArray:
-    """Return sizes of ``I - C M``, but for the rounding of the product."""
+    """Return absolute values of ``I - C M``, without the rounding of the product."""
     return np.asarray(np.abs(np.eye(C.shape[-2]) - C @ M) * (1 + 2 * UNIT) + 2 * UNIT)
 
 
 @np.errstate(all="ignore")
 def solved(A: AffineMatrix, D: AffineMatrix) -> tuple[AffineMatrix, NDArray[np.bool_], FloatArray]:
-    """Return the solutions (B, c, k) of ``A Y = D``, where they are known (B,), and shares (B, n) in the rest.
+    """Return the solutions (B, c, k) of ``A Y = D``, where they are known (B,), and shares (B, n) in the remainder.
 
     A (B, m, c) may have more rows than columns. With C near a left inverse of A in the middle of a box, ``Y_0 = C D_0``
     and ``B >= |I - C A|``,
 
         Y - Y_0 = C (D - A Y_0) + (C A)^-1 (I - C A) C (D - A Y_0).
 
-    The first part is affine in the coordinates but for a rest, the second at most ``(I - B)^-1 B |C (D - A Y_0)|``.
+    The first part is affine in the coordinates up to a remainder, the second at most ``(I - B)^-1 B |C (D - A Y_0)|``.
     """
     C = inverses(A.M)
     holds, bound, shares = A.contracted(C)

@@ -1,6 +1,6 @@
-"""Claims about a robot's expressions over boxes, with closed loops, of a design or of all machines within a tolerance.
+"""Claims about a robot's expressions over boxes, with closed loops, for the nominal design or within a tolerance.
 
-Errors of joint centres are coordinates of the forms, which are never cut.
+Joint-centre errors are coordinates of the forms, and are never bisected.
 """
 
 from __future__ import annotations
@@ -26,27 +26,27 @@ from .path_loops import PathAssembly
 from .path_root import PathRoot
 from .pose_boxes import Attempt, PoseRoot
 
-#: Errors at which equations and screws that were left out are tested, in parts of the robot's length, part of the
-#: workspace about its middle in which the poses lie, number of tests, and largest residual of a closed loop.
+#: Test of omitted equations and screws at random errors: size of the errors in parts of the robot's length, part of the
+#: workspace about its middle with the poses, number of tests, and largest residual of a closed loop.
 _OFF, _SPREAD, _TESTS, _CLOSED, _SEED = 1e-2, 0.5, 4, 1e-9, 2
 #: Singular values below this part of the largest are zero.
 _ZERO = 1e-9
-#: Parts of a length, or radians, by which a number of the pose is moved to test equations that were left out, the
-#: largest change of their left sides then, and the number of coordinates of positions.
+#: Test of omitted equations by moving a pose coordinate: step in parts of a length, or radians; largest change of the
+#: left sides; and number of position coordinates.
 _SHORT, _ROUNDING, _POSITION = 1e-3, 1e-12, 3
-#: Largest number of coordinates of boxes with closed loops that are kept of a claim.
+#: Largest number of coordinates of boxes with closed loops that are stored for a claim.
 _MOST_KEPT = 2**24
 
 
 class PosedLoops(NamedTuple):
-    """A robot over a workspace or a path with its closed loops, and the numbers by which its machines differ.
+    """A robot over a workspace or a path with its closed loops, and with the joint-centre errors of a tolerance.
 
     Attributes:
-        robot: the robot.
+        robot: expressions of the robot.
         start: (n,) closed loops near the middle of the workspace, or at the first point.
-        assembly: the loops that change continuously from there.
-        tolerance: largest error of each joint centre in the machines that are meant.
-        needed: loop equations that do not follow from others.
+        assembly: loops that change continuously from the start.
+        tolerance: largest error of each joint centre; 0 for the exact robot.
+        needed: indices of the independent loop equations.
     """
 
     robot: PosedRobot
@@ -61,19 +61,19 @@ def posed_loops(
 ) -> PosedLoops:
     """Return a robot with closed loops.
 
-    Loop equations that hold at all closed points by themselves are left out. That is found by their ranks at a few
-    points: where it is wrong, claims are about more than the closed loops, and say more.
+    Loop equations that hold at all closed points anyway are left out, by their ranks at a few points. If this is wrong,
+    claims cover more points than the closed ones, and are only stronger.
 
     Args:
-        case: with fixed dimensions.
-        model: its robot without unknowns that follow in closed form.
-        root: the box of coordinates.
-        tolerance: largest error of each joint centre in the machines that are meant.
-        built: the robot with errors of its joint centres as coordinates; None for the design.
+        case: case with fixed dimensions.
+        model: model of its robot without the unknowns in closed form.
+        root: box of coordinates.
+        tolerance: largest error of each joint centre; 0 for the exact robot.
+        built: model with joint-centre errors as coordinates; None for the nominal design.
 
     Raises:
-        ProofError: no closed loops are found in the middle of the workspace, they are singular there or leave a joint
-            free, an expression has an operation without a rule, or errors take freedoms from the robot.
+        ProofError: the loops cannot be closed in the middle of the workspace, are singular there or leave a joint free;
+            an expression has an operation without a rule; or joint-centre errors remove degrees of freedom.
     """
     if isinstance(root, PathRoot):
         return _along_path(case, model, root, posed_loops(case, model, root.box, tolerance, built), built)
@@ -88,7 +88,7 @@ def posed_loops(
     except UncoveredError as error:
         raise ProofError(f"the check has no rule for {error}") from None
     if built is not None:
-        _refuse_other_freedoms(robot, assembly)
+        _refuse_other_mobility(robot, assembly)
     if len(needed) < robot.equations.numel():
         _refuse_narrow(robot, assembly, root)
     return PosedLoops(robot, start, assembly, tolerance, needed)
@@ -107,9 +107,9 @@ def _along_path(case: Case, model: Model, root: PathRoot, about: PosedLoops, bui
 
 
 def _refuse_narrow(robot: PosedRobot, assembly: Assembly, root: PoseRoot) -> None:
-    """Refuse an equation that was left out as a number of the pose hardly changes, and does not hold where it does."""
+    """Refuse an omitted equation that holds only because a pose coordinate has a narrow range."""
     equations = ca.vertcat(robot.equations, robot.loops)
-    # Constants of a robot that should be 0 may be rounding of its numbers.
+    # Constants of a robot that should be 0 may be rounding errors.
     first = robot.at(equations, assembly.start)
     for j in (each for each in assembly.independent if each < len(robot.free)):
         k = robot.free[j]
@@ -120,11 +120,11 @@ def _refuse_narrow(robot: PosedRobot, assembly: Assembly, root: PoseRoot) -> Non
             (z,) = assembly.moved(assembly.start[None], to[:, assembly.independent])
             off = np.abs(robot.at(equations, z) - first)
             if np.isfinite(z).all() and not off.max(initial=0.0) <= _ROUNDING:
-                raise ProofError("the loops do not close all over the workspace")
+                raise ProofError("the loops cannot be closed everywhere in the workspace")
 
 
-def _refuse_other_freedoms(robot: PosedRobot, assembly: Assembly) -> None:
-    """Refuse machines in which, at random errors, equations or screws that were left out do not follow from others."""
+def _refuse_other_mobility(robot: PosedRobot, assembly: Assembly) -> None:
+    """Refuse a tolerance if, at random errors, omitted equations or screws do not follow from the others."""
     rng, n = np.random.default_rng(_SEED), len(assembly.start) - robot.errors
     poses = [j for j in assembly.independent if j < n]
     for _ in range(_TESTS):
@@ -134,24 +134,24 @@ def _refuse_other_freedoms(robot: PosedRobot, assembly: Assembly) -> None:
         (z,) = assembly.moved(assembly.start[None], to[:, assembly.independent])
         every = robot.at(ca.vertcat(robot.equations, robot.loops), z)
         if not (np.isfinite(z).all() and np.abs(every).max(initial=0.0) <= _CLOSED):
-            raise ProofError("with errors of joint centres the robot does not have the poses of the workspace")
+            raise ProofError("with joint-centre errors the robot cannot take the poses of the workspace")
         for each in (one for one in robot.members if one.rank < one.screws.shape[1]):
             columns = scaled_twists(each.screws, each.centre, SX(robot.length), each.size)
             sizes = np.linalg.svd(robot.at(columns, z), compute_uv=False)
             if int(np.count_nonzero(sizes > _ZERO * sizes.max(initial=0.0))) != each.rank:
-                raise ProofError("errors of joint centres take freedoms from the robot")
+                raise ProofError("joint-centre errors remove degrees of freedom from this overconstrained robot")
 
 
 class LoopClaim(ABC):
     """A claim about expressions (R, 1) of a robot's coordinates.
 
     Raises:
-        ProofError: an expression holds an operation without a rule.
+        ProofError: an expression has an operation without a rule.
     """
 
     def __init__(self, loops: PosedLoops, expressions: SX) -> None:
         robot, self.assembly, self.tolerance = loops.robot, loops.assembly, loops.tolerance
-        # Independent coordinates as those of poses.
+        # Independent coordinates use the order of pose coordinates.
         self.free = [robot.free[j] for j in self.assembly.independent if j < len(robot.free)]
         self.errors, self._shown, self._kept = robot.errors, list[ClosedBoxes](), 0
         self.coordinates = robot.coordinates
@@ -162,7 +162,7 @@ class LoopClaim(ABC):
 
     @np.errstate(all="ignore")
     def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
-        """Try to show the claim on boxes (B, 6)."""
+        """Try to prove the claim on boxes (B, 6)."""
         closed = self.closed(lower, upper)
         holds, shares = closed.is_known.copy(), closed.shares[:, : len(self.free)].copy()
         is_wrong = np.zeros(len(holds), dtype=bool)
@@ -178,16 +178,16 @@ class LoopClaim(ABC):
 
     @abstractmethod
     def examined(self, closed: Enclosed) -> Attempt:
-        """Try to show the claim over closed loops that are known."""
+        """Try to prove the claim over known closed loops."""
 
     def finish(self) -> None:
-        """Refuse boxes with closed loops that are not shown to be those of one assembly, after all were shown."""
+        """Refuse boxes whose closed loops are not proved to belong to one assembly mode, at the end of the check."""
         if self._shown:
             every = zip(*self._shown, strict=True)
             self.assembly.refuse_apart(ClosedBoxes(*map(np.concatenate, every)))
 
     def _keep(self, boxes: ClosedBoxes) -> None:
-        """Keep boxes whose closed loops must be those of one assembly."""
+        """Store boxes whose closed loops must belong to one assembly mode."""
         self._shown.append(boxes)
         self._kept += sum(each.size for each in boxes)
         if self._kept > _MOST_KEPT:
@@ -203,5 +203,5 @@ class LoopClaim(ABC):
         return self.assembly.enclosed(lower[:, own], upper[:, own])
 
     def values(self, closed: Enclosed) -> Values:
-        """Return the expressions over closed loops, of all coordinates."""
+        """Return the expressions of all coordinates over closed loops."""
         return self._entries(closed.lower, closed.upper)

@@ -1,20 +1,20 @@
-"""Matrices of motions, as expressions of the pose: their null space has the motions that no limb resists.
+"""Matrices of motion conditions, as expressions of the pose; their null space has the unresisted motions.
 
-They are built for the check from the model and the case alone. A motion is the velocity v of the platform's origin and
-its angular velocity, here ``x = (v, length omega)``, with rates of joints. Each row is a condition that it keeps:
+They are built for the check from the model and the case only. A motion consists of the velocity v of the platform's
+origin and its angular velocity, here ``x = (v, length omega)``, and of joint rates. Each row is a condition:
 
 * the force f and moment m of a limb's row, about the platform's origin, do no work: ``f.v + m.omega = 0``;
-* the motion is one of the passive joints of each member, ``x - sum_j w_j S_j = 0`` with rates w; of a pinned member the
-  velocity of its centre alone.
+* the passive joints of a member can follow the motion, ``x - sum_j w_j S_j = 0`` with rates w; for a pinned member only
+  the velocity of its centre.
 
-With the actuators free, x minus the motion ``sum_k u_k A_k`` of the actuators that move a member stands for x in its
-conditions, and relations ``B u = 0`` that loops demand of the actuators alone are conditions too. With locked actuators
-the matrix has full column rank where J has full rank, and the passive screws of each member are independent. With free
-ones its null space has as many dimensions as the robot has freedoms and rates ``u`` without a motion, and more only
-where the constraint wrenches lose their rank, or passive screws theirs.
+With free actuators, x minus the motion ``sum_k u_k A_k`` of the actuators that move a member replaces x in its
+conditions; relations ``B u = 0`` between actuator rates are conditions too. With locked actuators the matrix has full
+column rank where J has full rank and the passive screws of each member are independent. With free ones its null space
+has as many dimensions as the robot has degrees of freedom and idle rates ``u``, and more only where the constraint
+wrenches or the passive screws lose rank.
 
-Screws of members with nested loops have these solved, with the rank that they have at almost all poses. That each loop
-keeps its rank is claimed beside: as many of its conditions as its rank are columns of a block of their own.
+The loops of members with nested loops are solved, with their rank at almost all poses. A separate block claims that
+each loop keeps its rank: as many of its conditions as the rank are its columns.
 
 A rotation is a polynomial matrix over a positive number. Rows of limbs that are linear in the rotation are multiplied
 by that number, so that they are polynomials.
@@ -39,7 +39,7 @@ from .....models.rows import independent_rows
 from ....case.case import Case
 from ....case.pose import Free
 from ....case.workspace import TurnKind
-from ...statement.machine import has_straight_legs
+from ...statement.fixed_robot import has_straight_legs
 from ..proof_file import ProofError
 from .forms import FormArithmetic
 from .path_root import PathRoot
@@ -47,7 +47,7 @@ from .pose_boxes import PoseRoot
 
 #: Singular values below this part of the largest are zero at the middle of the workspace.
 _ZERO = 1e-9
-#: The poses of a workspace, or those of a path.
+#: Poses of a workspace, or of a path.
 Root: TypeAlias = "PoseRoot | PathRoot"
 
 
@@ -55,33 +55,33 @@ class PosedRobot:
     """A robot with its dimensions over a workspace.
 
     Args:
-        case: with fixed dimensions.
-        model: its robot, some of whose unknowns may have been replaced by expressions; further parameters than the
-            case's are components of errors of joint centres, and come last.
-        root: the box of coordinates.
+        case: case with fixed dimensions.
+        model: model of its robot, possibly without some of its unknowns; parameters beyond those of the case are
+            components of joint-centre errors, and come last.
+        root: box of coordinates.
 
     Attributes:
-        z: (n, 1) symbols: those of the six coordinates of the pose that vary, then the unknowns, then errors.
+        z: (n, 1) symbols: varying coordinates of the pose, then unknowns, then errors.
         errors: number of components of errors.
         coordinates: number of coordinates of boxes.
         free: indices of the varying coordinates among those of boxes.
-        dependent: places among these of the coordinates that follow from the others.
+        dependent: positions of the dependent coordinates among these.
         given: (g, 1) symbols whose values follow from the coordinates of boxes; see :class:`.pose_boxes.PoseSymbols`.
         varying: (v, 1) symbols of the pose, and of the unknowns.
         of_errors: (e, 1) symbols of the errors.
-        centre: (n,) the middle of the workspace, or the first point of a path, with unknowns and errors of 0.
-        size: (n,) by which coordinates are comparable: half ranges, sizes of the unknowns, and the tolerance.
+        centre: (n,) middle of the workspace, or first point of a path, with unknowns and errors of 0.
+        size: (n,) sizes that make coordinates comparable: half ranges, sizes of the unknowns, and the tolerance.
         length: characteristic size of the robot, factor of the angular velocities.
-        position: (3, 1) the platform's origin, length.
+        position: (3, 1) origin of the platform frame, length.
         rotation: (3, 3) platform to world coordinates.
-        scale: (1, 1) by which rows are multiplied that are linear in the rotation; at least 1.
+        scale: (1, 1) factor of rows that are linear in the rotation; at least 1.
         rows: rows of limbs, one wrench each, with moments about the platform's origin.
-        members, actuators: of the robot.
+        members, actuators: members and actuators of the robot.
         legs: base joint (3, 1) of each straight leg, and its platform joint a in the world, ``scale R a``.
-        nested: (m, k) each, the conditions of nested loops on rates of a member's passive joints.
-        equations: (k, 1) that are 0 where the loops are closed, of order 1.
-        loops: (l, 1) further equations of the same loops, which other assemblies of the joints do not fulfil.
-        signs: (s, 1) numbers that are positive in home's working mode.
+        nested: (m, k) each, conditions of nested loops on rates of a member's passive joints.
+        equations: (k, 1) loop equations of order 1, 0 where the loops are closed.
+        loops: (l, 1) further equations of the same loops, which other assembly modes do not satisfy.
+        signs: (s, 1) expressions that are positive in home's working mode.
     """
 
     def __init__(self, case: Case, model: Model, root: Root) -> None:
@@ -100,12 +100,12 @@ class PosedRobot:
         self.varying, self.of_errors = ca.vertcat(SX(0, 1), *varying, unknowns), errors
 
         def put(expressions: Iterable[SX], rotation: SX = self.rotation) -> list[SX]:
-            """Return expressions of the model with those of the coordinates in the place of its symbols."""
+            """Return expressions of the model with the coordinates in place of its symbols."""
             numbers = [ca.vertcat(SX(0, 1), *values, errors), unknowns, rotation, self.position]
             return list(ca.Function("robot", symbols, list(expressions)).call(numbers))
 
         def scaled(vectors: Iterable[SX]) -> list[SX]:
-            """Return vectors, those that are linear in the rotation as multiples without the inverse of the scale."""
+            """Return vectors; those that are linear in the rotation are multiplied by the scale."""
             inverse = SX.sym("inverse")
             found = put(map(ca.densify, vectors), inverse * turned)
             for k, vector in enumerate(found):
@@ -117,7 +117,7 @@ class PosedRobot:
             return found
 
         def stacked(expressions: Iterable[SX]) -> SX:
-            """Return numbers of the robot as a column."""
+            """Return expressions of the robot as a column."""
             return ca.vertcat(SX(0, 1), *put(expressions))
 
         sizes = np.array(ca.evalf(stacked(each.size for each in model.unknowns))).ravel()
@@ -127,7 +127,7 @@ class PosedRobot:
         arms = scaled(model.pose.rotation @ leg.platform for leg in model.legs)
         self.legs = tuple(zip(put(leg.base for leg in model.legs), arms, strict=True))
         if has_straight_legs(model):
-            # The line of a leg passes its platform joint: u x (s (p - b) + u) / s is its moment about the origin.
+            # The leg's line passes through its platform joint: u x (s (p - b) + u) / s is its moment about the origin.
             spans = [(self.position - foot, arm) for foot, arm in self.legs]
             rows = [ca.vertcat(self.scale * d + u, ca.cross(u, d)) for d, u in spans]
         else:
@@ -144,13 +144,13 @@ class PosedRobot:
         self.signs = stacked(each.value for each in model.signs)
 
     def at(self, expression: SX, z: FloatArray) -> FloatArray:
-        """Return the values of a matrix of expressions at a point (n,); at points (n, P) side by side."""
+        """Return the values of a matrix of expressions at a point (n,), or side by side at points (n, P)."""
         function = ca.Function("values", [self.z, self.given], [ca.densify(expression)])
         given = self.values_given(z.T.reshape(-1, len(z))).T
         return np.asarray(function(z, given).full())
 
     def function(self, *outputs: SX) -> Callable[[FloatArray], list[FloatArray]]:
-        """Return a function of points (P, n) with the values (P, rows, columns) of matrices of expressions."""
+        """Return a function that evaluates matrices of expressions at points (P, n), as (P, rows, columns)."""
         function = ca.Function("values", [self.z, self.given], [ca.densify(each) for each in outputs])
         return lambda z: values_at(function, z, self.values_given(z))
 
@@ -158,7 +158,7 @@ class PosedRobot:
         """Return the forms of expressions (R, 1) over boxes.
 
         Raises:
-            UncoveredError: an expression holds an operation without a rule.
+            UncoveredError: an expression has an operation without a rule.
         """
         return FormArithmetic(ca.vertcat(self.z, self.given), expressions, self._root.given)
 
@@ -167,7 +167,7 @@ class PosedRobot:
         return self._root.values_at(z[:, :1])
 
     def slopes(self, expressions: SX) -> Callable[[FloatArray], FloatArray]:
-        """Return a function of points (P, n) with the derivatives (P, k, n) of expressions (k, 1) by coordinates."""
+        """Return a function that gives the derivatives (P, k, n) of expressions (k, 1) at points (P, n)."""
         own, through = (ca.jacobian(expressions, each) for each in (self.z, self.given))
         values, root = self.function(own, through), self._root
 
@@ -181,9 +181,9 @@ class PosedRobot:
 
 
 def turned_rotation(root: Root, turn: list[SX]) -> tuple[SX, SX]:
-    """Return the rotation (3, 3) with its coordinates times a positive number, and this number: polynomials.
+    """Return the rotation (3, 3) times a positive number, and this number: polynomials of the rotation coordinates.
 
-    Four coordinates are those of a quaternion of any size but zero.
+    Four coordinates are a quaternion of any size except zero.
     """
 
     def of_quaternion(r: SX, w: SX | int = 1) -> tuple[SX, SX]:
@@ -200,17 +200,17 @@ def turned_rotation(root: Root, turn: list[SX]) -> tuple[SX, SX]:
 
 
 def motion_matrix(robot: PosedRobot, start: FloatArray, *, is_locked: bool) -> tuple[SX, int]:
-    """Return the matrix (m, c), and the dimensions of its null space claimed to be all: freedoms and idle rates.
+    """Return the matrix (m, c), and the claimed dimension of its null space: degrees of freedom and idle rates.
 
-    With locked actuators there are none. With free ones the matrix of a robot given by its rows is that of its couples.
+    With locked actuators the dimension is 0. With free ones, the matrix of a robot given by rows has its couples only.
 
     Args:
-        robot: the robot.
-        start: (n,) closed loops, at which those screws of each member are chosen that are independent.
+        robot: expressions of the robot.
+        start: (n,) closed loops at which the independent screws of each member are chosen.
         is_locked: whether the actuators are locked.
 
     Raises:
-        ProofError: the screws or loops of a member are singular at the start, or all freedoms of a platform are left.
+        ProofError: the screws or loops of a member are singular at the start, or the robot has no constraint wrenches.
     """
     if is_locked:
         return _whole_matrix(robot, start, ()), 0
@@ -220,21 +220,21 @@ def motion_matrix(robot: PosedRobot, start: FloatArray, *, is_locked: bool) -> t
         matrix = ca.vertcat(SX(0, 6), *[_work(robot, row) for row in robot.rows if row.kind is WrenchKind.COUPLE])
     generic = robot.model.generic
     if generic is not None:
-        freedoms, idle = 6 - generic.constraints, generic.idle
+        mobility, idle = 6 - generic.constraints, generic.idle
     else:
-        # Where every pose is closed, the rank is that at almost all of them.
+        # If all poses are closed, the rank is that at almost all poses.
         away = np.random.default_rng(0).uniform(-0.5, 0.5, (4, len(start))) * robot.size * (not robot.model.unknowns)
         spectra = np.linalg.svd(np.hsplit(robot.at(matrix, (start + away).T), len(away)), compute_uv=False)
-        freedoms, idle = matrix.shape[1] - max(int(np.count_nonzero(each > _ZERO * each[0])) for each in spectra), 0
-    if not 0 < freedoms < 6:
-        raise ProofError("the robot has no constraint wrenches of which the rank could be claimed")
-    return matrix, freedoms + idle
+        mobility, idle = matrix.shape[1] - max(int(np.count_nonzero(each > _ZERO * each[0])) for each in spectra), 0
+    if not 0 < mobility < 6:
+        raise ProofError("the robot has no constraint wrenches whose rank could be claimed")
+    return matrix, mobility + idle
 
 
 def driven_matrices(robot: PosedRobot, start: FloatArray) -> tuple[SX, SX]:
-    """Return A (m, c) and D (m, a) with ``A (x, w) = D u`` for motions x, rates w of passive joints and u of actuators.
+    """Return A (m, c) and D (m, a) with ``A (x, w) = D u`` for motions x and rates of passive joints w and actuators u.
 
-    The actuators of a robot without given ones are its legs, whose rates are those of their rows.
+    For a robot without given actuators, the actuators are its legs, with the rates of their rows.
     """
     if robot.actuators:
         whole, count = _motion_rows(robot, start, robot.actuators), len(robot.actuators)
@@ -260,9 +260,9 @@ def _whole_matrix(robot: PosedRobot, start: FloatArray, actuators: Sequence[Actu
 def _motion_rows(robot: PosedRobot, start: FloatArray, actuators: Sequence[Actuator]) -> SX:
     """Return the conditions (m, c) of limbs, with columns of the platform, of passive joints and of actuators.
 
-    Of each member as many screws are taken as have its rank: where these are independent, they span all.
+    For each member, as many screws are taken as its rank: where these are independent, they span all screws.
     """
-    # What limbs see of a motion, by the names of those that actuators move, and the motions of their passive joints.
+    # For each limb: the label by which actuators move it, its conditions on the motion, and its passive motions.
     limbs = [(row.label.member, _work(robot, row), SX(6, 0)) for row in robot.rows]
     for each in robot.members:
         kept = list(range(each.screws.shape[1]))
@@ -284,7 +284,7 @@ def _motion_rows(robot: PosedRobot, start: FloatArray, actuators: Sequence[Actua
 
 
 def _independent(rows: FloatArray, rank: int, whose: str) -> list[int]:
-    """Return as many independent rows as their rank; rows that loops hold still are rounding errors."""
+    """Return as many independent rows as the rank; rows of joints that loops lock are rounding errors."""
     chosen = sorted(independent_rows([rows])) if rank else []
     if len(chosen) != rank:
         raise ProofError(f"{whose} are singular in the middle of the workspace")
@@ -292,11 +292,11 @@ def _independent(rows: FloatArray, rank: int, whose: str) -> list[int]:
 
 
 def _work(robot: PosedRobot, row: Wrench) -> SX:
-    """Return the work (1, 6) of a limb's row in motions."""
+    """Return the work (1, 6) of a limb's row per unit of each motion component."""
     return ca.horzcat(row.force.T, row.moment.T / robot.length)
 
 
 def _motions(robot: PosedRobot, screws: SX) -> SX:
-    """Return the motions (6, n) of screws: twists with the world's origin as reference."""
+    """Return the motions (6, n) of screws: twists with the world origin as reference."""
     omega, v = screws[:3, :], screws[3:, :]
     return ca.vertcat(v - ca.skew(robot.position) @ omega, robot.length * omega)

@@ -1,17 +1,18 @@
 """Claims about forces, speeds and powers of an actuator.
 
 ``A (x, w) = D u`` holds for the motion x of the platform, the rates w of passive joints and u of the actuators
-(:func:`.motion_matrix.driven_matrices`). With ``x_k`` the motion by a unit rate of actuator k, it holds a load W with
-the force ``-(W . x_k)``, by virtual work. Loads of any direction add multiples of the sizes of velocities. A leg's rate
-in a motion x of the platform is ``row . x / |force|`` with its own row. Else the motions of the platform are ``X u``,
-and of the left inverses of X, which all return the rates, a speed is by definition that of least size.
+(:func:`.motion_matrix.driven_matrices`). If ``x_k`` is the motion for a unit rate of actuator k, its force under a load
+W is ``-(W . x_k)``, by virtual work. Loads of any direction add multiples of velocity magnitudes. A leg's rate in a
+motion x of the platform is ``row . x / |force|`` with its row. Otherwise the motions of the platform are ``X u``, and
+the speed is defined by the left inverse of X with the least norm.
 
 Along a path with times the coordinate q of the actuator has the rate ``q_X X' + q_u u'`` with the rates X' of the pose,
-and ``L_u u' = -L_X X'`` for the loop equations L and the coordinates u that follow from others: the speed is its size.
+and ``L_u u' = -L_X X'`` for the loop equations L and the dependent coordinates u: the speed is its absolute value.
 
-All are an affine function of the coordinates, multiples of sizes of affine vectors, and a rest: but for the rest they
-are convex, so that the corners of a box decide. Rotations about any axis lie in a ball, where ``n . r <= sqrt(b)`` for
-unit vectors n. A multiple of the difference is added: it is at least 0 at every pose, and less at corners outside.
+Each quantity is an affine function of the coordinates, plus multiples of norms of affine vectors, plus a remainder.
+Without the remainder it is convex, so that the corners of a box decide. Rotations about any axis lie in a ball, where
+``n . r <= sqrt(b)`` for unit vectors n. A multiple of the difference is added: it is at least 0 at every pose, and
+reduces the bound at corners outside of the ball.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from numpy.typing import NDArray
 from .....models import FloatArray, WrenchKind
 from ....case.case import Case
 from ....case.loads import Motion
-from ....case.motors import Motor, MotorNumber
+from ....case.motors import ActuatorQuantity, Motor
 from ....case.task import Sense
 from .closed_loops import Enclosed
 from .forms import PRODUCT, UP, AffineMatrix, SparseMatrices, solved
@@ -36,45 +37,45 @@ from .loop_claims import LoopClaim, PosedLoops
 from .motion_matrix import Root, driven_matrices
 from .pose_boxes import COORDINATES, Attempt
 
-#: Part of a bound by which a number at a pose must be beyond it to show that a claim is wrong: far more than rounding.
+#: Relative excess over a bound by which the value at a pose refutes a claim: far more than rounding.
 _WRONG = 1e-6
-#: Part by which a unit vector may be too long.
+#: Relative amount by which a unit vector may be too long.
 _UNIT = 1e-12
 
 
 class _Sum(NamedTuple):
-    """A number over boxes: an affine one (B, 1, 1), and sizes of affine vectors (B, 3, 1), each with a factor."""
+    """A quantity over boxes: an affine function (B, 1, 1), and norms of affine vectors (B, 3, 1) with factors."""
 
     affine: AffineMatrix
     sizes: Sequence[tuple[float, AffineMatrix]] = ()
 
 
 class _Number(NamedTuple):
-    """The product of its parts, a force times a sign and, None, the speed; and the largest one allowed."""
+    """Product of a signed force and, for None, the speed; and the largest allowed value."""
 
     parts: tuple[float | None, ...]
     most: float
 
 
 def _number_of(motor: Motor, sense: Sense, bound: float) -> _Number:
-    """Return the number of a claim that a bound is the largest, or the smallest, value."""
-    if motor.number is MotorNumber.SPEED:
+    """Return the product for the claim that a bound is the largest, or the smallest, value of a quantity."""
+    if motor.number is ActuatorQuantity.SPEED:
         return _Number((None,), bound)
-    if motor.number is MotorNumber.POWER:
+    if motor.number is ActuatorQuantity.POWER:
         return _Number((-1.0 if motor.is_backwards else 1.0, None), bound)
     return _Number((float(sense.sign),), sense.sign * bound)
 
 
 class MotorClaims(LoopClaim):
-    """The claims that numbers of one actuator, under one load, are at most bounds, or forces at least bounds.
+    """Claims that quantities of one actuator, under one load, are at most bounds, or forces at least bounds.
 
     Args:
-        case: with its loads and motions.
-        loops: the robot, whose loops demand no relation of the actuators' rates.
-        root: the box of poses, or the path.
-        claims: the numbers, with their bounds.
-        coordinate: (1, 1) of the actuator in the coordinates of the robot, whose rate along the path is the speed; None
-            for the speed in any motion of the case.
+        case: case with its loads and motions.
+        loops: robot whose loops do not constrain the actuator rates.
+        root: box of poses, or the path.
+        claims: quantities with their bounds.
+        coordinate: (1, 1) actuator coordinate as an expression of the robot's coordinates, whose rate along the path
+            is the speed; None for the speed in any motion of the case.
     """
 
     def __init__(
@@ -110,7 +111,7 @@ class MotorClaims(LoopClaim):
         super().__init__(loops, self._matrices.entries)
 
     def examined(self, closed: Enclosed) -> Attempt:
-        """Try to show the claims over closed loops."""
+        """Try to prove the claims over closed loops."""
         forms = self.assembly.followed(self.values(closed).forms(), closed)
         A, D, wrench, moment, turn, L_u, L_t, q_u, q_t, *arms = self._matrices.forms(forms)
         y, known, shares = solved(A, D)
@@ -129,7 +130,7 @@ class MotorClaims(LoopClaim):
         for number in self._numbers:
             (upper, middle), *others = (ends[part] for part in number.parts)
             for most, at_centre in others:
-                # The power of a force below 0 counts as 0.
+                # A negative force has the power 0.
                 upper, middle = np.maximum(upper, 0.0) * most * UP, np.maximum(middle, 0.0) * at_centre
             holds = holds & (upper <= number.most)
             is_wrong |= known & (middle > number.most + _WRONG * abs(number.most))
@@ -137,7 +138,7 @@ class MotorClaims(LoopClaim):
         return Attempt(np.asarray(holds), (shares * rest)[:, : len(self.free)], is_wrong)
 
     def _force(self, sign: float, x: AffineMatrix, wrench: AffineMatrix, arms: Sequence[AffineMatrix]) -> _Sum:
-        """Return the force times a sign, from the motion (B, 6, 1) by a unit rate of the actuator."""
+        """Return the force times a sign, from the motion (B, 6, 1) for a unit rate of the actuator."""
         M, A, E = wrench.matmul(x)
         moved, turned, sizes = x.part(slice(0, 3)), x.part(slice(3, 6)), []
         for (force, moment), arm in zip(self._any, arms, strict=True):
@@ -149,7 +150,7 @@ class MotorClaims(LoopClaim):
         return _Sum(AffineMatrix(-sign * M, -sign * A, E), sizes)
 
     def _speed(self, x: AffineMatrix, moment: AffineMatrix) -> tuple[_Sum, NDArray[np.bool_]]:
-        """Return the largest speed, and where it is known, from motions (B, 6, a) by unit rates of all actuators."""
+        """Return the largest speed, and where it is known, from motions (B, 6, a) for unit rates of all actuators."""
         (linear, angular), B = self._fastest, len(x.M)
         fixed = AffineMatrix(*(np.zeros((*each.shape[:-2], 1, 1)) for each in x))
         if self._is_six_legs:
@@ -160,8 +161,8 @@ class MotorClaims(LoopClaim):
             right = AffineMatrix(np.broadcast_to(np.eye(COORDINATES), x.M.shape), 0 * x.A, 0 * x.E)
             rates, known, _ = solved(x, right)
         else:
-            # Rows g of rates of least size, as numbers at a pose have them: (X' S X)^-1 X' S.
-            length = linear / angular if linear and angular else 1.0  # the robot's length
+            # Rows g of the least-norm left inverse (X' S X)^-1 X' S, as used at single poses.
+            length = linear / angular if linear and angular else 1.0  # length of the robot
             weights = np.repeat([1.0, length**2], 3)
             right = _transposed(AffineMatrix(*(each * weights[:, None] for each in x)))
             rates, known, _ = solved(right.matmul(x), right)
@@ -170,7 +171,7 @@ class MotorClaims(LoopClaim):
         return _Sum(fixed, sizes), known
 
     def _largest(self, number: _Sum, turn: AffineMatrix) -> tuple[FloatArray, FloatArray]:
-        """Return upper bounds (B,) of a number over boxes, and its values in their middles."""
+        """Return upper bounds (B,) of a quantity over boxes, and its values at their centres."""
         p, affine = len(self.free), number.affine
         corners, middle = affine.corners(p)[:, :, 0, 0], affine.M[:, 0, 0].copy()
         slopes, rest = affine.A[:, :p, 0, 0].copy(), affine.E[:, 0, 0] + self._of_errors(affine)
@@ -189,7 +190,7 @@ class MotorClaims(LoopClaim):
         return np.asarray(upper + (rest + PRODUCT * terms) * UP), middle
 
     def _inside(self, slopes: FloatArray, turn: AffineMatrix) -> FloatArray:
-        """Return multiples (B, corners) of what is at least 0 wherever rotations lie in the ball."""
+        """Return multiples (B, corners) of a term that is at least 0 wherever rotations lie in the ball."""
         p = len(self.free)
         r = turn.M[:, 0]
         size = np.sqrt((r * r).sum(axis=1))
@@ -198,7 +199,7 @@ class MotorClaims(LoopClaim):
         room = self._ball - (turn.corners(p)[:, :, 0] @ n[:, :, None])[:, :, 0]
         rest = turn.rest[:, 0] + np.abs(turn.A[:, p:, 0]).sum(axis=1)
         room += ((rest * np.abs(n)).sum(axis=1) * UP + PRODUCT * self._ball)[:, None]
-        # Of the multiples at which a slope vanishes, that with the least bound.
+        # Take the least bound among the multiples at which a slope vanishes.
         tried = np.nan_to_num(np.where(along != 0, -slopes / np.where(along != 0, along, 1.0), 0.0))
         tried = np.maximum(tried, 0.0)
         left = np.abs(slopes[:, None] + tried[:, :, None] * along[:, None]).sum(axis=2)
@@ -207,15 +208,15 @@ class MotorClaims(LoopClaim):
         return np.asarray(best * room)
 
     def _of_errors(self, vector: AffineMatrix) -> FloatArray:
-        """Return the largest change (B,) of a column by errors of joint centres, each a vector of at most unit size."""
+        """Return the largest change (B,) of a column by joint-centre errors, each a vector of at most unit length."""
         own = vector.A[:, len(self.free) :].reshape(len(vector.A), -1, 3, vector.A.shape[2])
         return np.asarray(np.sqrt((own**2).sum(axis=(2, 3))).sum(axis=1) * UP)
 
 
 def _rates(loops: PosedLoops, coordinate: SX | None) -> list[SX]:
-    """Return the derivatives of loop equations, and of a coordinate: by those that follow, and by time along the path.
+    """Return derivatives of loop equations, and of a coordinate: by dependent coordinates, and by time along the path.
 
-    There are none without a coordinate.
+    The list is empty without a coordinate.
     """
     robot, (D, k) = loops.robot, (loops.assembly.dependent, len(loops.needed))
     if coordinate is None:
@@ -230,13 +231,13 @@ def _rates(loops: PosedLoops, coordinate: SX | None) -> list[SX]:
 def _along_path(
     L_u: AffineMatrix, L_t: AffineMatrix, q_u: AffineMatrix, q_t: AffineMatrix
 ) -> tuple[_Sum, NDArray[np.bool_]]:
-    """Return the size of a coordinate's rate along the path, and where it is known."""
+    """Return the absolute value of a coordinate's rate along the path, and where it is known."""
     known, rate = np.ones(len(q_t.M), dtype=bool), q_t
     if L_u.M.shape[1]:
         following, known, _ = solved(L_u, L_t)
         of_loops = q_u.matmul(following)
         M, A = rate.M - of_loops.M, rate.A - of_loops.A
-        # The differences round by a part of the numbers in them.
+        # The rounding of the differences is a part of their terms.
         sizes = np.abs(rate.M) + np.abs(of_loops.M) + rate.spread + of_loops.spread
         rate = AffineMatrix(M, A, (rate.E + of_loops.E + PRODUCT * sizes) * UP)
     fixed = AffineMatrix(*(np.zeros_like(each) for each in rate))

@@ -1,17 +1,17 @@
-"""Claims about numbers that are no single expression: terms of second order, and those of six straight legs.
+"""Claims about quantities that are no single expression: second-order terms, and quantities of six straight legs.
 
-Of six straight legs, with A their rows, F the diagonal matrix of the sizes of their forces, and J = F^-1 A with unit
-rows, the columns of ``P = A^-1 F`` are the platform's motions for unit changes of the legs' lengths, affine but for a
-rest (:func:`.forms.solved`). Sizes of affine matrices and vectors are convex: the corners of the box decide.
+For six straight legs, with A their rows, F the diagonal matrix of their force norms, and J = F^-1 A with unit rows, the
+columns of ``P = A^-1 F`` are the platform's motions for unit changes of the leg lengths, affine up to a remainder
+(:func:`.forms.solved`). Norms of affine matrices and vectors are convex: the corners of the box decide.
 
 * The smallest singular value of J is at least t where ``|P| <= 1 / t``, and the largest at most t where ``|J| <= t``.
-  The condition number is at most k where they are t and k t for any t.
-* Errors of legs d move the platform by ``P d`` to first order.
-* Two legs, as segments between their joints, are at least ``n.(x - y) / |n|`` apart, for any vector n and the least of
-  it over their ends x and y.
+  The condition number is at most k if, for some t, these bounds are t and k t.
+* Leg errors d move the platform by ``P d`` to first order.
+* Two legs, as segments between their joints, have at least the distance of the least ``n.(x - y) / |n|`` over their
+  ends x and y, for any vector n.
 
-With a tolerance on joint centres every singular value changes by at most a number, so that the smallest is claimed to
-be larger by it, and the largest to be smaller by it.
+A joint-centre tolerance changes every singular value by at most a known number; so larger smallest, and smaller largest
+values of the design are claimed.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from .....models import FloatArray
 from ....case.pose import Free
 from ....case.task import Sense
 from ....errors import UncoveredError
-from ...statement.machine import Legs
+from ...statement.fixed_robot import Legs
 from ...statement.tolerance import is_smooth
 from ..polynomials import UNIT
 from .closed_loops import Enclosed
@@ -38,32 +38,32 @@ from .forms import ENLARGED, PRODUCT, UP, AffineMatrix, FormArithmetic, solved
 from .loop_claims import LoopClaim, PosedLoops
 from .motion_matrix import PosedRobot
 from .pose_boxes import Attempt
-from .statement import Machines
+from .statement import RobotsWithinTolerance
 
-#: Part of a bound by which a number at a pose must be beyond it to show that a claim is wrong: far more than rounding.
+#: Relative excess over a bound by which the value at a pose refutes a claim: far more than rounding.
 _WRONG = 1e-6
 #: Rows and columns of the entries of a diagonal matrix (6, 6).
 _DIAGONAL = np.stack([np.arange(6)] * 2)
-#: Signs (6, 32) of the errors of legs: a pair of opposite signs has one size.
+#: Signs (6, 32) of the leg errors: vectors of opposite signs have the same norm.
 _ERRORS = np.array(list(itertools.product((-1.0, 1.0), repeat=6)))[:32].T
 #: Rows and columns of the entries of matrices (6, 6) and (3, 4).
 _DENSE, _ENDS = (np.indices(shape, dtype=np.intp).reshape(2, -1) for shape in ((6, 6), (3, 4)))
-#: Part of the trace that is taken off before Cholesky's factorisation: many times the bound of its rounding for
-#: matrices (6, 6), which is 8 roundings. A factorisation that ends proves the matrix positive definite (S. M. Rump,
+#: Part of the trace that is subtracted before Cholesky's factorisation: many times the bound of its rounding for
+#: matrices (6, 6), which is 8 roundings. A completed factorisation proves the matrix positive definite (S. M. Rump,
 #: *Verification of positive definiteness*, BIT 46 (2006)).
 _CHOLESKY = 1e-13
-#: Steps in the search of the part of second order of errors, and of the nearest points of two legs.
+#: Steps in the search for the second-order part of errors, and for the nearest points of two legs.
 _STEPS, _NEAREST = 200, 12
 
 
 class NumberClaim(LoopClaim):
-    """The claim that a number (1, 1) in a robot's coordinates is at most, or at least, a bound at its closed loops.
+    """Claim that a quantity (1, 1) of a robot is at most, or at least, a bound at its closed loops.
 
     Args:
-        loops: the robot.
-        number: the number.
-        sense: whether the bound is of the largest value or of the smallest.
-        bound: the bound.
+        loops: robot with closed loops.
+        number: (1, 1) quantity as an expression of the robot's coordinates.
+        sense: sense of the bound: largest or smallest value.
+        bound: value of the bound.
     """
 
     def __init__(self, loops: PosedLoops, number: SX, sense: Sense, bound: float) -> None:
@@ -71,7 +71,7 @@ class NumberClaim(LoopClaim):
         self._sign, self._most = sense.sign, sense.sign * bound
 
     def examined(self, closed: Enclosed) -> Attempt:
-        """Try to show the claim over closed loops."""
+        """Try to prove the claim over closed loops."""
         forms, p = self.assembly.followed(self.values(closed).forms(), closed), len(self.free)
         slopes = np.abs(forms.a[:, 0])
         errors = np.sqrt((slopes[:, p:].reshape(len(slopes), -1, 3) ** 2).sum(axis=2)).sum(axis=1)
@@ -82,30 +82,30 @@ class NumberClaim(LoopClaim):
 
 
 class SecondOrderClaim:
-    """The claim that the terms of second order of a number (1, 1) in the symbols of machines are at most a bound.
+    """Claim that the second-order terms of a quantity (1, 1), within the tolerance, are at most a bound.
 
     Raises:
-        UncoveredError: an expression holds an operation without a rule.
+        UncoveredError: an expression has an operation without a rule.
     """
 
-    def __init__(self, machines: Machines, expression: SX, bound: float) -> None:
-        symbols = machines.symbols
-        self.free = [k for k, each in enumerate(machines.root.values) if isinstance(each, Free)]
+    def __init__(self, robots: RobotsWithinTolerance, expression: SX, bound: float) -> None:
+        symbols = robots.symbols
+        self.free = [k for k, each in enumerate(robots.root.values) if isinstance(each, Free)]
         self._bound, self._tolerance = bound, symbols.tolerance
         pose, errors = SX.sym("pose", len(self.free)), SX.sym("errors", symbols.errors.numel())
         number = symbols.of(expression, errors, pose)
         if not is_smooth(number):
-            raise UncoveredError("a number whose derivatives jump")
+            raise UncoveredError("a quantity whose derivatives jump")
         second = ca.hessian(number, errors)[0]
         rows, columns = (np.array(each, dtype=int) for each in second.sparsity().get_triplet())
-        # Errors that second derivatives do not depend on are no variables of theirs.
+        # Errors that do not occur in the second derivatives are no variables of the forms.
         entries = ca.vertcat(SX(0, 1), second.nz[:])
         own = [k for k in range(errors.numel()) if ca.depends_on(entries, errors[k])]
         _, self._block = np.unique(rows // 3 * errors.numel() + columns // 3, return_inverse=True)
         self._errors, self._entries = len(own), FormArithmetic(ca.vertcat(pose, errors[own]), entries)
 
     def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
-        """Try to show the claim on boxes (B, 6)."""
+        """Try to prove the claim on boxes (B, 6)."""
         errors = np.full((len(lower), self._errors), self._tolerance)
         values = self._entries(np.hstack([lower[:, self.free], -errors]), np.hstack([upper[:, self.free], errors]))
         squares = np.zeros((self._block.max(initial=-1) + 1, len(lower)))
@@ -128,24 +128,24 @@ def are_positive(matrices: FloatArray) -> NDArray[np.bool_]:
 
 
 def _size_at_centre(matrices: AffineMatrix) -> FloatArray:
-    """Return the spectral norms (B,) at the centres: computed numbers, 0 where they are not known."""
+    """Return the spectral norms (B,) at the centres, computed in doubles; 0 where they are not known."""
     return np.asarray(np.linalg.norm(np.where(np.isfinite(matrices.M), matrices.M, 0.0), 2, axis=(1, 2)))
 
 
 def _size_is_at_most(matrices: AffineMatrix, most: FloatArray) -> NDArray[np.bool_]:
-    """Return whether the spectral norm is shown to be at most numbers (B,)."""
+    """Return whether the spectral norm is proved to be at most the given numbers (B,)."""
     room = most * (1 - 8 * UNIT) - np.sqrt((matrices.rest**2).sum(axis=(1, 2))) * UP
     corners = matrices.corners()
     square = corners @ corners.transpose(0, 1, 3, 2)
-    # The product rounds by a part of the square of the Frobenius norm.
+    # The rounding of the product is a part of the squared Frobenius norm.
     free = (room * room * (1 - 8 * UNIT))[:, None] - PRODUCT * np.trace(square, axis1=2, axis2=3)
     return np.asarray((room > 0) & are_positive(free[..., None, None] * np.eye(6) - square).all(axis=1))
 
 
 class LegInverse:
-    """The inverse P of J of six straight legs over boxes of poses.
+    """Inverse P of J of six straight legs over boxes of poses.
 
-    A length divides moments, and multiplies rotations; ``is_unit`` says whether J itself is meant too.
+    A length divides moments, and multiplies rotations. If ``is_unit``, J with unit rows is enclosed too.
     """
 
     def __init__(self, robot: PosedRobot, length: float, *, is_unit: bool = False) -> None:
@@ -158,7 +158,7 @@ class LegInverse:
     def inverse(
         self, lower: FloatArray, upper: FloatArray
     ) -> tuple[AffineMatrix, NDArray[np.bool_], FloatArray, AffineMatrix]:
-        """Return P over boxes (B, 6), where it is known, shares (B, n) of coordinates in its rest, and J or A."""
+        """Return P over boxes (B, 6), where it is known, shares (B, n) of coordinates in its remainder, and J or A."""
         values = self._forms(lower[:, self.free], upper[:, self.free])
         sizes, matrix = values.forms(slice(0, 6)), values.forms(slice(6, 42)).matrix(_DENSE, (6, 6))
         inverse, known, shares = solved(matrix, sizes.matrix(_DIAGONAL, (6, 6)))
@@ -167,9 +167,9 @@ class LegInverse:
 
 
 class SingularClaim(LegInverse):
-    """The claim that the smallest singular value of J is at least a bound, or its condition number at most.
+    """Claim that the smallest singular value of J is at least a bound, or its condition number at most.
 
-    A length divides moments. In the machines that are meant singular values change by at most ``change``.
+    A length divides moments. Within the tolerance singular values change by at most ``change``.
     """
 
     def __init__(
@@ -180,12 +180,12 @@ class SingularClaim(LegInverse):
 
     @np.errstate(all="ignore")
     def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
-        """Try to show the claim on boxes (B, 6), from the sizes of P, and for the condition number those of J."""
+        """Try to prove the claim on boxes (B, 6), from the norm of P, and for the condition number also that of J."""
         inverse, known, shares, J = self.inverse(lower, upper)
         low, high = 1 / _size_at_centre(inverse), _size_at_centre(J)
         shares = np.abs(inverse.A).sum(axis=(2, 3)) + shares * inverse.E.sum(axis=(1, 2))[:, None]
         if self._is_condition:
-            # The smallest singular value changes more: most of the room between the two is left to it.
+            # The smallest singular value varies more: most of the room between both bounds is for it.
             least = (high + self._change) / self._bound
             t = least * np.sqrt(np.sqrt((low - self._change) / least))
             flat = _size_is_at_most(J, (t * self._bound * (1 - 4 * UNIT) - self._change) * (1 - 4 * UNIT))
@@ -199,9 +199,9 @@ class SingularClaim(LegInverse):
 
 
 class ErrorClaim(LegInverse):
-    """The claim that errors of legs of at most 1 move the platform, to first order, by at most a number.
+    """Bound on the first-order pose error: ``|P d|`` over a box of poses for all leg errors ``|d_i| <= 1``.
 
-    It is about the rotation, or about the position of the platform's origin.
+    The error is that of the rotation, or of the position of the platform's origin.
     """
 
     def __init__(self, robot: PosedRobot, most: float, *, is_rotation: bool) -> None:
@@ -211,7 +211,7 @@ class ErrorClaim(LegInverse):
 
     @np.errstate(all="ignore")
     def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
-        """Try to show the claim on boxes (B, 6), at all corners of the boxes and of the errors."""
+        """Try to prove the claim on boxes (B, 6), at all corners of the boxes and of the errors."""
         inverse, known, shares, _ = self.inverse(lower, upper)
         moves = np.ascontiguousarray(inverse.part(self._part).corners()) @ _ERRORS
         worst = np.sqrt((moves * moves).sum(axis=2).max(axis=(1, 2)))
@@ -224,17 +224,17 @@ class ErrorClaim(LegInverse):
 
 
 def whole_errors(position: float, rotation: float, eps: float, shortest: float, reach: float) -> tuple[float, float]:
-    """Return bounds of the whole errors of a pose, position and rotation; infinite where none is found.
+    """Return bounds of the whole pose errors, position and rotation; infinite where none is known.
 
-    With errors of second order r in the lengths, ``p = P (eps + r)`` and ``w = Q (eps + r)``, r must be at least
-    ``((p + a w)^2 / (l - p - a w) + a w^2) / 2``. It is found by iteration in fractions.
+    With second-order errors r in the lengths, ``p = P (eps + r)`` and ``w = Q (eps + r)``, where r must be at least
+    ``((p + a w)^2 / (l - p - a w) + a w^2) / 2``. Iteration in fractions finds such an r.
 
     Args:
-        position: P, error of the position to first order for errors of legs of 1.
-        rotation: Q, that of the rotation.
+        position: P, first-order error of the position for leg errors of 1.
+        rotation: Q, first-order error of the rotation for leg errors of 1.
         eps: largest error of a leg, length.
-        shortest: l, a length below which no leg is.
-        reach: a, the largest distance of a joint from the platform's origin.
+        shortest: l, lower bound of all leg lengths.
+        reach: a, largest distance of a joint from the platform's origin.
     """
     P, Q, error, leg, arm = map(Fraction, (position, rotation, eps, shortest, reach))
     r = 0.0
@@ -253,11 +253,11 @@ def whole_errors(position: float, rotation: float, eps: float, shortest: float, 
 
 
 def change_of_jacobian(joints: Legs, tolerance: float, length: float, shortest: float) -> float:
-    """Return a bound of the Frobenius norm of the change of J, by which every singular value changes at most.
+    """Return a bound of the Frobenius norm of the change of J, and so of the change of every singular value.
 
     Within a tolerance t the unit force of a leg changes by at most ``h = 2 t / l``, with l the shortest length of a leg
-    of any machine, and its moment by ``|a| h + t``. A length divides moments. The bound is infinite where errors may
-    take up a whole leg.
+    of all robots, and its moment by ``|a| h + t``. A length divides moments. The bound is infinite if errors may be as
+    long as a leg.
     """
     if not shortest > 0:
         return math.inf
@@ -267,7 +267,7 @@ def change_of_jacobian(joints: Legs, tolerance: float, length: float, shortest: 
 
 
 class ClearanceClaim:
-    """The claim that two legs, with these indices, are at least a distance apart."""
+    """Claim that two legs, given by their indices, have at least a distance."""
 
     def __init__(self, robot: PosedRobot, pair: Sequence[int], least: float) -> None:
         self.free, self._least = robot.free, least
@@ -279,7 +279,7 @@ class ClearanceClaim:
         self._forms = robot.forms(ca.vertcat(*[ca.vertcat(end, robot.scale) for end in ends]))
 
     def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
-        """Try to show the claim on boxes (B, 6)."""
+        """Try to prove the claim on boxes (B, 6)."""
         matrix = self._forms(lower[:, self.free], upper[:, self.free]).forms().matrix(_ENDS, (3, 4))
         gaps = matrix.M[:, :, :3] / matrix.M[:, :, 3:]
         n = _between(self._feet, gaps[:, 0], gaps[:, 1])
@@ -291,14 +291,14 @@ class ClearanceClaim:
         slopes, rest = np.abs(matrix.A @ factors[:, None])[..., 0], (matrix.rest @ np.abs(factors))[..., 0]
         fine = (matrix.M @ factors)[..., 0] >= (slopes.sum(axis=1) + rest) * UP
         shares = np.where(fine[:, None], 0.0, slopes).sum(axis=2)
-        # The distance is at most that of two points of the legs.
+        # The distance of the legs is at most that of any two of their points.
         return Attempt(holds & fine.all(axis=1), shares, np.asarray(size < self._least * (1 - _WRONG)))
 
 
 def _between(feet: FloatArray, foot_to_tip: FloatArray, tip_to_foot: FloatArray) -> FloatArray:
-    """Return vectors (B, 3) from the nearest point of the second leg to that of the first, from those of their ends.
+    """Return vectors (B, 3) between the nearest points of two legs, to that of the first, from those of their ends.
 
-    Any vector is allowed, and a good one shows larger boxes: Newton's step for both, then one after the other.
+    Any vector is valid, but a good one proves larger boxes: a joint Newton step, then one step for each leg.
     """
     d, e = tip_to_foot - feet, feet - foot_to_tip
     dd, ee, de, dg, eg = ((x * y).sum(axis=1) for x, y in ((d, d), (e, e), (d, e), (d, feet), (e, feet)))

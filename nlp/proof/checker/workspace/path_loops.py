@@ -1,7 +1,8 @@
 """Closed loops along a path, from those at its first point: pieces are tied in their order.
 
-A pose that a path comes to twice may have two assemblies of the joints, such as those of joints that turn all round. So
-the box of each piece must hold the closed point at the place where it meets the piece before, and no other ties count.
+A pose that a path visits twice may have two assembly modes, for example if joints turn through full revolutions. The
+box of each piece must therefore contain the closed point at which it meets the preceding piece; other ties do not
+count.
 """
 
 from __future__ import annotations
@@ -14,30 +15,30 @@ from ..proof_file import ProofError
 from .closed_loops import Assembly, ClosedBoxes, Enclosed, is_home
 from .motion_matrix import PosedRobot
 
-#: Steps from one knot of a path to the next one, and number of ties that are shown at once.
+#: Steps from one knot of a path to the next one, and number of ties that are proved at once.
 _STEPS, _BLOCK = 4, 512
-#: Largest number of numbers of closed points that are kept for further claims.
+#: Largest number of values of closed points that are stored for further claims.
 _MOST_KNOWN = 2**22
 
 
 class PathAssembly(Assembly):
-    """The closed loops of a robot along a path that change continuously from those at its first point.
+    """Closed loops of a robot along a path that change continuously from those at its first point.
 
     Args:
-        robot: along the path.
-        equations: (k, 1) that count.
+        robot: expressions of the robot along the path.
+        equations: (k, 1) independent loop equations.
         start: (n,) closed loops at the first point.
         segments: number of segments.
 
     Raises:
-        UncoveredError: an equation holds an operation without a rule.
-        ProofError: the loops do not close at the first point, or are singular there.
+        UncoveredError: an equation has an operation without a rule.
+        ProofError: the loops cannot be closed at the first point, or are singular there.
     """
 
     def __init__(self, robot: PosedRobot, equations: SX, start: FloatArray, segments: int) -> None:
         super().__init__(robot, equations, start)
         if not is_home(robot, self.start):
-            raise ProofError("the loops could not be closed at the first point of the path")
+            raise ProofError("no solution of the loop equations at the first point of the path")
         self._known, self._left = dict[bytes, Enclosed](), _MOST_KNOWN
         self._knots: FloatArray = np.tile(self.start, (segments + 1, 1))
         self._knots[:, 0] = np.arange(segments + 1)
@@ -51,7 +52,7 @@ class PathAssembly(Assembly):
         return self.moved(self._knots[k], to)
 
     def refuse_apart(self, boxes: ClosedBoxes) -> None:
-        """Refuse pieces whose closed loops are not shown to be those of one assembly, that of the first point."""
+        """Refuse pieces whose closed loops are not proved to belong to the assembly mode of the first point."""
         boxes = ClosedBoxes(*(each[np.argsort(boxes.lower[:, 0], kind="stable")] for each in boxes))
         every, (lower, upper) = np.arange(len(boxes.lower)), (boxes.lower[:, 0], boxes.upper[:, 0])
         start = self.start[None]
@@ -66,10 +67,10 @@ class PathAssembly(Assembly):
             tied = meets & self.holds(boxes, first, near) & self.holds(boxes, first + 1, near)
             good = good and bool(tied.all())
         if not good:
-            raise ProofError("the loops closed along the path are not shown to be of one assembly")
+            raise ProofError("the loops closed along the path are not shown to be of one assembly mode")
 
     def enclosed(self, lower: FloatArray, upper: FloatArray, near: FloatArray | None = None) -> Enclosed:
-        """Return the closed points over pieces; those over the same pieces, of other claims, are known already."""
+        """Return the closed points over pieces; results for the same pieces from other claims are reused."""
         key = lower.tobytes() + upper.tobytes()
         if near is not None or not self.dependent:
             return super().enclosed(lower, upper, near)

@@ -1,17 +1,17 @@
 """Poses along a path as polynomials of the parameter, over pieces of its segments.
 
-A place of a path of N segments is one number from 0 to N: the index k of a segment plus the parameter s from 0 to 1
-along it. The pose is an expression of s and of the segment's numbers, which :mod:`..polynomials` encloses, as it does
-all other expressions. Positions are on lines, or ``centre + (r + s g) (cos, sin)(a + s w)`` on arcs. Rotations are
+A place on a path of N segments is one number from 0 to N: the index k of a segment plus the parameter s from 0 to 1
+along it. The pose is an expression of s and of the segment's data, enclosed by :mod:`..polynomials` like all other
+expressions. Positions are on lines, or ``centre + (r + s g) (cos, sin)(a + s w)`` on arcs. Rotations are
 
 * roll, pitch and yaw, as tangents of half angles that change linearly;
-* or a quaternion of any size: the product of those of three angles that change linearly; or of a turn about a fixed
+* or a quaternion of any size: the product of those of three angles that change linearly; or of a rotation about a fixed
   axis by twice h between unit quaternions q_0 and q_1, with ``sinc x = sin x / x``
 
       (1 - s) sinc((1 - s) h) q_0 + s sinc(s h) q_1 = (sin h / h) times a unit quaternion.
 
-A frame turns positions, and multiplies quaternions from the left. An arc may miss the knots at its ends: the gap is
-part of the rest of a piece that reaches such an end.
+A frame rotates positions, and multiplies quaternions from the left. An arc may miss the knots at its ends: the gap is
+part of the remainder of a piece that reaches such an end.
 """
 
 from __future__ import annotations
@@ -35,16 +35,15 @@ from ..arithmetic import PolynomialArithmetic
 from ..polynomials import Polynomial, settled
 from .pose_boxes import POSITION
 
-#: Largest angle of roll, pitch and yaw whose tangents of halves are coordinates, radians.
+#: Largest roll, pitch or yaw for which tangents of half angles are coordinates, radians.
 _LARGEST = math.radians(149)
-#: Terms of the series of ``sin x / x`` up to a right angle, and more than its remainder and rounding of its numbers.
+#: Terms of the series of ``sin x / x`` up to a right angle, and a bound of its remainder and of rounding.
 _TERMS, _SERIES = 12, 4e-15
-#: Rounding of half an angle that is computed from two unit quaternions.
+#: Rounding of half an angle computed from two unit quaternions.
 _HALF = 1e-14
-#: Numbers of an arc.
+#: Number of data of an arc.
 _ARC = 6
-#: Number of places of each segment, and of the first turn of an arc with more, from which ranges of coordinates are
-#: taken.
+#: Number of places on each segment, and on the first turn of an arc with several turns, for the ranges of coordinates.
 _SAMPLES = 9
 
 
@@ -52,12 +51,12 @@ class PathPoses:
     """Coordinates of poses along a path.
 
     Args:
-        path: with a segment at least.
+        path: path with at least one segment.
 
     Attributes:
-        is_tangents: whether rotations are roll, pitch and yaw; else they are quaternions.
-        varying: (v,) indices of the coordinates that are not one number all along the path.
-        constant: (6,) or (7,) the numbers of the others; 0 for these.
+        is_tangents: If true, rotations are roll, pitch and yaw; otherwise quaternions.
+        varying: (v,) indices of the coordinates that are not constant along the path.
+        constant: (6,) or (7,) values of the constant coordinates; 0 for varying ones.
     """
 
     def __init__(self, path: ProgrammedPath) -> None:
@@ -65,7 +64,7 @@ class PathPoses:
         self._is_slerp = path.between is Between.SLERP
         is_direct = frame is None and not self._is_slerp and path.order == ORDERS["rpy"]
         self.is_tangents = bool(is_direct and np.abs(angles).max() < _LARGEST)
-        # Angles that are 0 all along leave components of quaternions that are exactly 0.
+        # Angles that are 0 along the whole path make components of quaternions exactly 0.
         self._turning = [bool(angles[:, k].any()) for k in range(3)]
         self._numbers = self._segment_numbers()
         self._functions: dict[int, ca.Function] = {}
@@ -87,7 +86,7 @@ class PathPoses:
         return len(self._path)
 
     def _segment_numbers(self) -> tuple[FloatArray, FloatArray]:
-        """Return the numbers (m, N) of the segments, and by how much each may be off."""
+        """Return the data (m, N) of the segments, with their error bounds."""
         path = self._path
         arcs = np.zeros((_ARC, len(path)))
         arcs[:, path.arc_segments] = path.arcs.T
@@ -105,9 +104,9 @@ class PathPoses:
         )
 
     def _quaternions(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Return the unit quaternions (4, N) at both ends of turns, half their angles (1, N), and how far all are off.
+        """Return the unit quaternions (4, N) at both ends of rotations, half their angles (1, N), and error bounds.
 
-        Of both quaternions of the second rotation the one nearer to the first is meant.
+        Of the two quaternions of the second rotation, the one nearer to the first is used.
         """
         angles = SX.sym("angles", 3)
         own = ca.vertcat(*_product_of_angles([angles[k] * on for k, on in enumerate(self._turning)], self._path.order))
@@ -120,7 +119,7 @@ class PathPoses:
         first, last = q[:, :-1], q[:, 1:]
         last = np.where((first * last).sum(axis=0) < 0, -last, last)
         rest = np.concatenate([off[:, :-1], off[:, 1:]])
-        # With a and b the sizes of difference and sum, h = 2 atan(a / b) and a^2 + b^2 = 4: both change h by their own.
+        # With a and b the norms of difference and sum, h = 2 atan(a / b) and a^2 + b^2 = 4: h has the errors of both.
         half = 2 * np.arctan2(*(np.linalg.norm(each, axis=0) for each in (last - first, last + first)))
         off_half = 2 * np.abs(rest).sum(axis=0) + _HALF
         return first, last, half[None], np.concatenate([rest, off_half[None]])
@@ -130,8 +129,8 @@ class PathPoses:
 
         Args:
             plane: index of the arc's plane; -1 for a line.
-            s: (1, 1) the parameter.
-            numbers: (m, 1) of the segment.
+            s: (1, 1) parameter along the segment.
+            numbers: (m, 1) data of the segment.
         """
         parts = iter(ca.vertsplit(numbers))
 
@@ -164,7 +163,7 @@ class PathPoses:
         return ca.vertcat(*position, *turns), gaps
 
     def _turn(self, s: SX, numbers: Sequence[SX]) -> list[SX]:
-        """Return the coordinates of a rotation in the path's frame, from its numbers."""
+        """Return the coordinates of a rotation in the path's frame, from its data."""
         if self._is_slerp:
             q_0, q_1, half = numbers[:4], numbers[4:8], numbers[8]
             weights = [(1 - s) * _sine_ratio((1 - s) * half), s * _sine_ratio(s * half)]
@@ -178,7 +177,7 @@ class PathPoses:
         return _product_of_angles(angles, self._path.order)
 
     def _function(self, plane: int) -> ca.Function:
-        """Return the function of parameter and numbers with the varying coordinates, their derivatives, and gaps."""
+        """Return the function of parameter and data with the varying coordinates, their derivatives, and gaps."""
         if plane not in self._functions:
             s, numbers = SX.sym("s"), SX.sym("numbers", len(self._numbers[0]))
             pose, gaps = self._pose(plane, s, numbers)
@@ -188,23 +187,23 @@ class PathPoses:
         return self._functions[plane]
 
     def _arithmetic(self, plane: int) -> PolynomialArithmetic:
-        """Return the polynomials of this function."""
+        """Return the polynomial arithmetic of this function."""
         if plane not in self._arithmetics:
             self._arithmetics[plane] = PolynomialArithmetic(self._function(plane))
         return self._arithmetics[plane]
 
     @np.errstate(all="ignore")
     def over(self, lower: FloatArray, upper: FloatArray) -> tuple[list[Polynomial], list[Polynomial]]:
-        """Return the varying coordinates over pieces, and their derivatives by the parameter.
+        """Return the varying coordinates over pieces, and their derivatives with respect to the parameter.
 
-        Both are NaN where a piece is not one of a single segment.
+        Both are NaN where a piece does not belong to a single segment.
 
         Args:
             lower: (B,) places where pieces begin.
-            upper: (B,) places where they end.
+            upper: (B,) places where pieces end.
         """
         k = self.segments(lower, upper)
-        # Exact: the two are close to each other, or one of them is 0.
+        # Both differences are exact: the operands are close to each other, or one of them is 0.
         ends = lower - k, upper - k
         count, B = len(self.varying), len(k)
         P, s, V = np.zeros((2 * count, 3, B)), np.zeros((2 * count, B)), np.zeros((2 * count, 2, B))
@@ -228,25 +227,25 @@ class PathPoses:
         return every[:count], every[count:]
 
     def _off(self, coordinate: int) -> float:
-        """Return by how much a coordinate may be off beside its expression: by the series of quaternions."""
+        """Return the error of a coordinate besides its expression: from the series of quaternions."""
         return _SERIES if self._is_slerp and coordinate >= POSITION else 0.0
 
     def segments(self, lower: FloatArray, upper: FloatArray) -> NDArray[np.intp]:
-        """Return the segments (B,) of pieces, by their middles; of a knot the segment that begins there.
+        """Return the segments (B,) of pieces, by their middles; a knot belongs to the segment that begins there.
 
-        NaN, the place of loops that do not close, is of the first one.
+        NaN, the place of loops that cannot be closed, belongs to the first segment.
         """
         return np.clip(np.floor(np.nan_to_num(0.5 * lower + 0.5 * upper)), 0, len(self) - 1).astype(np.intp)
 
     def inverse_seconds(self, segments: NDArray[np.intp]) -> Polynomial:
-        """Return 1 over the times of segments (B,); 0, as if the platform stood there, where none is known."""
+        """Return 1 over the times of segments (B,); 0, as for a platform at rest, where no time is known."""
         seconds = self._path.durations[segments]
         known = np.isfinite(seconds)
         inverse = np.where(known, 1 / np.where(known, seconds, 1.0), 0.0)
         return _number(inverse, np.spacing(inverse) * known)
 
     def at(self, along: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the varying coordinates (P, v) at places (P,), and their derivatives by the parameter: computed."""
+        """Return varying coordinates (P, v) at places (P,), and their derivatives by the parameter, in doubles."""
         k, count = self.segments(along, along), len(self.varying)
         found = np.zeros((len(along), 2 * count))
         for plane in np.unique(self._plane[k]).tolist():
@@ -256,10 +255,10 @@ class PathPoses:
         return found[:, :count], found[:, count:]
 
     def ranges(self) -> tuple[FloatArray, FloatArray]:
-        """Return the ends (c,) of all coordinates along the path: computed."""
+        """Return the ends (c,) of all coordinates along the path, computed in doubles."""
         lower, upper = self.constant.copy(), self.constant.copy()
         part = np.ones(len(self))
-        # Equal parts of several turns may all end at one point.
+        # Equal parts of several turns may all end at the same point.
         part[self._path.arc_segments] = math.tau / np.maximum(np.abs(self._path.arcs[:, 5]), math.tau)
         parts = part[:, None] * np.linspace(0, 1, _SAMPLES)
         # The end of a segment is the beginning of the next one.
@@ -269,7 +268,7 @@ class PathPoses:
 
 
 def _number(value: FloatArray, off: FloatArray) -> Polynomial:
-    """Return numbers (B,) that may be off as constants."""
+    """Return values (B,) with errors as constants."""
     V = np.stack([value - off, value + off])
     return settled((), value[None], off, np.where(off > 0, np.nextafter(V, [[-np.inf], [np.inf]]), V), 0.0)
 
@@ -286,10 +285,10 @@ def _product(left: Sequence[SX], right: Sequence[SX]) -> list[SX]:
 
 
 def _product_of_angles(angles: Sequence[SX], order: Order) -> list[SX]:
-    """Return the unit quaternion of three angles by a convention."""
+    """Return the unit quaternion of three angles in a given order."""
 
     def about(axis: int) -> list[SX]:
-        """Return that of the angle about one axis."""
+        """Return the unit quaternion of the angle about one axis."""
         found = [SX(0)] * 4
         found[0], found[1 + axis] = ca.cos(0.5 * angles[axis]), ca.sin(0.5 * angles[axis])
         return found

@@ -1,6 +1,6 @@
-"""The poses of a path as coordinates of boxes: the place along the path, and those of the pose that follow from others.
+"""Poses of a path as coordinates of boxes: the place along the path, and the dependent coordinates of the pose.
 
-A tree of a path has one tree for each segment, in their order, whose nodes halve or cut the place.
+A tree of a path has one tree for each segment, in their order, whose nodes bisect the place.
 """
 
 from __future__ import annotations
@@ -28,30 +28,30 @@ from ..tree import Node, TreeReader, ahead, blocks_of
 from .path_poses import PathPoses
 from .pose_boxes import POSITION, BoxClaim, PoseRoot, PoseSymbols
 
-#: Part of its size, or of 1, by which the range of a coordinate is wider than along the path.
+#: Relative widening, or absolute below 1, of the range of a coordinate beyond its range along the path.
 _ROOM = 1e-9
-#: Parts of a robot's size, or angle, by which a coordinate moves that stands still but for rounding.
+#: Parts of a robot's size, or angle, below which the motion of a coordinate is rounding.
 _STILL = 1e-9
 
 
 class PathRoot:
-    """The poses of a path.
+    """Poses of a path.
 
     Args:
-        case: with fixed dimensions.
-        path: with a segment at least.
+        case: case with fixed dimensions.
+        path: path with at least one segment.
 
     Attributes:
         poses: coordinates along the path.
-        box: a box about all poses, which begins at the first one.
-        workspace: the same, with the coordinates that the robot cannot choose; those stand still, and have no range.
-        stated: (v,) indices of the coordinates of a pose that vary, and do not follow from others.
+        box: a box about all poses, with the first pose as its start.
+        workspace: the box as a workspace with dependent coordinates; these are constant, and have no range.
+        stated: (v,) indices of the varying coordinates of the pose that are not dependent.
         coordinates: number of coordinates of a piece: the place along the path.
-        lower, upper, middle, dependent: ends and middle of the place, and of the coordinates that follow from others;
-            see :class:`.pose_boxes.PoseRoot`.
+        lower, upper, middle, dependent: ends and middle of the place, and dependent coordinates; see
+            :class:`.pose_boxes.PoseRoot`.
 
     Raises:
-        ProofError: the path moves a coordinate that the robot cannot choose.
+        ProofError: the path moves a coordinate that the robot cannot control.
     """
 
     coordinates = 1
@@ -86,7 +86,7 @@ class PathRoot:
         self._columns = [varying.index(k) for k in self.stated]
 
     def symbols(self) -> PoseSymbols:
-        """Return the coordinates as symbols; given are those of a place, and their rates of a path with times."""
+        """Return the coordinates as symbols; given are those of a place, and their rates for a path with times."""
         pose = list(self.box.symbols().pose)
         following = [pose[k] for k in self.box.dependent]
         stated = ca.vertcat(SX(0, 1), *[pose[k] for k in self.stated])
@@ -96,7 +96,7 @@ class PathRoot:
         return PoseSymbols(free, [SX.sym("along"), *following], ca.vertcat(stated, rates), pose, varying)
 
     def given(self, lower: FloatArray, upper: FloatArray) -> Sequence[Polynomial]:
-        """Return the stated coordinates over pieces (B, n), and their rates by seconds of a timed path."""
+        """Return the stated coordinates over pieces (B, n), and their rates by seconds for a path with times."""
         low, high = lower[:, 0], upper[:, 0]
         values, slopes = ([each[k] for k in self._columns] for each in self.poses.over(low, high))
         if not self._is_timed:
@@ -105,7 +105,7 @@ class PathRoot:
         return [*values, *(each * inverse for each in slopes)]
 
     def values_at(self, along: FloatArray) -> FloatArray:
-        """Return these values (P, g) at places (P, 1): computed."""
+        """Return these values (P, g) at places (P, 1), computed in doubles."""
         place = np.clip(along[:, 0], 0.0, len(self.poses))
         values, slopes = (each[:, self._columns] for each in self.poses.at(place))
         if not self._is_timed:
@@ -114,16 +114,16 @@ class PathRoot:
         return np.hstack([values, slopes * inverse[:, None]])
 
     def slopes_at(self, along: FloatArray) -> FloatArray:
-        """Return the derivatives (P, g) of the coordinates by the place at places (P, 1): computed; 0 of rates."""
+        """Return derivatives (P, g) of the coordinates by the place at places (P, 1), in doubles; 0 for rates."""
         slopes = self.poses.at(np.clip(along[:, 0], 0.0, len(self.poses)))[1][:, self._columns]
         return np.hstack([slopes, np.zeros((len(slopes), slopes.shape[1] * self._is_timed))])
 
     def holds(self, y: FloatArray) -> bool:
-        """Return whether a point (1,) is a place of the path."""
+        """Return whether a point (1,) is a place on the path."""
         return bool(0 <= y[0] <= len(self.poses))
 
     def show_on_leaves(self, claim: BoxClaim, tree: bytes) -> tuple[int, int]:
-        """Show a claim on the leaves of a tree, and return the numbers of leaves and of pieces examined."""
+        """Prove a claim on the leaves of a tree, and return the numbers of leaves and of examined pieces."""
         leaves = pieces = 0
         for each in ahead(self._read_pieces(tree), lambda block: int(block.size)):
             rule = _PieceRule(claim, *each)
@@ -140,14 +140,14 @@ class PathRoot:
             pieces = list[tuple[FloatArray, FloatArray]]()
             for kind, _, low, high in block:
                 if kind != Node.BOUNDED:
-                    raise ProofError(f"the tree holds {kind} where a piece must be closed or cut")
+                    raise ProofError(f"the tree has {kind} where a piece must be proved or cut")
                 pieces.append((low, high))
             yield np.array(pieces).transpose(1, 2, 0)
         reader.finish()
 
 
 class _PieceRule:
-    """The rule of a claim about pieces (1, L) of a path."""
+    """Rule for a claim about pieces (1, L) of a path."""
 
     block, most_pieces = 256, 5_000
     width: FloatArray = np.ones(1)
@@ -168,10 +168,10 @@ class _PieceRule:
 
 
 def _workspace(case: Case, low: FloatArray, high: FloatArray, *, is_tangents: bool) -> Workspace:
-    """Return a workspace about a path with these ends (c,) of coordinates; those that follow from others stand still.
+    """Return a workspace about a path with these ends (c,) of coordinates, of which dependent ones are constant.
 
     Raises:
-        ProofError: the path moves one of these.
+        ProofError: the path moves a dependent coordinate.
     """
     turns = Turns(TurnKind.ANY_AXIS, (Free(-LARGEST_TURN, LARGEST_TURN),))
     position = _values(low[:POSITION], high[:POSITION])
@@ -188,11 +188,11 @@ def _workspace(case: Case, low: FloatArray, high: FloatArray, *, is_tangents: bo
     length = _STILL * robot_size(case, [sum(ends_of(each)) / 2 for each in position])
     moved = [found.names[k] for k in following if np.ptp(ends_of(stated[k])) > (length if k < POSITION else _STILL)]
     if moved:
-        raise ProofError(f"the path moves {' and '.join(moved)}, which this robot cannot choose")
+        raise ProofError(f"the path moves {' and '.join(moved)}, which this robot cannot control")
     still = [sum(ends_of(each)) / 2 if k in following else each for k, each in enumerate(stated)]
     return replace(found, position=still[:POSITION], turns=replace(found.turns, angles=tuple(still[POSITION:])))
 
 
 def _values(low: FloatArray, high: FloatArray) -> list[Value]:
-    """Return ranges, or fixed numbers where both ends are one."""
+    """Return ranges, or fixed values where both ends are equal."""
     return [Free(a, b) if b > a else a for a, b in zip(low.tolist(), high.tolist(), strict=True)]

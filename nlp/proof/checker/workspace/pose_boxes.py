@@ -1,4 +1,4 @@
-"""Boxes of poses: the box of a workspace's coordinates, the leaves of a tree of it, and claims shown on pieces of them.
+"""Boxes of poses: the box of a workspace's coordinates, the leaves of its tree, and the proof of claims on pieces.
 
 The coordinates are three of position and three of rotation, tangents of half angles. Ends of the box are fractions;
 rotations about any axis are a ball in it. Nodes of a tree are ``cut``, ``bounded`` and ``outside`` of :mod:`..tree`.
@@ -27,10 +27,10 @@ from ..tree import Node, TreeReader, ahead, blocks_of
 
 #: Number of coordinates of a pose.
 COORDINATES = 6
-#: Number of those of its position.
+#: Number of coordinates of its position.
 POSITION = 3
-#: Part of itself by which tangents move outwards where they multiply an axis: its doubles are of length 1 to rounding.
-#: A fixed angle's coordinate is a rounded tangent too.
+#: Relative outward rounding of tangents that multiply an axis: its components have unit length up to rounding. The
+#: coordinate of a fixed angle is a rounded tangent too.
 _AXIS = Fraction(1, 2**50)
 
 
@@ -38,11 +38,11 @@ class PoseSymbols(NamedTuple):
     """A pose as symbols and numbers.
 
     Attributes:
-        free: indices of the coordinates of boxes that vary.
-        head: their symbols.
-        given: (g, 1) further symbols, whose values follow from those of boxes.
-        pose: the coordinates of a pose, symbols or numbers.
-        varying: those of them that are symbols.
+        free: indices of the box coordinates that vary.
+        head: symbols of these coordinates.
+        given: (g, 1) further symbols, whose values follow from the box coordinates.
+        pose: coordinates of the pose, symbols or numbers.
+        varying: coordinates of the pose that are symbols.
     """
 
     free: list[int]
@@ -54,18 +54,18 @@ class PoseSymbols(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PoseRoot:
-    """The box of coordinates.
+    """Box of pose coordinates.
 
     Attributes:
-        kind: coordinates of rotations.
-        axis: (3,) of rotations about one axis.
-        values: (6,) the ends of each coordinate that varies; the number of one that does not, or the angle.
-        lower, upper: (6,) ends, which hold every pose of the workspace.
-        inner: (6,) pairs of ends between which every pose is one of the workspace; of a fixed angle those of its box.
-        ball, inner_ball: the same of the squared size of a Cayley vector; infinite without a ball.
-        dependent: indices of the coordinates that follow from the others: their ends leave no pose out, and a ball is
-            one of the other components.
-        at: (6,) the pose at which closed loops begin; None for the middle.
+        kind: kind of the rotation coordinates.
+        axis: (3,) axis of rotations about one axis.
+        values: (6,) ends of each varying coordinate; value of a constant one, or its angle.
+        lower, upper: (6,) ends of a box that contains every pose of the workspace.
+        inner: (6,) pairs of ends within which every pose belongs to the workspace; for a fixed angle its box ends.
+        ball, inner_ball: outer and inner bound of the squared norm of a Cayley vector; infinite without a ball.
+        dependent: indices of the dependent coordinates: their ends exclude no pose, and the ball is one of the other
+            components.
+        at: (6,) pose at which closed loops begin; None for the middle.
     """
 
     kind: TurnKind
@@ -90,13 +90,13 @@ class PoseRoot:
         return 0.5 * self.lower + 0.5 * self.upper if self.at is None else self.at
 
     def symbols(self) -> PoseSymbols:
-        """Return the coordinates as symbols, and as numbers where they do not vary."""
+        """Return the coordinates as symbols, or as numbers where they are constant."""
         free: list[int] = np.flatnonzero(self.upper > self.lower).tolist()
         pose = [SX.sym(f"y{k}") if k in free else SX(float(each)) for k, each in enumerate(self.middle)]
         own = [pose[k] for k in free]
         return PoseSymbols(free, own, SX(0, 1), pose, own)
 
-    def given(self, lower: FloatArray, upper: FloatArray) -> Sequence[Polynomial]:  # noqa: ARG002 - those of paths
+    def given(self, lower: FloatArray, upper: FloatArray) -> Sequence[Polynomial]:  # noqa: ARG002 - used by paths
         """Return the values that follow from coordinates of boxes (B, n): none."""
         return ()
 
@@ -117,7 +117,7 @@ class PoseRoot:
         return math.isfinite(self.ball) and len(self._turns) == 3
 
     def holds(self, y: FloatArray) -> bool:
-        """Return whether a point (6,) is surely a pose of the workspace."""
+        """Return whether a point (6,) is provably a pose of the workspace."""
         at = [Fraction(each) for each in y.tolist()]
         inside = all(
             low <= each <= high or k in self.dependent
@@ -126,7 +126,7 @@ class PoseRoot:
         return inside and (self.inner_ball is None or sum(at[k] * at[k] for k in self._turns) <= self.inner_ball)
 
     def show_on_leaves(self, claim: BoxClaim, tree: bytes) -> tuple[int, int]:
-        """Show a claim on the leaves of a tree, and return the numbers of leaves and of boxes examined."""
+        """Prove a claim on the leaves of a tree, and return the numbers of leaves and of examined boxes."""
         leaves = pieces = 0
         for count, boxes in ahead(_read_boxes(self, tree), lambda block: int(block[1].size)):
             rule = _PoseRule(claim, self, *boxes)
@@ -142,7 +142,7 @@ class PoseRoot:
         least = np.maximum(np.maximum(lower[:, turns], -upper[:, turns]), 0.0)
         squares = least * least
         whole = squares.sum(axis=1, keepdims=True)
-        # Sums and differences of three squares round by less than 8 parts in 2^53 of the numbers in them.
+        # Sums and differences of three squares have a relative rounding below 8 parts in 2^53.
         room = np.maximum(self.ball - (whole - squares) + 2.0**-50 * (self.ball + whole), 0.0)
         most = np.sqrt(room) * (1 + 2.0**-50)
         low, high = lower.copy(), upper.copy()
@@ -187,23 +187,23 @@ def pose_root(workspace: Workspace) -> PoseRoot:
 
 
 def _down(value: Fraction) -> float:
-    """Return a double that is not above a fraction."""
+    """Return a double that is at most a fraction."""
     number = float(value)
     return number if number <= value else math.nextafter(number, -math.inf)
 
 
 def _up(value: Fraction) -> float:
-    """Return a double that is not below a fraction."""
+    """Return a double that is at least a fraction."""
     return 0.0 - _down(-value)
 
 
 class Attempt(NamedTuple):
-    """An attempt to show a claim on B boxes.
+    """Result of an attempt to prove a claim on B boxes.
 
     Attributes:
-        holds: (B,) whether it is shown.
-        shares: (B, n) share of each varying coordinate in what is missing.
-        is_wrong: (B,) whether the number at the centre is clearly beyond the bound; None where that is not asked.
+        holds: (B,) whether the claim is proved on the box.
+        shares: (B, n) share of each varying coordinate in the remaining gap.
+        is_wrong: (B,) whether the value at the centre clearly violates the bound; None where this was not tested.
     """
 
     holds: NDArray[np.bool_]
@@ -212,12 +212,12 @@ class Attempt(NamedTuple):
 
 
 class BoxClaim(Protocol):
-    """A claim about boxes of poses; ``free`` are indices among the six coordinates of those that vary in it."""
+    """A claim about boxes of poses; ``free`` has the indices of the six coordinates that vary in it."""
 
     free: list[int]
 
     def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
-        """Try to show the claim on boxes (B, 6)."""
+        """Try to prove the claim on boxes (B, 6)."""
 
 
 def _read_boxes(root: PoseRoot, tree: bytes) -> Iterator[tuple[int, FloatArray]]:
@@ -230,7 +230,7 @@ def _read_boxes(root: PoseRoot, tree: bytes) -> Iterator[tuple[int, FloatArray]]
             if kind == Node.BOUNDED:
                 boxes.append((low, high))
             elif kind != Node.OUTSIDE:
-                raise ProofError(f"the tree holds {kind} where a box must be closed or cut")
+                raise ProofError(f"the tree has {kind} where a box must be proved or cut")
             elif root.contracted(low[None], high[None])[2][0]:
                 raise ProofError(f"the box {box_words(low, high)} is not outside of the workspace")
         yield count, np.array(boxes).reshape(-1, 2, COORDINATES).transpose(1, 2, 0)
@@ -238,7 +238,7 @@ def _read_boxes(root: PoseRoot, tree: bytes) -> Iterator[tuple[int, FloatArray]]
 
 
 class _PoseRule:
-    """The rule of a claim about boxes of poses (6, L), of which those outside of the workspace need nothing."""
+    """Rule for a claim about boxes of poses (6, L); boxes outside of the workspace need no proof."""
 
     block, most_pieces = 1024, 5_000
 
@@ -256,7 +256,7 @@ class _PoseRule:
             holds[at], shares[at[:, None], self._claim.free] = found.holds, found.shares
             if found.is_wrong is not None:
                 at = at[found.is_wrong]
-                # A claim about a box is wrong only at a pose of the workspace.
+                # A claim about a box is only wrong at a pose of the workspace.
                 is_wrong[at] = [self._root.holds(y) for y in 0.5 * low[at] + 0.5 * high[at]]
         return Shown(holds, shares.T, low.T, high.T, is_wrong)
 
@@ -266,5 +266,5 @@ class _PoseRule:
 
 
 def box_words(lower: FloatArray, upper: FloatArray) -> str:
-    """Return a box in words."""
+    """Return a box as text."""
     return ", ".join(f"[{low:.6g}, {high:.6g}]" for low, high in zip(lower, upper, strict=True))

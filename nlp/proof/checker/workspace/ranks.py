@@ -1,17 +1,17 @@
-"""The claim that a matrix of motions keeps its rank at every pose of a box, with closed loops.
+"""Claim that a matrix of motion conditions keeps its rank at every pose of a box, with closed loops.
 
 With forms ``M = M_0 + sum_k A_k e_k + [-E, E]`` of the matrix over a box, in which :mod:`.closed_loops` replaces the
-dependent coordinates, and C near a pseudo-inverse of M_0, every ``C M`` has an inverse where
+dependent coordinates, and C near a pseudo-inverse of M_0, every ``C M`` is invertible if
 
     |I - C M_0| + sum_k |C A_k| + |C| E     has a spectral radius below 1.
 
-M has full column rank then. A matrix with d freedoms gets d further rows first, a basis of the null space of M_0: full
-column rank then says that there are no more freedoms anywhere in the box.
+M then has full column rank. To a matrix with d degrees of freedom, d rows are added first, a basis of the null space of
+M_0: full column rank then proves that there are no more degrees of freedom anywhere in the box.
 
-Of six straight legs, with e and f the errors of both joints of a leg in the world frame, the row
+For six straight legs with joint-centre errors e and f of a leg in the world frame, the row
 ``(s (p - b) + u, u x (p - b))`` changes by ``(s (f - e), s f x (p - b) - u x e - s f x e)``. A component of a vector
-product with f is at most the tolerance times the size of the two other components of the other vector. The errors of
-other robots are coordinates of the forms.
+product with f is at most the tolerance times the norm of the other vector's two other components. For other robots the
+errors are coordinates of the forms.
 """
 
 from __future__ import annotations
@@ -35,65 +35,65 @@ from .loop_claims import LoopClaim, PosedLoops, posed_loops
 from .motion_matrix import Root, motion_matrix
 from .pose_boxes import Attempt
 
-#: Part of the size of a row by which its entries may be off: numbers of a robot that should be 0 are rounding error.
+#: Relative error of the entries of a row: numbers of a robot that should be 0 are rounding errors.
 _CONSTANTS = 1e-13
-#: Numbers of parts of the way between two poses that are tried.
+#: Numbers of parts of the path between two poses that are tried.
 _PARTS = (1, 16, 256, 4096)
-#: Indices after a component, and before it, of a vector.
+#: Indices after and before a component of a vector.
 _AFTER, _BEFORE = [1, 2, 0], [2, 0, 1]
 
 
 def rank_claim(
     case: Case, model: Model, root: Root, name: str, tolerance: float = 0.0, built: BuiltModel | None = None
 ) -> RankClaim:
-    """Return the claim that a robot's J, or its constraint wrenches alone, keep their rank.
+    """Return the claim that a robot's J, or its constraint wrenches, keep their rank.
 
     Args:
-        case: with fixed dimensions.
-        model: its robot without unknowns that follow in closed form.
-        root: the box of coordinates.
-        name: ``regular``, or ``constraints regular``.
-        tolerance: largest error of each joint centre in the machines that are meant.
-        built: the robot with errors of its joint centres; None for six straight legs, and for the design.
+        case: case with fixed dimensions.
+        model: model of its robot without the unknowns in closed form.
+        root: box of coordinates.
+        name: name of the claim: ``regular``, or ``constraints regular``.
+        tolerance: largest error of each joint centre; 0 for the exact robot.
+        built: model with joint-centre errors; None for six straight legs, and for the nominal design.
 
     Raises:
-        ProofError: no closed loops are found in the middle of the workspace, they are singular there or leave a joint
-            free, an expression has an operation without a rule, or errors take freedoms from the robot.
+        ProofError: the loops cannot be closed in the middle of the workspace, are singular there or leave a joint free;
+            an expression has an operation without a rule; or joint-centre errors remove degrees of freedom.
     """
     loops = posed_loops(case, model, root, tolerance, built)
     return RankClaim(loops, *motion_matrix(loops.robot, loops.start, is_locked=name != CONSTRAINTS))
 
 
 class RankClaim(LoopClaim):
-    """The claim that a sparse matrix of motions (m, c) has no more freedoms than it is claimed to have.
+    """Claim that a sparse matrix of motion conditions (m, c) has no more degrees of freedom than claimed.
 
-    Errors of joint centres within a tolerance are those of six straight legs, or coordinates of the robot.
+    Joint-centre errors are changes of the rows of six straight legs, or coordinates of the robot.
     """
 
-    def __init__(self, loops: PosedLoops, matrix: SX, freedoms: int) -> None:
+    def __init__(self, loops: PosedLoops, matrix: SX, nullity: int) -> None:
         robot = loops.robot
-        self._freedoms, self._length, self._shape = freedoms, robot.length, matrix.shape
+        self._nullity, self._length, self._shape = nullity, robot.length, matrix.shape
         self._at = np.array(matrix.sparsity().get_triplet(), dtype=np.intp)
         self._off = np.zeros(matrix.shape)
         self._off[tuple(self._at)] = [0.0 if each.is_zero() else _CONSTANTS for each in ca.vertsplit(matrix.nz[:])]
-        # The errors of joint centres change rows of legs by a part of these.
+        # Joint-centre errors change the rows of legs in proportion to these norms.
         of_rows = bool(loops.tolerance) and not robot.errors
         parts = [ca.vec(each) for foot, arm in robot.legs * of_rows for each in (robot.position - foot, arm)]
         super().__init__(loops, ca.vertcat(matrix.nz[:], *([robot.scale, *parts] if parts else [])))
 
     def examined(self, closed: Enclosed) -> Attempt:
-        """Try to show the claim over closed loops."""
+        """Try to prove the claim over closed loops."""
         return self._examined(self._matrices(closed))
 
     def show_sign_change(self, root: Root, sides: Sequence[Sequence[float]]) -> None:
-        """Show that the determinant has opposite signs at two points (c + e,): a pose, and errors of joint centres.
+        """Prove that the determinant has opposite signs at two points (c + e,): a pose, and joint-centre errors.
 
-        The entries have values along the whole way between them, and poses and errors are convex in their coordinates:
-        the determinant changes continuously, and is 0 at a point.
+        The entries are defined along the whole line between them, and poses and errors are convex in their coordinates:
+        the determinant changes continuously, and is 0 at some point.
         """
-        # The matrix is J itself, with rows that are neither normalised nor zero, over poses without loops.
-        if self._shape != (6, 6) or self._freedoms or self.assembly.dependent:
-            raise ProofError("only robots with six rows and without loops have proofs of singular poses")
+        # The matrix must be J itself, with rows that are neither normalised nor zero, over poses without loops.
+        if self._shape != (6, 6) or self._nullity or self.assembly.dependent:
+            raise ProofError("singular poses can be proved only for robots with six rows and without loops")
         points, poses = [np.array(each, dtype=float) for each in sides], self.coordinates
         if len(points) != 2 or any(y.shape != (poses + self.errors,) for y in points):
             raise ProofError("the claim has no two poses")
@@ -101,7 +101,7 @@ class RankClaim(LoopClaim):
             raise ProofError("a pose is not one of the workspace")
         for error in np.concatenate([y[poses:] for y in points]).reshape(-1, 3).tolist():
             if sum(Fraction(each) ** 2 for each in error) > Fraction(self.tolerance) ** 2:
-                raise ProofError("a joint centre of the machine is off by more than the tolerance")
+                raise ProofError("a joint centre of the robot is off by more than the tolerance")
         signs = self._signs_at(np.stack(points))
         if signs[0] * signs[1] >= 0:
             raise ProofError("the determinants at the two poses do not have opposite signs")
@@ -115,9 +115,9 @@ class RankClaim(LoopClaim):
 
     @np.errstate(all="ignore")
     def _signs_at(self, y: FloatArray) -> list[int]:
-        """Return the signs of the determinant at points (K, 6 + e); 0 where a sign is not shown.
+        """Return the signs of the determinant at points (K, 6 + e); 0 where a sign is not proved.
 
-        Where ``C M`` is near I its determinant is positive: that of M has the sign of that of C, in fractions.
+        If ``C M`` is near I, its determinant is positive: M has the sign of the determinant of C, in fractions.
         """
         matrices = self._matrices(self.closed(y, y))
         C = inverses(matrices.M)
@@ -126,7 +126,7 @@ class RankClaim(LoopClaim):
 
     @np.errstate(all="ignore")
     def _matrices(self, closed: Enclosed) -> AffineMatrix:
-        """Return the forms of the matrix, whose coordinates are the independent ones."""
+        """Return the forms of the matrix in the independent coordinates."""
         values, count = self.values(closed), self._at.shape[1]
         matrices = self.assembly.followed(values.forms(slice(0, count)), closed).matrix(self._at, self._shape)
         if self.tolerance and not self.errors:
@@ -137,21 +137,21 @@ class RankClaim(LoopClaim):
         return matrices
 
     def _examined(self, matrices: AffineMatrix) -> Attempt:
-        """Return where the rank is shown, from the forms of the matrix."""
+        """Return where the rank is proved, from the forms of the matrix."""
         M, A, E = matrices
-        # Rows are made comparable by a power of two, which rounds nothing.
+        # Powers of two make rows comparable without rounding.
         sizes = np.sqrt((M * M).sum(axis=2, keepdims=True))
         scale = 2.0 ** -np.round(np.log2(np.where(sizes > 0, sizes, 1.0)))
         M, E, A = M * scale, E * scale + self._off, A * scale[:, None]
-        if self._freedoms:
+        if self._nullity:
             known = np.asarray(np.isfinite(M).all(axis=(1, 2)))
-            null = np.linalg.svd(np.where(known[:, None, None], M, 0.0), full_matrices=True)[2][:, -self._freedoms :]
+            null = np.linalg.svd(np.where(known[:, None, None], M, 0.0), full_matrices=True)[2][:, -self._nullity :]
             none = np.zeros((len(M), A.shape[1], *null.shape[1:]))
             rows = (M, null), (E, np.zeros_like(null)), (A, none)
             M, E, A = (np.concatenate(each, axis=-2) for each in rows)
         C, p = inverses(M), len(self.free)
         moved = np.abs(C[:, None] @ A)
-        # The error of a centre is no larger than the tolerance in any direction.
+        # The error of a centre is at most the tolerance in any direction.
         centres = np.sqrt((moved[:, p:].reshape(len(M), -1, 3, *moved.shape[2:]) ** 2).sum(axis=2))
         holds, _, shares = AffineMatrix(M, A, E).contracted(C, np.concatenate([moved[:, :p], centres], axis=1))
         return Attempt(holds, shares[:, :p])
@@ -163,14 +163,14 @@ def change_of_rows(
     """Return bounds (B, 6, 6) of the change of the rows of six legs, entry by entry, by errors within a tolerance.
 
     Args:
-        scale: (B,) largest s.
-        span: (B, 6, 3) largest sizes of ``p - b``.
-        arm: (B, 6, 3) largest sizes of ``u``.
-        tolerance: of each joint centre.
-        length: by which moments are divided.
+        scale: (B,) largest values of s.
+        span: (B, 6, 3) largest absolute values of ``p - b``.
+        arm: (B, 6, 3) largest absolute values of ``u``.
+        tolerance: largest error of each joint centre.
+        length: length that divides moments.
     """
     s = scale[:, None, None]
     across, along = (np.hypot(each[..., _AFTER], each[..., _BEFORE]) for each in (span, arm))
-    # The size of f x e is at most the tolerance squared, and so is each of its components.
+    # The norm of f x e is at most the tolerance squared, and so is each of its components.
     moments = (s * (across + tolerance) + along) * UP / length
     return np.concatenate([np.broadcast_to(2 * s, moments.shape), moments], axis=2) * tolerance * UP

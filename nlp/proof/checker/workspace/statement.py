@@ -1,4 +1,4 @@
-"""Claims that a proof of a workspace must name, one by one, and comparison of a proof with its case."""
+"""Claims that a proof of a workspace must contain, one by one, and comparison of a proof with its case."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .....models.joints.model.closedform import closed_form
 from ....case.case import Case
 from ....case.checks import check_determined_joints
 from ....case.limits.legs import LegLength
-from ....case.motors import MotorNumber
+from ....case.motors import ActuatorQuantity
 from ....case.task import Sense
 from ....case.workspace import Workspace
 from ....errors import InputError
@@ -34,72 +34,72 @@ from ...statement.claims import (
     claims_of,
     dependent_claims,
     length_claims,
-    one_machine_name,
+    one_robot_name,
     searched_claims,
 )
-from ...statement.machine import Legs, legs_of
+from ...statement.fixed_robot import Legs, legs_of
 from ...statement.motors import in_motion, in_path_motion, motor_claims, speed_claims
 from ...statement.posed_layout import closed_layout, posed_layout, reach_claims
 from ...statement.tolerance import (
     BuiltModel,
-    MachineLayout,
     PoseCoordinates,
+    ToleranceLayout,
     built_model,
     design_layout,
-    machine_layout,
     second_order_name,
+    tolerance_layout,
 )
 from ..premises import exact
-from ..proof_file import PathPremises, Premises, ProofClaim, ProofError, workspace_numbers
+from ..proof_file import PathPremises, Premises, ProofClaim, ProofError, workspace_premise
 from .motion_matrix import Root, turned_rotation
 from .path_root import PathRoot
 from .pose_boxes import pose_root
 
-#: Part of the largest coordinate by which joint centres may differ: the same case gives other last digits elsewhere.
+#: Part of the largest coordinate by which joint centres may differ: other computers give other last digits.
 _SAME = 1e-9
 
 
-class Machines:
-    """Every machine within a tolerance on joint centres, as the check states it.
+class RobotsWithinTolerance:
+    """All robots within a joint-centre tolerance, as the check states them.
 
-    With the derivatives g_j of a number g by the error of centre j, and the blocks H_jk of its second derivatives, the
-    number of a machine within the tolerance t differs from that of the design by at most
+    With the derivatives g_j of a quantity g by the error of centre j, and the blocks H_jk of its second derivatives, a
+    robot within the tolerance t differs from the nominal design in this quantity by at most
 
         t sum_j |g_j| + t^2 / 2 sum_jk |H_jk|
 
-    at each pose. The first sum is an expression of the pose. The second is shown to be at most the bound that the proof
-    gives, over all poses and errors (:class:`~.number_claims.SecondOrderClaim`).
+    at each pose. The first sum is an expression of the pose. The second is proved to be at most the bound in the proof,
+    over all poses and errors (:class:`~.number_claims.SecondOrderClaim`).
 
     Attributes:
-        model: the robot of a case with fixed dimensions, without unknowns in closed form.
-        root: the box of coordinates.
-        symbols: the machines as symbols of one pose.
+        model: model of a case with fixed dimensions, without the unknowns in closed form.
+        root: box of coordinates.
+        symbols: robots within the tolerance as symbols at one pose.
 
     Raises:
-        RobotError: the robot cannot be assembled with errors of its joint centres.
+        RobotError: the robot cannot be assembled with joint-centre errors.
     """
 
     def __init__(self, case: Case, model: Model, root: Root, *, with_angles: bool = True) -> None:
         self._case, self.model, self.root, self._at = case, model, root, coordinates_of(root)
         tolerance = case.joint_centre_tolerance or 0.0
-        self.symbols: MachineLayout = machine_layout(
+        self.symbols: ToleranceLayout = tolerance_layout(
             case, built_model(case.model, with_angles=with_angles), tolerance, self._at
         )
 
     @cached_property
     def design(self) -> Layout:
-        """The design as symbols of the pose; refuses a robot of which coordinates follow from others."""
+        """Nominal design as symbols of the pose; an error for a robot with dependent coordinates."""
         if self.model.unknowns:
-            raise ProofError("numbers of machines with loops that are not in closed form have no proof")
+            raise ProofError("within a tolerance, loops without a closed form need a tree of boxes")
         return design_layout(self._case, self.model, self._at)
 
     def varies(self, claim: Claim) -> bool:
-        """Return whether a number changes with the errors."""
+        """Return whether a quantity changes with the errors."""
         errors = self.symbols.errors
         return bool(errors.numel()) and any(ca.which_depends(claim.expression, errors, 1, True))
 
     def number(self, claim: Claim, rest: float) -> SX:
-        """Return a bound (1, 1) of a number over all machines in the symbols of the design, from the rest's bound."""
+        """Return a bound (1, 1) of a quantity over all robots, in the symbols of the design, from the rest's bound."""
         errors, pose = self.symbols.errors, self.design.table.variables_vector
         slopes, sign = ca.densify(ca.gradient(claim.expression, errors)), claim.sense.sign
         squares = [ca.sumsqr(slopes[k : k + 3]) for k in range(0, errors.numel(), 3)]
@@ -111,22 +111,22 @@ class Machines:
 
 @dataclass(frozen=True, eq=False)
 class RobotClaims:
-    """The robot that claims about a workspace, or a path, are about.
+    """Robot of the claims about a workspace or a path.
 
     Attributes:
         legs: joint centres of six straight legs; None for another robot.
-        layout: the case as symbols of the pose in which its numbers are bounded: without the unknowns that follow in
-            closed form, where all limbs reach every pose.
-        place: the same for claims about reach.
-        model: the robot without these unknowns, over whose poses its ranks are claimed.
+        layout: case as symbols of the pose for bounds of quantities: without the unknowns in closed form, if all limbs
+            reach every pose.
+        place: case as symbols of the pose for claims about reach.
+        model: model without these unknowns, for claims about ranks.
         reaches: claims that limbs reach every pose.
-        numbers_at: assemblies that its numbers are about, but for those of actuators under loads, in words; empty for a
-            robot without unknowns.
-        machines: every machine within the tolerance, in whose symbols the numbers and ``reaches`` are then; None where
-            the design is meant, or machines cannot be assembled.
+        numbers_at: assembly modes that claims about quantities cover, in words, except for actuators under loads; empty
+            for a robot without unknowns.
+        within_tolerance: robots within the tolerance, whose symbols then replace those of quantities and ``reaches``;
+            None for the nominal design, or where robots cannot be assembled.
         dependent: claims about dependent coordinates of the pose.
-        followed: the symbols of the numbers of a robot whose loops are followed in the home assembly mode, as they are
-            with dependent coordinates and within a tolerance; else None.
+        followed: symbols of quantities of a robot whose loops are followed in the home assembly mode, for dependent
+            coordinates and within a tolerance; else None.
     """
 
     legs: Legs | None
@@ -135,38 +135,38 @@ class RobotClaims:
     place: Layout
     reaches: tuple[Claim, ...] = ()
     numbers_at: str = ""
-    machines: Machines | None = None
+    within_tolerance: RobotsWithinTolerance | None = None
     dependent: tuple[Claim, ...] = ()
-    followed: MachineLayout | None = None
+    followed: ToleranceLayout | None = None
 
 
 def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> RobotClaims:
-    """Return the robot of a case with fixed dimensions, and the claims about its reach, of which some are proved."""
+    """Return the robot of a case with fixed dimensions, with claims about its reach, some of which are proved."""
     legs, closed, is_open = legs_of(case), closed_form(case.model), bool(case.model.unknowns)
     if case.joint_centre_tolerance:
         try:
-            machines = Machines(case, closed.model, pose_root(workspace))
+            robots = RobotsWithinTolerance(case, closed.model, pose_root(workspace))
         except RobotError:
             pass
         else:
-            return _followed(legs, closed.model, workspace, machines.symbols, is_open=is_open, machines=machines)
+            return _followed(legs, closed.model, workspace, robots.symbols, is_open=is_open, within_tolerance=robots)
     if workspace.dependent:
-        symbols = machine_layout(
+        symbols = tolerance_layout(
             case, BuiltModel(closed.model, (), closed.reaches), 0.0, coordinates_of(pose_root(workspace))
         )
         return _followed(legs, closed.model, workspace, symbols, is_open=is_open)
     layout = posed_layout(case, workspace)
     place, every = reach_claims(case, closed, workspace) if closed.reaches else (layout, ())
     if every and all(each.name in reached for each in every):
-        partly = "every assembly in which limbs in closed form are as at home"
-        numbers_at = partly if closed.model.unknowns else "the assembly of home"
+        partly = "every assembly mode in which limbs in closed form are as at home"
+        numbers_at = partly if closed.model.unknowns else "the home assembly mode"
         return RobotClaims(legs, closed_layout(case, closed, workspace), closed.model, place, every, numbers_at)
-    numbers_at = "every assembly" if is_open else ""
+    numbers_at = "every assembly mode" if is_open else ""
     return RobotClaims(legs, layout, closed.model, place, every, numbers_at)
 
 
 def case_along_path(case: Case, path: ProgrammedPath) -> Case:
-    """Return a case whose claims are about a path, whose own motion is meant by limits on speeds and powers.
+    """Return a case with claims about a path; limits on speeds and powers refer to the path's motion if it has times.
 
     Raises:
         CaseError: a dimension is free, the pose does not determine driven joints, or limits need a motion that neither
@@ -187,45 +187,45 @@ def robot_along_path(case: Case, root: PathRoot, *, with_angles: bool) -> RobotC
 
     Args:
         case: the case.
-        root: of the path.
-        with_angles: whether angles of joints are replaced by closed forms, which jump where a joint turns all round.
+        root: poses of the path.
+        with_angles: whether closed forms replace joint angles; these forms jump if a joint turns all the way round.
 
     Raises:
-        ProofError: the robot cannot be assembled with errors of its joint centres.
+        ProofError: the robot cannot be assembled with joint-centre errors.
     """
-    closed, machines = closed_form(case.model, with_angles=with_angles), None
+    closed, robots = closed_form(case.model, with_angles=with_angles), None
     if case.joint_centre_tolerance:
         try:
-            machines = Machines(case, closed.model, root, with_angles=with_angles)
+            robots = RobotsWithinTolerance(case, closed.model, root, with_angles=with_angles)
         except RobotError as error:
             raise ProofError(str(error)) from None
     symbols = (
-        machine_layout(case, BuiltModel(closed.model, (), closed.reaches), 0.0, coordinates_of(root))
-        if machines is None
-        else machines.symbols
+        tolerance_layout(case, BuiltModel(closed.model, (), closed.reaches), 0.0, coordinates_of(root))
+        if robots is None
+        else robots.symbols
     )
     is_open = bool(case.model.unknowns)
-    return _followed(legs_of(case), closed.model, root.workspace, symbols, is_open=is_open, machines=machines)
+    return _followed(legs_of(case), closed.model, root.workspace, symbols, is_open=is_open, within_tolerance=robots)
 
 
 def _followed(
     legs: Legs | None,
     model: Model,
     workspace: Workspace,
-    symbols: MachineLayout,
+    symbols: ToleranceLayout,
     *,
     is_open: bool,
-    machines: Machines | None = None,
+    within_tolerance: RobotsWithinTolerance | None = None,
 ) -> RobotClaims:
     """Return the claims about a robot whose loops are followed."""
-    home = "the assembly of home" if is_open else ""
+    home = "the home assembly mode" if is_open else ""
     reaches, dependent = symbols.claims(())[0], tuple(dependent_claims(symbols.layout.robots[0], workspace))
-    whole = RobotClaims(legs, symbols.layout, model, symbols.layout, tuple(reaches), home, machines)
+    whole = RobotClaims(legs, symbols.layout, model, symbols.layout, tuple(reaches), home, within_tolerance)
     return replace(whole, dependent=dependent, followed=symbols)
 
 
 def coordinates_of(root: Root) -> PoseCoordinates:
-    """Return the coordinates of a box as those of a layout."""
+    """Return the coordinates of a box in the terms of a layout."""
 
     def rotation(turn: SX) -> SX:
         """Return the rotation (3, 3) with coordinates (3, 1)."""
@@ -236,10 +236,10 @@ def coordinates_of(root: Root) -> PoseCoordinates:
 
 
 def expected_claims(case: Case, robot: RobotClaims, quantities: Sequence[str], leg_error: float) -> list[Claim]:
-    """Return the claims about a case over its workspace, and about measures that were asked for.
+    """Return the claims about a case over its workspace, including requested quantities.
 
     Raises:
-        InputError: the robot has no measure of a name.
+        InputError: the robot has no quantity of a requested name.
     """
     ranks = [REGULAR, *([CONSTRAINTS] if _has_constraints(robot.model) else [])]
     claims = claims_of(robot.layout, [name for name in quantities if name not in SPECTRAL])
@@ -256,7 +256,7 @@ def expected_claims(case: Case, robot: RobotClaims, quantities: Sequence[str], l
 
 
 def expected_along_path(case: Case, robot: RobotClaims, *, is_timed: bool) -> list[Claim]:
-    """Return the claims about a case along a path; one with times has speeds and powers of its own motion."""
+    """Return the claims about a case along a path; with times, they include speeds and powers of its motion."""
     ranks = [REGULAR, *([CONSTRAINTS] if _has_constraints(robot.model) else [])]
     names = [each.name for each in case.model.quantities if each.name in (*ACTUATED, LegLength.key)]
     every = [
@@ -269,21 +269,21 @@ def expected_along_path(case: Case, robot: RobotClaims, *, is_timed: bool) -> li
     ]
     if is_timed:
         of_loads = (each for each in motor_claims(in_path_motion(case)) if each.motor)
-        every += [*speed_claims(case), *(each for each in of_loads if _number_of(each) is not MotorNumber.SPEED)]
+        every += [*speed_claims(case), *(each for each in of_loads if _number_of(each) is not ActuatorQuantity.SPEED)]
     else:
         every += motor_claims(case)
     return [each for each in every if robot.legs is not None or each.kind is not ClaimKind.SPECTRUM]
 
 
-def _number_of(claim: Claim) -> MotorNumber | None:
-    """Return the number of an actuator that a claim is about."""
+def _number_of(claim: Claim) -> ActuatorQuantity | None:
+    """Return the actuator quantity of a claim; None for another claim."""
     return None if claim.motor is None else claim.motor.number
 
 
 def refuse_other_lemmas(lemmas: Sequence[ProofClaim], expected: Sequence[Claim]) -> None:
-    """Refuse lemmas on which no claim of a case can rest."""
+    """Refuse lemmas that no claim of a case can use."""
     claims = [each.label for each in expected]
-    strokes = [(one_machine_name(each.name), sense.value) for each in expected for sense in Sense]
+    strokes = [(one_robot_name(each.name), sense.value) for each in expected for sense in Sense]
     allowed = {*strokes, *((second_order_name(name), sense) for name, sense in claims + strokes)}
     for each in lemmas:
         if (each.name, each.sense) not in allowed:
@@ -291,37 +291,39 @@ def refuse_other_lemmas(lemmas: Sequence[ProofClaim], expected: Sequence[Claim])
 
 
 def _has_constraints(model: Model) -> bool:
-    """Return whether a robot has constraint wrenches, of which a rank is claimed."""
+    """Return whether a robot has constraint wrenches whose rank is claimed."""
     if model.generic is not None:
         return 0 < model.generic.constraints < 6
     return not model.members and any(row.kind is WrenchKind.COUPLE for row in model.wrenches)
 
 
 def leg_error_of(case: Case, leg_error: float) -> float:
-    """Return by how much a leg is off at most when its length and its joint centres are in error."""
+    """Return the largest error of a leg's length from its own error and from its joint centres."""
     return leg_error + 2 * (case.joint_centre_tolerance or 0.0)
 
 
-def legs_numbers(legs: Legs | None) -> tuple[tuple[float, ...], ...]:
-    """Return joint centres (12, 3), base before platform; none for a robot that is not six straight legs."""
+def legs_premise(legs: Legs | None) -> tuple[tuple[float, ...], ...]:
+    """Return joint centres (12, 3), base before platform; empty for a robot without six straight legs."""
     return () if legs is None else tuple(map(tuple, [*legs.base.tolist(), *legs.platform.tolist()]))
 
 
-def hold_premises(case: Case, workspace: Workspace, legs: Legs | None, leg_error: float, given: Premises) -> None:
-    """Refuse a proof whose file names other premises than those of the case; the check does without the file's."""
-    if workspace_numbers(workspace) != given.workspace:
+def refuse_other_premises(
+    case: Case, workspace: Workspace, legs: Legs | None, leg_error: float, given: Premises
+) -> None:
+    """Refuse a proof whose file has other premises than the case; the check itself does not use them."""
+    if workspace_premise(workspace) != given.workspace:
         raise ProofError("the proof is for another workspace than this case's")
     if given.leg_error != leg_error:
-        stated = f"the proof is for legs that are off by at most {exact(given.leg_error)} {case.units.length}"
-        raise ProofError(f"{stated}, and not {exact(leg_error)}: see --leg-error")
-    hold_robot(case, legs, given)
+        stated = f"the proof is for leg errors of at most {exact(given.leg_error)} {case.units.length}"
+        raise ProofError(f"{stated}, but {exact(leg_error)} was given: see --leg-error")
+    refuse_other_robot(case, legs, given)
 
 
-def hold_robot(case: Case, legs: Legs | None, given: Premises | PathPremises) -> None:
-    """Refuse a proof whose file names other joint centres, or another tolerance on them, than the case has."""
-    numbers = legs_numbers(legs)
+def refuse_other_robot(case: Case, legs: Legs | None, given: Premises | PathPremises) -> None:
+    """Refuse a proof whose file names other joint centres, or another joint-centre tolerance, than the case has."""
+    numbers = legs_premise(legs)
     same = list(map(len, numbers)) == list(map(len, given.legs))
     if not same or not np.allclose(given.legs, numbers, rtol=0.0, atol=_SAME * np.abs(numbers).max(initial=0.0)):
         raise ProofError("the proof is for other joint centres than this case's")
     if (case.joint_centre_tolerance or 0.0) != given.joint_centre:
-        raise ProofError("the proof is for machines within another tolerance on joint centres than this case's")
+        raise ProofError("the proof is for another joint-centre tolerance than this case's")

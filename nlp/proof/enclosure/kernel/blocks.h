@@ -1,4 +1,4 @@
-/* Blocks of LANES boxes: their tapes, then the examination of each. */
+/* Blocks of LANES boxes: runs of the tapes, then the examination of each box. */
 #ifndef BLOCKS_H
 #define BLOCKS_H
 
@@ -11,7 +11,7 @@ static void read_value(Box *x, size_t k, const Value *v, Py_ssize_t l)
     x->c[k] = v->c[l], x->p[k] = v->p[l], x->q[k] = v->q[l], x->s[k] = v->s[l], x->lo[k] = v->lo[l], x->hi[k] = v->hi[l];
 }
 
-/* The forms of second order of a box: centre, gradient and matrix of each row. */
+/* Reads second-order forms of a box: centre, gradient and matrix of each row. */
 static void read_second(Box *x, int rows, Store out, Py_ssize_t l)
 {
     int n = x->n;
@@ -29,7 +29,7 @@ static void read_second(Box *x, int rows, Store out, Py_ssize_t l)
     }
 }
 
-/* Values and gradients of E rows over a box, the latter times its radii r. */
+/* Reads values and gradients of E rows over a box; gradients are multiplied by the radii r. */
 static void read_gradients(Box *x, size_t E, Store out, Py_ssize_t l)
 {
     size_t n = (size_t)x->n;
@@ -49,9 +49,9 @@ static void read_gradients(Box *x, size_t E, Store out, Py_ssize_t l)
     }
 }
 
-/* Examines boxes; without memory, what they need of it is counted only. The tapes are run one after the other in the same
- * memory: that of the expressions alone, the first pass; that of the functions and their gradients where there are many
- * conditions; and that of all gradients on the boxes where they may decide. */
+/* Examines boxes; without memory, only counts the memory that is needed. The tapes run one after the other in the same
+ * memory: expressions without gradients (the first pass); functions and their gradients if there are many conditions; and
+ * all gradients, on the boxes where they may decide. */
 static void examine_range(const Form *form, Report *report, Py_ssize_t begin, Py_ssize_t finish, double threshold, Room *room)
 {
     size_t n = (size_t)form->n, boxes = (size_t)(finish - begin), behind = room->used;
@@ -68,7 +68,7 @@ static void examine_range(const Form *form, Report *report, Py_ssize_t begin, Py
     int rows = rows_of(form), others = form->expressions + rows_of_tangents(form);
     Box x = lay_box(form->n, (size_t)(rows > others ? rows : others), room);
     Py_ssize_t *open = (Py_ssize_t *)carve(room, boxes), count = finish - begin;
-    double *scores = in_turn ? carve(room, boxes * n) : NULL; /* of the variables of open boxes */
+    double *scores = in_turn ? carve(room, boxes * n) : NULL; /* scores of the variables of open boxes */
     if (!room->at)
         return;
     x.J = form->functions, x.squares = form->quotients > 0;

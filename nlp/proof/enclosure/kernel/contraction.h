@@ -1,4 +1,4 @@
-/* Ends of a box for which a model can reach a level.
+/* Contraction: ends of the part of a box in which a model can reach a level.
  * Reference in NumPy: tests/reference/numpy_engine/quadratic_models.py. */
 #ifndef CONTRACTION_H
 #define CONTRACTION_H
@@ -8,7 +8,7 @@
 #define ROOT_SLACK 1e-12
 #define LEAST_SIZE 1e-140 /* tests/reference/numpy_engine/quadratic_models.py */
 
-/* First and last t in [0, 1] with linear t + 1/2 quadratic t^2 >= need; last < first without one. */
+/* First and last t in [0, 1] with linear t + 1/2 quadratic t^2 >= need; last < first if there is none. */
 static void roots(double linear, double quadratic, double need, double *first, double *last)
 {
     int at_start = need <= 0, at_end = linear + 0.5 * quadratic >= need;
@@ -36,7 +36,7 @@ static void keep(Box *x, int i, double low, double high, int reason)
         x->e_hi[i] = high, x->why_hi[i] = reason;
 }
 
-/* Ends of the e_i for which a model can reach a level; sign H is the matrix of the model, not made symmetric yet. */
+/* Ends of the e_i for which a model can reach a level; the symmetric part of sign H is the matrix of the model. */
 static void reach_quadratic(Box *x, double sign, double middle, const double *b, const double *H, const double *w,
                             double rounding, double level, int reason)
 {
@@ -65,7 +65,7 @@ static void reach_quadratic(Box *x, double sign, double middle, const double *b,
     }
 }
 
-/* Moves the ends past points where sign times a row cannot reach a level. */
+/* Moves the ends to exclude points where sign times a row cannot reach a level. */
 static void reach_row(Box *x, int r, double sign, double level)
 {
     int n = x->n;
@@ -87,8 +87,8 @@ static void reach_row(Box *x, int r, double sign, double level)
     reach_quadratic(x, sign, middle, x->fb, A, x->fw, 64 * ULP * lost + TINY, level, r);
 }
 
-/* Moves the ends past points where no function, unless it has tilts, or not the Lagrangian can reach the threshold, or a
- * condition cannot hold. */
+/* Moves the ends to exclude points where a function (without tilts) or the Lagrangian cannot reach the threshold, or where
+ * a condition is violated. */
 static void contract(const Form *form, Box *x, double threshold, int tilted)
 {
     for (int r = 0; r < x->R; r++)

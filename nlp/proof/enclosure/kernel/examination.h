@@ -17,10 +17,10 @@ typedef struct {
     const double *lower, *upper;
     int *verdict, *reason, *split, *cut_lower, *cut_upper;
     double *bound, *value, *left_lower, *left_upper, *centre;
-    int shared;     /* number of the first variables that other limbs have too */
-    double *models; /* of the Lagrangian and of the function's gradient: write_model; NULL without them */
-    const double *least; /* (B) points with lesser values do not matter; NULL where all do */
-    const double *tilts; /* of the other limbs, for the part with shared variables alone: add_tilts; NULL without them */
+    int shared;     /* number of variables that other limbs share, the first ones */
+    double *models; /* models of the Lagrangian and of the function's gradient: write_model; NULL without them */
+    const double *least; /* (B) value below which points are irrelevant; NULL if all points are relevant */
+    const double *tilts; /* tilts of the limbs, for the common part: add_tilts; NULL without them */
 } Report;
 
 static Py_ssize_t rows_of_models(int n, int shared) { return 3 + 4 * n + n * n + 4 * shared; }
@@ -32,7 +32,7 @@ static void write_model(const Form *form, const Box *x, Report *report, Py_ssize
     double *to = report->models + at;
     const double *vectors[] = {x->qb, x->qw, x->qlo, x->qhi};
     Py_ssize_t B = report->B;
-    int holds = 1; /* whether every condition holds on the whole box */
+    int holds = 1; /* whether every condition is satisfied on the whole box */
     for (int r = J; r < R; r++)
         holds = holds && form->equation[r] != 1 && x->hi[r] < 0;
     *to = defined + 2 * holds, *(to += B) = x->q_middle, *(to += B) = x->q_rounding;
@@ -55,8 +55,8 @@ static void write_model(const Form *form, const Box *x, Report *report, Py_ssize
     }
 }
 
-/* Adds best + g e + 1/2 e'Q e, the sum of the limbs' tilts, to the form of the function: rows of best, of the size of its
- * terms, of the rounding of each sum of g and Q, and of these. */
+/* Adds best + g e + 1/2 e'Q e, the sum of the limbs' tilts, to the form of the function. The rows of tilts are: best, the
+ * sum of the absolute values of its terms, the rounding error of each sum in g and Q, then g and Q. */
 static void add_tilts(Box *x, const Report *report, Py_ssize_t at)
 {
     Py_ssize_t n = x->n, B = report->B;
@@ -75,9 +75,9 @@ static void add_tilts(Box *x, const Report *report, Py_ssize_t at)
     }
 }
 
-/* A box by the ranges of its expressions, and what an earlier pass has found. */
+/* Result for a box from the ranges of its expressions and from an earlier pass. */
 typedef struct {
-    int defined, impossible; /* whether every function is; a condition that cannot hold, or -1 */
+    int defined, impossible; /* whether every function is defined; index of a violated condition, or -1 */
     double bound, value;
 } Look;
 
@@ -98,7 +98,7 @@ static Look look_at(const Form *form, const Box *x, const Report *report, Py_ssi
     return found;
 }
 
-/* Improves a bound by that of the Lagrangian, whose model is left in the box. */
+/* Improves a bound by the bound of the Lagrangian, and keeps the Lagrangian's model in the box. */
 static void weigh(const Form *form, Box *x, const Report *report, Py_ssize_t at, int passed, int first, Look *found)
 {
     choose_multipliers(x, form->equation, first);
@@ -109,10 +109,10 @@ static void weigh(const Form *form, Box *x, const Report *report, Py_ssize_t at,
         found->bound = passed ? report->bound[at] : INFINITY;
 }
 
-/* Examines a box by forms of first order of its gradients. Where a first pass came before, the report holds its results.
+/* Examines a box by first-order forms of its gradients. After a first pass, the report holds the results of that pass.
  *
- * With scores, those of the variables from the first pass, x holds the functions alone: returns whether the gradients of
- * the conditions are needed too, which is where the functions rise along a variable. */
+ * With scores of the variables from the first pass, x contains only the functions, and the call returns whether the
+ * gradients of the conditions are needed too: this is the case if the functions increase along a variable. */
 static int judge(const Form *form, Box *x, Report *report, Py_ssize_t at, double threshold, int passed, const double *scores)
 {
     int n = x->n, J = x->J, R = x->R, verdict = OPEN, reason = 0;

@@ -1,4 +1,4 @@
-/* The first pass over a box, by forms of second order of its expressions alone.
+/* The first pass over a box, by second-order forms of its expressions without gradients.
  * Reference in NumPy: tests/reference/numpy_engine/first_pass.py. */
 #ifndef FIRSTPASS_H
 #define FIRSTPASS_H
@@ -8,10 +8,10 @@
 
 enum { FIRST, DEFINED_BEFORE, UNDEFINED_BEFORE };
 
-/* Whether the box is closed; -1 where it is not and a function may be undefined. If not, the report holds what contraction
- * leaves, in parts of the radius, and why; and scores, unless NULL, how much the Lagrangian can change along each
- * variable. After a pass over the same box, with other rows of the functions, what that has found is kept where it is
- * tighter. */
+/* Returns 1 if the box is closed, 0 if it is open, and -1 if it is open and a function may be undefined. For an open box
+ * the report gets the contracted ends, relative to the radius, with their reasons; and scores, unless NULL, the possible
+ * change of the Lagrangian along each variable. After an earlier pass over the same box, with other rows of the
+ * functions, tighter results of that pass are kept. */
 static int pass_over(const Form *form, Box *x, Report *report, Py_ssize_t at, double threshold, double *scores, int before)
 {
     int n = x->n;
@@ -42,7 +42,8 @@ static int pass_over(const Form *form, Box *x, Report *report, Py_ssize_t at, do
     return closed ? 1 : found.defined ? 0 : -1;
 }
 
-/* The first pass over a box, and again with tangents to its squares where it is still open: whether it is open then. */
+/* The first pass over a box, and a second one with tangents to its squares if it is still open; returns whether the box
+ * is open after that. */
 static int pass_first(const Form *form, Box *x, Report *report, Py_ssize_t at, double threshold, double *scores)
 {
     int closed = pass_over(form, x, report, at, threshold, scores, FIRST);

@@ -1,21 +1,21 @@
-/* The interpreter of a tape in forms of first or second order over LANES boxes.
+/* Interpreter of a tape in first-order or second-order forms over LANES boxes.
  * Reference in NumPy: tests/reference/numpy_engine/first_order.py and tests/reference/numpy_engine/second_order.py. */
 #ifndef FORMS_H
 #define FORMS_H
 
 #include "univariate.h"
 
-/* Most variables of a form of second order: bits of an unsigned number. */
+/* Largest number of variables of a second-order form: bits of an unsigned number. */
 #define MOST_VARIABLES 15
 
-/* Which coefficients of a form of second order may differ from 0, as bits: a, and the rows of Q, which is symmetric. */
+/* Coefficients of a second-order form that may differ from 0, as bits: a, and the rows of the symmetric Q. */
 typedef struct {
     unsigned linear, pairs[MOST_VARIABLES];
 } Terms;
 
 /* c + a e + Q(e) + [p, q] +- s over LANES boxes, with the sum of |a| and Q's range [sl, sh]; and an interval. The n
- * coefficients a follow in memory. In forms of second order those of e_i e_j, i <= j, come behind, row by row; memory is
- * all 0 at first, and coefficients that are no terms stay so. In forms of first order Q is 0. */
+ * coefficients a follow in memory. Second-order forms then have the coefficients of e_i e_j, i <= j, row by row; memory is
+ * 0 at first, and unused coefficients stay 0. In first-order forms Q is 0. */
 typedef struct {
     Lane c, p, q, s, lo, hi, rad, sl, sh;
     Terms terms;
@@ -32,16 +32,16 @@ typedef struct {
 
 static inline Value *value_of(Store s, int i) { return (Value *)(s.memory + (size_t)i * s.stride); }
 static inline Lane *terms_of(const Value *v) { return (Lane *)(v + 1); }
-/* Place of the coefficient of e_i e_j, i <= j, less j, behind the linear ones. */
+/* Index of the coefficient of e_i e_j, i <= j, minus j; the linear coefficients come first. */
 static inline int row_of(int n, int i) { return n + i * n - i * (i + 1) / 2; }
 static size_t terms_of_order(int n, int order) { return (size_t)(order > 1 ? n * (n + 3) / 2 : n); }
 
 /* The variables i = from, ..., n - 1 of a set of bits. */
 #define EACH_OF(i, from, set) for (int i = from; i < n; i++) if ((set) >> i & 1)
-/* The variables, and the pairs i <= j, of an operation's result. */
+/* Loops over the variables, and over the pairs i <= j, of an operation's result. */
 #define EACH_VARIABLE(i) for (int i = first; i < last; i++) if (order == 1 || which.linear >> i & 1)
 #define EACH_PAIR(i, j) for (int j = i; order > 1 && j < n; j++) if (which.pairs[i] >> j & 1)
-/* Writes the linear coefficients t[i] and those of pairs t[at] that are terms. */
+/* Writes the linear coefficients t[i], and the coefficients t[at] of pairs, that may differ from 0. */
 #define EACH_TERM(single, pair)                                                                                        \
     EACH_VARIABLE(i)                                                                                                   \
     {                                                                                                                  \
@@ -53,7 +53,7 @@ static size_t terms_of_order(int n, int order) { return (size_t)(order > 1 ? n *
         }                                                                                                              \
     }
 
-/* The terms of a sum, with product those of a product, and with dense those of any function, of two forms. */
+/* Terms of the sum of two forms; with product, of their product; with dense, of any function of them. */
 static Terms structure_of(int n, Terms x, Terms y, int product, int dense)
 {
     Terms found = {.linear = x.linear | y.linear};
@@ -95,7 +95,7 @@ INLINE void square_ends(const Value *x, Result *restrict out)
     }
 }
 
-/* Ends of the inverse of an interval without 0, and the size of its end that is nearest to 0; NaN for another one. */
+/* Ends of the inverse of an interval without 0, and the absolute value of its end nearest to 0; NaN for other intervals. */
 INLINE void inverse_ends(const Value *y, double *restrict near, double *restrict low, double *restrict high)
 {
     EACH
@@ -109,8 +109,8 @@ INLINE void inverse_ends(const Value *y, double *restrict near, double *restrict
     }
 }
 
-/* Range of the product of two linear parts, whose sums of sizes are ra and rb: by e_i^2 <= 1 term by term, and by
- * 4 a b = (a + b)^2 - (a - b)^2 with both scaled to one size. */
+/* Range of the product of two linear parts with absolute sums ra and rb: by e_i^2 <= 1 term by term, and by
+ * 4 a b = (a + b)^2 - (a - b)^2 with both scaled to the same size. */
 INLINE void linear_product(int first, int last, const Lane *a, const double *ra, const Lane *b, const double *rb,
                            double *restrict least, double *restrict most)
 {
@@ -127,7 +127,7 @@ INLINE void linear_product(int first, int last, const Lane *a, const double *ra,
     {
         double both = ra[l] * rb[l], cross = both - sizes[l], quarter = 0.25 / (both > 0 ? both : 1.0);
         double up = 0.5 * (sizes[l] + balance[l]) + cross, down = 0.5 * (sizes[l] - balance[l]) + cross;
-        /* In this order: the square of a sum may underflow. */
+        /* This order avoids underflow of the square of a sum. */
         double more = plus[l] * (plus[l] * quarter), less = minus[l] * (minus[l] * quarter);
         most[l] = more < up ? more : up, least[l] = -(less < down ? less : down);
     }
@@ -139,7 +139,7 @@ INLINE unsigned cubic_terms(Terms a, Terms Q, int i, int j)
     return (a.linear >> i & 1 ? Q.pairs[j] : 0) | (a.linear >> j & 1 ? Q.pairs[i] : 0) | (Q.pairs[i] >> j & 1 ? a.linear : 0);
 }
 
-/* Adds the sizes of the coefficients of (a e) P(e) + (b e) Q(e), monomial by monomial. */
+/* Adds the absolute values of the coefficients of (a e) P(e) + (b e) Q(e), monomial by monomial. */
 INLINE void add_cubic_sizes(int n, Terms x, Terms y, const Lane *a, const Lane *Q, const Lane *b, const Lane *P,
                             double *restrict out)
 {
@@ -162,7 +162,7 @@ INLINE void add_cubic_sizes(int n, Terms x, Terms y, const Lane *a, const Lane *
     }
 }
 
-/* Makes the coefficients of a form those of t: from first to last, or those that are terms. */
+/* Copies the coefficients t into a form: from first to last, or only the terms that may differ from 0. */
 INLINE void write_terms(Value *v, int n, int order, int first, int last, Terms terms, const Lane *t)
 {
     Lane *to = terms_of(v);
@@ -190,8 +190,8 @@ INLINE void write_terms(Value *v, int n, int order, int first, int last, Terms t
     v->terms = terms;
 }
 
-/* Writes a value with the coefficients t: poisons one without a finite form, and intersects the interval with the
- * form's range. */
+/* Writes a value with the coefficients t: poisons it without a finite form, and intersects the interval with the form's
+ * range. */
 INLINE void settle(Value *restrict v, int n, int order, int first, int last, Terms which, double slack,
                    const Result *restrict from, Lane *restrict t)
 {
@@ -232,18 +232,18 @@ INLINE void settle(Value *restrict v, int n, int order, int first, int last, Ter
         EACH terms[i][l] = v->s[l] < INFINITY ? terms[i][l] : 0.0;
 }
 
-/* Width and largest size of the quadratic part, and largest size of the rest. */
+/* Width and largest absolute value of the quadratic part, and largest absolute value of the remainder. */
 #define SPREAD(x) (order > 1 ? x->sh[l] - x->sl[l] : 0.0)
 #define CURVED(x) (order > 1 ? larger(-x->sl[l], x->sh[l]) : 0.0)
 #define REST(x) larger(-x->p[l], x->q[l])
 
-/* Parts of a box in memory. */
+/* Order of a box's data in memory. */
 enum { CENTRE, RADIUS, LOWER, UPPER };
 
 INLINE void interpret(int order, const Tape *tape, int n, Store work, Store out, Lane *const *box, Lane *restrict t)
 {
     const Terms none = {0};
-    /* An operation makes fewer roundings of each of its terms: as many as monomials of third order, or variables. */
+    /* Upper bound of the roundings of each term in one operation: the number of monomials of third order, or of variables. */
     double slack = ((double)(order > 1 ? n * (n + 1) * (n + 2) / 6 + 16 : n + 8)) * ULP;
     for (int index = 0; index < tape->length; index++) {
         const int *code = tape->code + 6 * index;
@@ -276,10 +276,10 @@ INLINE void interpret(int order, const Tape *tape, int n, Store work, Store out,
         Terms X = none, Y = none, which = none;
         if (order > 1) {
             int is_product = op == MUL || op == SQUARE, is_sum = op == ADD || op == SUB || op == SHIFT || op == SCALE;
-            X = x->terms, Y = y->terms; /* an operation on one value has it twice */
+            X = x->terms, Y = y->terms; /* an operation on one value reads it twice */
             which = structure_of(n, X, Y, is_product, !is_sum && !is_product);
         }
-        Lane least, most; /* of the terms of the next order */
+        Lane least, most; /* range of the terms of the next order */
         EACH least[l] = most[l] = 0.0;
         Result r;
         switch (op) {
@@ -316,7 +316,7 @@ INLINE void interpret(int order, const Tape *tape, int n, Store work, Store out,
                 double c = x->c[l] * k, down = x->lo[l] * k, up = x->hi[l] * k, p = x->p[l] * k, q = x->q[l] * k;
                 double lo = k >= 0 ? down : up, hi = k >= 0 ? up : down, all = fabs(c) + size * (x->rad[l] + SPREAD(x));
                 r.c[l] = c, r.p[l] = k >= 0 ? p : q, r.q[l] = k >= 0 ? q : p;
-                /* 1 and -1 cause no rounding. */
+                /* Factors 1 and -1 cause no rounding. */
                 r.s[l] = size == 1 ? x->s[l] : x->s[l] * size + (slack * all + TINY);
                 r.lo[l] = size == 1 ? lo : lo - (fabs(lo) * ULP + TINY);
                 r.hi[l] = size == 1 ? hi : hi + (fabs(hi) * ULP + TINY);
@@ -355,7 +355,7 @@ INLINE void interpret(int order, const Tape *tape, int n, Store work, Store out,
             {
                 double c = x->c[l], rad = x->rad[l], p = x->p[l], q = x->q[l], s = x->s[l], m = REST(x);
                 double mixed = most[l] + 2 * rad * m, size = fabs(c) + rad + SPREAD(x) + m;
-                /* What is squared whole: terms of second and higher order, or each order by itself. */
+                /* Two bounds of the square: terms of second and higher order together, or each order separately. */
                 double square = order > 1 ? (CURVED(x) + m) * (CURVED(x) + m) : rad * rad + m * m;
                 r.c[l] = c * c;
                 r.p[l] = smaller(2 * c * p, 2 * c * q) - mixed;
@@ -365,7 +365,7 @@ INLINE void interpret(int order, const Tape *tape, int n, Store work, Store out,
             square_ends(x, &r);
             break;
         case DIV: {
-            /* P + (x - P y) / y, with P the quotient's own terms up to the order of the forms. */
+            /* P + (x - P y) / y, with the quotient's terms P up to the order of the forms. */
             Lane ratio, inverse, near, rad, size, low, high;
             inverse_ends(y, near, low, high);
             EACH inverse[l] = 1.0 / y->c[l], ratio[l] = x->c[l] / y->c[l], rad[l] = size[l] = 0.0;
@@ -431,7 +431,7 @@ INLINE void interpret(int order, const Tape *tape, int n, Store work, Store out,
                 r.q[l] = larger(slope * p, slope * q) + larger(curve * -mixed, curve * square) + larger(up, 0.0);
                 double steep = fabs(slope) + 2 * bend * reach;
                 double size = fabs(rule.value) + fabs(slope) * moved + fabs(curve) * (moved * moved);
-                /* larger() and smaller() lose a NaN: one in the rule must poison the value. */
+                /* larger() and smaller() drop a NaN, but a NaN in the rule must poison the value. */
                 double unknown = 0 * (down + up), lost = TINY * (1 + fabs(curve) + fabs(rule.least) + fabs(rule.most));
                 r.s[l] = steep * s + (rule.error + rule.slope_error * further + lost * (1 + further)) + slack * size + unknown;
             }

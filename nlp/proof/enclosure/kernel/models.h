@@ -1,4 +1,4 @@
-/* Bounds of quadratic models over many boxes, and ends that reach levels, for the search by limbs.
+/* Bounds of quadratic models over many boxes, and contraction by levels, for the search by limbs.
  * Reference in NumPy: tests/reference/numpy_engine/quadratic_models.py. */
 #ifndef MODELS_H
 #define MODELS_H
@@ -6,17 +6,17 @@
 #include <Python.h>
 #include "contraction.h"
 
-/* Models of B boxes; the entries of a vector or matrix follow each other in steps of B. */
+/* Models of B boxes; entries of a vector or matrix are B places apart. */
 typedef struct {
     Py_ssize_t B;
     int n;
     const double *middle, *b, *H, *w, *slope_lo, *slope_hi, *rounding;
-    const double *level;  /* (B); NULL where bounds are meant */
+    const double *level;  /* (B); NULL to compute bounds */
     double *bound;        /* (B) */
     double *low, *high;   /* (n, B) */
 } Models;
 
-/* Bounds models, or moves ends; without memory, what is needed of it is counted only. */
+/* Bounds models, or moves ends; without memory, only counts the memory that is needed. */
 static void use_models(const Models *all, Room *room)
 {
     int n = all->n;

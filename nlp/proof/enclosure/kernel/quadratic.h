@@ -12,8 +12,8 @@
 /* Enclosures of the expressions over one box, and an upper model middle + b e + 1/2 e'He + w |e| of a weighted sum. */
 typedef struct {
     int n, J, R;
-    int is_second;                        /* whether the expressions have forms of second order, or their gradients forms */
-    double *centre, *radius;              /* (n) of the box */
+    int is_second;                        /* whether the expressions have second-order forms; else their gradients have forms */
+    double *centre, *radius;              /* (n) centre and radii of the box */
     double *c, *p, *q, *s, *lo, *hi;      /* (R) enclosures of the expressions */
     double *gb, *gA, *gp, *gq, *gs;       /* (R, n), gA: (R, n, n): gradients at the centre and matrices; forms of gradients, times r_i */
     double *slope_lo, *slope_hi;  /* (R, n) interval gradients, times r_i */
@@ -24,11 +24,11 @@ typedef struct {
     double *e_lo, *e_hi;
     int *why_lo, *why_hi;
     double q_middle, q_rounding;
-    int squares;          /* whether functions have quotients, whose models are in gb, gA and gs: quotients.h */
+    int squares;          /* whether functions have quotients, with models in gb, gA and gs: quotients.h */
     double *aE, *HN, *HD, *bN, *bD, *wN, *wD; /* (n), HN and HD: (n, n) */
 } Box;
 
-/* Lays a box with E rows over memory. */
+/* Allocates a box with E rows in the working memory. */
 static Box lay_box(int variables, size_t E, Room *room)
 {
     Box x = {.n = variables};
@@ -47,7 +47,7 @@ static Box lay_box(int variables, size_t E, Room *room)
     return x;
 }
 
-/* Size of all terms of a form of second order. */
+/* Sum of the absolute values of all terms of a second-order form. */
 static double size_of_row(const Box *x, int r)
 {
     int n = x->n;
@@ -59,8 +59,8 @@ static double size_of_row(const Box *x, int r)
     return size;
 }
 
-/* The gradient is made small in the variables from number first on; rounding errors are those of the gradients' forms, or
- * of the values: multipliers in tests/reference/numpy_engine/quadratic_models.py. */
+/* Multipliers that make the gradient small in the variables from index first on; rounding errors come from the gradients'
+ * forms, or from the values: multipliers in tests/reference/numpy_engine/quadratic_models.py. */
 static void choose_multipliers(Box *x, const int *equation, int first)
 {
     int n = x->n, J = x->J, R = x->R, m = x->is_second ? 1 : n;
@@ -81,7 +81,7 @@ static void choose_multipliers(Box *x, const int *equation, int first)
     memcpy(x->left, x->gb, (size_t)n * sizeof(double));
     for (int round = 0; round < (R > 1 ? MULTIPLIER_ROUNDS : 0); round++)
         for (int r = 1; r < R; r++) {
-            /* A condition that follows from others has no weight: 2 in the place of whether it is an equation. */
+            /* A redundant condition has no weight; its mark is 2 instead of 0 or 1. */
             if (!(x->size[r] > 0 && x->size[r] < INFINITY && (r < J || x->hi[r] >= 0)) || equation[r] == 2)
                 continue;
             double product = 0.0, weight = x->weights[r];
@@ -110,7 +110,7 @@ static void choose_multipliers(Box *x, const int *equation, int first)
             x->weights[r] = r == 0;
 }
 
-/* One variable's part of a model, from the parts of a gradient's form and the size of what cancelled in them:
+/* One variable's part of a model, from a gradient's form and the absolute values of terms that cancelled in it:
  * integral in tests/reference/numpy_engine/quadratic_models.py. */
 static double finish_model(double *b, double *w, double *low, double *high, double across, double p, double q, double s,
                            double size)
@@ -124,7 +124,7 @@ static double finish_model(double *b, double *w, double *low, double *high, doub
     return lost;
 }
 
-/* Weighted sum of the rows: an upper model, whose remainder is constant in forms of second order. */
+/* Upper model of the weighted sum of the rows; with second-order forms its remainder is constant. */
 static void combine(Box *x)
 {
     int n = x->n, R = x->R;
@@ -159,7 +159,7 @@ static void combine(Box *x)
             across += fabs(H[j]);
         x->qb[i] = b, x->qlo[i] = low, x->qhi[i] = high;
         lost += finish_model(x->qb + i, x->qw + i, x->qlo + i, x->qhi + i, across, p, q, s, x->is_second ? largest : 0.0);
-        if (x->squares) { /* the linear part is that of an upper model: the slopes are in the other enclosure alone */
+        if (x->squares) { /* the linear part belongs to an upper model; only the other enclosure has the slopes */
             double margin = 64 * ULP * (fabs(b) + across + q - p + s) + TINY;
             x->qlo[i] = low - margin, x->qhi[i] = high + margin;
         }
@@ -170,11 +170,11 @@ static void combine(Box *x)
             x->H[i * n + j] = x->H[j * n + i] = 0.5 * (x->H[i * n + j] + x->H[j * n + i]);
 }
 
-/* Largest linear t + 1/2 quadratic t^2 for t in [0, 1], linear not negative. */
+/* Maximum of linear t + 1/2 quadratic t^2 for t in [0, 1]; linear is not negative. */
 static double largest_of(double linear, double quadratic)
 {
     if (quadratic < 0 && linear < -quadratic)
-        return linear * (linear / (-2 * quadratic)); /* in this order: the square may underflow */
+        return linear * (linear / (-2 * quadratic)); /* tested first, as the square may underflow */
     return linear + 0.5 * quadratic;
 }
 

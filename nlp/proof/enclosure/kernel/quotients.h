@@ -1,4 +1,4 @@
-/* Functions that are sums of squared quotients: their models from those of N and D.
+/* Models of sums of squared quotients N^2 / D from models of N and D.
  * Reference in NumPy: tests/reference/numpy_engine/squared_quotients.py. */
 #ifndef QUOTIENTS_H
 #define QUOTIENTS_H
@@ -8,14 +8,14 @@
 #define SUM (64 * ULP)
 #define LEAST 1e-20 /* tests/reference/numpy_engine/squared_quotients.py */
 
-/* The model c + b e + 1/2 e'He +- w |e| +- s of one row, with its ends over the box. */
+/* Model c + b e + 1/2 e'He +- w |e| +- s of one row, with its range over the box. */
 typedef struct {
     double c, s, lo, hi;
     const double *slope_lo, *slope_hi;
     double *b, *w, *H;
 } RowModel;
 
-/* From the form of the row's gradient. */
+/* Reads the model from the form of the row's gradient. */
 static void read_row(const Box *x, int r, RowModel *to)
 {
     int n = x->n;
@@ -43,7 +43,7 @@ static void gradient_factor(const RowModel *N, const RowModel *D, int n, int i, 
     *low = INFINITY, *high = -INFINITY;
     for (int end = 0; end < 2; end++) {
         double r = end ? r_hi : r_lo, size = fabs(r), across = 0.0;
-        /* A gradient's terms of second order lie in [p, q]; w is at least (q - p) / 6, and b has (p + q) / 6 in it. */
+        /* A gradient's second-order terms lie in [p, q]; w is at least (q - p) / 6, and b includes (p + q) / 6. */
         double b = 2 * N->b[i] - r * D->b[i], w = 5 * (2 * N->w[i] + size * D->w[i]);
         double terms = 2 * fabs(N->b[i]) + size * fabs(D->b[i]) + w;
         for (int j = 0; j < n; j++) {
@@ -71,7 +71,7 @@ static void product(double r_lo, double r_hi, double g_lo, double g_hi, int sign
     *low = sign > 0 ? least : -most, *high = sign > 0 ? most : -least;
 }
 
-/* Ends of the r for which sign r^2 D can be at least a value. */
+/* Range of the r for which sign r^2 D can be at least a value. */
 static void where_it_matters(double *r_lo, double *r_hi, const RowModel *D, int sign, double least)
 {
     if (sign < 0) {
@@ -87,7 +87,7 @@ static void where_it_matters(double *r_lo, double *r_hi, const RowModel *D, int 
     *r_lo = low, *r_hi = high;
 }
 
-/* N and D, r = N / D over the box, and what models of the quotient are made of:
+/* N and D, r = N / D over the box, and intermediate results for models of the quotient:
  * _Ratio in tests/reference/numpy_engine/squared_quotients.py. */
 typedef struct {
     RowModel N, D;
@@ -161,7 +161,7 @@ static void add_square(Box *x, const Ratio *ratio, int j, int sign)
     x->q[j] += 0.5 * whole * (1 + SUM);
 }
 
-/* Adds the ends of a quotient's gradient to row j; those that are not times a radius are for points that matter. */
+/* Adds the ends of a quotient's gradient to row j; ends without the factor radius are for relevant points only. */
 static void add_slopes(Box *x, const Ratio *ratio, int j, int sign, const double *least)
 {
     int n = x->n;

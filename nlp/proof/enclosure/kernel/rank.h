@@ -6,8 +6,8 @@
 #include <Python.h>
 #include "values.h"
 
-/* Part of the sum of the sizes of all terms by which a computed sum of products may be off: fewer than 900 roundings, those
- * of the middles among them. A sum has as many as the matrix has rows, and a few. */
+/* Rounding error of a computed sum of products, relative to the sum of the absolute values of all terms: fewer than 900
+ * roundings, including those of the middles. A sum has about as many roundings as the matrix has rows. */
 #define PRODUCTS 1e-13
 #define MOST_ROWS 800
 #define RANK_POWERS 12
@@ -18,9 +18,9 @@ typedef struct {
     const double *scale; /* (entries) powers of two */
 } Matrix;
 
-/* Forms of the entries: middle + terms e + [-rest, rest]. The coordinates come first, the errors of joint centres last:
- * three of each, which are a vector of at most unit length. Of the middles M0 of whole matrices, scaled, there is a left
- * inverse C, NaN without one, and a bound of |I - C M0|. */
+/* Forms of the entries: middle + terms e + [-rest, rest]. Coordinates come first, joint-centre errors last: three for each
+ * centre, a vector of norm at most 1. C is a left inverse of the scaled matrix of middles M0, NaN without one; off is a
+ * bound of |I - C M0|. */
 typedef struct {
     int terms, coordinates, errors;
     const double *inverse, *off;  /* (B, columns, rows), (B, columns, columns) */
@@ -30,14 +30,15 @@ typedef struct {
     Py_ssize_t B;
 } Ranks;
 
-/* Parts of LANES boxes, and of one of them. */
+/* Working memory for LANES boxes, and for one of them. */
 typedef struct {
     Lane *C, *bound, *linear, *row, *squares, *rest, *size, *terms;
     int *is_term; /* (entries, terms) whether a term differs from 0 in one of the boxes */
     double *B, *v, *w;
 } RankParts;
 
-/* Whether a vector shows that the spectral radius of a nonnegative matrix (c, c) is below 1; writes the vector. */
+/* Returns whether a positive vector proves that the spectral radius of a nonnegative matrix (c, c) is below 1; writes the
+ * vector. */
 static int is_contracting(const double *B, int c, double *v, double *w)
 {
     for (int i = 0; i < c; i++)
@@ -76,7 +77,7 @@ static RankParts lay_parts(const Matrix *m, const Ranks *found, Room *room)
     return x;
 }
 
-/* Reads boxes from number start on: what belongs to their middles, and the scaled forms with the sizes of what moves. */
+/* Reads boxes from index start on: inverses and bounds at their middles, scaled forms, and absolute sums of their terms. */
 WIDE static void read_forms(const Matrix *m, const Ranks *found, Py_ssize_t start, RankParts x)
 {
     Py_ssize_t B = found->B, count = B - start < LANES ? B - start : LANES, c = m->columns, places = c * m->rows;
@@ -102,7 +103,7 @@ WIDE static void read_forms(const Matrix *m, const Ranks *found, Py_ssize_t star
     }
 }
 
-/* Adds the parts of |I - C M| that move with the coordinates and the errors, and what is left. */
+/* Adds to the bound of |I - C M| the parts that vary with the coordinates and the errors, and the remainders. */
 WIDE static void add_moving(const Matrix *m, const Ranks *found, RankParts x)
 {
     int rows = m->rows, c = m->columns, T = found->terms, first = T - found->errors;
@@ -125,7 +126,7 @@ WIDE static void add_moving(const Matrix *m, const Ranks *found, RankParts x)
             }
             for (int j = 0; j < c; j++) {
                 double *row = x.row[j], *squares = x.squares[j];
-                int part = t < first ? -1 : (t - first) % 3; /* of an error */
+                int part = t < first ? -1 : (t - first) % 3; /* component of an error */
                 if (part < 0)
                     EACH bound[j][l] += fabs(row[l]);
                 else
@@ -139,7 +140,8 @@ WIDE static void add_moving(const Matrix *m, const Ranks *found, RankParts x)
     }
 }
 
-/* Whether the matrix surely has full rank in the box of lane l; if not, the shares of the coordinates in the bound. */
+/* Returns whether the matrix provably has full rank in the box of lane l; if not, writes the shares of the coordinates in
+ * the bound. */
 static int judge_lane(const Matrix *m, const Ranks *found, int l, RankParts x, double *shares)
 {
     int c = m->columns;
@@ -159,7 +161,7 @@ static int judge_lane(const Matrix *m, const Ranks *found, int l, RankParts x, d
     return good;
 }
 
-/* Judges boxes, whose shares are 0 at first; without memory, what they need of it is counted only. */
+/* Tests boxes, with shares set to 0 before; without memory, only counts the memory that is needed. */
 static void rank_all(const Matrix *m, Ranks *found, Room *room)
 {
     RankParts parts = lay_parts(m, found, room);

@@ -6,7 +6,7 @@
 #include <Python.h>
 #include "forms.h"
 
-/* A tape and memory in which it runs over LANES boxes: registers and results, the boxes, and the terms of an operation. */
+/* A tape, and its memory for LANES boxes: registers and results, the boxes, and the terms of an operation. */
 typedef struct {
     const Tape *tape;
     int n, order;
@@ -14,7 +14,7 @@ typedef struct {
     Lane *box[4], *terms; /* centre, radius, lower and upper ends; terms */
 } Run;
 
-/* Lays a run over memory. */
+/* Allocates a run in the working memory. */
 static Run prepare(const Tape *tape, int n, int order, Room *room)
 {
     size_t terms = terms_of_order(n, order), stride = sizeof(Value) / sizeof(double) + terms * LANES;
@@ -27,8 +27,8 @@ static Run prepare(const Tape *tape, int n, int order, Room *room)
     return x;
 }
 
-/* Runs a tape over LANES of B boxes with these ends, of numbers list[start], list[start + 1], ... or, without a list, from
- * number start on; the last one before finish again where there are fewer. */
+/* Runs a tape over LANES of B boxes with these ends, with indices list[start], list[start + 1], ... or, without a list,
+ * from index start on; if there are fewer boxes, the last one before finish is repeated. */
 static void run_block(const Run *x, const double *lower, const double *upper, Py_ssize_t B, const Py_ssize_t *list,
                       Py_ssize_t start, Py_ssize_t finish)
 {
@@ -50,12 +50,12 @@ static void run_block(const Run *x, const double *lower, const double *upper, Py
 /* Forms middle + a e + [-rest, rest] of a tape's results over B boxes. */
 typedef struct {
     const double *lower, *upper; /* (n, B) */
-    double *middle, *a, *rest;   /* (R, B), a: (R, n, B), or (R, n + n (n + 1) / 2, B) for forms of second order */
+    double *middle, *a, *rest;   /* (R, B), a: (R, n, B), or (R, n + n (n + 1) / 2, B) for second-order forms */
     Py_ssize_t B;
     int order;
 } Forms;
 
-/* Writes forms; without memory, what is needed of it is counted only. */
+/* Writes forms; without memory, only counts the memory that is needed. */
 static void enclose_all(const Tape *tape, int n, const Forms *found, Room *room)
 {
     Py_ssize_t B = found->B;

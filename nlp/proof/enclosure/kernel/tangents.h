@@ -1,4 +1,4 @@
-/* Tangents to squares over a box: forms of second order of functions that take squared quotients away.
+/* Tangents to squares over a box: second-order forms of functions with negative squared quotients.
  * Reference in NumPy: tests/reference/numpy_engine/tangent_bounds.py. */
 #ifndef TANGENTS_H
 #define TANGENTS_H
@@ -9,7 +9,7 @@
 
 static int rows_of_tangents(const Form *form) { return form->tangents ? form->functions + 2 * form->tangents : 0; }
 
-/* Value of a form of second order at e, apart from its remainder. */
+/* Value of a second-order form at e, without its remainder. */
 static double value_of_row(const Box *x, int r, const double *e)
 {
     int n = x->n;
@@ -36,8 +36,8 @@ static void add_row(Box *x, int to, int from, double weight)
         x->gA[to * n * n + i] += x->gA[from * n * n + i] * weight;
 }
 
-/* A point of the box, in parts of its radii, at which the sum of N^2 / D of a function is small: N by its linear form,
- * D that of the centre. */
+/* A point of the box, relative to its radii, with a small sum of N^2 / D of a function: N by its linear form, D at the
+ * centre. */
 static void find_low_point(const Form *form, Box *x, int function, double *e)
 {
     int n = x->n, first = form->expressions + x->J;
@@ -62,7 +62,7 @@ static void find_low_point(const Form *form, Box *x, int function, double *e)
         }
 }
 
-/* Replaces the rows of the functions by those with tangents; returns whether it could: not where some D may be 0. */
+/* Replaces the rows of the functions by rows with tangents; returns 0, without a change, if some D may be 0. */
 static int take_tangents(const Form *form, Box *x)
 {
     int n = x->n, J = x->J, R = form->expressions;
@@ -85,7 +85,7 @@ static int take_tangents(const Form *form, Box *x)
             if (form->squared[k] != j)
                 continue;
             double D = value_of_row(x, N + 1, x->t), ratio = D > 0 ? value_of_row(x, N, x->t) / D : 0.0;
-            ratio = fabs(ratio) > 1 / LARGEST && fabs(ratio) < LARGEST ? ratio : 0.0; /* any ratio gives a bound */
+            ratio = fabs(ratio) > 1 / LARGEST && fabs(ratio) < LARGEST ? ratio : 0.0; /* any ratio gives a valid bound */
             add_row(x, j, N, -2 * ratio);
             add_row(x, j, N + 1, ratio * ratio);
         }

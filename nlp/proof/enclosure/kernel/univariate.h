@@ -29,7 +29,7 @@ static Rule rule_of(int op, double c, double lo, double hi)
 {
     Rule r = {NAN, NAN, 0.0, NAN, NAN, NAN, 0.0, NAN, NAN};
     lo = smaller(lo, c), hi = larger(hi, c);
-    if (op == SQRT && lo >= 0) { /* below 0 it stays NaN: smaller and larger would lose a NaN of least alone */
+    if (op == SQRT && lo >= 0) { /* below 0 all results stay NaN: smaller and larger would drop a NaN of least */
         double root = sqrt(c), low = sqrt(lo), high = sqrt(hi), slope = 0.5 / root;
         r.value = root, r.slope = slope, r.curve = -0.25 * slope / c, r.error = OFF * root;
         r.least = -slope / ((low + root) * (low + root)), r.most = -slope / ((high + root) * (high + root));

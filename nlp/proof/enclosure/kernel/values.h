@@ -20,7 +20,7 @@
 #define ULP 0x1p-51
 #define TINY 1e-300
 #define LARGEST 1e150 /* tests/reference/numpy_engine/intervals.py */
-#define TIE 1e-6 /* part by which sizes may differ and count as the same: models/arrays.py */
+#define TIE 1e-6 /* relative difference of sizes that count as the same: models/arrays.py */
 
 enum { CONSTANT, INPUT, OUTPUT, ADD, SUB, MUL, DIV, SHIFT, SCALE, SQUARE, SQRT, SIN, COS, EXP, LOG, ATAN, RAMP, STEP };
 
@@ -34,19 +34,19 @@ typedef struct {
 
 typedef struct {
     int n, functions, expressions; /* R expressions, the functions first, then the conditions */
-    const int *equation;      /* (R) 1 where it must be 0, 2 where it has no weight */
-    const int *depends;       /* (R, n) whether it depends on a variable */
+    const int *equation;      /* (R) 1 if it must be 0, 2 if it has no weight */
+    const int *depends;       /* (R, n) whether each expression depends on each variable */
     const double *low, *high; /* (n) ends of the whole box */
     int quotients;       /* terms sign N^2 / D of functions: the rows after the expressions are N and D of each */
     const int *whose;    /* (quotients, 2) function and sign */
     int tangents;        /* terms -N^2 / D of functions that tangents may replace: tangents.h */
-    const int *squared;  /* (tangents) function of each; the values have a rest of each function and N and D behind */
+    const int *squared;  /* (tangents) function of each; values then has a remaining part of each function, and N and D */
     Tape tape;   /* the rows and their derivatives */
-    Tape values; /* the expressions alone, and the rows for tangents; without instructions where forms of second order are not used */
-    Tape objective; /* the functions and their derivatives; without instructions where all are evaluated at once */
+    Tape values; /* the expressions without derivatives, and the rows for tangents; empty if second-order forms are not used */
+    Tape objective; /* the functions and their derivatives; empty if all rows are evaluated together */
 } Form;
 
-/* Memory that is laid out in parts, all 0 at first; without an address they are counted only. */
+/* Working memory that is given out in parts, all 0 at first; without an address, parts are only counted. */
 typedef struct {
     double *at;
     size_t used;

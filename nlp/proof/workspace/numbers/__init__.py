@@ -1,10 +1,8 @@
-"""Proven smallest and largest values of numbers over a workspace.
+"""Proved smallest and largest values of quantities over a workspace.
 
-The modules import each other in this order: ``bound_search`` (the search of numbers over boxes), ``extremes`` (verdicts
-on claims, and the certificate's search); ``expressions`` (of all machines), ``jacobian_numbers`` (singular values and
-the worst error of the pose to first order), ``clearance`` (of legs), ``quadratic_forms`` (numbers of second order) and
-``motors`` (forces, speeds and powers of actuators); ``searched`` (claims about all but the second of these),
-``strokes`` (claims that follow from lengths of legs), ``pose_error`` (the whole errors of the pose);
-``second_order_change`` (bounds of second derivatives by errors of joint centres), ``machines`` (claims about every
-machine within a tolerance).
+The modules import each other in this order: ``bound_search`` (branch and bound over boxes of poses), ``extremes``
+(verdicts by the search of ``certify``); quantities: ``expressions``, ``jacobian_numbers`` (singular values, first-order
+pose error), ``clearance`` (of legs), ``quadratic_forms`` and ``motors`` (actuator forces, speeds and powers);
+``searched`` (claims by branch and bound), ``strokes`` (claims from leg lengths), ``pose_error`` (full pose errors);
+``second_order_change`` and ``within_tolerance`` (claims about every robot within the tolerance).
 """

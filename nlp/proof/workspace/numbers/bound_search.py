@@ -1,8 +1,8 @@
-"""Smallest values of numbers of a robot over a workspace, from bounds of them over boxes: bisection.
+"""Branch and bound for the smallest values of quantities of a robot over a workspace.
 
-A :class:`Number` has lower bounds over boxes, and values at points. A value at a point is an upper bound of the
-smallest one; proofs rest on the bounds alone. One number is searched with the boxes of the smallest bounds first.
-Several with limits share one cover by boxes: following closed loops there costs more than bounds of numbers.
+A :class:`Number` has lower bounds over boxes, and values at points. Values at points only tell where to search; proofs
+use the bounds. For one quantity, boxes with the smallest bounds are bisected first. Several quantities with limits
+share one cover of boxes, as closing the loops over boxes takes longer than bounding quantities.
 """
 
 from __future__ import annotations
@@ -38,38 +38,43 @@ from ..robot.posed_robot import Problem
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Number of boxes examined at once, and number of those with the smallest bounds at which values are computed.
+#: Number of boxes examined at once, and number of boxes with the smallest bounds at which values are computed.
 _BLOCK, _TRIED = 256, 8
-#: Part of the largest value known below which gaps are parts of this one.
+#: Part of the largest known absolute value below which gaps are relative to this part.
 _NEAR_ZERO = 1e-6
-#: Random points from which the search of a small value begins, steps from the best of them, and points in each step.
+#: Number of random points at the start of the search for small values, of steps from the best one, and points per step.
 _POINTS, _STEPS, _AROUND = 256, 24, 32
-#: Factor of the size of steps from one to the next.
+#: Factor of the step size from one step to the next.
 _SHRINK = 0.7
 _SEED = 0
-#: Part of itself by which a value may be off by rounding: the first of several that are the same is taken.
+#: Relative difference of values that counts as rounding; the first of equal values is taken.
 _TIE = 1e-11
 
 
 class Bounds(NamedTuple):
-    """Lower bounds (B, K) over boxes, -inf without one, and the shares (B, K, f) of coordinates in their slack."""
+    """Lower bounds of K quantities over B boxes.
+
+    Attributes:
+        lower: (B, K) lower bounds; -inf without one.
+        shares: (B, K, f) shares of the coordinates in the overestimation.
+    """
 
     lower: FloatArray
     shares: FloatArray
 
 
 class Number(ABC):
-    """K numbers of a robot whose smallest values are looked for: a test of boxes, and values at points.
+    """K quantities of a robot for branch and bound: lower bounds over boxes, and values at points.
 
     Args:
-        problem: the design, or all machines that are meant.
-        entries: (E, 1) expressions of its coordinates whose forms give bounds.
-        count: K.
+        problem: the design, or all robots within the tolerance.
+        entries: (E, 1) expressions of the problem's coordinates; bounds are computed from their forms.
+        count: number K of quantities.
 
     Attributes:
-        problem, entries, count: as given.
-        unknown: (K,) bounds over a box of which nothing is known.
-        levels: (K,) bounds from which on a number has no part in where boxes are bisected.
+        problem, entries, count: the arguments.
+        unknown: (K,) bounds over a box without a known bound.
+        levels: (K,) bounds above which a quantity does not influence the bisection.
     """
 
     def __init__(self, problem: Problem, entries: SX, count: int = 1) -> None:
@@ -81,26 +86,26 @@ class Number(ABC):
         """Return lower bounds over B boxes.
 
         Args:
-            forms: of the entries.
-            count: number f of the first terms, which are the independent coordinates. The last terms are the errors of
-                joint centres; those between are products of two coordinates.
+            forms: forms of the entries.
+            count: number f of independent coordinates, whose terms come first. Products of two coordinates follow, then
+                joint-centre errors.
         """
 
     @abstractmethod
     def values(self, z: FloatArray) -> FloatArray:
-        """Return the values (P, K) at closed points (P, n)."""
+        """Return the values (P, K) at points (P, n) with closed loops."""
 
     @cached_property
     def examiner(self) -> Examiner:
-        """The examination of boxes by bounds of the numbers, which are the ``smallest`` of its results.
+        """Examiner of boxes; ``smallest`` of its results are the bounds of the quantities.
 
         Raises:
-            UncoveredError: an expression holds an operation without a rule.
+            UncoveredError: an expression has an operation without an interval rule.
         """
         return Examiner(self.problem, self)
 
-    def examine(self, forms: Forms, f: int, errors: int) -> Tested:  # noqa: ARG002 - they are those of the problem
-        """Return the lower bounds (B, K) of boxes; none is regular."""
+    def examine(self, forms: Forms, f: int, errors: int) -> Tested:  # noqa: ARG002 - the problem has them
+        """Return the lower bounds (B, K) of boxes; no box counts as regular."""
         lower, shares = self.over(forms, f)
         shares = np.nan_to_num(shares, posinf=0.0)
         shares /= np.maximum(shares.sum(axis=2, keepdims=True), np.finfo(float).tiny)
@@ -113,25 +118,25 @@ class Number(ABC):
         return self.examiner.examine(LoopBoxes(*ends, ends[0], np.ones(len(lower), dtype=bool))).smallest
 
     def near(self, boxes: LoopBoxes, which: NDArray[np.intp]) -> FloatArray:  # noqa: ARG002 - for numbers with slopes
-        """Return points (S, P, n) at which number ``which[k]`` may be small in box k of P, closed or NaN."""
+        """Return points (S, P, n) at which quantity ``which[k]`` may be small in box k of P; NaN with open loops."""
         return self.closed(boxes.centre)[None]
 
     def closed(self, z: FloatArray) -> FloatArray:
-        """Return points (P, n) with closed loops near points; one that does not close is NaN."""
+        """Return points (P, n) with closed loops near given points; NaN where the loops do not close."""
         return self.problem.loops.all_closed(z.T, list(self.problem.dependent)).T if self.problem.dependent else z
 
 
 class Minimum(NamedTuple):
-    """The smallest value of a number over a workspace.
+    """Smallest value of a quantity over a workspace.
 
     Attributes:
-        bound: proven: no pose, and no machine that is meant, has a smaller value; -inf where nothing is proved.
-        value: the smallest value known; infinite without one.
-        at: coordinates of the point that has it.
-        boxes, open: number of boxes examined, and of boxes left.
+        bound: proved lower bound over all poses and all robots within the tolerance; -inf without one.
+        value: smallest known value; infinite without one.
+        at: coordinates of the point with this value.
+        boxes, open: number of examined boxes, and of open boxes at the end.
         seconds: wall time.
-        reason: for stopping before the gap was met; else empty.
-        place: segment of a path, and its parameter, of the point that has the value; None for a workspace.
+        reason: reason for a search that stopped before the gap was reached; else empty.
+        place: place on a path of the point with this value; None for a box of poses.
     """
 
     bound: float = -math.inf
@@ -145,14 +150,14 @@ class Minimum(NamedTuple):
 
 
 class Goal(NamedTuple):
-    """The bound that a search of a smallest value is to reach.
+    """Goal of a search for a smallest value.
 
     Attributes:
-        gap: allowed distance of the bound from the smallest value known.
-        part: the same as a part of the value, which is added.
-        limit: a bound of this is enough while no smaller value is known, and not less; None without one.
-        slack: how far a value may be below the limit and still count as on it.
-        is_enough: whether such a bound is enough whatever the gap is.
+        gap: allowed absolute difference between the smallest known value and the bound.
+        part: allowed relative difference, which is added.
+        limit: lower limit of the quantity; the bound must reach it unless a smaller value is known. None without one.
+        slack: violation of the limit that counts as rounding.
+        is_enough: If true, a bound that reaches the limit is sufficient, whatever its gap.
     """
 
     gap: float = 0.0
@@ -177,7 +182,13 @@ class Goal(NamedTuple):
 
 
 class _Best(NamedTuple):
-    """The smallest values (K,) known, infinite without one, the points (K, n) that have them, and places (K, 2)."""
+    """Best known values.
+
+    Attributes:
+        value: (K,) smallest known values; infinite without one.
+        at: (K, n) points with these values.
+        where: (K, 2) places of the points on a path.
+    """
 
     value: FloatArray
     at: FloatArray
@@ -185,15 +196,15 @@ class _Best(NamedTuple):
 
 
 class SmallestValues(LoopRule):
-    """Rule of the smallest values of numbers; boxes carry their bounds.
+    """Rule of branch and bound for the smallest values of quantities; boxes carry their bounds.
 
     Args:
-        number: the numbers.
-        goals: the bounds that are to be reached.
-        recorder: records the boxes for a proof.
+        number: the quantities.
+        goals: goal of each quantity.
+        recorder: recorder of the boxes for a proof.
 
     Raises:
-        UncoveredError: an expression holds an operation without a rule.
+        UncoveredError: an expression has an operation without an interval rule.
     """
 
     def __init__(self, number: Number, goals: Sequence[Goal], recorder: TreeRecord | None = None) -> None:
@@ -210,13 +221,13 @@ class SmallestValues(LoopRule):
             self._start_from_poses()
 
     def _levels(self) -> FloatArray:
-        """Return the bounds (K,) at which boxes are closed: of several numbers those that are enough."""
+        """Return the bounds (K,) at which boxes are closed; of several quantities each must reach its level."""
         known = self._best.value.tolist(), self._sizes.tolist()
         pairs = [goal.levels(*each) for goal, *each in zip(self._goals, *known, strict=True)]
         return np.array(pairs)[:, 1 if len(pairs) > 1 else 0]
 
     def examine(self, boxes: Boxes[Followed]) -> BoxResults[Followed]:
-        """Return bounds of boxes, and take note of small values in them."""
+        """Return bounds of boxes, and update the best known values from points in them."""
         self._number.levels = self._levels()
         found = self.examined(boxes)
         if not self._sizes.all():  # The bounds give a size to a quantity whose known values are all 0.
@@ -228,13 +239,13 @@ class SmallestValues(LoopRule):
         left = some(found, np.flatnonzero(~done))
         width = self.widths(left.boxes)
         widest = width.max(axis=1, keepdims=True, initial=0.0)
-        # Bounds over long and narrow boxes are wide, those of loops above all. A box of a dwell has no width.
+        # Bounds over long and narrow boxes are weak, most of all for loops. The box of a dwell has no width.
         split = coordinates_to_split(left.shares * np.sqrt(width / np.where(widest > 0, widest, 1.0)), width)
         parts = self.boxes_of(left, (-left.smallest).max(axis=1), split, left.smallest)
         return BoxResults(parts, -float(found.smallest[done].min(initial=np.inf)), len(done))
 
     def _try(self, found: Examined) -> None:
-        """Take note of values in the boxes with the smallest bounds of each number."""
+        """Update the best known values in the boxes with the smallest bounds of each quantity."""
         known, count = np.flatnonzero(found.boxes.is_known), len(self._goals)
         if not known.size:
             return
@@ -253,7 +264,7 @@ class SmallestValues(LoopRule):
         self._note(z[inside])
 
     def _start_from_path(self, cover: PathCover) -> None:
-        """Take note of values at the ends of segments; of a robot with dependent coordinates at the first one."""
+        """Update the best known values at ends of segments; with dependent coordinates only at the first point."""
         if self._problem.dependent:
             self._note(self._problem.start[None], np.zeros((1, 2)))
             return
@@ -263,7 +274,7 @@ class SmallestValues(LoopRule):
             )
 
     def _note_on_path(self, cover: PathCover, boxes: LoopBoxes, along: FloatArray) -> None:
-        """Take note of values at the ends and in the middle of pieces of a path, where their boxes are known."""
+        """Update the best known values at the ends and middles of pieces of a path with known boxes."""
         for part in (0.0, 0.5, 1.0):
             z = boxes.near.copy()
             z[:, self._problem.of_path] = self._problem.path_points(cover, along, part)
@@ -272,7 +283,7 @@ class SmallestValues(LoopRule):
             self._note(z[kept], np.stack([along[kept, 0], s[kept]], axis=1))
 
     def _start_from_poses(self) -> None:
-        """Take note of values at random poses and at corners, and near the best of them; without dependent ones."""
+        """Update the best known values at random poses, at corners, and near the best ones."""
         box, free, rng, step = self._problem.box, list(self._problem.free), np.random.default_rng(_SEED), 0.3
         sides = np.array(np.meshgrid(*[[0, 1]] * 6)).reshape(6, -1).T
         points = np.concatenate([box.random(_POINTS, rng), box.clipped(box.lower + sides * (box.upper - box.lower))])
@@ -286,7 +297,7 @@ class SmallestValues(LoopRule):
             points = box.clipped(y + step * (box.upper - box.lower) * rng.normal(size=(_AROUND, 6)))
 
     def _note(self, z: FloatArray, where: FloatArray | None = None) -> None:
-        """Take note of the values at points (P, n), and of their places (P, 2) on a path."""
+        """Update the best known values at points (P, n) with places (P, 2) on a path."""
         if not len(z):
             return
         known, at, places = self._best
@@ -302,8 +313,8 @@ class SmallestValues(LoopRule):
             self._best = _Best(np.where(better, least, known), np.where(better[:, None], z[first], at), places)
 
     def is_one_assembly(self) -> bool:
-        """Return whether all boxes surely have the assembly of the middle, or of the first point of a path."""
-        # A path may come back to a pose with other joints, such as those that have turned all round.
+        """Return whether all boxes are provably in the assembly mode of the start of the search."""
+        # A path may return to a pose in another assembly mode, for example after full turns of joints.
         if not self._roots or self._problem.cover is not None:
             return super().is_one_assembly()
         roots, start = joined(self._roots), self._problem.start
@@ -312,7 +323,7 @@ class SmallestValues(LoopRule):
         return bool((same | ~here).all()) and super().is_one_assembly()
 
     def minima(self) -> list[Minimum]:
-        """Search the workspace; return the smallest value of each number."""
+        """Search the workspace; return the smallest value of each quantity."""
         effort, is_one = Effort(), len(self._goals) == 1
         search = self.search(Order.LARGEST if is_one else Order.NEWEST)
 
@@ -328,7 +339,7 @@ class SmallestValues(LoopRule):
         if self._problem.cover is None and np.isfinite(bounds).any() and not self.is_one_assembly():
             reason, bounds = APART, np.full(len(bounds), -np.inf)
         elif until < (math.inf, 0.0):
-            # Joints beyond may be those of another assembly, and so are numbers.
+            # Boxes beyond may be in another assembly mode, with other values.
             reason, bounds = reason or APART, np.full(len(bounds), -np.inf)
             is_beyond = [tuple(where) > until for where in self._best.where.tolist()]
             values = np.where(is_beyond, np.inf, values)
@@ -343,16 +354,16 @@ class SmallestValues(LoopRule):
 
 
 def smallest_values(number: Number, goals: Sequence[Goal], recorder: TreeRecord | None = None) -> list[Minimum]:
-    """Prove the smallest values of numbers of a robot over its poses.
+    """Prove the smallest values of quantities of a robot over its poses.
 
     Args:
-        number: K numbers.
-        goals: K bounds that are to be reached.
-        recorder: records the boxes for a proof, without dependent coordinates; every leaf has a bound of at least that
-            of the result.
+        number: K quantities.
+        goals: goal of each quantity.
+        recorder: recorder of the boxes for a proof, without dependent coordinates. The bound of every leaf is at least
+            the bound of the result.
 
     Raises:
-        UncoveredError: an expression holds an operation without a rule.
+        UncoveredError: an expression has an operation without an interval rule.
     """
     with one_search():
         return SmallestValues(number, goals, recorder).minima()

@@ -1,11 +1,11 @@
-"""Bounds of the distance between two legs over boxes of poses: legs as line segments between their joints.
+"""Bounds of the distance between two legs over boxes of poses; legs are line segments between their joint centres.
 
-For a unit vector n the distance of two segments is at least the least of ``n.(x - y)`` over their ends x and y: a plane
-normal to n separates them. With n between the nearest points at the middle of a box, the bound differs from the
+For a unit vector n, the distance of two segments is at least the smallest ``n.(x - y)`` over their end points x and y:
+a plane normal to n separates them. With n between the nearest points at the middle of a box, the bound differs from the
 distance by a term of second order in the width of the box.
 
-Where every joint centre may be off by a tolerance, so may every point of a leg, and the least distance is smaller by
-twice the tolerance: that of two legs that are moved towards each other.
+Within a joint-centre tolerance, every point of a leg may be off by the tolerance, so the distance is smaller by at most
+twice the tolerance.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from casadi import SX
 
 from .....models.arrays import FloatArray, values_at
 from ...enclosure.forms import Forms
-from ...statement.machine import Legs
+from ...statement.fixed_robot import Legs
 from ..robot.pose_box import polynomial_rotation
 from ..robot.posed_robot import Problem, steepest
 from .bound_search import Bounds, Number
 
-#: Part of the sum of the sizes of all terms by which a bound is moved outwards: rounding.
+#: Outward shift of a bound, relative to the sum of the absolute values of all terms, for rounding.
 _ROUNDING = 1e-13
-#: Part of the squared lengths below which lines count as parallel; the distance found is then too large by little.
+#: Relative size below which lines count as parallel; the computed distance is then slightly too large.
 _PARALLEL = 1e-12
 
 
@@ -37,8 +37,8 @@ class Clearance(Number):
 
     Args:
         problem: the robot.
-        legs: joint centres of its legs, with the tolerance that is meant.
-        places: those of the two legs.
+        legs: joint centres of the legs, with the tolerance.
+        places: indices of the two legs.
     """
 
     def __init__(self, problem: Problem, legs: Legs, places: Sequence[int]) -> None:
@@ -57,7 +57,7 @@ class Clearance(Number):
         return np.asarray(np.maximum(distances - self._nearer, 0.0))
 
     def between(self, z: FloatArray) -> FloatArray:
-        """Return the vectors (P, 3) from the nearest point of the second leg to that of the first."""
+        """Return the vectors (P, 3) from the nearest point of the second leg to the nearest point of the first."""
         return _between(values_at(self._ends, z[:, : len(self.problem.free)])[0][:, :, 0])
 
     def worst(self, y: FloatArray) -> FloatArray | None:
@@ -69,7 +69,7 @@ class Clearance(Number):
         signs[list(self._places)] = -1.0, 1.0
         both = np.concatenate([between, between @ self.problem.box.pose(y).rotation])
         errors = steepest(signs[:, None, None] * both, self._legs.tolerance).reshape(-1, 3)
-        # Legs that the whole errors would move through each other touch with a part of them.
+        # If the full errors would move the legs through each other, a part of the errors makes them touch.
         return min(1.0, float(np.linalg.norm(between)) / self._nearer) * errors
 
     def over(self, forms: Forms, count: int) -> Bounds:
@@ -80,7 +80,7 @@ class Clearance(Number):
         n = np.divide(between, size * (1 + 1e-15), out=np.zeros_like(between), where=size > 0)
         bounds, falls = [], []
         for one, other in itertools.product((0, 1), (2, 3)):
-            # n.(x - y) times the scale, less its middle times the scale.
+            # n.(x - y) times the scale, minus its middle times the scale.
             along = np.einsum("bk,bkt->bt", n, moved[:, one] - moved[:, other])
             middle = (n * (ends[:, one] - ends[:, other])).sum(axis=1)
             fall = np.abs(along).sum(axis=1) + (np.abs(n) * (rest[:, one] + rest[:, other])).sum(axis=1)
@@ -109,12 +109,12 @@ def _ends_over(forms: Forms) -> tuple[FloatArray, FloatArray, FloatArray, tuple[
     """Return the ends of two legs over B boxes.
 
     Args:
-        forms: of the entries of a clearance.
+        forms: forms of the entries of a clearance.
 
     Returns:
-        (B, 4, 3) ends m in the middle; (B, 4, 3, t) terms of the ends times the scale less m times the scale; (B, 4, 3)
-        rests of the ends times the scale; (B,) smallest values and (B,) rests of the scale; (B,) by which computed
-        distances may be off, infinite where nothing is known.
+        (B, 4, 3) ends m in the middle; (B, 4, 3, t) terms of the ends times the scale minus m times the scale;
+        (B, 4, 3) remainders of the ends times the scale; (B,) smallest values and (B,) remainders of the scale; (B,)
+        rounding errors of computed distances, infinite where no form is known.
     """
     known = np.isfinite(forms.c).all(axis=1) & np.isfinite(forms.r).all(axis=1)
     c, a, r = (np.where(known.reshape(-1, *[1] * (each.ndim - 1)), each, 1.0) for each in forms)
@@ -128,7 +128,7 @@ def _ends_over(forms: Forms) -> tuple[FloatArray, FloatArray, FloatArray, tuple[
 
 
 def _shares(falls: FloatArray, count: int) -> FloatArray:
-    """Return the share (B, f) of each coordinate in terms (B, t): its own, and half of each product with it, if any."""
+    """Return the share (B, f) of each coordinate in terms (B, t): its linear term, and half of each of its products."""
     shares, pairs = falls[:, :count].copy(), itertools.combinations_with_replacement(range(count), 2)
     for k, (i, j) in zip(range(count, falls.shape[1]), pairs, strict=False):
         shares[:, [i, j]] += 0.5 * falls[:, [k]] * (2 if i == j else 1)
@@ -136,7 +136,7 @@ def _shares(falls: FloatArray, count: int) -> FloatArray:
 
 
 def _between(ends: FloatArray) -> FloatArray:
-    """Return the vectors (K, 3) from the nearest point of the second of two segments (K, 12) to that of the first."""
+    """Return the vectors (K, 3) between the nearest points of two segments (K, 12), from the second to the first."""
     p, end, q, other = ends.reshape(-1, 4, 3).transpose(1, 0, 2)
     d, e, r = end - p, other - q, p - q
     a, b, c = (d * d).sum(axis=1), (d * e).sum(axis=1), (e * e).sum(axis=1)

@@ -1,13 +1,12 @@
-"""Smallest values of expressions over all machines within a tolerance, or of the design alone, at every pose.
+"""Lower bounds of expressions over poses, for the design or for all robots within the tolerance.
 
-Over a box of poses, and for all machines, an expression has a form ``g + a e_I + b e_D + d e_E + [-r, r]``. With the
-dependent coordinates replaced by their relation, no machine at a pose of the box has a smaller value than
+Over a box of poses, an expression has a form ``g + a e_I + b e_D + d e_E + [-r, r]`` with errors ``e_E`` of joint
+centres. With the dependent coordinates replaced by their relation, its values are at least
 
     (g + b off) - sum |a - b T| - sum_j |(d - b E)_j| - (r + |b| rho),
 
-where the errors of joint centre j count as one vector. Boxes of poses are bisected; errors never are. Values are those
-of machines whose errors are along the gradient, at the corner of a box. Loops are followed in the assembly of home;
-conditions of a program hold in others too.
+where the errors of joint centre j count as one vector. Only poses are bisected, never errors. Values are taken with
+errors along the gradient, at the corner of a box. Loops are followed in the home assembly mode.
 """
 
 from __future__ import annotations
@@ -25,16 +24,16 @@ from ..ranks.loop_boxes import LoopBoxes
 from ..robot.posed_robot import Problem
 from .bound_search import Bounds, Number
 
-#: Slope, as a part of the largest at a point, that is rounding error.
+#: Slope, relative to the largest one at a point, that counts as rounding error.
 _FLAT = 1e-9
 
 
 def ranges(forms: Forms, errors: int = 0) -> tuple[FloatArray, FloatArray]:
-    """Return lower and upper bounds (B, R) of expressions, infinite where nothing is known.
+    """Return lower and upper bounds (B, R) of expressions; infinite where no bound is known.
 
     Args:
-        forms: of the expressions.
-        errors: number of the last terms, which are errors of joint centres.
+        forms: forms of the expressions over boxes.
+        errors: number of the last terms, which are joint-centre errors.
     """
     c, a, r = forms
     t = a.shape[2] - errors
@@ -46,11 +45,11 @@ def ranges(forms: Forms, errors: int = 0) -> tuple[FloatArray, FloatArray]:
 
 
 class Expressions(Number):
-    """Expressions of machines.
+    """Expressions of the design, or of all robots within the tolerance.
 
     Args:
-        problem: the design, or all machines that are meant.
-        expressions: (K, 1) in its coordinates.
+        problem: the design, or all robots within the tolerance.
+        expressions: (K, 1) expressions of the problem's coordinates.
     """
 
     def __init__(self, problem: Problem, expressions: SX) -> None:
@@ -61,16 +60,16 @@ class Expressions(Number):
 
     def over(self, forms: Forms, count: int) -> Bounds:
         """Return lower bounds over boxes; see :meth:`.bound_search.Number.over`."""
-        # Each coordinate has a part of the rest, so that one with little slope is divided once the others are narrow.
+        # Each coordinate gets a part of the remainder, so that flat ones are bisected once the steep ones are narrow.
         shares = np.abs(forms.a[:, :, :count]) + forms.r[:, :, None] / max(count, 1)
         return Bounds(ranges(forms, len(self.problem.of_errors))[0], shares)
 
     def values(self, z: FloatArray) -> FloatArray:
-        """Return the values (P, K) at closed points (P, n)."""
+        """Return the values (P, K) at points (P, n) with closed loops."""
         return values_at(self._values, z)[0][:, :, 0]
 
     def slopes(self, z: FloatArray, which: NDArray[np.intp]) -> FloatArray:
-        """Return derivatives (P, n) of an expression each at points; those by dependent coordinates are 0."""
+        """Return derivatives (P, n) of one expression at each point; those by dependent coordinates are 0."""
         found: FloatArray = values_at(self._slopes, z)[0][np.arange(len(z)), which]
         D, size = list(self.problem.dependent), self.problem.size
         if D:
@@ -90,7 +89,7 @@ class Expressions(Number):
         return np.stack([self.closed(each) for each in (z, moved)])
 
     def worst(self, z: FloatArray, slopes: FloatArray) -> FloatArray:
-        """Return the machines (P, n) with the smallest values to first order, from derivatives of the design."""
+        """Return points (P, n) with the errors that make values smallest to first order, from slopes of the design."""
         parts = slopes[:, self.problem.of_errors].reshape(len(z), -1, 3)
         sizes = np.linalg.norm(parts, axis=2, keepdims=True)
         return self.problem.with_errors(z, np.where(sizes > _FLAT * _sizes(sizes), -parts, 0.0))
@@ -100,7 +99,7 @@ class Expressions(Number):
         own, free = list(self.problem.independent), list(self.problem.free)
         z = z.copy()
         change = slopes[:, own] * (boxes.upper - boxes.lower)[:, own]
-        # A slope that is rounding error points to the upper end.
+        # A slope that counts as rounding error selects the upper end.
         z[:, own] = np.where(change > _FLAT * _sizes(change), boxes.lower[:, own], boxes.upper[:, own])
         of_pose = [j for j in own if j < len(free)]
         z[:, of_pose] = self.problem.box.clipped(self.problem.pose_of(z))[:, free][:, of_pose]
@@ -108,5 +107,5 @@ class Expressions(Number):
 
 
 def _sizes(values: FloatArray) -> FloatArray:
-    """Return the largest size of the values at each of P points, with the shape (P, 1, ...)."""
+    """Return the largest absolute value at each of P points, with the shape (P, 1, ...)."""
     return np.asarray(np.nan_to_num(np.abs(values)).max(axis=tuple(range(1, values.ndim)), keepdims=True, initial=0.0))

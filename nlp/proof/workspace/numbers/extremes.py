@@ -1,6 +1,6 @@
-"""Proven smallest and largest values over a workspace, each with the pose at which it is met.
+"""Proved smallest and largest values over a workspace by the search of ``certify``, each with a pose.
 
-Every claim is a program over the numbers of the pose, which :mod:`screwsynth.nlp.proof.certificate` bounds.
+Every claim is a nonlinear program over the coordinates of the pose; :mod:`screwsynth.nlp.proof.certificate` bounds it.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ...boxes.tree import TreeRecord
 from ...certificate.branch_and_bound import certify_program
 from ...certificate.certificate import Certificate, CertificateStatus
 from ...statement.claims import Claim
-from ...statement.machine import JointErrors
+from ...statement.fixed_robot import JointErrors
 from ...statement.posed_layout import extreme_program, varies
 from ..robot.pose_box import PoseNumbers
 from ..verdict import Outcome, Verdict, slack_of
@@ -31,26 +31,26 @@ from .bound_search import Goal, Minimum
 if TYPE_CHECKING:
     from ..proof_record import ProofRecord
 
-#: Returns the errors of the machine that is worst at a pose, to first order, and the value of its expression.
-WorstMachine = Callable[[PoseNumbers], tuple[JointErrors, float]]
-#: Gap of a bound as a part of the value, where none is asked for.
+#: Returns the joint-centre errors that are worst at a pose to first order, and the value with these errors.
+WorstRobot = Callable[[PoseNumbers], tuple[JointErrors, float]]
+#: Default of the largest relative gap of a bound.
 GAP = 1e-3
-#: Finest gap that is tried where a limit lies between a bound and the best value known: that of rounding.
+#: Smallest gap for a limit between a bound and the best known value, near rounding.
 _FINEST = 1e-10
-#: Part of the room between a value and its limit that a finer gap is: the value known grows a little in a search.
+#: Part of the distance from a value to its limit that a smaller gap may take: the best known value changes in a search.
 _SHARE = 0.9
-#: Part of an expression's scale that gaps of smaller values are parts of, as in the search of certificates.
+#: Part of an expression's scale below which gaps are relative to this part, as in the search of certificates.
 _NEAR_ZERO = 1e-6
 #: Reason for a limit that stays open between a bound and a value although the search ended.
-CLOSE = "the limit is closer to the value reached than bounds can tell"
+CLOSE = "the limit is too close to the best known value: bounds cannot separate them"
 
 
 @dataclass(frozen=True)
 class NumberSearch:
-    """Search of the smallest and the largest values of numbers.
+    """Settings of a search of smallest and largest values of quantities.
 
     Attributes:
-        gap: largest distance of a bound from the best known value, as a part of it.
+        gap: largest relative gap between a bound and the best known value.
         jobs: number of threads; None for all processors.
         record: record of the searches for a proof; None without a proof.
     """
@@ -60,20 +60,20 @@ class NumberSearch:
     record: ProofRecord | None = None
 
 
-#: The search with the gap of numbers.
+#: Default settings of a search.
 DEFAULT = NumberSearch()
 
 
 def verdict_of(
     claim: Claim, found: Minimum, pose: PoseNumbers | None = None, *, errors: JointErrors | None = None
 ) -> Verdict:
-    """Return the verdict on a number from the smallest value of its expression, or of minus it for the largest one.
+    """Return the verdict on a claim from the proved minimum of its expression; negated for a largest value.
 
     Args:
-        claim: the number, with its limit.
-        found: without a reason where it is as good as asked for.
-        pose: at which the value is reached.
-        errors: of the machine that reaches it, as for :class:`.Verdict`.
+        claim: claim about the quantity, with its limit.
+        found: result of the search; without a reason if the gap was reached.
+        pose: pose of the best known value.
+        errors: joint-centre errors of the robot with this value, as in :class:`.Verdict`.
     """
     sign, read, limit = claim.sense.sign, claim.reading.from_value, claim.limit
     is_bounded, is_reached, reason = math.isfinite(found.bound), math.isfinite(found.value), found.reason
@@ -85,7 +85,7 @@ def verdict_of(
         outcome = Outcome.REFUTED if found.value < least - slack else outcome
         reason = reason or CLOSE
     if claim.uncovered:
-        # What is proved of the exact machine is nothing about the others, and refutes all the same.
+        # A bound for the design does not cover other robots within the tolerance; a violation refutes the claim.
         bound, reason = sign * math.inf, claim.uncovered
         outcome = outcome if outcome is Outcome.REFUTED else Outcome.OPEN
     return Verdict(
@@ -104,7 +104,7 @@ def verdict_of(
 
 
 def goal_of(claim: Claim, gap: float = 0.0, part: float = 0.0, *, is_enough: bool = True) -> Goal:
-    """Return what a search of minus a claim's number, or of it for a smallest one, is to reach."""
+    """Return the goal of a search for the smallest value of a claim's expression, negated for a largest value."""
     if claim.limit is None:
         return Goal(gap, part)
     return Goal(gap, part, claim.limit if claim.sense is Sense.MIN else -claim.limit, slack_of(claim.limit), is_enough)
@@ -116,18 +116,18 @@ def prove_extreme(
     search: NumberSearch = DEFAULT,
     *,
     time_limit: float | None = None,
-    machine: WorstMachine | None = None,
+    worst: WorstRobot | None = None,
 ) -> Verdict:
-    """Prove the smallest or the largest value of a number over a workspace.
+    """Prove the smallest or the largest value of a quantity over a workspace.
 
-    A search whose bound is beyond the number's limit, with a value within it, goes on until the limit is decided.
+    If the limit lies between the bound and the best known value, the search goes on until the limit is decided.
 
     Args:
-        layout: the case as symbols of the pose.
-        claim: the number.
+        layout: the case as expressions of the pose.
+        claim: claim about the quantity.
         search: gap, threads and record.
-        time_limit: seconds after which the search stops with the bound reached.
-        machine: returns the machine that is worst at a pose, for a claim about every machine within a tolerance.
+        time_limit: seconds after which the search stops with its present bound.
+        worst: function that returns the worst robot within the tolerance at a pose; None for a claim about the design.
     """
     sign = claim.sense.sign
     if is_requested():
@@ -146,19 +146,19 @@ def prove_extreme(
         except UncoveredError as error:
             return verdict_of(claim, Minimum(reason=str(error)))
     pose = None if x is None else _pose(nlp, x)
-    if pose is None or machine is None:
+    if pose is None or worst is None:
         return verdict_of(claim, found, pose)
-    errors, value = machine(pose)
+    errors, value = worst(pose)
     return verdict_of(claim, found._replace(value=-sign * value), pose, errors=errors)
 
 
 def _searched(nlp: Nlp, claim: Claim, search: NumberSearch) -> tuple[Minimum, FloatArray | None]:
-    """Return the bound of an expression, to the gap or as fine as its limit needs, and the point of its best value.
+    """Return the bound of an expression, with the gap that its limit requires, and the point of its best value.
 
     Raises:
-        UncoveredError: the expression holds an operation without a rule.
+        UncoveredError: the expression has an operation without an interval rule.
     """
-    # A program of a claim has one function, and its search is that of certify with or without a record.
+    # The program of a claim has one function: the search of ``certify`` is the same with and without a record.
     sign, writer = claim.sense.sign, None if search.record is None else TreeRecord()
     found = certify_program(nlp, gap=search.gap, jobs=search.jobs, recorder=writer)
     boxes, seconds = found.boxes, found.seconds
@@ -174,7 +174,7 @@ def _searched(nlp: Nlp, claim: Claim, search: NumberSearch) -> tuple[Minimum, Fl
         return Minimum(boxes=boxes, seconds=seconds, reason="the robot has no pose there"), None
     if search.record is not None and writer is not None:
         search.record.program(claim, found, writer)
-    # A search that ends early has a bound too, which may be as good as asked for.
+    # A search that ends early may still have reached the requested gap.
     is_met = found.status is CertificateStatus.PROVED or found.gap <= found.allowed
     value = math.inf if math.isnan(found.incumbent) else -sign * found.incumbent
     reason = "" if is_met else found.reason
@@ -182,7 +182,7 @@ def _searched(nlp: Nlp, claim: Claim, search: NumberSearch) -> tuple[Minimum, Fl
 
 
 def _finer_gap(nlp: Nlp, claim: Claim, found: Certificate) -> float | None:
-    """Return the gap that decides a claim's limit; None where it is decided, or the search did not end by itself."""
+    """Return the gap that decides a claim's limit; None if it is decided, or if the search was stopped."""
     if claim.limit is None or found.status is not CertificateStatus.PROVED:
         return None
     sign = claim.sense.sign

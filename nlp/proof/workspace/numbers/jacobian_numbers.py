@@ -1,24 +1,24 @@
-"""Numbers of J over boxes of poses, from its left inverses: singular values, and the worst error of the pose.
+"""Bounds of quantities of J over boxes of poses, from left inverses: singular values, first-order pose error.
 
-J has rows A divided by sizes l, which :class:`.ScaledRows` chooses so that A is nearly a polynomial of the coordinates.
+J has rows A divided by norms l; :class:`.ScaledRows` scales them so that A is nearly a polynomial of the coordinates.
 Let C be a pseudo-inverse of A at the middle of a box, where l is 1. Then ``(C A)^-1 C diag(l)`` is a left inverse of J,
 and with ``C A = I + E`` and ``|E| <= B``, entry by entry,
 
     (I + E)^-1 C = C - E C + ...,    where the terms of higher order are at most  B^2 (I - B)^-1 |C|.
 
-The part of first order in the coordinates is kept exactly, so that a convex number is largest at a corner of the box.
+The first-order part in the coordinates is kept exactly, so a convex function of it is largest at a corner of the box.
 
 The smallest singular value of J is at least 1 over the norm of any left inverse. The norm ``(tr (P P')^n)^(1/2n)`` is
 convex in P, not below the largest singular value and close to it. The largest singular value of J itself is bounded
-likewise, from forms of its own entries. The Frobenius norm of a rest bounds its effect.
+likewise, from forms of its entries. The Frobenius norm of a remainder bounds its effect.
 
-Errors of joint centres count as further terms of the rows. Those of six straight legs, up to t, change J by a matrix
-whose Frobenius norm bounds the change of every singular value (H. Weyl). With l the shortest length of a leg of any
-machine, the unit force of a leg changes by at most ``h = 2 t / l``, and its moment about the platform's origin by
+Joint-centre errors are additional terms of the rows. For six straight legs and errors up to t, J changes by a matrix
+with a Frobenius norm that bounds the change of every singular value (H. Weyl). With a lower bound l of all leg lengths,
+the unit force of a leg changes by at most ``h = 2 t / l``, and its moment about the platform's origin by
 ``|a| h + t``.
 
-Lengths of six legs that are off by d move the platform, to first order, by ``J^-1 d``. For ``|d_i| <= 1`` the largest
-size of its position, or of its rotation, is met where every ``d_i`` is 1 or -1.
+Leg-length errors d of six legs move the platform, to first order, by ``J^-1 d``. For ``|d_i| <= 1`` the position error
+and the rotation error are largest with every ``d_i`` equal to 1 or -1.
 """
 
 from __future__ import annotations
@@ -35,31 +35,31 @@ from casadi import SX
 from .....models.arrays import FloatArray, values_at
 from ....evidence.closed_loops import inverses
 from ...enclosure.forms import Forms
-from ...statement.machine import LEGS, Legs
+from ...statement.fixed_robot import LEGS, Legs
 from ..ranks.krawczyk import bounds_of_inverses, by_centres
 from ..robot.posed_robot import Problem
 from .bound_search import Bounds, Number
 
-#: Part of its size by which a computed number may be off: rounding of products and of LAPACK.
+#: Relative rounding error of computed quantities, from products and LAPACK.
 ROUNDING = 1e-10
-#: Part of itself by which the bound of a change moves outwards: its own rounding.
+#: Outward factor of the bound of a change, for rounding.
 _OUTWARDS = 1 + 1e-12
-#: Part of C below which a singular value of the middle matrix is zero.
+#: Relative singular value of the middle matrix that counts as zero.
 _ZERO = 1e-14
-#: Squarings in the norm of an inverse: its n is 2 to this power. Two equal singular values make it 2 % too large.
+#: Squarings in the norm of an inverse: n is 2 to this power. Two equal singular values make the norm 2 % too large.
 _SQUARINGS = 4
-#: Signs (6, 32) of the errors of legs: a pair of opposite signs has one size.
+#: Signs (6, 32) of leg-length errors: opposite signs give the same pose error.
 _ERRORS = np.array(list(itertools.product((-1.0, 1.0), repeat=LEGS)))[: 2 ** (LEGS - 1)].T
 
 
 class _Rows(NamedTuple):
-    """Rows A and sizes l of J over B boxes, scaled so that the middle of each size is 1.
+    """Rows A and norms l of J over B boxes, scaled so that the middle of each norm is 1.
 
     Attributes:
         A: (B, m, 6) middles.
-        terms: (B, t, m, 6) coefficients of ``|e| <= 1``: f coordinates, then products of two, then errors of centres.
-        rest: (B, m, 6).
-        bend, slack: (B, t, m) coefficients, and (B, m) rests, of sizes.
+        terms: (B, t, m, 6) coefficients of ``|e| <= 1``: f coordinates, then products of two, then joint-centre errors.
+        rest: (B, m, 6) remainders.
+        bend, slack: (B, t, m) coefficients, and (B, m) remainders, of norms.
         coordinates, errors: number f of coordinates, and number of the terms that are errors.
     """
 
@@ -72,32 +72,32 @@ class _Rows(NamedTuple):
     errors: int
 
     def spread(self, linear: FloatArray) -> FloatArray:
-        """Return the largest sizes (B, ...) of linear parts (B, t, ...); the errors of a centre are a vector."""
+        """Return the largest absolute values (B, ...) of linear parts (B, t, ...); errors of a centre are a vector."""
         t = linear.shape[1] - self.errors
         return np.asarray(np.abs(linear[:, :t]).sum(axis=1) + by_centres(np.moveaxis(linear[:, t:], 1, -1)))
 
 
 class _RowsNumber(Number):
-    """A number of J.
+    """A quantity of J.
 
     Args:
-        problem: the design, or all machines that are meant.
-        length: by which moments about the platform's origin are divided.
-        machines: those of which values are; of the problem if left out.
+        problem: the design, or all robots within the tolerance.
+        length: length that divides moments about the platform's origin.
+        family: robots for the values; if None, the robots of the problem.
     """
 
-    def __init__(self, problem: Problem, length: float, machines: Problem | None = None) -> None:
-        scaled, of = problem.posed.scaled, machines or problem
+    def __init__(self, problem: Problem, length: float, family: Problem | None = None) -> None:
+        scaled, of = problem.posed.scaled, family or problem
         super().__init__(problem, ca.vertcat(ca.vec(ca.densify(scaled.rows)), scaled.sizes))
         self._scale = np.array([1.0, 1.0, 1.0, *[problem.length / length] * 3])
         self._jacobian = ca.Function("J", [of.z], [ca.densify(of.posed.scaled.jacobian)])
 
     def jacobian(self, z: FloatArray) -> FloatArray:
-        """Return J (P, m, 6) at points (P, n) of the machines."""
+        """Return J (P, m, 6) at points (P, n) of the family."""
         return np.asarray(values_at(self._jacobian, z)[0] * self._scale)
 
     def rows(self, forms: Forms, count: int) -> _Rows:
-        """Return the rows over boxes from forms of them, column by column, of their sizes, and of more."""
+        """Return the rows over boxes from forms of the rows, column by column, and of their norms, in this order."""
         m = self.problem.posed.scaled.rows.shape[0]
         c, a, r = forms.part(slice(0, 7 * m))
         (B, _, t), sizes = a.shape, c[:, 6 * m :]
@@ -112,17 +112,17 @@ class _RowsNumber(Number):
 
 
 class SingularValues(_RowsNumber):
-    """Smallest singular value of J, or minus its condition number.
+    """Smallest singular value of J, or its negative condition number.
 
-    With machines, values are those of the one that is worst to first order at each point: with u and v the vectors of a
-    singular value, it is ``u . J v``, whose derivatives by the errors are those of the entries of J alone.
+    With joint-centre errors, values are taken with the errors that are worst to first order at each point: a singular
+    value with vectors u and v is ``u . J v``, with derivatives by the errors from the entries of J.
 
     Args:
-        problem: the design, or all machines that are meant, whose errors count entry by entry.
-        length: by which moments about the platform's origin are divided.
-        is_condition: whether minus the condition number is meant, whose smallest value is that of the worst pose.
-        machines: all that are meant, where the problem is the design alone.
-        change: by which every singular value of theirs differs from the design's at most.
+        problem: the design, or all robots within the tolerance with errors in each entry.
+        length: length that divides moments about the platform's origin.
+        is_condition: If true, the negative condition number; else the smallest singular value.
+        family: all robots within the tolerance, if the problem is only the design.
+        change: largest change of a singular value within the tolerance.
     """
 
     def __init__(
@@ -131,52 +131,52 @@ class SingularValues(_RowsNumber):
         length: float,
         *,
         is_condition: bool,
-        machines: Problem | None = None,
+        family: Problem | None = None,
         change: float = 0.0,
     ) -> None:
-        super().__init__(problem, length, machines)
-        self._is_condition, self._change, self._machines = is_condition, change, machines
+        super().__init__(problem, length, family)
+        self._is_condition, self._change, self._family = is_condition, change, family
         self._has_six = problem.posed.scaled.rows.shape[0] >= 6
         if is_condition:
             self.entries = ca.vertcat(self.entries, ca.vec(ca.densify(problem.posed.scaled.jacobian)))
 
     @cached_property
     def _slopes(self) -> ca.Function:
-        """The derivatives of u . J v by the errors of machines."""
-        of = self._machines or self.problem
+        """Derivatives of ``u . J v`` by joint-centre errors."""
+        of = self._family or self.problem
         J = of.posed.scaled.jacobian * ca.repmat(SX(self._scale.tolist()).T, of.posed.scaled.rows.shape[0], 1)
         u, v = SX.sym("u", J.shape[0]), SX.sym("v", J.shape[1])
         return ca.Function("slopes", [of.z, u, v], [ca.densify(ca.gradient(ca.dot(u, J @ v), of.errors))])
 
-    def _worst(self, machines: Problem, z: FloatArray) -> FloatArray:
-        """Return the machines that are worst to first order at points (P, n) of the design."""
-        z = machines.exact(z)
+    def _worst(self, family: Problem, z: FloatArray) -> FloatArray:
+        """Return points with the joint-centre errors that are worst to first order at points (P, n) of the design."""
+        z = family.exact(z)
         if not self._has_six:
             return z
         u, s, v = np.linalg.svd(np.nan_to_num(self.jacobian(z)))
-        slopes = np.zeros((len(z), len(machines.of_errors)))
-        # The logarithm of the condition number falls with that of the smallest one, and grows with that of the largest.
+        slopes = np.zeros((len(z), len(family.of_errors)))
+        # log(condition number) = log(largest) - log(smallest singular value).
         for k, weight in ((5, -1.0), (0, 1.0)) if self._is_condition else ((5, -1.0),):
             slopes += weight / s[:, k, None] * values_at(self._slopes, z, u[:, :, k], v[:, k])[0][:, :, 0]
-        return machines.with_errors(z, slopes)
+        return family.with_errors(z, slopes)
 
     def values(self, z: FloatArray) -> FloatArray:
         """Return the values (P, 1) at points (P, n)."""
-        J = self.jacobian(z if self._machines is None else self._worst(self._machines, z))
+        J = self.jacobian(z if self._family is None else self._worst(self._family, z))
         known = np.asarray(np.isfinite(J).all(axis=(1, 2)))
         values = np.linalg.svd(np.where(known[:, None, None], J, 0.0), compute_uv=False)
         least = values[:, 5] if self._has_six else np.zeros(len(values))
-        # A singular value that is 0 counts as rounding: the condition number stays a number.
+        # A singular value of 0 is replaced by rounding error, so that the condition number is finite.
         rounding = np.maximum(np.finfo(float).eps * values[:, 0], np.finfo(float).tiny)
         found = -values[:, 0] / np.maximum(least, rounding) if self._is_condition else least
         return np.where(known, found, np.nan)[:, None]
 
     def worst(self, y: FloatArray) -> FloatArray | None:
-        """Return the errors (m, 3) that are worst at a pose (6,) to first order; None for the design."""
-        if self._machines is None:
+        """Return the joint-centre errors (m, 3) that are worst at a pose (6,) to first order; None for the design."""
+        if self._family is None:
             return None
-        machine = self._worst(self._machines, y[None, list(self.problem.free)])[0]
-        return self._machines.errors_of(machine).vectors
+        robot = self._worst(self._family, y[None, list(self.problem.free)])[0]
+        return self._family.errors_of(robot).vectors
 
     def over(self, forms: Forms, count: int) -> Bounds:
         """Return lower bounds over boxes; see :meth:`.bound_search.Number.over`."""
@@ -192,7 +192,7 @@ class SingularValues(_RowsNumber):
         return Bounds(np.where(np.isfinite(found), found, floor)[:, None], shares)
 
     def _largest(self, rows: _Rows, forms: Forms) -> FloatArray:
-        """Return an upper bound (B,) of the largest singular value of J from forms of it, column by column."""
+        """Return an upper bound (B,) of the largest singular value of J from forms of J, column by column."""
         (B, _, t), scale = forms.a.shape, self._scale[:, None]
         c, r = (each.reshape(B, 6, -1) * scale for each in (forms.c, forms.r))
         a = forms.a.reshape(B, 6, -1, t).transpose(0, 3, 1, 2) * scale
@@ -203,15 +203,15 @@ class SingularValues(_RowsNumber):
 
 
 def change_of_rows(legs: Legs, length: float, shortest: float) -> float:
-    """Return a bound of the Frobenius norm of the change of J by errors within the legs' tolerance.
+    """Return a bound of the Frobenius norm of the change of J by joint-centre errors within the tolerance.
 
     Args:
-        legs: joint centres.
-        length: by which moments are divided.
-        shortest: no leg of any of the machines is shorter.
+        legs: joint centres, with the tolerance.
+        length: length that divides moments.
+        shortest: lower bound of all leg lengths, length.
 
     Returns:
-        0 without a tolerance; infinite where the errors may take up a whole leg.
+        The bound; 0 without a tolerance, infinite if errors may be as large as a leg length.
     """
     t = legs.tolerance
     if not t:
@@ -224,11 +224,11 @@ def change_of_rows(legs: Legs, length: float, shortest: float) -> float:
 
 
 class WorstError(_RowsNumber):
-    """Minus the largest error of the pose to first order, for unit errors of legs: its smallest value is the worst.
+    """Negative largest first-order pose error for leg-length errors of at most 1.
 
     Args:
-        problem: six straight legs.
-        is_rotation: whether the rotation is meant, and not the position of the platform's origin.
+        problem: robot with six straight legs.
+        is_rotation: If true, the rotation error; else the position error of the platform's origin.
     """
 
     def __init__(self, problem: Problem, *, is_rotation: bool) -> None:
@@ -236,15 +236,15 @@ class WorstError(_RowsNumber):
         self._part = slice(3, 6) if is_rotation else slice(0, 3)
 
     def values(self, z: FloatArray) -> FloatArray:
-        """Return minus the error (P, 1) at points (P, n)."""
+        """Return the negative error (P, 1) at points (P, n)."""
         return np.asarray(-self._sizes(z).max(axis=1, keepdims=True))
 
     def worst(self, z: FloatArray) -> FloatArray:
-        """Return the signs (6,) of the errors of legs that are worst at a point (n,)."""
+        """Return the signs (6,) of the leg-length errors that are worst at a point (n,)."""
         return np.asarray(_ERRORS[:, int(np.argmax(self._sizes(z[None])))])
 
     def _sizes(self, z: FloatArray) -> FloatArray:
-        """Return the errors (P, 32) for all signs of the errors of legs."""
+        """Return the pose errors (P, 32) for all signs of leg-length errors."""
         return np.asarray(np.linalg.norm(inverses(self.jacobian(z))[:, self._part] @ _ERRORS, axis=1))
 
     def over(self, forms: Forms, count: int) -> Bounds:
@@ -261,8 +261,8 @@ def _left_inverses(rows: _Rows) -> tuple[FloatArray, FloatArray, FloatArray, Flo
     """Return left inverses ``fixed + linear.e + [-rest, rest]`` of J over B boxes, with ``|e_i| <= 1``.
 
     Returns:
-        (B, 6, m) fixed: position, then rotation times a length, for unit values of the rows; (B, f, 6, m) linear: for
-        each coordinate the change over half of the box; (B, 6, m) rest, infinite where no bound is known; (B, 1, f)
+        (B, 6, m) fixed: position, then rotation times a length, for unit values of the rows; (B, f, 6, m) linear:
+        change over half of the box by each coordinate; (B, 6, m) rest, infinite where no bound is known; (B, 1, f)
         shares of coordinates in the width.
     """
     known = np.asarray(np.isfinite(rows.A).all(axis=(1, 2)) & np.isfinite(rows.terms).all(axis=(1, 2, 3)))
@@ -280,7 +280,7 @@ def _left_inverses(rows: _Rows) -> tuple[FloatArray, FloatArray, FloatArray, Flo
         # |(I + E)^-1 C| <= X.
         X, holds = bounds_of_inverses(E, size)
         known &= holds
-        # Rows are divided by 1 + d with |d| <= spread of the sizes.
+        # Rows are divided by 1 + d with |d| <= spread of the norms.
         change = C[:, None] * rows.bend[:, :, None] - slopes @ C[:, None]
         d = rows.spread(rows.bend) + rows.slack
         rest = rows.spread(change[:, f:]) + size * rows.slack[:, None]
@@ -299,7 +299,7 @@ def _at_corners(fixed: FloatArray, linear: FloatArray) -> FloatArray:
 
 
 def _schatten(matrices: FloatArray) -> FloatArray:
-    """Return the largest norm (B,) of matrices (B, S, 6, m): convex, and not below the largest singular value."""
+    """Return the largest Schatten norm (B,) of matrices (B, S, 6, m): convex, at least the largest singular value."""
     square = matrices @ matrices.transpose(0, 1, 3, 2)
     trace = np.trace(square, axis1=2, axis2=3)
     power = square / trace[:, :, None, None]
@@ -310,5 +310,5 @@ def _schatten(matrices: FloatArray) -> FloatArray:
 
 
 def _frobenius(r: FloatArray) -> FloatArray:
-    """Return the Frobenius norms (B,) of matrices (B, r, c), not below their exact values."""
+    """Return upper bounds (B,) of the Frobenius norms of matrices (B, r, c)."""
     return np.asarray(np.sqrt((r * r).sum(axis=(1, 2))) * (1 + ROUNDING))

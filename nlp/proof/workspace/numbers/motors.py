@@ -1,13 +1,13 @@
 """Force, speed and power of an actuator over boxes of poses, for every load case.
 
 With ``A y = D u`` for the rates u of the actuators, the platform's motion by a unit rate of actuator k is ``x_k`` in
-the solution of ``A y_k = D_k``, and the actuator holds a load W with the force ``-(W . x_k)``, by virtual work. Of a
-robot without given actuators A has the rows of J times their sizes, and D the sizes of those of legs; else y has the
-platform's motion and the rates of passive joints, and D the screws of the actuators. Forms of second order of the
-solution are kept: what they leave is of third order in the widths of a box.
+the solution of ``A y_k = D_k``, and the actuator holds a load W with the force ``-(W . x_k)``, by virtual work. For a
+robot without given actuators, A has the rows of J times their norms, and D the norms of the rows of legs. Else y has
+the platform's motion and the rates of passive joints, and D the screws of the actuators. Second-order forms of the
+solution are kept; the remainder is of third order in the widths of a box.
 
-Loads of any direction add the size of a velocity. All numbers are bounded from above, a smallest force by its opposite.
-Rotations about any axis lie in a ball, ``|r|^2 <= b``, so that a bound may have a multiple of ``b - |r|^2`` added.
+Loads of any direction add the norm of a velocity. All quantities are bounded from above; a smallest force is negated.
+Rotations about any axis lie in a ball, ``|r|^2 <= b``, so a multiple of ``b - |r|^2`` may be added to a bound.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from casadi import SX
 
 from .....models import FloatArray, rate_relations
 from .....models.arrays import values_at
-from .....models.statics import freedoms_of
+from .....models.statics import degrees_of_freedom
 from ....case.case import Case
 from ....case.loads import Motion
-from ....case.motors import Motor, MotorNumber
+from ....case.motors import ActuatorQuantity, Motor
 from ....case.task import Sense
 from ....case.workspace import TurnKind
 from ....program.layout import robot_length
@@ -37,49 +37,54 @@ from ..robot.posed_robot import NotJudgedError, Problem
 from .bound_search import Bounds, Number
 from .quadratic_forms import Quadratics, solved
 
-#: More than underflow can cost a sum.
+#: Upper bound of the underflow error of a sum.
 _TINY = 1e-290
 
 
 class _Part(NamedTuple):
-    """A part of a number: the force in a sense, upwards or that of its opposite, under a load; or the speed, None."""
+    """Factor of a quantity: a force in one direction under a load, or the speed.
+
+    Attributes:
+        sense: ``MAX`` for the largest force, ``MIN`` for the smallest force; None for the speed.
+        load: index of the load.
+    """
 
     sense: Sense | None = None
     load: int = 0
 
 
 class Motors(Number):
-    """Forces, speed and powers of one actuator: smallest ones, and minus the largest ones.
+    """Forces, speed and powers of one actuator; largest values are negated.
 
     Args:
-        problem: the design, or all machines that are meant.
-        case: with its loads and motions.
-        claims: the numbers, of one actuator.
+        problem: the design, or all robots within the tolerance.
+        case: case with loads and motions.
+        claims: claims about quantities of one actuator.
 
     Raises:
-        NotJudgedError: loops demand relations of the actuators' rates.
+        NotJudgedError: the loops impose relations between the actuators' rates.
     """
 
     def __init__(self, problem: Problem, case: Case, claims: Sequence[Claim]) -> None:
         posed, self._loading = problem.posed, case.loading
         if rate_relations(case.model.actuators).shape[0]:
-            raise NotJudgedError("loops demand relations of its actuators' rates, for which there is no rule")
+            raise NotJudgedError("relations between actuator rates, which the robot's loops impose, are not supported")
         motor, R = claims[0].motor or Motor(), posed.turned[0]
-        self._actuator, self._length, self._is_six = motor.place, problem.length, freedoms_of(case.model) == 6
+        self._actuator, self._length, self._is_six = motor.place, problem.length, degrees_of_freedom(case.model) == 6
         self._size = robot_length(case)
         self._numbers = [_parts_of(case, claim) for claim in claims]
         self._parts = list(dict.fromkeys(itertools.chain(*self._numbers)))
         A, D = posed.driven_rows
         row_of_leg = SX(6, 0)
         if not case.model.actuators and self._is_six:
-            # A leg's speed follows from its row, and its force from its own column.
+            # A leg's speed follows from its row of J, and its force from its column of the solution.
             row = [each.limb for each in posed.limbs.wrenches].index(motor.actuator)
             row_of_leg, D = posed.scaled.jacobian[row, :].T, D[:, row]
         self._column = 0 if D.shape[1] == 1 else self._actuator
         free, loading = problem.free, self._loading
         is_ball = problem.box.is_ball
         turn = [problem.z[j] for j, k in enumerate(free) if k >= 3 and is_ball]
-        # Minus the matrices of cross products with arms, in parts of the length by which rotations are multiplied.
+        # Negative cross-product matrices of arms, divided by the length that multiplies rotations.
         arms = [-ca.skew(R @ SX([float(part) for part in each.point])) / problem.length for each in loading.loads]
         loads = [each.wrench(R) for each in loading.cases]
         scaled = [ca.vertcat(each[:3], each[3:] / problem.length) for each in loads]
@@ -91,15 +96,15 @@ class Motors(Number):
         self._entries = ca.Function("entries", [problem.z], [self.entries])
 
     def values(self, z: FloatArray) -> FloatArray:
-        """Return the values (P, K) at closed points (P, n)."""
+        """Return the values (P, K) at points (P, n) with closed loops."""
         with np.errstate(all="ignore"):
             found = self._bounded(self._at(z))[0]
         return -self._of_claims([np.where(np.isfinite(each.r), each.c, np.nan)[0, 0] for each in found])
 
     def products(self, z: FloatArray) -> FloatArray:
-        """Return sizes (P, K) of loads and motions, whatever their directions, at closed points (P, n).
+        """Return products (P, K) of the norms of loads and motions at points (P, n) with closed loops.
 
-        A number is of this size for most directions of a load, or of a motion, and may be 0 for others.
+        They are typical sizes of the quantities, which may be 0 for single directions of a load or a motion.
         """
         motion = self._loading.motion or Motion()
         with np.errstate(all="ignore"):
@@ -132,19 +137,19 @@ class Motors(Number):
         return Bounds(np.where(np.isfinite(upper), -upper, -np.inf), shares.transpose(2, 0, 1))
 
     def _of_claims(self, ends: Sequence[FloatArray]) -> FloatArray:
-        """Return the numbers (B, K), each the product of its parts at their largest, (B,) each."""
+        """Return upper bounds (B, K) of the quantities from upper bounds (B,) of their factors."""
         every = dict(zip(self._parts, ends, strict=True))
         columns = []
         for first, *others in self._numbers:
             found = every[first]
             for other in others:
-                # The power of a force below 0 counts as 0.
+                # The power of a negative force counts as 0.
                 found = np.maximum(found, 0.0) * every[other]
             columns.append(found)
         return np.asarray(np.stack(columns, axis=1))
 
     def _upper(self, of: Quadratics, turn: Quadratics) -> FloatArray:
-        """Return upper bounds (B,) of a number; rotations, if they are given, lie in the ball."""
+        """Return upper bounds (B,) of a quantity; rotations, if they are given, lie in the ball."""
         upper, ball = of.upper()[0, 0], self.problem.box.ball
         which = np.flatnonzero((turn.size**2).sum(axis=(0, 1)) > ball)
         if not (which.size and of.q.shape[2] and turn.c.size):
@@ -152,7 +157,7 @@ class Motors(Number):
         of, turn = of[..., which], turn[..., which]
         inside = turn.by(turn).sums(1).times(-1.0)
         inside = replace(inside, c=inside.c + ball, r=inside.r + ROUNDING * ball)
-        # The multiple with which the number does not change along r in the middle.
+        # The multiple that makes the derivative along r zero in the middle.
         r, half = turn.c[0], turn.a[0]
         slopes = (of.a[0, 0] * half / np.maximum((half**2).sum(axis=0), _TINY)).sum(axis=1)
         factor = (slopes * r).sum(axis=0) / np.maximum(2 * (r**2).sum(axis=0), _TINY)
@@ -161,7 +166,7 @@ class Motors(Number):
         return np.asarray(upper)
 
     def _matrices(self, forms: Forms, count: int) -> list[Quadratics]:
-        """Return A, D, row of the leg, the path's twist, arms and wrenches of loads, and rotations, from forms."""
+        """Return A, D, row of the leg, twist on the path, arms and wrenches of loads, and rotations, from forms."""
         ends = np.cumsum([0, *(rows * columns for rows, columns in self._shapes)]).tolist()
         errors = len(self.problem.of_errors) if count else 0
         return [
@@ -170,7 +175,7 @@ class Motors(Number):
         ]
 
     def _bounded(self, matrices: Sequence[Quadratics]) -> tuple[list[Quadratics], FloatArray]:
-        """Return the parts that are bounded from above, (1, 1) each, and shares (t, B) of coordinates in their rest."""
+        """Return the factors (1, 1) that are bounded from above, and shares (t, B) of coordinates in remainders."""
         A, D, row, twist, arms, wrenches, _ = matrices
         every, k = solved(A, D)[:6], self._column
         x = every[:, k : k + 1]
@@ -184,7 +189,7 @@ class Motors(Number):
         return found, (A.a**2).sum(axis=(0, 1))
 
     def _spread(self, case: int, x: Quadratics, arms: Quadratics) -> Quadratics:
-        """Return the largest change (1, 1) of the force by the loads of any direction in a load case."""
+        """Return the largest change (1, 1) of the force by loads of any direction in a load case."""
         found, turned = x[:1].times(0.0), x[3:]
         for load, _ in self._loading.cases[case].parts:
             k = self._loading.loads.index(load)
@@ -196,19 +201,19 @@ class Motors(Number):
         return found
 
     def _speed(self, x: Quadratics, row: Quadratics, twist: Quadratics) -> Quadratics:
-        """Return the largest speed (1, 1) in the case's motions, or that in the path's.
+        """Return the largest speed (1, 1) in the motions of the case, or in the motion of the path.
 
         Args:
             x: motions of the platform by all actuators.
-            row: of a leg, (6, 1); (6, 0) for other actuators.
-            twist: of the platform in the motion of a path, (6, 1); (6, 0) for the case's motions.
+            row: (6, 1) row of the leg; (6, 0) for other actuators.
+            twist: (6, 1) twist of the platform in the motion of a path; (6, 0) for the motions of the case.
         """
         motion = self._loading.motion or Motion()
         linear, angular = motion.linear, motion.angular * self._length
         if row.c.size:
             if twist.c.size:
                 return row.by(twist).sums(0).lengths()
-            # The force of a leg has unit size.
+            # The wrench of a leg has a unit force.
             speed = row[3:].lengths().times(angular)
             return replace(speed, c=speed.c + linear, r=speed.r + ROUNDING * linear)
         if self._is_six:
@@ -226,22 +231,22 @@ class Motors(Number):
 
 
 def _parts_of(case: Case, claim: Claim) -> list[_Part]:
-    """Return the parts of the number of a claim."""
+    """Return the factors of the quantity of a claim."""
     motor, cases = claim.motor or Motor(), case.loading.cases
-    if motor.number is MotorNumber.SPEED:
+    if motor.number is ActuatorQuantity.SPEED:
         return [_Part()]
     load = next(k for k, each in enumerate(cases) if each.name == motor.load)
     sense = Sense.MIN if motor.is_backwards else claim.sense
     if not any(each.is_fixed for each, _ in cases[load].parts):
-        sense = Sense.MAX  # loads of any direction alone have forces of one size in both
-    return [_Part(sense, load), *([_Part()] if motor.number is MotorNumber.POWER else [])]
+        sense = Sense.MAX  # loads of any direction give the same force in both directions
+    return [_Part(sense, load), *([_Part()] if motor.number is ActuatorQuantity.POWER else [])]
 
 
 def path_twist(problem: Problem) -> SX:
-    """Return the platform's twist ``(v, length omega)`` (6, 1) by the rates of its pose in the motion of a path.
+    """Return the platform's twist ``(v, length omega)`` (6, 1) from the rates of its pose on a path.
 
     Raises:
-        NotJudgedError: some follow from others.
+        NotJudgedError: a coordinate of the pose is dependent.
     """
     if problem.box.dependent:
         raise NotJudgedError("the platform's twist along the path has dependent components")
@@ -257,7 +262,7 @@ def path_twist(problem: Problem) -> SX:
 
 
 def _shares(found: Quadratics, of: FloatArray, count: int) -> FloatArray:
-    """Return the shares (f, B) of coordinates in what a bound of a number (1, 1) may be too large by."""
+    """Return the shares (f, B) of coordinates in the overestimation of a bound of a quantity (1, 1)."""
     shares = found.r[0, 0] * (of / np.maximum(of.sum(axis=0), _TINY))[:count] + 1e-200 * of[:count]
     q = np.abs(found.q[0, 0])
     rows, columns = np.triu_indices(count if len(q) else 0)

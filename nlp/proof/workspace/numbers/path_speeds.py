@@ -1,12 +1,12 @@
-"""Speeds of actuators along a path whose motion is known: coordinates of actuators by rates of the pose's numbers.
+"""Actuator speeds along a tool path with times.
 
-The rates w of the pose, of its free numbers or its angular velocity, are coordinates of the search, which a piece of
-the path determines. With the loop equations ``L(X, u) = 0`` for the passive joints u that have no closed form, and
-``X' = X'(X, w)``,
+The rates w of the pose (rates of its coordinates, or its angular velocity) are coordinates of the search; each piece of
+the path determines their ranges. With the loop equations ``L(X, u) = 0`` for the passive joints u without a closed
+form, and ``X' = X'(X, w)``,
 
     L_u u' = -L_X X',        q' = q_X X' + q_u u'
 
-for the coordinates q of the actuators. Forms of the four matrices give those of the speeds over each box.
+for the actuator coordinates q. Forms of the four matrices give forms of the speeds over each box.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ from .quadratic_forms import Quadratics, solved
 
 
 def with_rates(problem: Problem, cover: PathCover) -> Problem:
-    """Return the same machines along a path, with rates of the pose as further coordinates."""
+    """Return the problem along a path, with rates of the pose as additional coordinates."""
     return _with(problem, cover, ca.vertcat(SX(0, 1), *[SX.sym(f"rate{k}") for k in problem.rated]))
 
 
 def _with(problem: Problem, cover: PathCover, rates: SX) -> Problem:
-    """Return the same machines with symbols of the rates."""
+    """Return the problem with symbols of the rates as additional coordinates."""
     rated, n = problem.rated, len(problem.start) - len(problem.of_errors)
     ends = [each[:, rated] for each in cover.rates(cover.pieces)]
     largest = np.abs(np.concatenate(ends)).max(axis=0)
@@ -43,7 +43,7 @@ def _with(problem: Problem, cover: PathCover, rates: SX) -> Problem:
     z = ca.vertcat(problem.z[:n, :], rates, problem.z[n:, :])
     whole = np.concatenate([size[:n], np.where(largest > 0, largest, 1.0), size[n:]])
     own = tuple(range(n, n + len(rated)))
-    # Errors stay the last coordinates.
+    # Errors must stay the last coordinates.
     return replace(
         problem,
         loops=Loops(z, loops.equations, loops.every, loops.signs, whole),
@@ -56,11 +56,11 @@ def _with(problem: Problem, cover: PathCover, rates: SX) -> Problem:
 
 
 class PathSpeeds(Number):
-    """Minus the sizes of the speeds of actuators in a path's motion.
+    """Negative absolute speeds of actuators in the motion of a path.
 
     Args:
-        problem: the design, or all machines that are meant, with rates of the pose's numbers.
-        coordinates: (K, 1) of the actuators, in the coordinates of the problem.
+        problem: the design, or all robots within the tolerance, with rates of the pose as coordinates.
+        coordinates: (K, 1) actuator coordinates, as expressions of the problem's coordinates.
     """
 
     def __init__(self, problem: Problem, coordinates: SX) -> None:
@@ -78,7 +78,7 @@ class PathSpeeds(Number):
         self._parts = ca.Function("parts", [z], parts)
 
     def values(self, z: FloatArray) -> FloatArray:
-        """Return the values (P, K) at closed points (P, n)."""
+        """Return the values (P, K) at points (P, n) with closed loops."""
         with np.errstate(all="ignore"):
             L_u, L_t, q_u, q_t = values_at(self._parts, z)
             return -np.abs(q_t - q_u @ (inverses(L_u) @ L_t))[:, :, 0]
@@ -94,16 +94,16 @@ class PathSpeeds(Number):
             if L_u.c.size:
                 speeds = speeds.plus(q_u.matmul(solved(L_u, L_t).times(-1.0)))
             upper = np.maximum(speeds.upper(), speeds.times(-1.0).upper())[:, 0].T
-            # The path is divided, whatever coordinate counts.
+            # Only the path is bisected: each coordinate counts for it.
             shares = np.abs(speeds.a[:, 0, :count]).transpose(2, 0, 1) + speeds.r[:, 0].T[:, :, None] / max(count, 1)
         shares[:, :, [k for k, j in enumerate(self.problem.independent) if j in self.problem.rates]] = 0.0
         return Bounds(np.where(np.isfinite(upper), -upper, -np.inf), shares)
 
 
 def pose_rates(problem: Problem) -> SX:
-    """Return the rates (f, 1) of the pose's free coordinates, of which angles have tangents of their halves.
+    """Return the rates (f, 1) of the pose's free coordinates, with tangents of half angles for angles.
 
-    Dependent coordinates have 0: their rates follow from the loops.
+    Rates of dependent coordinates are 0 here: they follow from the loops.
     """
     rates, y = SX(6, 1), problem.box.symbols(problem.z)
     rates[problem.rated] = problem.z[list(problem.rates), :]

@@ -1,16 +1,16 @@
-"""Largest error of the platform's pose over a workspace, for every machine within its tolerances.
+"""Largest pose error over a workspace, from leg-length errors and joint-centre errors within the tolerances.
 
-A leg's length changes by at most ``eps = leg error + 2 joint error`` when its joint centres and its length are in
-error, at every pose: by the triangle inequality. To first order the platform's origin and its rotation are off by
-``J^-1 d`` with ``|d_i| <= eps``, and the largest size is met where every ``d_i`` is eps or -eps.
+By the triangle inequality, errors of joint centres and of a leg's length act as a leg-length error of at most ``eps =
+leg error + 2 joint error``. To first order the pose error is ``J^-1 d`` with ``|d_i| <= eps``; its position or rotation
+is largest with every ``d_i`` equal to eps or -eps.
 
-For the rest of the pose error, let the error found be P eps in position and Q eps in rotation. By Taylor's formula the
-lengths at the true pose differ from those to first order by at most
+For second-order terms, let the first-order error be P eps in position and Q eps in rotation. By Taylor's formula the
+leg lengths at the true pose differ from the first-order ones by at most
 
     r = ((p + a w)^2 / l + a w^2) / 2,      p = P (eps + r),  w = Q (eps + r),
 
-with l the shortest length of a leg on the way and a the largest distance of a joint from the platform's origin. The
-machine comes continuously from the one without errors, and so its errors are those of the smallest such r.
+with l the shortest leg length in between and a the largest distance of a joint from the platform's origin. The true
+pose depends continuously on the errors, from 0, so the smallest such r applies.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from casadi import SX
 from .....models import Dimension, FloatArray
 from ....evidence.closed_loops import Loops
 from ...statement.claims import ERRORS
-from ...statement.machine import Legs
+from ...statement.fixed_robot import Legs
 from ..robot.pose_box import PoseNumbers, cayley_rotation
 from ..verdict import Verdict
 from .bound_search import Goal, Minimum, smallest_values
@@ -37,24 +37,22 @@ from .searched import Subject
 if TYPE_CHECKING:
     from ..proof_record import ProofRecord
 
-#: Part of its size by which a computed bound is moved outwards: rounding.
+#: Relative outward shift of a computed bound, for rounding.
 _ROUNDING = 1e-10
-#: Steps in the search of the smallest r.
+#: Largest number of steps in the iteration for the smallest r.
 _STEPS = 200
-#: Gap of an error of the pose as a part of that at the middle of the workspace: a finer one takes many more boxes.
+#: Gap of a pose error relative to its value at the middle of the workspace: a smaller gap takes many more boxes.
 _GAP = 0.1
-#: Reason for errors of which nothing is proved.
-_TOO_LARGE = "the errors are too large for a bound of their terms of second order"
+#: Reason for errors without a proved bound.
+_TOO_LARGE = "the errors are too large for a bound of their second-order terms"
 
 
 def pose_errors(subject: Subject, leg_error: float, record: ProofRecord | None = None) -> Iterator[Verdict]:
-    """Yield the largest errors of the platform's position and rotation, for every machine within its tolerances.
-
-    None is yielded without tolerances.
+    """Yield the verdicts on the largest errors of the platform's position and rotation; none without tolerances.
 
     Args:
-        subject: six straight legs.
-        leg_error: largest error of a leg's length, length.
+        subject: robot with six straight legs.
+        leg_error: largest leg-length error, length.
         record: record of the searches for a proof.
     """
     legs, shortest = subject.legs, subject.shortest
@@ -73,7 +71,7 @@ def pose_errors(subject: Subject, leg_error: float, record: ProofRecord | None =
             record.firsts[claim.name] = -found.bound
     first = PoseErrors(*(-eps * found.bound for _, found in searches))
     reach = float(np.linalg.norm(legs.platform, axis=1).max())
-    # The design's legs may be longer than those of every machine.
+    # Legs of the design may be longer than legs of robots within the tolerance.
     exact = shortest + 2 * legs.tolerance if shortest > 0 else -math.inf
     whole = with_rest(first, eps, exact, reach)
     for k, (claim, (number, found)) in enumerate(zip(ERRORS, searches, strict=True)):
@@ -87,23 +85,28 @@ def pose_errors(subject: Subject, leg_error: float, record: ProofRecord | None =
 
 
 class PoseErrors(NamedTuple):
-    """Largest errors of a platform's pose: of its origin's position, length, and of its rotation, radians."""
+    """Largest pose errors.
+
+    Attributes:
+        position: largest error of the position of the platform's origin, length.
+        rotation: largest angle of the rotation error, radians.
+    """
 
     position: float
     rotation: float
 
 
 def with_rest(first: PoseErrors, eps: float, shortest: float, reach: float) -> PoseErrors:
-    """Return bounds of the whole errors from bounds to first order.
+    """Return bounds of the full pose errors from first-order bounds.
 
     Args:
-        first: bounds to first order, for errors of legs of at most eps.
-        eps: largest error of a leg, length.
-        shortest: shortest length of a leg over the workspace.
-        reach: largest distance of a joint from the platform's origin.
+        first: first-order bounds, for leg-length errors of at most eps.
+        eps: largest leg-length error, length.
+        shortest: shortest leg length over the workspace, length.
+        reach: largest distance of a joint from the platform's origin, length.
 
     Returns:
-        Infinite errors where no bound is found: errors are then too large for the machine.
+        Bounds of the pose errors; infinite if leg-length errors are too large for a bound.
     """
     r = 0.0
     for _ in range(_STEPS if all(map(math.isfinite, first)) else 0):
@@ -120,17 +123,17 @@ def with_rest(first: PoseErrors, eps: float, shortest: float, reach: float) -> P
 
 
 def displaced(legs: Legs, pose: PoseNumbers, errors: FloatArray) -> FloatArray:
-    """Return the errors (2, K) of position and rotation of a machine whose legs are longer by given lengths.
+    """Return the errors (2, K) of position and rotation for given leg-length errors.
 
-    They are NaN where Newton's method finds no pose with these lengths, as about a singular one.
+    They are NaN where Newton's method finds no pose with these lengths, for example near a singular pose.
 
     Args:
         legs: joint centres.
-        pose: the pose without errors.
-        errors: (6, K) of the lengths of the legs.
+        pose: pose without errors.
+        errors: (6, K) leg-length errors, length.
     """
     z, lengths = SX.sym("z", 12), np.linalg.norm(legs.spans(pose.position, pose.rotation), axis=1, keepdims=True)
-    # The platform's origin moves, and a Cayley vector turns the platform; the wanted lengths follow.
+    # Unknowns: motion of the platform's origin, and a Cayley vector of the rotation.
     size = float(lengths.max())
     move, (turned, scale), wanted = z[:3], cayley_rotation(z[3:6]), z[6:]
     ends = ca.repmat(pose.position + move, 1, 6) + turned @ (pose.rotation @ legs.platform.T) / scale

@@ -1,8 +1,8 @@
-"""Forms of second order of many numbers over boxes: sums, products, sizes, and solutions of linear systems.
+"""Second-order forms of quantities over boxes: sums, products, norms, and solutions of linear systems.
 
-A number is ``c + a.e + sum q_ij e_i e_j + [-r, r]`` with ``|e_i| <= 1`` for each coordinate of the pose, or, where no
-more than the first order is known, without products; then the last e may be errors of joint centres, vectors of at most
-unit size. What a product has of higher order is in r, and so is rounding. Boxes are the last axis of all arrays.
+A form is ``c + a.e + sum q_ij e_i e_j + [-r, r]`` with ``|e_i| <= 1`` for each coordinate of the pose. First-order
+forms have no products; their last e may be joint-centre errors, vectors of norm at most 1. Terms of higher order and
+rounding are in r. Boxes are the last axis of all arrays.
 
 The solution Y of ``A Y = D``, where A may have more rows than columns, is that of ``(I + E) Y = Z``, ``E = C A - I``,
 ``Z = C D``, with C near a left inverse of A in the middle of the box. Let Y' be its terms up to the second order. The
@@ -27,22 +27,22 @@ from ..ranks.krawczyk import ROUNDING, bounds_of_inverses, by_centres
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Part of C below which a singular value of the middle matrix is zero.
+#: Relative singular value of the middle matrix that counts as zero.
 _ZERO = 1e-14
-#: More than underflow can cost a sum or a product.
+#: Upper bound of the underflow error of a sum or a product.
 _TINY = 1e-290
 
 
 @dataclass(frozen=True, eq=False)
 class Quadratics:
-    """Matrices of numbers over B boxes.
+    """Matrices of forms over B boxes.
 
     Attributes:
         c: (n, m, B) values at the centres.
         a: (n, m, t, B) linear parts.
         q: (n, m, p, B) factors of products of two of f coordinates, ``e_i e_j`` with i <= j, row by row; or p is 0.
-        r: (n, m, B) bounds of the rest; infinite where nothing is known.
-        errors: number of the last linear terms that are errors of joint centres.
+        r: (n, m, B) bounds of the remainder; infinite where no form is known.
+        errors: number of the last linear terms that are joint-centre errors.
     """
 
     c: FloatArray
@@ -53,13 +53,13 @@ class Quadratics:
 
     @classmethod
     def of(cls, forms: Forms, count: int, errors: int, shape: tuple[int, int]) -> Quadratics:
-        """Return the entries of a matrix from forms of them, column by column, in which squares are ``1/2 + 1/2 e``.
+        """Return a matrix from forms of its entries, column by column, with squares written as ``1/2 + 1/2 e``.
 
         Args:
-            forms: of the entries.
-            count: number f of coordinates, the first terms.
-            errors: number of the last terms that are errors.
-            shape: of the matrix.
+            forms: forms of the entries.
+            count: number f of coordinates; their terms come first.
+            errors: number of the last terms that are joint-centre errors.
+            shape: shape of the matrix.
         """
         c, a, r = forms.c.T, forms.a.transpose(1, 2, 0), forms.r.T
         end = a.shape[1] - errors
@@ -76,33 +76,33 @@ class Quadratics:
 
     @property
     def parts(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """The four arrays."""
+        """The four arrays c, a, q and r."""
         return self.c, self.a, self.q, self.r
 
     @cached_property
     def linear(self) -> FloatArray:
-        """Largest sizes (n, m, B) of the linear parts."""
+        """Largest absolute values (n, m, B) of the linear parts."""
         t = self.a.shape[2] - self.errors
         sizes = np.abs(self.a[:, :, :t]).sum(axis=2)
         return np.asarray(sizes + by_centres(np.moveaxis(self.a[:, :, t:], 2, 3)) if self.errors else sizes)
 
     @cached_property
     def varying(self) -> FloatArray:
-        """Largest sizes (n, m, B) of linear parts and products together."""
+        """Largest absolute values (n, m, B) of linear parts and products together."""
         return np.asarray(self.linear + np.abs(self.q).sum(axis=2)) if self.q.shape[2] else self.linear
 
     @cached_property
     def size(self) -> FloatArray:
-        """Largest sizes (n, m, B)."""
+        """Largest absolute values (n, m, B)."""
         return np.asarray((np.abs(self.c) + self.varying + self.r) * (1 + ROUNDING))
 
     def made(self, parts: Iterable[FloatArray]) -> Quadratics:
-        """Return forms of other four arrays."""
+        """Return forms with four new arrays c, a, q and r."""
         c, a, q, r = parts
         return Quadratics(c, a, q, r, self.errors)
 
     def __getitem__(self, which: slice | tuple[Any, ...]) -> Quadratics:
-        """Return some of the rows, of the columns, or, after an ellipsis, of the boxes."""
+        """Return selected rows, columns, or, after an ellipsis, boxes."""
         return self.made(each[which] for each in self.parts)
 
     @property
@@ -138,7 +138,7 @@ class Quadratics:
         return Quadratics(c * d, new, square, rest + 4 * ROUNDING * self.size * other.size + _TINY, self.errors)
 
     def matmul(self, other: Quadratics) -> Quadratics:
-        """Return the matrix products, entry by entry of what is summed."""
+        """Return the matrix products."""
         (c, a, q, r), (d, b, p, s) = self.parts, other.parts
         new, square = _contracted(a, d[:, :, None]), _contracted(q, d[:, :, None])
         if c.any():
@@ -153,9 +153,9 @@ class Quadratics:
         return Quadratics(_product(c, d), new, square, rest, self.errors)
 
     def lengths(self) -> Quadratics:
-        """Return forms (1, m) of which the upper ends are no smaller than the sizes of the columns.
+        """Return forms (1, m) with upper ends that bound the norms of the columns.
 
-        A size is at most ``(g / t + t) / 2``, with its square g and any t, here the largest one.
+        A norm is at most ``(g / t + t) / 2``, with its square g and any t > 0, here the largest norm.
         """
         g = self.by(self).sums(0)
         with np.errstate(all="ignore"):
@@ -164,7 +164,7 @@ class Quadratics:
         return replace(found, c=found.c + 0.5 * t, r=found.r + ROUNDING * t)
 
     def upper(self) -> FloatArray:
-        """Return upper bounds (n, m, B); infinite where nothing is known."""
+        """Return upper bounds (n, m, B); infinite where no form is known."""
         f, total = self.a.shape[2] - self.errors, self.c + self.r
         if not self.q.shape[2]:
             return np.asarray(total + self.varying + 4 * ROUNDING * self.size)
@@ -179,7 +179,7 @@ class Quadratics:
 
 
 def _add_products(square: FloatArray, a: FloatArray, b: FloatArray) -> None:
-    """Add the products of two linear parts (n, m, f, B), which broadcast, to factors (n, m, p, B)."""
+    """Add the products of two linear parts (n, m, f, B), which broadcast, to coefficients (n, m, p, B)."""
     f, begin = a.shape[2], 0
     for i in range(f):
         end = begin + f - i
@@ -189,7 +189,7 @@ def _add_products(square: FloatArray, a: FloatArray, b: FloatArray) -> None:
 
 
 def _contracted(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Return products of matrices of terms (n, k, t, B) and (k, m, t, B), of which one has a single term."""
+    """Return products of matrices of terms (n, k, t, B) and (k, m, t, B); one of them has t = 1."""
     return np.asarray(sum(one[:, k, None] * other[None, k] for k in range(one.shape[1])))
 
 
@@ -199,7 +199,7 @@ def _product(one: FloatArray, other: FloatArray) -> FloatArray:
 
 
 def solved(A: Quadratics, D: Quadratics) -> Quadratics:
-    """Return the solutions (n, k) of ``A Y = D`` for matrices (m, n), of infinite rest where nothing is known."""
+    """Return the solutions (n, k) of ``A Y = D`` for matrices (m, n); remainders are infinite without a proof."""
     known = np.asarray(np.isfinite(A.size).all(axis=(0, 1)) & np.isfinite(D.size).all(axis=(0, 1)))
     A, D, n = _where(known, A), _where(known, D), A.c.shape[1]
     eye = np.eye(n)
@@ -208,9 +208,9 @@ def solved(A: Quadratics, D: Quadratics) -> Quadratics:
         inverse = inverses if n == A.c.shape[0] else partial(np.linalg.pinv, rcond=_ZERO)
         C = np.ascontiguousarray(inverse(middle).transpose(1, 2, 0))
         E, Z = _fixed_times(C, A), _fixed_times(C, D)
-        # What C A differs from I by in the middle is rest.
+        # The difference of C A and I in the middle goes into the remainder.
         E = replace(E, c=np.zeros_like(E.c), r=E.r + np.abs(E.c - eye[:, :, None]) * (1 + ROUNDING))
-        # Up to the second order both sides of (I + E) Y = Z agree.
+        # Coefficients that make both sides of (I + E) Y = Z equal up to the second order.
         new, square = Z.a - _contracted(E.a, Z.c[:, :, None]), Z.q - _contracted(E.q, Z.c[:, :, None])
         if square.shape[2]:
             for k in range(n):
@@ -238,6 +238,6 @@ def _fixed_times(factors: FloatArray, of: Quadratics) -> Quadratics:
 
 
 def _where(known: NDArray[np.bool_], of: Quadratics) -> Quadratics:
-    """Return the forms where they are known, and else zeros."""
+    """Return the forms, with zeros where they are not known."""
     each = known if known.ndim == 1 else known[:, :, None]
     return of.made(np.where(each if part.ndim == 4 else known, part, 0.0) for part in of.parts)

@@ -1,4 +1,4 @@
-"""Branch and bound for singular values and condition numbers of J, clearances of legs, and numbers of actuators."""
+"""Branch and bound for singular values and condition numbers of J, leg clearances, and actuator quantities."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ import numpy as np
 
 from .....models import FloatArray, Model
 from ....case.case import Case
-from ....case.motors import Motor, MotorNumber
+from ....case.motors import ActuatorQuantity, Motor
 from ....case.task import Sense
 from ....errors import UncoveredError
 from ....interruption import seconds_left, within
 from ...boxes.tree import TreeRecord
 from ...statement.claims import Claim, ClaimKind, searched_claims
-from ...statement.machine import JointErrors, Legs, has_straight_legs, joint_centres
+from ...statement.fixed_robot import JointErrors, Legs, has_straight_legs, joint_centres
 from ...statement.motors import motor_claims
 from ..proof_record import ProofRecord
 from ..robot.path_cover import PathCover
@@ -30,44 +30,44 @@ from .extremes import NumberSearch, goal_of, verdict_of
 from .jacobian_numbers import SingularValues, change_of_rows
 from .motors import Motors
 
-#: Singular values, and clearances in parts of the robot's length, of which gaps are parts where a limit is smaller.
+#: Singular value, and clearance in parts of the robot's size, below which gaps are relative to this value.
 _NEAR_ZERO = {ClaimKind.SPECTRUM: 0.1, ClaimKind.CLEARANCE: 0.01}
-#: Reason for a measure of which nothing is known of every machine.
-_TOO_LARGE = "the errors of joint centres are too large for a bound of the change of J"
-#: Gap of numbers of actuators as a part of the largest size of the same number.
+#: Reason for a measure without a bound over all robots within the tolerance.
+_TOO_LARGE = "the joint-centre errors are too large for a bound of the change of J"
+#: Gap of an actuator quantity, relative to its largest absolute value.
 MOTOR_GAP = 0.01
-#: Part of a load times a motion that such a size is at least: some numbers are 0 at every pose, as those of a platform
-#: that cannot turn under a moment.
+#: Lower bound of this value in parts of load times motion: some quantities are 0 at every pose, such as moments on a
+#: platform that cannot turn.
 _SMALL = 0.01
-#: Part of a product of two bounds that is more than its rounding.
+#: Relative rounding error of a product of two bounds, rounded up.
 _ROUNDING = 1e-15
-#: Number of poses at which the width of a bound over machines is taken, and as many near corners.
+#: Number of random poses, and of poses near corners, at which the width of a bound within the tolerance is sampled.
 _POINTS, _SEED = 64, 0
 
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """The robot that numbers are about, and all machines that are meant.
+    """Robot whose quantities are searched: the design, or all robots within the tolerance.
 
     Attributes:
-        case: with fixed dimensions.
-        model: its robot, without unknowns that follow in closed form.
-        machines: the design, or all machines within its tolerance, over the workspace; None where they are not judged.
-        reason: why they are not; else empty.
-        shortest: no leg of any machine is shorter over the workspace.
+        case: case with fixed dimensions.
+        model: robot of the case, with closed forms in place of unknowns.
+        family: the design, or all robots within the tolerance, over the workspace; None if they are not judged.
+        reason: reason for a robot that is not judged; else empty.
+        shortest: lower bound of all leg lengths over the workspace, length.
     """
 
     case: Case
     model: Model
-    machines: Problem | None
+    family: Problem | None
     reason: str = ""
     shortest: float = 0.0
 
     def errors(self, vectors: FloatArray | None, *, of_legs: bool = False) -> JointErrors | None:
-        """Return errors (m, 3) of joint centres, or of those of legs alone, with their names; None for the design."""
-        if vectors is None or self.machines is None:
+        """Return joint-centre errors (m, 3) with names; ``of_legs`` states errors of legs only. None for the design."""
+        if vectors is None or self.family is None:
             return None
-        names, found = self.machines.names, np.zeros((len(self.machines.names), 3))
+        names, found = self.family.names, np.zeros((len(self.family.names), 3))
         of = [names.index(each) for leg in self.case.model.legs for each in leg.centres] if of_legs else slice(None)
         found[of] = vectors
         return JointErrors(names, found)
@@ -82,36 +82,36 @@ class Subject:
         """The design over the workspace.
 
         Raises:
-            NotJudgedError: the machines that are meant are not judged.
+            NotJudgedError: the robots are not judged.
         """
-        if self.machines is None:
+        if self.family is None:
             raise NotJudgedError(self.reason)
-        return self.machines.problem
+        return self.family.problem
 
     def number(self, claim: Claim) -> SingularValues | Clearance:
-        """Return what has bounds of the number of a claim about a clearance or a spectrum, or of minus it."""
+        """Return the quantity of a claim about a clearance or a singular value, negated for a largest value."""
         if claim.kind is ClaimKind.CLEARANCE:
             if self.legs.tolerance and self.problem.has_following:
-                raise NotJudgedError("numbers of the pose that follow from others differ from machine to machine")
+                raise NotJudgedError("dependent coordinates of the pose differ between robots within the tolerance")
             return Clearance(self.problem, self.legs, claim.legs)
         return self.spectrum(claim.length, is_condition=claim.sense is Sense.MAX)
 
     def spectrum(self, length: float, *, is_condition: bool) -> SingularValues:
-        """Return the smallest singular value of J, or minus its condition number."""
+        """Return the smallest singular value of J, or its negative condition number."""
         problem = self.problem
         if not (self.legs.tolerance and has_straight_legs(self.case.model)):
-            return SingularValues(self.machines or problem, length, is_condition=is_condition)
-        # The change of J by errors of six straight legs has a bound of its own.
+            return SingularValues(self.family or problem, length, is_condition=is_condition)
+        # For six straight legs the change of J by joint-centre errors has a special bound.
         change = change_of_rows(self.legs, length, self.shortest)
-        return SingularValues(problem, length, is_condition=is_condition, machines=self.machines, change=change)
+        return SingularValues(problem, length, is_condition=is_condition, family=self.family, change=change)
 
 
 def searched_extremes(subject: Subject, names: Sequence[str], search: NumberSearch) -> Iterator[Verdict]:
-    """Yield the extremes of :func:`~.claims.searched_claims`.
+    """Yield the verdicts on :func:`~.claims.searched_claims`.
 
     Args:
         subject: the robot.
-        names: measures that are asked for, of which the others are left out.
+        names: names of the requested measures; names of other kinds are ignored.
         search: gap and record.
     """
     for claim in searched_claims(subject.case, names):
@@ -119,7 +119,7 @@ def searched_extremes(subject: Subject, names: Sequence[str], search: NumberSear
 
 
 def _answer(subject: Subject, claim: Claim, search: NumberSearch) -> Verdict:
-    """Return the extreme of a number; the search of a limit ends as soon as it is decided."""
+    """Return the verdict on a quantity; the search of a limit ends as soon as it is decided."""
     if subject.model.rank < 6 and claim.limit is None and claim.kind is not ClaimKind.CLEARANCE:
         return verdict_of(claim, Minimum(reason=EVERYWHERE))
     try:
@@ -131,7 +131,7 @@ def _answer(subject: Subject, claim: Claim, search: NumberSearch) -> Verdict:
         (found,) = smallest_values(number, [goal_of(claim, allowed)], recorder)
     except (UncoveredError, NotJudgedError) as error:
         return verdict_of(claim, Minimum(reason=str(error)))
-    # A smallest singular value of at least 0, or an infinite condition number, says nothing.
+    # A bound of 0 for the smallest singular value, or an infinite condition number, is trivial.
     is_bound = math.isfinite(found.bound) and (claim.sense is Sense.MAX or found.bound > 0)
     if claim.limit is None and not is_bound and subject.case.joint_centre_tolerance:
         found = found._replace(reason=found.reason or _TOO_LARGE)
@@ -149,27 +149,27 @@ def motor_extremes(
     speeds: Mapping[str, float] | None = None,
     record: ProofRecord | None = None,
 ) -> Iterator[Verdict]:
-    """Yield the extremes of :func:`~.motors.motor_claims`, all or those with limits, for each actuator and load.
+    """Yield the verdicts on :func:`~.motors.motor_claims`, for each actuator and load.
 
-    Actuators are much alike: each takes its share of the time left, and the work after them has one too.
+    Each actuator gets an equal share of the time left, and so does the work after them.
 
     Args:
         subject: the robot.
-        with_all: whether numbers without limits are yielded too.
-        speeds: proven bounds of the actuators' speeds, by name, which are then not searched; None where they are.
+        with_all: If false, leave out quantities without limits.
+        speeds: proved bounds of actuator speeds, by name of the actuator; None if speeds are searched too.
         record: record of the searches for a proof.
     """
     claims = [each for each in motor_claims(subject.case) if with_all or each.limit is not None]
     known = dict(speeds or {})
     if speeds is not None:
-        claims = [each for each in claims if each.motor and each.motor.number is not MotorNumber.SPEED]
+        claims = [each for each in claims if each.motor and each.motor.number is not ActuatorQuantity.SPEED]
     alike = itertools.groupby(claims, lambda claim: claim.motor and claim.motor.whose)
     groups = [list(group) for _, group in alike]
     for left, group in zip(range(len(groups), 0, -1), groups, strict=True):
         actuator = group[0].motor.actuator if group[0].motor else ""
         with within(seconds_left() / (left + 1)):
             found = list(_motor_answers(subject, group, known.get(actuator, math.inf), record))
-        if group[0].motor and group[0].motor.number is MotorNumber.SPEED:
+        if group[0].motor and group[0].motor.number is ActuatorQuantity.SPEED:
             known[actuator] = found[0].bound
         yield from found
 
@@ -177,19 +177,19 @@ def motor_extremes(
 def _motor_answers(
     subject: Subject, claims: Sequence[Claim], speed: float, record: ProofRecord | None
 ) -> Iterator[Verdict]:
-    """Yield the extremes of numbers of an actuator, each to a part of the largest size of its kind at some poses.
+    """Yield the verdicts on quantities of one actuator, with gaps relative to the largest value of their kind.
 
     Args:
         subject: the robot.
-        claims: the numbers; those of one load, or the speed.
-        speed: proven bound of the actuator's speed; infinite where there is none.
+        claims: claims about the quantities of one load, or about the speed.
+        speed: proved bound of the actuator's speed; infinite without one.
         record: record of the search for a proof.
     """
     try:
-        if subject.machines is None:
+        if subject.family is None:
             raise NotJudgedError(subject.reason)
-        number, problem = Motors(subject.machines, subject.case, claims), subject.machines.problem
-        z = np.tile(subject.machines.start, (2 * _POINTS, 1))
+        number, problem = Motors(subject.family, subject.case, claims), subject.family.problem
+        z = np.tile(subject.family.start, (2 * _POINTS, 1))
         if problem.cover:
             z[:, problem.of_path] = _points_of_path(problem, problem.cover)
         else:
@@ -201,14 +201,14 @@ def _motor_answers(
         products = np.nan_to_num(number.products(closed), posinf=0.0)
         sizes = np.maximum(sizes, _SMALL * np.median(products, axis=0))
         allowed = MOTOR_GAP * sizes
-        if subject.machines.names and not problem.dependent:
+        if subject.family.names and not problem.dependent:
             z = z[:, : len(problem.start)]
             allowed = allowed + np.nan_to_num(values - number.bounds(z, z), posinf=0.0).max(axis=0)
         goals = [goal_of(claim, gap, is_enough=False) for claim, gap in zip(claims, allowed.tolist(), strict=True)]
         recorder = None if record is None else TreeRecord()
         every = _at_most_products(claims, smallest_values(number, goals, recorder), speed)
         if record is not None and recorder is not None:
-            # One search is that of all.
+            # All claims share one search.
             record.boxes |= dict.fromkeys((claim.name for claim in claims), recorder)
     except (UncoveredError, NotJudgedError) as error:
         every = [Minimum(reason=str(error))] * len(claims)
@@ -219,13 +219,13 @@ def _motor_answers(
 
 
 def _at_most_products(claims: Sequence[Claim], every: Sequence[Minimum], speed: float) -> list[Minimum]:
-    """Return the results of claims, with powers of at most the bound of the force times that of the speed."""
+    """Return the results of claims; a power is at most the bound of the force times the bound of the speed."""
     motors, forces, found = [claim.motor or Motor() for claim in claims], dict[Sense, float](), []
     for claim, motor, own in zip(claims, motors, every, strict=True):
         bound = own.bound
-        if motor.number is MotorNumber.FORCE:
+        if motor.number is ActuatorQuantity.FORCE:
             forces[claim.sense] = max(-bound, 0.0)
-        elif motor.number is MotorNumber.POWER:
+        elif motor.number is ActuatorQuantity.POWER:
             force = forces.get(Sense.MIN if motor.is_backwards else Sense.MAX, math.inf)
             most = force * speed * (1 + _ROUNDING) if math.isfinite(force) and math.isfinite(speed) else math.inf
             bound = max(bound, -most)
@@ -234,10 +234,10 @@ def _at_most_products(claims: Sequence[Claim], every: Sequence[Minimum], speed: 
 
 
 def _asked_gap(subject: Subject, number: SingularValues | Clearance, gap: float) -> float:
-    """Return the gap of a number without a limit: wider by how far the bound at a pose is from the worst machine there.
+    """Return the gap of a quantity without a limit, enlarged by the width of the bound at single poses.
 
-    A bound of the change of J is wider than its change in any one machine, and no smaller boxes make it less wide. The
-    most at a few poses is taken.
+    A bound of the change of J exceeds its change in any single robot, and smaller boxes do not reduce this difference.
+    Its largest value at a few poses is added to the gap.
     """
     problem = number.problem
     allowed = gap * (abs(float(number.values(problem.start[None])[0, 0])) or 1.0)

@@ -1,12 +1,12 @@
-"""Bounds of the second-order change of numbers by errors of joint centres, over a whole workspace.
+"""Bounds of the second-order change of quantities by joint-centre errors, over a whole workspace.
 
-With g a number of a machine and H its second derivatives by the errors e, on the way from the exact machine
+For a quantity g with second derivatives H by the errors e, at some errors between 0 and e,
 
     |g(e) - g(0) - g'(0) e| <= 1/2 sum_jk |H_jk| |e_j| |e_k|,
 
 where H_jk is the block (3, 3) of centres j and k, and |H_jk| its Frobenius norm. The blocks are bounded over boxes of
-poses and all errors within the tolerance; the boxes with the largest bounds are bisected. Centres whose blocks with all
-others are 0, as those of different limbs in F, are bounded apart.
+poses and all errors within the tolerance; the boxes with the largest bounds are bisected. Groups of centres without
+common blocks, such as different limbs in F, are bounded separately.
 """
 
 from __future__ import annotations
@@ -28,24 +28,24 @@ from ..robot.posed_robot import Problem
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Number of boxes examined at once, and of all boxes.
+#: Number of boxes examined at once, and largest number of boxes.
 _BLOCK, _MOST = 128, 4096
-#: The bound is good enough at this part of the first-order change, or this near to its size at the middle of a box.
+#: The search ends if the bound is at most this part of the first-order change, or this factor of a known value.
 _SHARE, _NEAR = 0.02, 1.2
-#: Part of itself by which a bound moves outwards: its own rounding, and room for the check of a proof.
+#: Outward factor of a bound, for rounding and for the check of a proof.
 _OUTWARDS = 1.02
 
 
 def second_order_change(family: Problem, expression: SX, first: float) -> float:
-    """Return a bound of the change of an expression beyond first order; infinite where none is found.
+    """Return a bound of the change of an expression beyond first order; infinite if none is found.
 
     Args:
-        family: the machines; no coordinate of theirs follows from others.
-        expression: (1, 1) in their coordinates, smooth.
-        first: size of the first-order change at some pose, beside which a small bound is good enough.
+        family: robots within the tolerance, without dependent coordinates.
+        expression: (1, 1) smooth expression of the coordinates of the family.
+        first: size of the first-order change at some pose; a much smaller bound is sufficient.
 
     Raises:
-        UncoveredError: an expression holds an operation without a rule.
+        UncoveredError: the expression has an operation without an interval rule.
     """
     H = ca.hessian(expression, family.errors)[0]
     groups = _groups(H, len(family.names))
@@ -53,7 +53,7 @@ def second_order_change(family: Problem, expression: SX, first: float) -> float:
 
 
 def _groups(H: SX, count: int) -> list[list[int]]:
-    """Return the centres in groups of which the second derivatives (3 m, 3 m) have no entries in common."""
+    """Return groups of centres without second derivatives in common; H has the shape (3 m, 3 m)."""
     rows, columns = (np.array(each, dtype=int) // 3 for each in H.sparsity().get_triplet())
     group = np.arange(count)
     for i, j in set(zip(rows.tolist(), columns.tolist(), strict=True)):
@@ -63,7 +63,7 @@ def _groups(H: SX, count: int) -> list[list[int]]:
 
 
 def _change(rule: _ChangeRule, enough: float) -> float:
-    """Return a bound of the change of a rule, which is good enough at a size."""
+    """Return a bound of the change of a rule; a bound of at most ``enough`` ends the search."""
     lower, upper = rule.whole.lower, rule.whole.upper
     root = Boxes(lower, upper, np.array([math.inf]), np.array([WHOLE]), np.zeros(1))
     search = Search(rule, root, whole=(upper - lower)[0], least=(0.0, 0.0), order=Order.LARGEST)
@@ -77,12 +77,12 @@ def _change(rule: _ChangeRule, enough: float) -> float:
 
 
 class _ChangeRule(Rule[FloatArray]):
-    """Rule of the change by errors of some centres; boxes carry its value at their middles.
+    """Rule of branch and bound for the change by errors of some centres; boxes carry the change at their middles.
 
     Args:
-        family: the machines.
+        family: robots within the tolerance.
         H: (3 m, 3 m) second derivatives by all errors.
-        centres: the k centres, whose second derivatives depend on no other errors.
+        centres: indices of the k centres; their second derivatives depend on no other errors.
 
     Attributes:
         whole: the workspace.
@@ -99,7 +99,7 @@ class _ChangeRule(Rule[FloatArray]):
         )
         rows, columns = (np.array(each, dtype=int) for each in lower.sparsity().get_triplet())
         self._block: NDArray[np.int64] = rows // 3 * self._count + columns // 3
-        # An entry below the diagonal of a block on the diagonal stands for two of this block.
+        # Symmetric blocks on the diagonal: an entry below the diagonal counts twice.
         self._times = np.where((rows != columns) & (rows // 3 == columns // 3), 2.0, 1.0)
 
     def examine(self, boxes: Boxes[FloatArray]) -> BoxResults[FloatArray]:
@@ -117,11 +117,11 @@ class _ChangeRule(Rule[FloatArray]):
         return BoxResults(Boxes(now.lower, now.upper, bound, split, middles), -math.inf, len(split))
 
     def _changes(self, sizes: FloatArray) -> FloatArray:
-        """Return the changes (B,) from sizes (B, R) of the entries: sums of the norms of all blocks."""
+        """Return the changes (B,) from absolute values (B, R) of the entries: sums of the norms of all blocks."""
         total = np.zeros((len(sizes), self._count**2))
         for k, block in enumerate(self._block):
             total[:, block] += self._times[k] * sizes[:, k] ** 2
         norms = np.sqrt(total).reshape(-1, self._count, self._count)
-        # The blocks above the diagonal are those below it.
+        # Blocks above the diagonal equal blocks below it.
         norm = 2 * norms.sum(axis=(1, 2)) - np.trace(norms, axis1=1, axis2=2)
         return np.asarray(0.5 * self._tolerance**2 * _OUTWARDS * norm)

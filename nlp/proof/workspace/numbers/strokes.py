@@ -1,4 +1,4 @@
-"""Limits on telescoping legs over a workspace, from the proven lengths of each leg."""
+"""Limits on telescoping legs over a workspace, from the proved shortest and longest length of each leg."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from .....models import FloatArray
 from ....case.task import Sense
 from ...statement.claims import Claim, length_claims
-from ...statement.machine import JointErrors
+from ...statement.fixed_robot import JointErrors
 from ...statement.tolerance import Directions
 from ..robot.pose_box import PoseNumbers
 from ..robot.posed_robot import steepest
@@ -20,7 +20,7 @@ from .bound_search import Minimum
 from .extremes import verdict_of
 from .searched import Subject
 
-#: Smallest gap of a length, as a part of it, and part of the room that lengths may leave: that of rounding.
+#: Smallest relative gap of a length, near rounding; and part of the margin to a limit that the gap may take.
 _FINEST, _SHARE = 1e-11, 0.9
 
 #: Gaps of lengths with which a limit is tried that the triangle inequality leaves open.
@@ -34,13 +34,13 @@ Refine = Callable[[int, Sense, float, Directions | None], Verdict | None]
 def stroke_verdicts(subject: Subject, lengths: Iterable[Verdict], refine: Refine) -> Iterator[Verdict]:
     """Yield the verdicts on the case's limits on telescoping legs.
 
-    A stroke is the longest length less the shortest, at whichever poses: both are poses of the workspace. Where a limit
-    lies between its bound and the value reached, the two lengths are proved more finely, and yielded again before it.
+    A stroke is the longest minus the shortest length over all poses of the workspace. If a limit lies between the bound
+    and the known value, the two lengths are proved with a smaller gap, and yielded again before it.
 
     Args:
         subject: the robot.
-        lengths: smallest and largest length of each leg.
-        refine: proves a length more finely.
+        lengths: verdicts on the smallest and largest length of each leg.
+        refine: function that proves a length with a smaller gap.
     """
     known = {(*each.claim.legs, each.sense): each for each in lengths}
     for claim in length_claims(subject.case):
@@ -54,12 +54,12 @@ def stroke_verdicts(subject: Subject, lengths: Iterable[Verdict], refine: Refine
 
 
 class _Combined:
-    """A number of a leg, its shortest and its longest length times factors.
+    """Linear combination of the shortest and the longest length of a leg.
 
     Args:
         subject: the robot.
-        claim: the number, with its limit.
-        refine: proves a length more finely.
+        claim: claim about the combination, with its limit.
+        refine: function that proves a length with a smaller gap.
     """
 
     def __init__(self, subject: Subject, claim: Claim, refine: Refine) -> None:
@@ -67,7 +67,7 @@ class _Combined:
         (self._leg,), self._factors, self._sign = claim.legs, np.array(claim.weights[::-1]), claim.sense.sign
 
     def refined(self, ends: list[Verdict]) -> tuple[list[Verdict], Verdict]:
-        """Return the two lengths as fine as the limit needs, and the extreme of the number."""
+        """Return the two lengths with the gap that the limit requires, and the verdict on the combination."""
         extreme = self.extreme(ends)
         while (gap := self.finer_gap(extreme, ends)) is not None:
             finer = self.lengths(gap, None)
@@ -75,38 +75,38 @@ class _Combined:
                 break
             ends = [_better(one, other) for one, other in zip(ends, finer, strict=True)]
             before, extreme = extreme, self.extreme(ends)
-            # A bound may be as fine as it gets before a value near it is reached.
+            # The bound may stop improving before a value near it is known.
             tighter, nearer = before.bound - extreme.bound, extreme.reached - before.reached
             if not (self._sign * tighter > 0 or self._sign * nearer > 0):
                 break
-        return ends, self.of_one_machine(extreme, ends)
+        return ends, self.of_one_robot(extreme, ends)
 
     def lengths(self, gap: float, about: Directions | None) -> list[Verdict] | None:
-        """Return the shortest and the longest length, proved to a gap; None where one cannot."""
+        """Return the shortest and the longest length, proved to a gap; None if one cannot be proved."""
         found = [self._refine(self._leg, sense, gap, about) for sense in (Sense.MIN, Sense.MAX)]
         known = [each for each in found if each is not None]
         return known if len(known) == len(found) else None
 
     def extreme(self, ends: Sequence[Verdict], bound: float | None = None) -> Verdict:
-        """Return the extreme from the shortest and the longest length, or from a bound, at the pose of one of them."""
+        """Return the verdict from the two lengths or from a bound, with the pose of one of the lengths."""
         if bound is None:
             bound = float(self._factors @ [each.bound for each in ends])
         reached, errors = self.reached(ends)
         reason = next((each.reason for each in ends if each.reason), "")
-        reason = reason if math.isfinite(bound) else "the leg's lengths are not bounded"
+        reason = reason if math.isfinite(bound) else "no bound of the leg length was proved"
         end = ends[self._claim.sense is Sense.MAX]
         found = Minimum(-self._sign * bound, -self._sign * reached, reason=reason, place=end.place)
         return verdict_of(self._claim, found, end.pose, errors=errors)
 
     def reached(self, ends: Sequence[Verdict]) -> tuple[float, JointErrors | None]:
-        """Return the value from the two lengths of one machine, and its errors; of the design without a tolerance."""
+        """Return the value for one robot at both poses, and its joint-centre errors; None for the design."""
         poses = [each.pose for each in ends if each.pose is not None]
         if not self._legs.tolerance or len(poses) < len(ends):
             return float(self._factors @ [each.reached for each in ends]), None
-        if self._subject.machines is None or self._subject.machines.has_following:
-            # Both poses are of different machines.
+        if self._subject.family is None or self._subject.family.has_following:
+            # The two poses belong to different robots.
             return math.nan, None
-        # The errors are along the change of the number, to first order.
+        # The errors with the largest first-order change.
         at, turned = self.directions(poses)
         errors = np.zeros((2 * len(self._legs.base), 3))
         slopes = self._sign * np.stack([-self._factors @ at, self._factors @ turned])
@@ -119,18 +119,18 @@ class _Combined:
         return np.array([self._legs.spans(pose.position, pose.rotation)[self._leg] for pose in poses])
 
     def directions(self, poses: Sequence[PoseNumbers]) -> tuple[FloatArray, FloatArray]:
-        """Return the unit directions (K, 3) of the leg at poses, in the world frame and in that of the platform."""
+        """Return the unit directions (K, 3) of the leg at poses, in the world frame and in the platform frame."""
         d = self._spans(poses)
         d /= np.linalg.norm(d, axis=1, keepdims=True)
         return d, np.array([n @ pose.rotation for n, pose in zip(d, poses, strict=True)])
 
-    def of_one_machine(self, extreme: Verdict, ends: Sequence[Verdict]) -> Verdict:
-        """Return an extreme that is open with a bound for machines whose errors are the same at both poses."""
+    def of_one_robot(self, extreme: Verdict, ends: Sequence[Verdict]) -> Verdict:
+        """Return an open verdict with a bound for robots with the same errors at both poses."""
         poses = [each.pose for each in ends if each.pose is not None]
         if not self._legs.tolerance or extreme.outcome is not Outcome.OPEN or len(poses) < len(ends):
             return extreme
         about = Directions(extreme.name, *(0.5 * each.sum(axis=0) for each in self.directions(poses)))
-        # What does not cancel: nothing in a stroke.
+        # The part that does not cancel; it is 0 for a stroke.
         left = abs(self._factors.sum()) * self._legs.tolerance * sum(float(np.linalg.norm(each)) for each in about[1:])
         for gap in _GAPS:
             lengths = self.lengths(gap, about) if extreme.outcome is Outcome.OPEN else None
@@ -142,19 +142,19 @@ class _Combined:
         return extreme
 
     def finer_gap(self, extreme: Verdict, ends: Sequence[Verdict]) -> float | None:
-        """Return the gap of squared lengths that decides the limit; None where it is decided, or cannot be."""
+        """Return the gap of squared lengths that decides the limit; None if it is decided or cannot be."""
         if extreme.outcome is not Outcome.OPEN or not math.isfinite(extreme.bound):
             return None
-        # Each length is that of its own worst machine here, as in the bound.
+        # Each length is the length of its worst robot here, as in the bound.
         reached, limit = float(self._factors @ [each.reached for each in ends]), self._claim.limit or 0.0
         room = self._sign * (limit - reached) + slack_of(limit) / 2
-        # A length is off by half the gap of its square.
+        # The relative gap of a length is half the gap of its square.
         gap = _SHARE * 2 * room / float(np.abs(self._factors).sum()) / ends[1].bound
         return gap if gap >= _FINEST else None
 
 
 def _better(one: Verdict, finer: Verdict) -> Verdict:
-    """Return a length that was proved more finely, with the boxes and seconds of both proofs."""
+    """Return the verdict with the smaller gap, with the boxes and seconds of both proofs."""
     sign = one.sense.sign
     best = finer if sign * finer.bound <= sign * one.bound else replace(finer, bound=one.bound)
     boxes, seconds = one.boxes + finer.boxes, one.seconds + finer.seconds

@@ -1,4 +1,4 @@
-"""Closed points of a design along a path, each from the one before: joints are followed from the path's start."""
+"""Joint positions of a design along a tool path: loops are closed from one point to the next, from the start."""
 
 from __future__ import annotations
 
@@ -11,13 +11,16 @@ from ....evidence.closed_loops import inverses
 from ..robot.path_cover import PathCover
 from ..robot.posed_robot import Problem
 
-#: Largest correction of extrapolated joints, in parts of their sizes, that is no jump, and shortest part of a piece in
-#: which they are extrapolated.
+#: Largest relative correction of extrapolated joint positions that does not count as a jump; and shortest part of a
+#: piece for one extrapolation.
 _JUMP, _SHORTEST = 0.1, 2.0**-10
 
 
 def closed_along(problem: Problem, cover: PathCover) -> FloatArray:
-    """Return closed points (N, n) of the design in the middle of segments, or in one before where one is lost."""
+    """Return points (N, n) of the design with closed loops in the middle of segments.
+
+    Where the loops cannot be closed, the row is the point of an earlier segment.
+    """
     near, D = np.repeat(problem.start[None], len(cover.pieces), axis=0), list(problem.dependent)
     if D:
         design = problem.problem
@@ -28,15 +31,15 @@ def closed_along(problem: Problem, cover: PathCover) -> FloatArray:
 
 @lru_cache(maxsize=2)
 def _followed(problem: Problem, cover: PathCover) -> FloatArray:
-    """Return closed points (N, n) in the middle of segments, each from the one before; the start where one is lost.
+    """Return points (N, n) with closed loops in the middle of segments; after a failure, the start of the path.
 
-    The searches of one path share them.
+    The result is cached: all searches of one path share it.
     """
     near, stated = np.repeat(problem.start[None], len(cover.pieces), axis=0), problem.stated
     parts = (0.0, 0.5, 1.0)
     z, points = problem.start.copy(), [problem.path_points(cover, cover.pieces, part) for part in parts]
     for k, ways in enumerate(zip(*points, strict=True)):
-        # A piece with another reference of rotations begins with other coordinates of the same pose.
+        # With another reference of rotations, the same pose has other coordinates.
         z[stated] = ways[0]
         for j in (1, 2):
             moved = _extrapolated(problem, z, ways[j])
@@ -47,9 +50,9 @@ def _followed(problem: Problem, cover: PathCover) -> FloatArray:
 
 
 def _extrapolated(problem: Problem, z: FloatArray, point: FloatArray) -> FloatArray | None:
-    """Return the closed point (n,) at another pose (f,), from joints that are extrapolated from a closed point.
+    """Return the point (n,) with closed loops at another pose (f,), from extrapolated joint positions.
 
-    None where Newton's method corrects them by more than a little: it may have found another assembly.
+    None if Newton's method corrects them by more than ``_JUMP``: it may have reached another assembly mode.
     """
     D, own, size, loops = list(problem.dependent), problem.stated, problem.size, problem.loops
     guess = z.copy()
@@ -65,7 +68,7 @@ def _extrapolated(problem: Problem, z: FloatArray, point: FloatArray) -> FloatAr
 def _moved(
     problem: Problem, cover: PathCover, piece: FloatArray, z: FloatArray, parts: tuple[float, ...]
 ) -> FloatArray:
-    """Return the closed point (n,) to which the way along a piece (1, 3) leads by short steps, or the last known."""
+    """Return the point (n,) with closed loops after short steps along a piece (1, 3), or the last known point."""
     (at, end), step = parts, 0.25
     while at < end and step > _SHORTEST:
         to = min(at + step, end)

@@ -1,13 +1,13 @@
-"""Krawczyk's operator for loop equations: the dependent coordinates over a box, as a linear relation with a rest.
+"""Krawczyk's operator for loop equations: dependent coordinates over a box, as a linear relation with a remainder.
 
 With forms ``g + A e + [-r, r]`` of the equations over a box, and Y close to the inverse of the columns of the dependent
-coordinates D, every closed point of the box has
+coordinates D, every point of the box with closed loops has
 
     e_D = off - T e_I + [-rho, rho],    off = -Y g,   T = Y A_I,   rho = |Y| r + |Y A_D - I|  (+ rounding).
 
-Errors of joint centres are further columns E, ``- Y A_E e_E``; those of one centre are a vector of at most unit length.
-Where the right side is inside of the box for all ``|e_I| <= 1``, Brouwer's theorem gives a closed point for each value
-of the independent coordinates; where moreover the derivatives by D are regular over the box, there is only one [1].
+Joint-centre errors are additional columns E, ``- Y A_E e_E``; errors of one centre are a vector of norm at most 1. If
+the right side is inside of the box for all ``|e_I| <= 1``, Brouwer's theorem gives a point with closed loops for each
+value of the independent coordinates; if also the derivatives by D are regular over the box, it is the only one [1].
 
 Source: 1. R. Krawczyk, *Newton-Algorithmen zur Bestimmung von Nullstellen mit Fehlerschranken*, Computing 4 (1969); the
 form with parameters is in A. Neumaier, *Interval Methods for Systems of Equations*, 1990, Section 5.6.
@@ -26,19 +26,19 @@ from ...enclosure.forms import Forms
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Part of the sum of the sizes of all terms by which a computed product may be off: products here have fewer than 400
-#: terms, each with a rounding of 2^-53.
+#: Rounding error of a computed product, relative to the sum of the absolute values of all terms: products here have
+#: fewer than 400 terms, each with a rounding of 2^-53.
 ROUNDING = 1e-13
-#: Part by which the bound of an inverse is enlarged, so that rounding errors do not decide whether it is proved.
+#: Relative enlargement of the bound of an inverse, so that rounding errors do not decide whether it is proved.
 _ROOM = 1e-6
-#: Steps that make the rounding error of each entry of such a bound relative to this entry, not to the largest one.
+#: Number of refinements that make the rounding error of each entry of this bound relative to the entry.
 _REFINED = 2
-#: More than underflow can take from a sum of squares.
+#: Upper bound of the underflow error of a sum of squares.
 _TINY = 1e-300
 
 
 class Coordinates(NamedTuple):
-    """Indices of coordinates: those that are free, those that follow, and errors of joint centres."""
+    """Indices of the independent coordinates, of the dependent ones, and of joint-centre errors."""
 
     independent: list[int]
     dependent: list[int]
@@ -46,13 +46,13 @@ class Coordinates(NamedTuple):
 
 
 class Relation(NamedTuple):
-    """Dependent coordinates over B boxes, in parts of their half widths.
+    """Dependent coordinates over B boxes, relative to their half widths.
 
     Attributes:
-        off: (B, k) at the middle of the independent ones.
-        T: (B, k, f) slopes, to be subtracted.
-        rho: (B, k) rest; infinite where nothing is known.
-        E: (B, k, 3 m) slopes by errors of m joint centres, to be subtracted.
+        off: (B, k) values at the middle of the independent coordinates.
+        T: (B, k, f) negative slopes by the independent coordinates.
+        rho: (B, k) remainder; infinite where no relation is known.
+        E: (B, k, 3 m) negative slopes by errors of m joint centres.
     """
 
     off: FloatArray
@@ -62,26 +62,26 @@ class Relation(NamedTuple):
 
     @property
     def of_errors(self) -> FloatArray:
-        """Largest sizes (B, k) of the part of the errors."""
+        """Largest absolute values (B, k) of the part of the joint-centre errors."""
         return by_centres(self.E)
 
     @property
     def reach(self) -> FloatArray:
-        """Largest sizes (B, k) over the box."""
+        """Largest absolute values (B, k) over the box."""
         return np.asarray((np.abs(self.off) + np.abs(self.T).sum(axis=2) + self.of_errors + self.rho) * (1 + ROUNDING))
 
 
 def by_centres(slopes: FloatArray) -> FloatArray:
-    """Return the largest sizes (...) of linear parts (..., 3 m) in the errors of m centres, each of at most size 1."""
+    """Return the largest absolute values (...) of linear parts (..., 3 m) in errors of m centres of norm at most 1."""
     parts = slopes.reshape(*slopes.shape[:-1], slopes.shape[-1] // 3, 3)
     return np.asarray(np.sqrt((parts * parts).sum(axis=-1) + _TINY).sum(axis=-1) * (1 + ROUNDING))
 
 
 def bounds_of_inverses(E: FloatArray, right: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Return X (B, n, k) with ``(I - E) X >= right`` for nonnegative matrices (B, n, n), and where it is proved (B,).
+    """Return X (B, n, k) with ``(I - E) X >= right`` for nonnegative E (B, n, n), and whether it is proved (B,).
 
-    With a positive row sum of every row of ``right``, a nonnegative X proves that ``I - E`` is an M-matrix. Then X is
-    not below ``(I - E)^-1 right``.
+    If every row of ``right`` has a positive sum, a nonnegative X proves that ``I - E`` is an M-matrix. Then X is at
+    least ``(I - E)^-1 right``.
     """
     wider = E * (1 + _ROOM)
     X = inverses(np.eye(E.shape[1]) - wider) @ right
@@ -93,7 +93,7 @@ def bounds_of_inverses(E: FloatArray, right: FloatArray) -> tuple[FloatArray, ND
 
 
 def no_relation(count: int, of: Coordinates) -> Relation:
-    """Return the relation over boxes of which nothing is known."""
+    """Return the unknown relation over boxes, with infinite remainders."""
     f, k, e = map(len, of)
     return Relation(np.zeros((count, k)), np.zeros((count, k, f)), np.full((count, k), np.inf), np.zeros((count, k, e)))
 
@@ -116,7 +116,7 @@ def relation_of(equations: Forms, of: Coordinates) -> Relation:
 
 
 def with_relation(forms: Forms, relation: Relation, of: Coordinates) -> Forms:
-    """Return forms of the independent coordinates, then the errors, with the relation in the place of the others."""
+    """Return forms in the independent coordinates and errors, with the relation in place of dependent coordinates."""
     own, others = forms.a[:, :, of.dependent], forms.a[:, :, [*of.independent, *of.errors]]
     size = np.abs(own)
     with np.errstate(all="ignore"):

@@ -1,8 +1,8 @@
-"""Boxes of a robot over a workspace, in which dependent coordinates follow from independent ones, and their search.
+"""Boxes of a search with dependent coordinates that follow from independent ones, in one assembly mode.
 
-Each pose of a box has one closed point between the ends of its dependent coordinates, which moves continuously with the
-pose. Two boxes with a pose in common have one assembly of the robot's joints where the closed point of the one at that
-pose is that of the other. All boxes have one where each is reached from the first.
+Each pose of a box has exactly one point with closed loops between the ends of its dependent coordinates, which moves
+continuously with the pose. Two boxes with a common pose are in the same assembly mode if they have the same point
+there. All boxes are in one assembly mode if each is connected with the first.
 """
 
 from __future__ import annotations
@@ -34,32 +34,32 @@ from .rank_rule import EntryChange, RankTest, Tested, is_polynomial, not_regular
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Factors by which widths of dependent coordinates are made wider: the first guess, from slopes at the middle of a box,
-#: and later ones, from the relation that was found with the guess before.
+#: Factors that widen estimates of widths of dependent coordinates: the first estimate, from slopes at the middle of a
+#: box, and later ones, from the relation of the attempt before.
 _WIDER, _AGAIN = 1.1, 1.05
-#: Widths of a box, in parts of the whole box, below which it is not bisected.
+#: Relative widths of a box below which it is not bisected.
 _LEAST_WIDTHS = 2.0**-24, 2.0**-24
-#: Attempts to find widths of dependent coordinates in which they surely stay.
+#: Number of attempts to find widths of dependent coordinates that the operator proves.
 _ATTEMPTS = 8
-#: Smallest half width of a dependent coordinate, in parts of its size: more than rounding.
+#: Smallest relative half width of a dependent coordinate, well above rounding.
 _LEAST = 1e-10
-#: Largest one: beyond it, the box of the pose is divided first.
+#: Largest relative half width of a dependent coordinate; a wider box is bisected first.
 _MOST = 1.0
-#: Part of itself by which an end of a dependent coordinate moves outwards: several roundings.
+#: Relative outward shift of an end of a dependent coordinate, for rounding.
 _ROUNDING = 1e-14
-#: Factor of a sum that is more than its rounding.
+#: Outward factor of a sum, for rounding.
 _UP = 1 + 1e-12
-#: Width of a coordinate along a path, as a part of its size, and of at least 1 of rotations, up to which it is fixed.
+#: Relative width of a coordinate along a path (absolute for small rotations) that counts as 0.
 _FIXED = 1e-11
-#: Part of their widths by which computed dependent coordinates may be beyond their ends: rounding of Newton's method.
+#: Part of their widths by which computed dependent coordinates may exceed their ends, for rounding of Newton's method.
 _CLOSE = 1e-9
-#: Contractions of the closed point at the common face of two boxes: each one squares its width.
+#: Number of contractions of the point at the common face of two boxes; each one squares its width.
 _CONTRACTIONS = 3
-#: Reason for which nothing is claimed although every box is closed.
-APART = "the assemblies in two neighbouring boxes are not proved to be the same"
-#: Most independent coordinates for which forms of second order are used: those of poses of a path, and their rates.
+#: Reason for an open claim although every box is closed.
+APART = "not proved: two neighbouring boxes have the same assembly mode"
+#: Largest number of independent coordinates with second-order forms: poses of a path, and their rates.
 _MOST_SECOND = 14
-#: Number of boxes beyond which pairs of them are too many, and number of pairs that are compared at once.
+#: Number of boxes beyond which not all pairs are compared, and number of pairs that are compared at once.
 _MANY, _PAIRS = 6000, 512
 
 
@@ -67,9 +67,9 @@ class LoopBoxes(NamedTuple):
     """B boxes.
 
     Attributes:
-        lower, upper: (B, n) ends of all coordinates; those of dependent ones are NaN until they are known.
-        near: (B, n) a closed point in or near the box.
-        is_known: (B,) whether each pose of the box surely has one, and only one, closed point between the ends.
+        lower, upper: (B, n) ends of all coordinates; NaN for dependent coordinates until they are known.
+        near: (B, n) point with closed loops in or near the box.
+        is_known: (B,) whether each pose of the box provably has exactly one point with closed loops between the ends.
     """
 
     lower: FloatArray
@@ -87,11 +87,11 @@ class Examined(NamedTuple):
     """Results for B boxes.
 
     Attributes:
-        boxes: the boxes, with dependent coordinates where they are known.
-        relation: of these; its rest is infinite where they are not known.
-        is_regular, shares, smallest, signs: those of :class:`~.rank_rule.Tested`; nothing is known of ``smallest``
-            where it is infinite. Of K numbers it is (B, K), their lower bounds.
-        along: of :class:`Followed`.
+        boxes: the boxes, with dependent coordinates where known.
+        relation: relation of the dependent coordinates; its remainder is infinite where they are not known.
+        is_regular, shares, smallest, signs: fields of :class:`~.rank_rule.Tested`; an infinite ``smallest`` is unknown.
+            For K quantities it holds their lower bounds (B, K).
+        along: pieces of a path, as in :class:`Followed`.
     """
 
     boxes: LoopBoxes
@@ -108,7 +108,7 @@ class Test(Protocol):
 
     Attributes:
         entries: (R, 1) the expressions.
-        unknown: smallest number, or numbers (K,), of a box of which nothing is known.
+        unknown: value, or values (K,), of ``smallest`` for a box without a result.
     """
 
     entries: SX
@@ -118,27 +118,26 @@ class Test(Protocol):
         """Return the results for boxes.
 
         Args:
-            forms: of the entries.
-            f: number of the first terms, which are the independent coordinates.
-            errors: number of the last terms, which are errors of joint centres; those between are products of two
-                coordinates.
+            forms: forms of the entries.
+            f: number of independent coordinates, whose terms come first; products of two coordinates follow.
+            errors: number of the last terms, which are joint-centre errors.
         """
 
 
 class Examiner:
-    """Examination of boxes of a robot by one test, as for the rank of a matrix.
+    """Examination of boxes of a robot by one test, such as the rank of a matrix.
 
     Args:
         problem: the robot.
-        test: its entries are in the coordinates of the problem.
+        test: test with entries in the coordinates of the problem.
 
     Attributes:
-        of: the coordinates.
+        of: indices of the coordinates.
         loops: the loop equations as functions.
-        second: forms of second order of the entries; None where forms of first order are used.
+        second: second-order forms of the entries; None if first-order forms are used.
 
     Raises:
-        UncoveredError: an expression holds an operation without a rule.
+        UncoveredError: an expression has an operation without an interval rule.
     """
 
     def __init__(self, problem: Problem, test: Test) -> None:
@@ -147,28 +146,28 @@ class Examiner:
         self.second: Encloser | None = None
         self._change: EntryChange | None = None
         is_short = not problem.dependent and len(problem.independent) <= _MOST_SECOND
-        # With errors, forms of second order are those of the polynomials of a matrix alone.
+        # With joint-centre errors, second-order forms exist only for matrices with polynomial entries.
         is_rank = isinstance(test, RankTest)
         if is_short and (not problem.names or (is_rank and is_polynomial(test.entries, problem.z))):
             self._change = EntryChange(problem, test.entries) if problem.names else None
             exact = test.entries if self._change is None else self._change.exact
             self.second = Encloser(problem.problem.z, exact)
         else:
-            _ = self._encloser  # refuses an operation without a rule at once
+            _ = self._encloser  # fails at once for an operation without a rule
 
     @cached_property
     def _single(self) -> RankTest:
-        """The test of the loop equations' derivatives: where it is passed, no pose has two closed points in a box."""
+        """Test of derivatives of the loop equations; if passed, no pose has two points with closed loops in a box."""
         problem, D = self.problem, self.of.dependent
-        # Powers of two, so that scaling rounds nothing.
+        # Powers of two make scaling exact.
         sizes = ca.diag(ca.DM(2.0 ** np.round(np.log2(problem.size[D]))))
         slopes = ca.jacobian(problem.equations, problem.z)[:, D] @ sizes
         return RankTest(RankMatrix(slopes, 0), problem.z, problem.start)
 
     @cached_property
     def _encloser(self) -> Encloser:
-        """Forms of first order of the equations, of their derivatives by dependent coordinates, and of the entries."""
-        # A last entry that is not used, for a matrix that is constant.
+        """First-order forms of the equations, of their derivatives by dependent coordinates, and of the entries."""
+        # The last entry is not used; it keeps the vector nonconstant.
         entries = self.problem.equations, self._single.entries, self._test.entries, self.problem.z[0]
         return Encloser(self.problem.z, ca.vertcat(*entries))
 
@@ -191,7 +190,7 @@ class Examiner:
         if new.size:
             tested.shares[new] = self._guess(new, lower, upper, near)
         for attempt in range(1 + (_ATTEMPTS if k else 0)):
-            # The first round is of boxes that are known already.
+            # The first attempt is for boxes that are known already.
             rows = np.flatnonzero(known if attempt == 0 else ~known & np.isfinite(lower).all(axis=1))
             if not rows.size:
                 continue
@@ -215,7 +214,7 @@ class Examiner:
         return Examined(LoopBoxes(lower, upper, near, known), relation, *tested)
 
     def _guess(self, rows: NDArray[np.int64], lower: FloatArray, upper: FloatArray, near: FloatArray) -> FloatArray:
-        """Set ends of dependent coordinates about closed loops at the middle of boxes; return shares (rows, f)."""
+        """Set ends of dependent coordinates about joint positions at the middle of boxes; return shares (rows, f)."""
         (own, D, errors), size = self.of, self.problem.size
         z = near[rows].copy()
         middle, half = 0.5 * (lower[rows] + upper[rows])[:, own], 0.5 * (upper[rows] - lower[rows])[:, own]
@@ -228,7 +227,7 @@ class Examiner:
             slopes = self.loops.slopes(z.T) * size
             Y = inverses(slopes[:, :, D])
             reach = np.abs(Y @ slopes[:, :, own]) * (half / size[own])[:, None, :]
-            # Errors move dependent coordinates too, here to first order; their sizes are their tolerances.
+            # Joint-centre errors move dependent coordinates too, here to first order.
             whole = reach.sum(axis=2) + by_centres(Y @ slopes[:, :, errors])
         near[rows] = z
         self._set_widths(rows, z[:, D], _WIDER * whole, lower, upper)
@@ -238,24 +237,24 @@ class Examiner:
     def _set_widths(
         self, rows: NDArray[np.int64], middle: FloatArray, half: FloatArray, lower: FloatArray, upper: FloatArray
     ) -> None:
-        """Set ends of dependent coordinates from their middles and half widths in parts of their sizes, (rows, k)."""
+        """Set ends of dependent coordinates from relative middles and half widths (rows, k)."""
         D, half = self.of.dependent, np.maximum(half, _LEAST)
         width = np.where(half <= _MOST, half, np.nan) * self.problem.size[D]
         lower[rows[:, None], D], upper[rows[:, None], D] = middle - width, middle + width
 
     def _widen(self, rows: NDArray[np.int64], reach: FloatArray, lower: FloatArray, upper: FloatArray) -> None:
-        """Set the widths of dependent coordinates to those that were found to be needed."""
+        """Set the widths of dependent coordinates from the relation of the last attempt."""
         D = self.of.dependent
         low, high = lower[rows][:, D], upper[rows][:, D]
         half = 0.5 * (high - low) / self.problem.size[D]
         self._set_widths(rows, 0.5 * (low + high), half * np.maximum(_AGAIN * reach, 0.5), lower, upper)
 
     def tied(self, one: LoopBoxes, other: LoopBoxes) -> NDArray[np.bool_]:
-        """Return whether neighbours have the same closed point somewhere on their common face.
+        """Return whether neighbours have the same point with closed loops somewhere on their common face.
 
         Args:
             one: (B,) boxes with known dependent coordinates.
-            other: as many, whose independent coordinates overlap those of the first in pairs.
+            other: (B,) neighbours of these boxes, with overlapping independent coordinates.
         """
         own = self.of.independent
         lower, upper = one.lower.copy(), one.upper.copy()
@@ -264,11 +263,11 @@ class Examiner:
         return self.leads(one._replace(lower=lower, upper=upper), other)
 
     def leads(self, part: LoopBoxes, other: LoopBoxes) -> NDArray[np.bool_]:
-        """Return whether the closed points of parts of boxes are surely between the ends of others.
+        """Return whether points with closed loops in parts of boxes are provably between the ends of other boxes.
 
         Args:
-            part: (B,) boxes with known dependent coordinates, with a smaller range of independent ones.
-            other: (B,) others.
+            part: (B,) boxes with known dependent coordinates, with smaller ranges of independent ones.
+            other: (B,) boxes with known dependent coordinates.
         """
         D, (lower, upper) = self.of.dependent, (part.lower.copy(), part.upper.copy())
         for _ in range(_CONTRACTIONS):
@@ -281,9 +280,9 @@ class Examiner:
         """Return parts of boxes with the ends of their dependent coordinates.
 
         Args:
-            boxes: parts (B,) of boxes, with the dependent coordinates of the whole.
-            relation: of the whole.
-            sides: (B, f) -1 or 1 for an independent coordinate in its lower or upper half, 0 for a whole one.
+            boxes: parts (B,) of boxes, with the dependent coordinates of the whole boxes.
+            relation: relation of the whole boxes.
+            sides: (B, f) -1 or 1 for the lower or upper half of an independent coordinate, 0 for its whole range.
         """
         D, known = self.of.dependent, boxes.is_known[:, None]
         if not D or not known.any():
@@ -291,7 +290,7 @@ class Examiner:
         (off, T, rho, _), size = relation, np.abs(relation.T)
         rho = rho + relation.of_errors
         total = size.sum(axis=2)
-        # A half lies in [-1, 0] or [0, 1] of the whole box, and a little beyond for rounding.
+        # A half is [-1, 0] or [0, 1] of the whole box, plus rounding.
         reach = total - 0.5 * (size @ np.abs(sides)[:, :, None])[:, :, 0] + rho
         reach = reach + 1e-12 * (np.abs(off) + total + rho)
         centre = off - (T @ (0.5 * sides)[:, :, None])[:, :, 0]
@@ -304,7 +303,7 @@ class Examiner:
 def _parts(
     lower: FloatArray, upper: FloatArray, centre: FloatArray, reach: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the parts of ranges that are near centres, in parts of their half widths, with ends moved outwards."""
+    """Return sub-ranges from relative centres and half widths, with ends moved outwards."""
     middle, half = 0.5 * lower + 0.5 * upper, 0.5 * (upper - lower) * (1 + _ROUNDING)
     slack = _ROUNDING * np.abs(middle)
     with np.errstate(all="ignore"):
@@ -314,14 +313,14 @@ def _parts(
 
 
 def are_between(z: FloatArray, boxes: LoopBoxes, dependent: Sequence[int]) -> NDArray[np.bool_]:
-    """Return whether closed points (B, n) are those of boxes: others may be of another assembly of the joints."""
+    """Return whether points (B, n) with closed loops lie in boxes; otherwise they may be in another assembly mode."""
     lower, upper, own = boxes.lower[:, dependent], boxes.upper[:, dependent], z[:, dependent]
     room = _CLOSE * (upper - lower)
     return np.asarray(((own >= lower - room) & (own <= upper + room)).all(axis=1))
 
 
 def whole_workspace(problem: Problem) -> LoopBoxes:
-    """Return the whole workspace as one box; its dependent coordinates are not known."""
+    """Return the whole workspace as one box, with unknown dependent coordinates."""
     box, free = problem.box, list(problem.free)
     if problem.cover is not None:
         return _whole_path(problem, problem.cover)
@@ -344,9 +343,9 @@ def _whole_path(problem: Problem, cover: PathCover) -> LoopBoxes:
 
 
 def contracted_boxes(problem: Problem, boxes: LoopBoxes) -> tuple[LoopBoxes, NDArray[np.bool_]]:
-    """Return boxes contracted to the workspace, and whether each holds poses of it, (B,).
+    """Return boxes contracted to the workspace, and whether each contains poses of it, (B,).
 
-    Dependent coordinates of the pose leave no box out.
+    Limits on dependent coordinates of the pose exclude no box.
     """
     box, free, following = problem.box, list(problem.free), list(problem.box.dependent)
     lower, upper = problem.pose_of(boxes.lower), problem.pose_of(boxes.upper)
@@ -360,29 +359,29 @@ def contracted_boxes(problem: Problem, boxes: LoopBoxes) -> tuple[LoopBoxes, NDA
 
 
 def coordinates_to_split(shares: FloatArray, width: FloatArray) -> NDArray[np.intp]:
-    """Return the places (B,) of the coordinates to bisect.
+    """Return the indices (B,) of the coordinates to bisect.
 
     Args:
-        shares: (B, f) share of each coordinate in what is missing.
-        width: (B, f) widths in parts of the whole box.
+        shares: (B, f) share of each coordinate in the overestimation.
+        width: (B, f) widths relative to the whole box.
     """
     score = np.where(width > 0, shares, -1.0)
     flat = ~(score > 0).any(axis=1)
     score[flat] = width[flat]
-    # A coordinate that counts for little is divided where it is much wider than all others.
+    # A coordinate with a small share is bisected if it is much wider than all others.
     score += 1e-3 * score.max(axis=1, keepdims=True, initial=0.0) * width
     return first_largest(score)
 
 
 class Followed(NamedTuple):
-    """Columns of boxes of a robot.
+    """Data that boxes of a robot carry.
 
     Attributes:
-        near, is_known: those of :class:`LoopBoxes`.
-        relation: of the dependent coordinates.
-        more: further columns (B, ...) of a rule, as a tuple.
-        along: (B, 3) pieces of a path that the boxes cover: index of the segment, and the ends of its parameter; (B, 0)
-            for boxes of a workspace.
+        near, is_known: fields of :class:`LoopBoxes`.
+        relation: relation of the dependent coordinates.
+        more: further arrays (B, ...) of a rule, as a tuple.
+        along: (B, 3) pieces of a path that the boxes cover: index of the segment, and both ends of the parameter;
+            (B, 0) for boxes of a workspace.
     """
 
     near: FloatArray
@@ -393,18 +392,18 @@ class Followed(NamedTuple):
 
 
 class LoopRule(Rule[Followed]):
-    """Rule for boxes of a robot, in which dependent coordinates are followed.
+    """Rule for boxes of a robot with dependent coordinates.
 
     Args:
         problem: the robot.
-        examiner: follows the dependent coordinates, and has the test.
-        recorder: records the boxes for a proof.
+        examiner: examiner of boxes, with the test.
+        recorder: recorder of the boxes for a proof.
 
     Attributes:
-        whole: (n,) widths of the whole workspace along independent coordinates; 0 for others.
+        whole: (n,) widths of the whole workspace along independent coordinates; 0 for dependent ones.
     """
 
-    #: Further columns of the whole workspace, as a tuple or an array.
+    #: Further arrays of the whole workspace, as a tuple or an array.
     _more: Any = ()
 
     def __init__(self, problem: Problem, examiner: Examiner, recorder: TreeRecord | None = None) -> None:
@@ -417,13 +416,13 @@ class LoopRule(Rule[Followed]):
         ]
         self._fixed: FloatArray = np.zeros(len(problem.start))
         if problem.cover is not None:
-            # What is fixed along the path is as wide as its rounding, however often a piece is halved.
+            # Fixed coordinates have a width by rounding, which bisection does not reduce.
             size = np.maximum(np.abs(self._start.lower).max(axis=0), np.abs(self._start.upper).max(axis=0))
             turns = [j for j, k in enumerate(problem.free) if k >= 3]
             size[turns] = np.maximum(size[turns], 1.0)
             self._fixed = np.nan_to_num(_FIXED * size)
             self.whole[~(self.whole > self._fixed)] = 0.0
-        # The boxes in which dependent coordinates became known.
+        # The boxes in which dependent coordinates became known; their sub-boxes are in the same assembly mode.
         self._roots: list[LoopBoxes] = []
         self._root_pieces: list[FloatArray] = []
 
@@ -457,7 +456,7 @@ class LoopRule(Rule[Followed]):
         return parts._replace(lower=found.lower, upper=found.upper)
 
     def parts(self, boxes: Boxes[Followed]) -> Boxes[Followed]:
-        """Return the halves of boxes, all lower ones first; along a path those of its pieces."""
+        """Return the halves of boxes, all lower halves first; along a path the halves of its pieces."""
         cover = self._problem.cover
         if cover is None:
             return bisected(boxes)
@@ -467,16 +466,16 @@ class LoopRule(Rule[Followed]):
         parts.more.along[:count, 2] = parts.more.along[count:, 1] = middle
         own = self._problem.of_path
         parts.lower[:, own], parts.upper[:, own] = self._problem.path_boxes(cover, parts.more.along)
-        # Dependent coordinates are found anew, from a closed point nearby.
+        # Dependent coordinates are computed again from a near point with closed loops.
         D = list(self._problem.dependent)
         parts.lower[:, D] = parts.upper[:, D] = np.nan
         return parts._replace(more=parts.more._replace(is_known=np.full(2 * count, not D)))
 
     def examined(self, boxes: Boxes[Followed]) -> Examined:
-        """Return the results for the boxes that hold poses of the workspace."""
+        """Return the results for the boxes that contain poses of the workspace."""
         inside = self._contracted(loop_boxes_of(boxes))
         found = self._examiner.examine(inside)
-        # Boxes are left out where the ball of rotations is left, which a path has not.
+        # Only boxes outside the ball of rotations are dropped; a path has no ball.
         along = boxes.more.along if self._problem.cover is not None else np.zeros((len(found.shares), 0))
         found = found._replace(along=along)
         new = np.flatnonzero(found.boxes.is_known & ~inside.is_known)
@@ -486,7 +485,7 @@ class LoopRule(Rule[Followed]):
         return found
 
     def _contracted(self, boxes: LoopBoxes) -> LoopBoxes:
-        """Return boxes contracted to the workspace, and record where they lead."""
+        """Return boxes contracted to the workspace, and record the contraction."""
         found, kept = contracted_boxes(self._problem, boxes)
         if self._recorder is not None and self._problem.cover is None:
             before, after = (self._poses(each.lower, each.upper) for each in (boxes, found))
@@ -494,7 +493,7 @@ class LoopRule(Rule[Followed]):
         return found if kept.all() else some(found, kept)
 
     def _poses(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return boxes by the ends of all six coordinates (B, 6): those that follow from others have their range."""
+        """Return boxes by the ends of all six coordinates (B, 6); dependent coordinates have their whole range."""
         box, free = self._problem.box, self._problem.free
         low, high = (np.broadcast_to(each, (len(lower), 6)).copy() for each in (box.lower, box.upper))
         for j in self._independent:
@@ -505,23 +504,23 @@ class LoopRule(Rule[Followed]):
     def boxes_of(
         self, found: Examined, bound: FloatArray, split: NDArray[np.intp], more: FloatArray
     ) -> Boxes[Followed]:
-        """Return examined boxes with bounds (B,), places (B,) of the coordinates to bisect, and columns of the rule."""
+        """Return examined boxes with bounds (B,), indices (B,) of the coordinates to bisect, and arrays of the rule."""
         lower, upper, near, is_known = found.boxes
         columns = np.array(self._independent)[split]
         if self._problem.cover is not None:
-            # Halves of a piece along which the platform stands, but for rounding, are as wide as the piece.
+            # If the platform stands still along a piece, except for rounding, its halves are as wide as the piece.
             own = list(self._problem.stated)
             stands = ((upper - lower)[:, own] <= self._fixed[own]).all(axis=1)
             columns = np.where(stands, SMALL, columns)
         return Boxes(lower, upper, bound, columns, Followed(near, is_known, found.relation, more, found.along))
 
     def widths(self, boxes: LoopBoxes | Boxes[Followed]) -> FloatArray:
-        """Return the widths (B, f) of boxes along independent coordinates, in parts of the whole workspace."""
+        """Return the widths (B, f) of boxes along independent coordinates, relative to the whole workspace."""
         own, whole = self._independent, self.whole[self._independent]
         return (boxes.upper - boxes.lower)[:, own] / np.where(whole > 0, whole, np.inf)
 
     def is_one_assembly(self) -> bool:
-        """Return whether the boxes surely belong to one assembly."""
+        """Return whether the boxes are provably in one assembly mode."""
         if not self._roots:
             return True
         roots = joined(self._roots)
@@ -539,11 +538,11 @@ class LoopRule(Rule[Followed]):
         return bool(one_assembly(self._examiner, roots, pairs.T, np.arange(count) == 0).all())
 
     def assembled_until(self) -> tuple[float, float]:
-        """Return the place of a path up to which boxes surely belong to the assembly of its start; infinite for all."""
+        """Return the place of a path up to which boxes are provably in its first assembly mode; infinite for all."""
         cover, start = self._problem.cover, self._problem.start
         if cover is None or not self._roots:
             return math.inf, 0.0
-        # Pieces in the order of the path: each holds the first point of the next one, and the first the start.
+        # Pieces in the order of the path: each contains the start of the next one.
         roots, along = joined(self._roots), joined(self._root_pieces)
         order = np.lexsort(along.T[[1, 0]])
         ordered, along = some(roots, order), along[order]
@@ -560,12 +559,12 @@ class LoopRule(Rule[Followed]):
     def _are_tied(
         self, cover: PathCover, boxes: Sequence[LoopBoxes], pieces: Sequence[FloatArray]
     ) -> NDArray[np.bool_]:
-        """Return whether boxes of a path have the first point of the next ones, and there the same closed point.
+        """Return whether each box of a path has the same point with closed loops as the next box at their common pose.
 
         Args:
-            cover: of the path.
-            boxes: (B,) of pieces, and of the next ones.
-            pieces: (B, 3) these.
+            cover: boxes of the path.
+            boxes: (B,) boxes of pieces, and (B,) boxes of the next pieces.
+            pieces: (B, 3) pieces, and (B, 3) next pieces.
         """
         (one, other), (before, after) = boxes, pieces
         (k, low, high), (segment, s, _) = before.T, after.T
@@ -573,13 +572,13 @@ class LoopRule(Rule[Followed]):
         meet = is_next | ((segment == k) & (low <= s) & (s <= high))
         end = np.stack([k, np.where(is_next, 1.0, s), np.where(is_next, 1.0, s)], axis=1)
         start = np.stack([segment, s, s], axis=1)
-        # The closed point of a small box is found to be between the ends of a large one, not the other way. In the two
-        # boxes the pose may have other coordinates.
+        # Containment is only proved for the point of the smaller box in the larger box. The same pose may have
+        # different coordinates in the two boxes.
         parts = self._at(cover, one, end, before), self._at(cover, other, start, after)
         return np.asarray(meet & (self._examiner.leads(parts[0], other) | self._examiner.leads(parts[1], one)))
 
     def _at(self, cover: PathCover, boxes: LoopBoxes, points: FloatArray, pieces: FloatArray) -> LoopBoxes:
-        """Return boxes (B,) of pieces (B, 3) of a path with the poses at points of these, pieces without a length."""
+        """Return boxes (B,) of pieces (B, 3) of a path, reduced to points, which are pieces without a length."""
         own = [j for j in self._independent if j < len(self._problem.free)]
         low, high = (each[:, [self._problem.free[j] for j in own]] for each in cover.boxes(points, pieces))
         lower, upper = boxes.lower.copy(), boxes.upper.copy()
@@ -595,17 +594,17 @@ def loop_boxes_of(boxes: Boxes[Followed]) -> LoopBoxes:
 def one_assembly(
     examiner: Examiner, boxes: LoopBoxes, pairs: NDArray[np.intp], is_reached: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Return for each box (B,) whether its closed points surely belong to the assembly of some boxes.
+    """Return whether each box (B,) is provably in the assembly mode of some given boxes.
 
     Args:
-        examiner: of the robot.
-        boxes: with known dependent coordinates where they are in pairs.
-        pairs: (P, 2) boxes that touch.
-        is_reached: (B,) those boxes.
+        examiner: examiner of the robot's boxes.
+        boxes: (B,) boxes; boxes in pairs have known dependent coordinates.
+        pairs: (P, 2) indices of neighbouring boxes.
+        is_reached: (B,) whether a box is one of the given boxes.
     """
     is_reached, tried = is_reached.copy(), np.zeros(len(pairs), dtype=bool)
     while True:
-        # Pairs of a box that is reached and one that is not: the first of each that is left is tried.
+        # Pairs with exactly one reached box; for each other box the first untested pair is tested.
         which = np.flatnonzero((is_reached[pairs[:, 0]] != is_reached[pairs[:, 1]]) & ~tried)
         if not which.size:
             return is_reached

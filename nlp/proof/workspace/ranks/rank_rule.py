@@ -1,21 +1,21 @@
-"""The test of a sparse matrix over boxes: whether it has full column rank at every closed point.
+"""Test of a sparse matrix over boxes for full column rank at every point with closed loops.
 
 With forms of the entries, in which the dependent coordinates are replaced by their relation to the independent ones,
-``M = M0 + sum_v M_v e_v + [-R, R]``; in forms of second order products of two coordinates are further terms. For any
-matrix C, here a left inverse of M0,
+``M = M0 + sum_v M_v e_v + [-R, R]``; second-order forms also have products of two coordinates. For any matrix C, here a
+left inverse of M0,
 
     |I - C M| <= |I - C M0| + sum_v |C M_v| + |C| R  entry by entry;
 
-the parts of the three errors of a joint centre, a vector of at most unit length, count together as that of a vector.
-Where the right side has a spectral radius below 1, C M has an inverse, and M full column rank.
+with the three errors of each joint centre bounded as one vector of norm at most 1. If the right side has a spectral
+radius below 1, C M is regular, and M has full column rank.
 
-A matrix whose null space has d dimensions at almost all poses gets d further rows, a basis of the null space at the
-middle of the box: full column rank then means that it has no more dimensions anywhere in the box.
+A matrix with a null space of d dimensions at almost all poses gets d additional rows, a basis of the null space at the
+middle of the box. Full column rank then means that the null space has d dimensions everywhere in the box.
 
-Errors of joint centres change polynomial entries, such as those of rows of straight legs, entry by entry: with g_j the
-derivative of an entry by the error of centre j, and H its second derivatives by all errors, the entry of a machine
-within the tolerance t differs from that of the design by at most ``t sum_j |g_j| + t^2 / 2 sum |H|``. The first
-derivatives are bounded over each box, the second ones once over the workspace and all errors.
+Joint-centre errors change polynomial entries, such as entries of rows of straight legs, one by one: with g_j the
+derivative of an entry by the error of centre j, and H its second derivatives by all errors, the entry of a robot within
+the tolerance t differs from the entry of the design by at most ``t sum_j |g_j| + t^2 / 2 sum |H|``. First derivatives
+are bounded over each box, second derivatives once over the workspace and all errors.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ from .krawczyk import ROUNDING
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Part of the size of a row by which its entries may be off: a constant that should be 0 may be rounding error.
+#: Error of entries relative to the norm of their row: a constant that should be 0 may be rounding error.
 _CONSTANTS = 1e-13
-#: Part of itself by which a bound of a change moves outwards: its own rounding.
+#: Outward factor of the bound of a change, for rounding.
 _OUTWARDS = 1 + 1e-12
 #: Operations of polynomials.
 _POLYNOMIAL = (
@@ -51,11 +51,11 @@ class Tested(NamedTuple):
     """Results for B boxes.
 
     Attributes:
-        is_regular: (B,) whether the rank is proved to be full.
+        is_regular: (B,) whether full rank is proved.
         shares: (B, f) share of each independent coordinate in the bound.
-        smallest: (B,) computed smallest singular value at the middle as a part of the largest; infinite where unknown.
-        signs: (B,) sign of the determinant of a square matrix at the middle: a computed number; 0 for other matrices.
-            Where the rank is proved, it is that at every pose of the box.
+        smallest: (B,) computed smallest singular value at the middle, relative to the largest; infinite if unknown.
+        signs: (B,) computed sign of the determinant of a square matrix at the middle; 0 for other matrices. With proved
+            full rank, it is the sign at every pose of the box.
     """
 
     is_regular: NDArray[np.bool_]
@@ -65,23 +65,23 @@ class Tested(NamedTuple):
 
 
 def not_regular(shares: FloatArray, smallest: FloatArray) -> Tested:
-    """Return the results for boxes of which none is regular."""
+    """Return the results for boxes without a proof of full rank."""
     signs = np.zeros(len(smallest), dtype=np.int32)
     return Tested(signs.astype(bool), shares, smallest, signs)
 
 
 class RankTest:
-    """The test of a matrix.
+    """Test of the rank of a matrix.
 
     Args:
         matrix: the matrix.
         z: (n, 1) symbols of the coordinates.
-        start: (n,) a closed point, at which rows and columns are scaled.
+        start: (n,) point with closed loops, at which rows and columns are scaled.
 
     Attributes:
-        entries: (E, 1) what is not constant.
-        sign: of the determinant of a square matrix at the start; 0 for other matrices.
-        unknown: smallest singular value where nothing is known.
+        entries: (E, 1) entries that are not constant.
+        sign: sign of the determinant of a square matrix at the start; 0 for other matrices.
+        unknown: value of ``smallest`` for a box without a result.
     """
 
     unknown: FloatArray = np.array(np.inf)
@@ -92,7 +92,7 @@ class RankTest:
         is_square = whole.shape[0] == whole.shape[1] and not matrix.nullity
         self.sign = int(np.linalg.slogdet(values)[0]) if is_square else 0
         sizes = np.linalg.norm(values, axis=1)
-        # A power of two, so that scaling rounds nothing.
+        # Powers of two make scaling exact.
         scale = 2.0 ** -np.round(np.log2(np.where(sizes > 0, sizes, 1.0)))
         constant, self._off = np.zeros(whole.shape), np.zeros((whole.shape[0] + matrix.nullity, whole.shape[1]))
         places, entries = [], []
@@ -111,7 +111,7 @@ class RankTest:
         self._head = (whole.shape[0] + matrix.nullity, whole.shape[1], len(at), (at, self._scale))
 
     def examine(self, forms: Forms, f: int, errors: int) -> Tested:
-        """Return the verdict on boxes from forms of the entries, as of :class:`~.loop_boxes.Test`."""
+        """Return the results for boxes from forms of the entries; see :class:`~.loop_boxes.Test`."""
         count, terms, (rows, columns, *_) = len(forms.c), forms.a.shape[2], self._head
         if rows < columns:  # singular at every pose
             return not_regular(np.zeros((count, f)), np.zeros(count))
@@ -126,13 +126,13 @@ class RankTest:
         given = (C, off, forms.a.transpose(1, 2, 0), forms.r.T)
         arrays = (*(np.ascontiguousarray(each) for each in given), regular, shares)
         kernel().rank(self._head, (terms, f, errors), arrays, count)
-        # Frobenius norms: at most as many times smaller than the singular value as there are columns.
+        # Frobenius norms make it smaller than the singular value, at most by the factor of the number of columns.
         smallest = 1 / (np.linalg.norm(M0, axis=(1, 2)) * np.linalg.norm(C, axis=(1, 2)))
         signs = signs if not self._nullity else np.zeros_like(signs)
         return Tested(regular.astype(bool), shares.T, np.where(is_known, np.nan_to_num(smallest), np.inf), signs)
 
     def _middles(self, entries: FloatArray) -> FloatArray:
-        """Return scaled matrices (B, m, c) from entries (B, E), with a basis of what their rows miss below."""
+        """Return scaled matrices (B, m, c) from entries (B, E), with a basis of their null spaces as last rows."""
         shape = (len(entries), *self._constant.shape)
         found = np.array(np.broadcast_to(self._constant, shape))
         found[:, self._at[:, 0], self._at[:, 1]] = entries * self._scale
@@ -143,9 +143,9 @@ class RankTest:
 
 
 def _left_inverses(matrices: FloatArray) -> tuple[FloatArray, NDArray[np.int32]]:
-    """Return left inverses (B, c, m) of matrices (B, m, c), and the signs (B,) of determinants of square ones, else 0.
+    """Return left inverses (B, c, m) of matrices (B, m, c), and signs (B,) of determinants; 0 if not square.
 
-    They are NaN for matrices without full column rank.
+    The inverses are NaN for matrices without full column rank.
     """
     is_square = matrices.shape[1] == matrices.shape[2]
     Q, R = (None, matrices) if is_square else np.linalg.qr(matrices)
@@ -160,7 +160,7 @@ def _left_inverses(matrices: FloatArray) -> tuple[FloatArray, NDArray[np.int32]]
 def is_polynomial(entries: SX, coordinates: SX) -> bool:
     """Return whether entries (E, 1) are polynomials in coordinates (n, 1)."""
     function = ca.Function("entries", [coordinates], [entries])
-    constant: set[int] = set()  # work places, which are used again
+    constant: set[int] = set()  # work registers, which are reused
     for k in range(function.n_instructions()):
         op, to, places = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
         if op not in _POLYNOMIAL and not (op == ca.OP_DIV and places[1] in constant):
@@ -171,17 +171,17 @@ def is_polynomial(entries: SX, coordinates: SX) -> bool:
 
 
 class EntryChange:
-    """Largest changes of entries over boxes of poses.
+    """Largest changes of entries by joint-centre errors, over boxes of poses.
 
     Args:
-        family: all machines; none of their coordinates follows from others.
-        entries: (E, 1) polynomials in their coordinates.
+        family: robots within the tolerance, without dependent coordinates.
+        entries: (E, 1) polynomials in the coordinates of the family.
 
     Attributes:
-        exact: (E, 1) the entries of the design, in the coordinates of the pose alone.
+        exact: (E, 1) entries of the design, in the coordinates of the pose.
 
     Raises:
-        UncoveredError: an expression holds an operation without a rule.
+        UncoveredError: an expression has an operation without an interval rule.
     """
 
     def __init__(self, family: Problem, entries: SX) -> None:
@@ -190,7 +190,7 @@ class EntryChange:
         self.exact: SX = ca.substitute(entries, errors, at_zero)
         self._tolerance = family.tolerance
         first, of_entry, of_error = _slopes(entries, errors)
-        # One sum for each entry and centre.
+        # One sum for each pair of entry and centre.
         self._sums, self._of_sum = np.unique(of_entry * len(family.names) + of_error // 3, return_inverse=True)
         self._sums //= len(family.names)
         self._slopes = Encloser(family.problem.z, ca.substitute(first, errors, at_zero))

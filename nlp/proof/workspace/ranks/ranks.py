@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 
 #: Number of boxes examined at once.
 _BLOCK = 1024
-#: Callback with seconds, number of boxes examined, and number of boxes open.
+#: Callback with seconds, number of examined boxes, and number of open boxes.
 RankProgress = Callable[[float, int, int], None]
-#: Search for a singular pose from the boxes that were examined last, and the number of all.
+#: Search for a singular pose from the boxes that were examined last, and the number of all examined boxes.
 Look = Callable[[Examined, int], Singular | None]
-#: Whether J, or the constraint wrenches, lose their rank at a pose (6,) of the machine with errors of joint centres.
+#: Whether J, or the constraint wrenches, lose their rank at a pose (6,) of the robot with joint-centre errors.
 IsSingular = Callable[..., bool]
 
 
@@ -45,13 +45,13 @@ def prove_ranks(
 
     Args:
         problem: the design, or all robots within the tolerance.
-        is_singular: whether single poses are singular in the home assembly mode; others refute nothing.
+        is_singular: function that tests single poses in the home assembly mode; only these refute a claim.
         rank: rank of J at almost all dimensions and poses.
-        progress: called during the searches.
+        progress: function that is called during the searches.
         record: record of the searches for a proof.
 
     Returns:
-        The verdict on J, and that on the constraint wrenches of a robot that has them.
+        The verdict on J, and on the constraint wrenches if the robot has any.
     """
     found = []
     try:
@@ -77,7 +77,7 @@ def prove_ranks(
 
 
 def _refuted(verdict: Verdict, problem: Problem, at: Singular | None) -> Verdict:
-    """Return a verdict that a singular pose refutes; the same verdict without one."""
+    """Return the verdict with a singular pose that refutes it; the same verdict without a pose."""
     if at is None:
         return verdict
     pose = problem.box.pose(at.y)
@@ -94,19 +94,19 @@ def prove_rank(
     recorder: TreeRecord | None = None,
     look: Look | None = None,
 ) -> Verdict:
-    """Prove that a matrix keeps its rank at every pose of a workspace, or find a pose at which it does not.
+    """Prove that a matrix keeps its rank at every pose of a workspace, or find a singular pose.
 
     Args:
         problem: the robot.
-        matrix: one of its two matrices.
+        matrix: one of the robot's two matrices.
         name: name of the claim.
-        most_boxes: number of boxes after which it stops.
-        progress: called about ten times a second.
-        recorder: records the boxes for a proof.
-        look: looks for singular poses; a search of its own if left out.
+        most_boxes: number of boxes after which the search stops.
+        progress: function that is called about ten times a second.
+        recorder: recorder of the boxes for a proof.
+        look: function that looks for singular poses; if left out, a new :class:`.SingularSearch`.
 
     Raises:
-        UncoveredError: an expression holds an operation without a rule.
+        UncoveredError: an expression has an operation without an interval rule.
     """
     effort = Effort(most_boxes)
     with one_search():
@@ -149,13 +149,13 @@ def prove_rank(
 
 
 class RankRule(LoopRule):
-    """Rule of the rank of a matrix.
+    """Rule for the rank of a matrix.
 
     Args:
-        problem, matrix, recorder, look: as in :func:`prove_rank`.
+        problem, matrix, recorder, look: arguments of :func:`prove_rank`.
 
     Attributes:
-        singular: a singular pose; None while none is known.
+        singular: singular pose; None while none is known.
     """
 
     block = _BLOCK
@@ -167,7 +167,7 @@ class RankRule(LoopRule):
         self._look, self._examined = look, 0
 
     def examine(self, boxes: Boxes[Followed]) -> BoxResults[Followed]:
-        """Return the boxes over which the rank is not proved to be full."""
+        """Return the boxes over which full rank is not proved."""
         found = self.examined(boxes)
         count = len(found.is_regular)
         self._examined += count
@@ -178,11 +178,11 @@ class RankRule(LoopRule):
         return BoxResults(self.boxes_of(found, np.zeros(len(split)), split, found.shares), 0.0, count)
 
     def divided(self, boxes: Boxes[Followed]) -> Boxes[Followed]:
-        """Return the halves of boxes, and the quarters where a half would fail by its linear part alone."""
+        """Return the halves of boxes; quarters if the linear part already makes the test of a half fail."""
         parts = super().divided(boxes)
         if self._problem.dependent:
             return parts
-        # With the positive vector of the box, the sum of all shares is that of as many row sums as there are columns.
+        # With the positive vector of the box, all shares add up to the sum of the row sums.
         shares = parts.more.more
         shares[np.arange(len(shares)), parts.split] *= 0.5
         fails = shares.sum(axis=1) >= self._columns

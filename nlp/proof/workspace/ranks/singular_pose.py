@@ -1,18 +1,18 @@
-"""Singular poses: by signs of determinants, and by Newton's method from poses with a small smallest singular value.
+"""Search for singular poses: by signs of determinants, and by Newton's method from poses with a small singular value.
 
-A pose is singular where ``M(z) v = 0`` for a unit vector v, with closed loops: equations in z and v, solved by Newton's
-method with steps of least squares. It converges where the determinant changes its sign, and more slowly where it
-touches 0 without a change of sign. What it finds is computed, not proved: J at the pose, with unit rows and moments
-divided by a length, has a singular value of at most 1e-10 of the largest.
+A pose is singular if ``M(z) v = 0`` for a unit vector v, with closed loops. Newton's method with least-squares steps
+solves these equations in z and v. It converges quickly where the determinant changes its sign, and slowly where it
+touches 0. Its result is computed, not proved: J at the pose, with unit rows and moments divided by a length, has a
+singular value of at most 1e-10 times the largest.
 
-The workspace is convex in its coordinates: where the determinant of six rows is positive at one pose, negative at
-another, and the rows have values along the segment between the two, a pose of it is singular. With C near the inverse
-of the rows at a pose, the sign of their determinant is that of det C where no row of ``|I - C M|`` has a sum of 1 or
-more. det C is computed in whole numbers.
+The workspace is convex in its coordinates. If the determinant of six rows is positive at one pose and negative at
+another, and the rows are defined along the segment between them, a pose of the segment is singular. With C near the
+inverse of the rows at a pose, their determinant has the sign of det C if every row sum of ``|I - C M|`` is less than 1.
+det C is computed in integers.
 
-Of all machines within a tolerance on joint centres, one may be singular although the design is not. The smallest
-singular value is made smaller by errors of the centres, each along its derivative: the method of Frank and Wolfe [1],
-whose steps stay within the tolerance. From each machine on the way a singular one is looked for.
+A robot within the joint-centre tolerance may be singular although the design is not. The method of Frank and Wolfe [1],
+with steps within the tolerance, reduces the smallest singular value by errors along its derivatives. Each iterate
+starts a search for a singular robot.
 
 Source: 1. M. Frank, P. Wolfe, *An algorithm for quadratic programming*, Naval Research Logistics Quarterly 3 (1956).
 """
@@ -32,7 +32,7 @@ from .....models.arrays import first_largest, values_at
 from .....models.newton import Linear, newton
 from ....evidence.closed_loops import inverses
 from ...enclosure.forms import Encloser
-from ...statement.machine import JointErrors
+from ...statement.fixed_robot import JointErrors
 from ..robot.posed_model import RankMatrix
 from ..robot.posed_robot import Problem
 from ..verdict import EVERYWHERE
@@ -42,43 +42,43 @@ from .loop_boxes import Examined
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Singular value, in parts of the largest, below which a pose counts as singular.
+#: Relative singular value below which a pose counts as singular.
 SINGULAR = 1e-10
-#: How a singular pose of Newton's method is known.
+#: Reason of a verdict with a singular pose of Newton's method.
 BY_NEWTON = "found singular to 1e-10 by Newton's method"
-#: Steps of Newton's method: where a determinant touches 0, each one halves the distance.
+#: Largest number of Newton steps: where a determinant touches 0, each step halves the distance.
 _STEPS = 60
-#: Steps in which the smallest singular value must become smaller by a tenth: at the edge of a workspace it does not.
+#: Number of steps in which the smallest singular value must decrease by a tenth; at the edge of a workspace it may not.
 _PATIENCE = 8
-#: Singular value of M, in parts of the largest, below which J is looked at.
+#: Relative singular value of M below which J is tested.
 _NEAR = 1e-6
-#: Largest step of a coordinate, in parts of its size.
+#: Largest relative step of a coordinate.
 _STEP = 0.25
 #: Largest residual of closed loops.
 _CLOSED = 1e-9
-#: Singular values below this part of the largest are zero in a step.
+#: Relative singular value that counts as zero in a step.
 _DEPENDENT = 1e-12
-#: Smallest part of the platform's motion in the null vector: below, passive joints alone move.
+#: Smallest share of the platform's motion in the null vector; below, only passive joints move.
 _MOVES = 1e-3
-#: Smallest singular value, in parts of the largest, from which Newton's method is tried, and most attempts.
+#: Largest relative singular value at the start of Newton's method, and largest number of attempts.
 _SMALL, _MOST = 0.1, 24
-#: Part of the value before at which it tries again.
+#: Factor of the singular value after which Newton's method is tried again.
 _SMALLER = 0.6
-#: Random poses from which Newton's method looks for a singular one, and number of the worst that are tried.
+#: Number of random poses for Newton's method, and number of the worst poses from which it begins.
 _POSES, _TRIED, _SEED = 2048, 8, 0
-#: Steps toward machines with smaller singular values, and number of boxes after which the first ones are made; later
-#: ones after twice as many each.
-_MACHINES, _FIRST = 6, 64
-#: Random poses whose determinants are computed at once; of those with the largest ones of either sign, the number from
-#: which larger ones are looked for, and of steps; distance for derivatives, in parts of the workspace.
+#: Number of steps to robots with smaller singular values, and number of boxes before the first steps; the number
+#: doubles each time.
+_ROBOTS, _FIRST = 6, 64
+#: Number of random poses with determinants; number of extreme ones of each sign that begin a descent, and of its steps;
+#: distance for derivatives, relative to the workspace.
 _SAMPLES, _KEPT, _DESCENTS, _APART = 256, 8, 6, 1e-4
-#: Number of poses of each sign that are kept, and of points on the way between two that are tried first.
+#: Number of poses of each sign that are kept, and of points between two poses that are tested first.
 _SIGNED, _ON_WAY = 4, 64
-#: Distances from a computed singular pose, in parts of the workspace, at which both signs are looked for.
+#: Distances from a computed singular pose, relative to the workspace, at which both signs are searched.
 _DISTANCES = (1e-4, 1e-3, 1e-2, 1e-1)
-#: Halvings between two points: more than a double has digits; and largest number of parts of the way between them.
+#: Number of bisections between two points, more than the digits of a double; and largest number of parts between them.
 _HALVINGS, _PARTS = 60, 1024
-#: Part of a sum of products of a row and a column by which it may be off.
+#: Relative rounding error of a sum of products of a row and a column.
 _PRODUCT = 2.0**-48
 
 
@@ -86,10 +86,10 @@ class Singular(NamedTuple):
     """A singular pose.
 
     Attributes:
-        y: (6,) its coordinates.
-        reason: how it is known, where that is no proof; else empty.
-        sides: (2, 6) two poses at which the determinant is proved to have opposite signs; None without them.
-        errors: of the joint centres of the machine that is singular; None for the design.
+        y: (6,) coordinates of the pose.
+        reason: how the pose was computed, if it is not proved; else empty.
+        sides: (2, 6) two poses at which the determinant has proved opposite signs; None without them.
+        errors: joint-centre errors of the singular robot; None for the design.
     """
 
     y: FloatArray
@@ -99,11 +99,11 @@ class Singular(NamedTuple):
 
 
 class SingularPose:
-    """Newton's method for a singular point of a matrix: a pose, and errors of a machine within the tolerance.
+    """Newton's method for a singular point of a matrix: a pose, and joint-centre errors within the tolerance.
 
     Args:
         problem: the robot.
-        matrix: whose rank is judged, in its coordinates.
+        matrix: the matrix, as expressions of the robot's coordinates.
     """
 
     def __init__(self, problem: Problem, matrix: RankMatrix) -> None:
@@ -118,7 +118,7 @@ class SingularPose:
         self._jacobian = ca.Function("J", [z], [ca.densify(problem.posed.scaled.jacobian)])
 
     def smallest(self, z: FloatArray) -> float:
-        """Return the singular value that is 0 at a singular pose, in parts of the largest; infinite without one."""
+        """Return the relative singular value that is 0 at a singular pose; infinite if the matrix is not finite."""
         decomposed, J, rank = self.decomposed(z), self._jacobian(z).full(), self.rank
         if decomposed is None or not np.isfinite(J).all() or rank < 1:
             return float("inf")
@@ -131,22 +131,22 @@ class SingularPose:
         return float(values[rank - 1] / values[0]) if len(values) >= rank else 0.0
 
     def search(self, z: FloatArray, moving: int | None = None) -> FloatArray | None:
-        """Return a singular point (n,) of the workspace near a point (n,); None where none is found.
+        """Return a singular point (n,) of the workspace near a point (n,); None if none is found.
 
         Args:
-            z: the point.
-            moving: number of the first coordinates that move; all if left out.
+            z: start of the search.
+            moving: number of coordinates that may move, the first ones; all if left out.
         """
         decomposed = self.decomposed(z)
         if decomposed is None:
             return None
-        # The direction that M shrinks most, among those across its null space.
+        # The direction with the smallest singular value, orthogonal to the constant null space of M.
         v = decomposed[2][self.rank - 1]
         found, _ = newton(_NullVector(self, moving), (z, v), steps=_STEPS, zeros=[_DEPENDENT])
         return found if self.is_singular(found) else None
 
     def decomposed(self, z: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray] | None:
-        """Return M at a point (n,), its singular values and its right singular vectors; None where M is not finite."""
+        """Return M at a point (n,), its singular values and its right singular vectors; None if M is not finite."""
         M = self._values(z).full()
         if not np.isfinite(M).all():
             return None
@@ -154,9 +154,9 @@ class SingularPose:
         return M, values, right
 
     def slopes(self, z: FloatArray) -> FloatArray | None:
-        """Return the derivatives (n,) of the smallest singular value at a closed point (n,); None without any.
+        """Return derivatives (n,) of the smallest singular value at a point (n,) with closed loops; None without any.
 
-        To first order it is ``u . M v`` with its vectors u and v; dependent coordinates follow from the others.
+        To first order it is ``u . M v`` with singular vectors u and v; dependent coordinates follow from the others.
         """
         M = self._values(z).full()
         if not np.isfinite(M).all():
@@ -170,32 +170,32 @@ class SingularPose:
         return found if np.isfinite(found).all() else None
 
     def is_singular(self, z: FloatArray) -> bool:
-        """Return whether a point (n,) is a pose of the workspace, with closed loops, that is singular."""
+        """Return whether a point (n,) is a singular pose of the workspace with closed loops."""
         problem = self.problem
         closed = np.abs(problem.loops.values(z[:, None])).max(initial=0.0) <= _CLOSED
         return bool(closed and problem.box.holds(problem.pose_of(z))) and self.smallest(z) <= SINGULAR
 
-    def machines(self, z: FloatArray) -> Iterator[FloatArray]:
-        """Yield points (n,) of machines with smaller and smaller singular values, from a point of the design."""
-        problem, machine = self.problem, z
-        for step in range(_MACHINES):
-            closed = problem.loops.all_closed(machine[:, None], problem.dependent)[:, 0]
+    def robots(self, z: FloatArray) -> Iterator[FloatArray]:
+        """Yield points (n,) with joint-centre errors and decreasing singular values, from a point of the design."""
+        problem, robot = self.problem, z
+        for step in range(_ROBOTS):
+            closed = problem.loops.all_closed(robot[:, None], problem.dependent)[:, 0]
             slopes = self.slopes(closed)
             if slopes is None:
                 return
             end = problem.with_errors(closed[None], -slopes[None, problem.of_errors])[0]
-            machine = closed + 2 / (step + 2) * (end - closed)
-            yield machine
+            robot = closed + 2 / (step + 2) * (end - closed)
+            yield robot
 
 
 class _NullVector:
-    """``M(z) v = 0`` at closed loops, for a unit vector v across the null space that M has everywhere.
+    """Equations ``M(z) v = 0`` with closed loops, for a unit vector v orthogonal to the constant null space of M.
 
     A point is z (n,) with v.
 
     Args:
         pose: the matrix.
-        moving: number of the first coordinates that move; all for None.
+        moving: number of coordinates that may move, the first ones; all for None.
     """
 
     def __init__(self, pose: SingularPose, moving: int | None) -> None:
@@ -203,7 +203,7 @@ class _NullVector:
         self._seen: list[float] = []
 
     def linear(self, at: tuple[FloatArray, FloatArray]) -> Linear | None:
-        """Return the equations to first order; None where z is singular, and where steps lead to no singular point."""
+        """Return the linearised equations; None if z is singular, or if the steps do not approach a singular point."""
         (z, v), pose, seen, n = at, self._pose, self._seen, len(self._size)
         decomposed, rank = pose.decomposed(z), pose.rank
         if decomposed is None:
@@ -227,7 +227,7 @@ class _NullVector:
         return Linear(residual, rows) if np.isfinite(residual).all() and np.isfinite(rows).all() else None
 
     def moved(self, at: tuple[FloatArray, FloatArray], step: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the point after a step that moves no coordinate far and stays in the workspace, with a unit vector."""
+        """Return the point after a step, limited in each coordinate and to the workspace, with a unit vector."""
         (z, v), n = at, len(self._size)
         step = step * min(1.0, _STEP / max(float(np.abs(step[:n]).max(initial=0.0)), 1e-300))
         z = z.copy()
@@ -237,7 +237,7 @@ class _NullVector:
 
 
 class DeterminantSigns:
-    """Signs of the determinant of six rows at points of a robot none of whose coordinates follows from others.
+    """Signs of the determinant of six rows at points of a robot without dependent coordinates.
 
     Args:
         problem: the robot.
@@ -253,17 +253,17 @@ class DeterminantSigns:
         return Encloser(self._problem.z, ca.vec(self._matrix.matrix.T))
 
     def computed(self, points: FloatArray) -> FloatArray:
-        """Return the determinants (K,) of unit rows at points (K, n): computed numbers, 0 where rows have no value."""
+        """Return computed determinants (K,) of unit rows at points (K, n); 0 where rows are not defined."""
         rows = np.nan_to_num(values_at(self._values, points)[0], posinf=0.0, neginf=0.0)
         sizes = np.linalg.norm(rows, axis=2).prod(axis=1)
         return np.asarray(np.linalg.det(rows) / np.where(sizes > 0, sizes, 1.0))
 
     def has_values(self, lower: FloatArray, upper: FloatArray) -> bool:
-        """Return whether the rows surely have values everywhere in boxes (B, n)."""
+        """Return whether the rows are provably defined everywhere in boxes (B, n)."""
         return bool(np.isfinite(self._encloser(lower.T, upper.T).r).all())
 
     def proved(self, z: FloatArray) -> int:
-        """Return the sign at a point (n,); 0 where it is not proved."""
+        """Return the proved sign at a point (n,); 0 if it is not proved."""
         forms = self._encloser(z[:, None], z[:, None])
         M, R = (each.reshape(1, 6, 6) for each in (forms.c, forms.r))
         C = inverses(M)
@@ -272,9 +272,9 @@ class DeterminantSigns:
         return _sign_of_determinant(C[0]) if bound.sum(axis=2).max() < 1 - ROUNDING else 0
 
     def change(self, one: FloatArray, other: FloatArray) -> FloatArray | None:
-        """Return a point (n,) next to where the sign changes between two points; it has the sign of the other one.
+        """Return a point (n,) near the change of sign between two points, with the sign of the second point.
 
-        None where their signs are not proved to be opposite, or the rows to have values along the whole way.
+        None if opposite signs are not proved, or if the rows are not provably defined between the two points.
         """
         values = self.computed(one + np.linspace(0, 1, _ON_WAY)[:, None] * (other - one))
         if not (values.all() and values[0] * values[-1] < 0 and self.proved(one) * self.proved(other) < 0):
@@ -294,15 +294,15 @@ class DeterminantSigns:
             share = 0.5 * (low + high)
             is_beyond = sign * self.computed((one + share * (other - one))[None])[0] > 0
             low, high = (low, share) if is_beyond else (share, high)
-        # Very near to the change no sign is proved.
+        # Signs cannot be proved very near to the change.
         shares = np.minimum(high + 2.0 ** np.arange(-52, 1), 1.0)
         points = (one + share * (other - one) for share in shares)
         return next((z for z in points if self.proved(z) == sign), other)
 
     def extremes(self) -> FloatArray:
-        """Return points (K, n) with the smallest and the largest determinants that few steps from random poses find.
+        """Return points (K, n) with small and large determinants, after a few steps from random poses.
 
-        The determinant changes little but linearly over a box: each step tries corners that its derivatives point to.
+        The determinant is nearly linear over a box: each step tests the corners in the direction of its derivatives.
         """
         box = self._problem.box
         width, parts = box.upper - box.lower, np.array([1.0, 0.5, 0.25])[:, None, None]
@@ -315,7 +315,7 @@ class DeterminantSigns:
         order = np.argsort(values(every))
         y, sign = every[np.r_[order[:_KEPT], order[-_KEPT:]]], np.repeat([1.0, -1.0], _KEPT)
         for _ in range(_DESCENTS):
-            # Derivatives, times the sign with which the determinant is to fall.
+            # Derivatives, with the sign for which the determinant must fall.
             near = sign * values(y + _APART * width * np.eye(7, 6)[:, None])
             slopes = (near[:6] - near[6]).T
             end = np.where(slopes > 0, box.lower, box.upper)
@@ -330,7 +330,7 @@ class DeterminantSigns:
         return self._points(y)
 
     def around(self, z: FloatArray) -> FloatArray:
-        """Return random points (K, n) of the design around one, at several distances."""
+        """Return random points (K, n) of the design around a point, at several distances."""
         y, box = self._problem.pose_of(z), self._problem.box
         away = np.random.default_rng(_SEED).uniform(-1, 1, (len(_DISTANCES), _SAMPLES, 6)) * (box.upper - box.lower)
         return self._points((y + np.array(_DISTANCES)[:, None, None] * away).reshape(-1, 6))
@@ -341,9 +341,9 @@ class DeterminantSigns:
 
 
 def _sign_of_determinant(matrix: FloatArray) -> int:
-    """Return the sign of a determinant, by elimination in whole numbers (Bareiss)."""
+    """Return the exact sign of a determinant, by integer elimination (Bareiss)."""
     ratios = [[each.as_integer_ratio() for each in row] for row in matrix.tolist()]
-    # Denominators are powers of two: the largest of a row is a multiple of the others.
+    # Denominators are powers of two, so the largest of a row is a multiple of the others.
     common = [max(denominator for _, denominator in row) for row in ratios]
     whole = [[a * (by // b) for a, b in row] for row, by in zip(ratios, common, strict=True)]
     sign, before = 1, 1
@@ -362,12 +362,12 @@ def _sign_of_determinant(matrix: FloatArray) -> int:
 
 
 class SingularSearch:
-    """Search for a singular pose from boxes: by signs where the matrix has six rows, else by Newton's method.
+    """Search for a singular pose from boxes: by signs if the matrix has six rows, else by Newton's method.
 
     Args:
         problem: the robot.
-        matrix: whose rank is judged, in its coordinates.
-        is_shown: whether a singular pose is one in home's assembly.
+        matrix: the matrix, as expressions of the robot's coordinates.
+        is_shown: function that tests whether a pose is singular in the home assembly mode.
     """
 
     def __init__(
@@ -376,7 +376,7 @@ class SingularSearch:
         self._problem, self._matrix, self._is_shown = problem, matrix, is_shown
         has_signs = matrix.matrix.shape == (6, 6) and not (matrix.nullity or problem.dependent)
         self._signs = DeterminantSigns(problem, matrix) if has_signs else None
-        # Poses with each sign of the determinant.
+        # Poses by the sign of the determinant.
         self._signed: dict[int, list[FloatArray]] = {1: [], -1: []}
         self._is_sampled = False
         self._attempts, self._last, self._due = 0, _SMALL, _FIRST
@@ -387,32 +387,32 @@ class SingularSearch:
         return SingularPose(self._problem, self._matrix)
 
     def look(self, found: Examined, boxes: int) -> Singular | None:
-        """Return a singular pose from the boxes that were examined last, of so many; at first from random poses too."""
+        """Return a singular pose from the last examined boxes; the first call also tests random poses."""
         worst = np.argsort(np.where(found.is_regular, np.inf, found.smallest))[:2].tolist()
         singular = self._by_newton(found, worst) if self._signs is None else self._by_signs(self._signs, found)
         if singular is not None or not self._problem.names or boxes < self._due or found.is_regular.all():
             return singular
         self._due = 2 * boxes
-        return self._machine(self._middle(found, worst[0]))
+        return self._singular_robot(self._middle(found, worst[0]))
 
     def everywhere(self) -> Singular | None:
-        """Return the pose of the start, of a structure that is singular at every pose."""
+        """Return the start pose, for a structure that is singular at every pose."""
         start = self._problem.start
         return self._shown(start, EVERYWHERE) if self._newton.smallest(start) <= SINGULAR else None
 
     def from_random(self) -> Singular | None:
-        """Return a singular pose near random ones, from those with the smallest singular values."""
+        """Return a singular pose near the random poses with the smallest singular values."""
         problem = self._problem
         y = problem.box.random(_POSES, np.random.default_rng(_SEED))
         points = problem.exact(y[:, list(problem.free)])
         values = np.array([self._newton.smallest(each) for each in points])
         worst = [points[k] for k in np.argsort(values)[:_TRIED] if np.isfinite(values[k])]
         found = (self._pose(point) for point in worst)
-        machines = (self._machine(point) for point in worst if problem.names)
-        return next((each for each in itertools.chain(found, machines) if each is not None), None)
+        robots = (self._singular_robot(point) for point in worst if problem.names)
+        return next((each for each in itertools.chain(found, robots) if each is not None), None)
 
     def _by_signs(self, signs: DeterminantSigns, found: Examined) -> Singular | None:
-        """Return a singular pose between two with opposite signs: random ones, and the centres of boxes."""
+        """Return a singular pose between two poses with opposite signs, among random poses and centres of boxes."""
         if self._is_sampled:
             return self._between(signs, found.boxes.centre, found.signs)
         self._is_sampled = True
@@ -422,12 +422,12 @@ class SingularSearch:
         if between is not None or not self._problem.names:
             return between
         nearest = first_largest(1 / np.where(values, np.abs(values), np.inf))
-        return self._machine(points[nearest])
+        return self._singular_robot(points[nearest])
 
     def _between(
         self, signs: DeterminantSigns, points: FloatArray, values: FloatArray | NDArray[np.int32]
     ) -> Singular | None:
-        """Return a singular pose between points (K, n) with computed determinants (K,), and those known before."""
+        """Return a singular pose between points (K, n) with computed determinants (K,), or between earlier points."""
         problem = self._problem
         for sign, known in self._signed.items():
             new = points[np.sign(values) == sign][:_SIGNED]
@@ -440,7 +440,7 @@ class SingularSearch:
         return None
 
     def _by_newton(self, found: Examined, worst: Sequence[int]) -> Singular | None:
-        """Return a singular pose from the boxes whose matrices are nearest to a singular one."""
+        """Return a singular pose from the boxes with the matrices nearest to a singular matrix."""
         for k in worst:
             value = float(found.smallest[k])
             if found.is_regular[k] or not value < self._last or self._attempts >= _MOST:
@@ -450,12 +450,12 @@ class SingularSearch:
             shown = self._shown(near, BY_NEWTON)
             if shown is not None:
                 return shown
-            # A singular pose of another assembly says nothing about where one of home's is.
+            # A singular pose in another assembly mode is no hint for the home assembly mode.
             self._last = _SMALLER * value if near is None else self._last
         return None
 
     def _pose(self, z: FloatArray) -> Singular | None:
-        """Return a singular pose of the design near a point, between two poses of opposite signs if there are any."""
+        """Return a singular pose of the design near a point; if possible between two poses with opposite signs."""
         near = self._newton.search(z, self._count)
         if near is None:
             return None
@@ -465,20 +465,20 @@ class SingularSearch:
             between = self._between(self._signs, points, self._signs.computed(points))
         return between or self._shown(near, BY_NEWTON)
 
-    def _machine(self, z: FloatArray) -> Singular | None:
-        """Return a singular machine at a point of the design, or near it."""
+    def _singular_robot(self, z: FloatArray) -> Singular | None:
+        """Return a singular pose of a robot within the tolerance, at or near a point of the design."""
         signs, is_held = self._signs, self._problem.box.holds(self._problem.pose_of(z))
-        for machine in self._newton.machines(z):
+        for robot in self._newton.robots(z):
             if signs is None:
-                found = self._shown(self._newton.search(machine), BY_NEWTON)
+                found = self._shown(self._newton.search(robot), BY_NEWTON)
             else:
-                found = self._shown(signs.change(z, machine) if is_held else None, "")
+                found = self._shown(signs.change(z, robot) if is_held else None, "")
             if found is not None:
                 return found
         return None
 
     def _shown(self, z: FloatArray | None, reason: str, sides: FloatArray | None = None) -> Singular | None:
-        """Return the singular pose at a point (n,), between two others (2, 6), if it is one in home's assembly."""
+        """Return the singular pose at a point (n,), between poses (2, 6), if it is in the home assembly mode."""
         if z is None:
             return None
         errors = self._problem.errors_of(z)

@@ -1,5 +1,6 @@
 """A robot over a box of poses, as expressions of the search's coordinates.
 
 The modules import each other in this order: ``pose_box`` (the box), ``posed_model`` (a model's matrices as
-expressions), ``posed_robot`` (which of these count over the box; every machine within a tolerance).
+expressions), ``path_turns``, ``long_turns`` and ``path_cover`` (boxes of pieces of a tool path), ``posed_robot`` (a
+robot over a box; all robots within the tolerance).
 """

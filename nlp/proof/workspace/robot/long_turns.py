@@ -1,9 +1,9 @@
-"""Rotations of any path, near one reference or with several: each piece then has coordinates of its own.
+"""Rotations of any tool path, also with full turns: Cayley vectors with one reference, or with one for each piece.
 
-A rotation is the quaternion ``y = (w, x, y, z)`` of any size but zero. A piece of the path is divided by one of the
-four components, which is then 1: y is that of a Cayley vector relative to no turn, or to half a turn about x, y or z.
-One of these is nearer than 120 degrees to any rotation, so that paths of any length, with whole turns too, are covered.
-Two pieces with different divisors have the same rotation where they meet, by two of its quaternions.
+A rotation is a quaternion ``y = (w, x, y, z)`` of any norm but zero. On each piece of the path it is divided by one of
+the four components: y is then a Cayley vector relative to no rotation, or to half a turn about x, y or z. One of these
+references is nearer than 120 degrees to any rotation, so paths of any length are covered. Where two pieces with
+different divisors meet, they have two quaternions of the same rotation.
 """
 
 from __future__ import annotations
@@ -50,20 +50,21 @@ if TYPE_CHECKING:
     from ....path.frame import PathFrame
     from ....path.path import ProgrammedPath
 
-#: Angles from which on the tangent of the half is too large a coordinate, and its cosine: the least scalar.
+#: Largest angle from the reference (the tangent of its half grows without bound), and its cosine, the least scalar.
 _LARGEST = math.radians(149)
 _LEAST = math.cos(_LARGEST / 2)
-#: Sum of the changes of three angles over a part of a segment with one divisor, at most. In the middle the divisor is
-#: at least a half, that of 120 degrees, and up to the ends the rotation turns by half of this sum.
+#: Largest sum of the changes of three angles over a part of a segment with one divisor. In the middle the divisor is at
+#: least 1/2 (120 degrees), and up to the ends the rotation turns by half of this sum.
 _PART = 0.75
-#: Largest number of parts of a path over which chords are taken.
+#: Largest number of parts of a path.
 _MOST = 5_000_000
-#: Least scalar of quaternions for which no other reference is needed: of a right angle.
+#: Smallest scalar of quaternions, for a right angle, that needs no other reference.
 _NEAR = math.sqrt(0.5)
-#: Steps in the search of the middle of rotations, most rotations that are looked at, and largest part of the reference.
+#: Number of steps in the search of the mean rotation, largest number of rotations for it, and largest component of the
+#: reference.
 _STEPS, _SAMPLES, _ROUND = 100, 8192, 8
-#: Largest pitch at which roll and yaw are computed from a rotation, and by how much these are off at most. A matrix is
-#: off by 110 roundings (2^-53), a yaw by 160 over the pitch's cosine, 0.17, and a roll by both over this cosine: 7000.
+#: Largest pitch at which roll and yaw are computed from a rotation, and bound of their errors. A matrix has an error of
+#: 110 roundings (2^-53), yaw 160 divided by the pitch's cosine, 0.17, and roll both divided by this cosine: 7000.
 _STEEP, _OFF_HELD = math.radians(80), 2.0**-39
 #: References of the four divisors.
 _UNITS: tuple[Reference, ...] = (UNTURNED, (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))
@@ -71,12 +72,12 @@ _UNITS: tuple[Reference, ...] = (UNTURNED, (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0,
 
 @dataclass(frozen=True, eq=False)
 class LongTurns:
-    """Rotations as quaternions of which one component is 1 in each part of a segment.
+    """Rotations as quaternions with one component equal to 1 in each part of a segment.
 
     Attributes:
-        views: the rotations relative to each of the four references.
-        counts: (N,) numbers of equal parts of the segments.
-        divisors: (M,) components that are 1 in these parts, in their order.
+        views: rotations relative to each of the four references.
+        counts: (N,) number of equal parts of each segment.
+        divisors: (M,) index of the component that is 1 in each part, in the order of the path.
     """
 
     views: Sequence[PathTurns]
@@ -87,11 +88,11 @@ class LongTurns:
 
     @cached_property
     def _first(self) -> NDArray[np.intp]:
-        """Places (N,) of the segments' first parts."""
+        """Indices (N,) of the segments' first parts."""
         return np.asarray(np.cumsum(self.counts) - self.counts)
 
     def _divisors_of(self, segments: NDArray[np.intp], ends: FloatArray) -> NDArray[np.intp]:
-        """Return the component (B,) that is 1 in pieces: that of the part with their middle."""
+        """Return the index (B,) of the component that is 1 in pieces, from the part with the middle of the piece."""
         count = self.counts[segments]
         part = np.clip((0.5 * (ends[:, 0] + ends[:, 1]) * count).astype(int), 0, count - 1)
         return np.asarray(self.divisors[self._first[segments] + part])
@@ -113,18 +114,18 @@ class LongTurns:
 
 
 def _as_quaternions(divisor: int, low: FloatArray, high: FloatArray) -> FloatArray:
-    """Return ranges (2, B, 4) of ``(1, r) u`` with the unit u that is a divisor from those (B, 3) of r.
+    """Return ranges (2, B, 4) of the quaternions ``(1, r) u``, with the quaternion unit u of a divisor.
 
     Args:
-        divisor: the component of the unit.
+        divisor: index of the component that is 1 in u.
         low: (B, 3) lower ends of r.
-        high: (B, 3) upper ends.
+        high: (B, 3) upper ends of r.
     """
     unit = np.array([_UNITS[divisor]], dtype=np.float64)
     found = np.zeros((2, len(low), 4))
     found[:, :, divisor] = 1.0
     for k in range(3):
-        # The product of two units is a unit, but for its sign.
+        # The product of two units is a unit, up to its sign.
         product = quaternion_products(np.eye(4)[None, 1 + k], unit)[0]
         at = int(np.argmax(np.abs(product)))
         ends = (low[:, k], high[:, k]) if product[at] > 0 else (-high[:, k], -low[:, k])
@@ -136,7 +137,7 @@ def turns_of_path(path: ProgrammedPath) -> PathTurns:
     """Return the rotations of a path.
 
     Raises:
-        InputError: they turn too often.
+        InputError: the path has too many turns.
     """
     angles, is_slerp, frame = path.knots[:, 3:], path.between is Between.SLERP, path.frame
     held = None if frame is None else _held(angles, path.order, frame)
@@ -148,7 +149,7 @@ def turns_of_path(path: ProgrammedPath) -> PathTurns:
     if is_slerp:
         quaternions = in_world(quaternions_from_angles(angles, order), frame)
         axes, width = shortest_turns(quaternions[:-1], quaternions[1:])
-        # Of both quaternions of a rotation the one nearer to that before.
+        # A rotation has two quaternions; the one nearer to the quaternion before is taken.
         flips = (quaternions[:-1] * quaternions[1:]).sum(axis=1) < 0
         quaternions[1:] *= np.where(np.cumsum(flips) % 2, -1.0, 1.0)[:, None]
         off = (1 if frame is None else 2) * ROUNDED + PER_RADIAN * np.abs(angles).sum(axis=1)
@@ -187,7 +188,7 @@ def turns_of_path(path: ProgrammedPath) -> PathTurns:
 
 
 def _held(angles: FloatArray, order: Order, frame: PathFrame) -> Tangents | None:
-    """Return the rotation of a path that does not turn in its frame, as roll, pitch and yaw in the world.
+    """Return the constant rotation of a path in its frame, as roll, pitch and yaw in the world.
 
     Args:
         angles: (N + 1, 3) angles at the knots, radians.
@@ -195,7 +196,7 @@ def _held(angles: FloatArray, order: Order, frame: PathFrame) -> Tangents | None
         frame: frame of the path.
 
     Returns:
-        None where it turns, or where roll, pitch and yaw are large or not well determined.
+        The rotation; None if it is not constant, or if roll, pitch and yaw are large or not well determined.
     """
     if np.ptp(angles, axis=0).any():
         return None
@@ -209,15 +210,15 @@ def _held(angles: FloatArray, order: Order, frame: PathFrame) -> Tangents | None
 
 
 def _reference(quaternions: FloatArray) -> Reference:
-    """Return no turn where it is near enough, else a rotation in small integers near the middle of those of a path.
+    """Return a reference near all rotations of a path: no rotation if possible, else a quaternion of small integers.
 
     Args:
-        quaternions: (n, 4) along the path, of which each is near the one before.
+        quaternions: (n, 4) quaternions along the path, each near the one before.
     """
     if np.abs(quaternions[:, 0]).min() >= _NEAR and np.ptp(np.sign(quaternions[:, 0])) == 0:
         return UNTURNED
     some = quaternions[:: -(-len(quaternions) // _SAMPLES)]
-    # The centre of the smallest ball with all of them, by steps to the farthest one.
+    # The centre of the smallest ball around all quaternions, by steps to the farthest one.
     middle = some[0].copy()
     for step in range(1, _STEPS + 1):
         middle += (some[int(np.argmin(some @ middle))] - middle) / (step + 1)

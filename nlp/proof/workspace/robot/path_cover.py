@@ -1,9 +1,8 @@
-"""Boxes of poses that cover pieces of a path: hulls in the coordinates of a :class:`~.pose_box.PoseBox`.
+"""Boxes of poses that cover pieces of a tool path, in the coordinates of a :class:`~.pose_box.PoseBox`.
 
-Positions on a line are monotone between its ends. Those on an arc are products of a radius between its ends and of
-cosines over a range. In a frame that is turned, a coordinate ``u cos a + v sin a`` of a circle is again a cosine,
-``hypot(u, v) cos(a - atan2(v, u))``, and a helix adds its height. Ends move outwards by several roundings. Ranges of
-rotations are those of :mod:`.path_turns`.
+Positions on a line are monotone. Positions on an arc are products of a radius and of cosines over ranges. In a rotated
+frame, a coordinate ``u cos a + v sin a`` of a circle is again a cosine, ``hypot(u, v) cos(a - atan2(v, u))``, and a
+helix adds its height. Ends move outwards by several roundings. Ranges of rotations come from :mod:`.path_turns`.
 """
 
 from __future__ import annotations
@@ -23,21 +22,26 @@ if TYPE_CHECKING:
 
     from ....path.frame import PathFrame
 
-#: Part of the sizes of the numbers of a piece by which its ends move outwards: more than the rounding of its formulas.
+#: Relative outward shift of the ends of a piece, more than the rounding of its formulas.
 _OUTWARDS = 2.0**-48
 #: Number of pieces whose points are computed at once.
 _BLOCK = 2**15
 
 
 class Place(NamedTuple):
-    """A point of a path: the index of its segment, and the parameter from 0 to 1 along it."""
+    """Point of a path.
+
+    Attributes:
+        segment: index of the segment.
+        parameter: parameter from 0 to 1 along the segment.
+    """
 
     segment: int
     parameter: float
 
 
 def place_in(piece: FloatArray, part: float) -> Place:
-    """Return the place at a part, from 0 to 1, of a piece (3,)."""
+    """Return the place at a part, from 0 to 1, of a piece (3,) of a path."""
     segment, low, high = piece.tolist()
     return Place(int(segment), low + part * (high - low) if part < 1 else high)
 
@@ -75,12 +79,12 @@ class PathCover:
     """A path as boxes of poses.
 
     Attributes:
-        knots: (N + 1, 3) positions, as arcs in the path's frame.
-        arcs: (N, 6) centre, radius, growth of the radius, angle and sweep of arcs; NaN of lines.
-        axes: (N, 3) axes of the plane of arcs, and the axis along it.
-        turns: the rotations.
-        seconds: (N,) times of the segments; infinite, as if the platform stood there, where none is known.
-        frame: place of the path in the world; None where its numbers are those of the world.
+        knots: (N + 1, 3) positions in the path's frame.
+        arcs: (N, 6) centre, radius, growth of the radius, angle and sweep of arcs in the path's frame; NaN for lines.
+        axes: (N, 3) indices of the two axes of an arc's plane, and of its normal.
+        turns: rotations along the path.
+        seconds: (N,) durations of the segments; infinite, which means standstill, where none is known.
+        frame: frame of the path in the world; None if it is the world frame.
     """
 
     knots: FloatArray
@@ -92,7 +96,7 @@ class PathCover:
 
     @cached_property
     def pieces(self) -> FloatArray:
-        """The segments as pieces (M, 3): index, and ends of the parameter; those that turn far in equal parts."""
+        """Pieces (M, 3) of the segments: index, and both ends of the parameter; large turns are divided."""
         count = len(self.knots) - 1
         parts = np.ones(count) if self.turns.counts is None else self.turns.counts.astype(float)
         rows, ends = divided(np.tile([0.0, 1.0], (count, 1)), parts)
@@ -101,15 +105,15 @@ class PathCover:
         return found
 
     def blocks(self) -> Iterator[slice]:
-        """Yield the places of these pieces in blocks, so that a long path needs little memory."""
+        """Yield the indices of these pieces in blocks, so that a long path needs little memory."""
         return (slice(begin, begin + _BLOCK) for begin in range(0, len(self.pieces), _BLOCK))
 
     def boxes(self, pieces: FloatArray, within: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
         """Return the ends (B, c) of boxes that cover pieces (B, 3).
 
         Args:
-            pieces: indices of segments, and ends of the parameter.
-            within: (B, 3) pieces whose references of rotations are used; the pieces themselves if left out.
+            pieces: indices of segments, and both ends of the parameter.
+            within: (B, 3) pieces that define the references of rotations; the pieces themselves if left out.
         """
         k = pieces[:, 0].astype(int)
         (start, off), (end, off_end) = self._in_world(k), self._in_world(k + 1)
@@ -117,7 +121,7 @@ class PathCover:
         ends = [start + s[:, None] * change for s in (pieces[:, 1], pieces[:, 2])]
         slack = _OUTWARDS * (np.abs(start) + np.abs(change)) + TINY + off
         low, high = np.minimum(*ends) - slack, np.maximum(*ends) + slack
-        # Fixed coordinates stay so.
+        # Fixed coordinates stay fixed.
         low, high = (np.where((change == 0) & (off == 0), start, each) for each in (low, high))
         arcs = np.flatnonzero(np.isfinite(self.arcs[k, 0]))
         if arcs.size:
@@ -134,7 +138,7 @@ class PathCover:
                 at = arcs[row.which], row.axis
                 low[at] = row.centre + products.min(axis=(1, 2)) + heights.min(axis=1) - slack
                 high[at] = row.centre + products.max(axis=(1, 2)) + heights.max(axis=1) + slack
-            # The ends of an arc meet its knots up to rounding, or up to what a program may be off.
+            # The ends of an arc meet its knots up to rounding, or up to the tolerance of a G-code program.
             for index, knots in enumerate((start, end)):
                 at = arcs[s[:, index] == index]
                 low[at], high[at] = np.minimum(low[at], (knots - off)[at]), np.maximum(high[at], (knots + off)[at])
@@ -142,14 +146,14 @@ class PathCover:
         return np.hstack([low, turns[0]]), np.hstack([high, turns[1]])
 
     def _in_world(self, knots: NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
-        """Return positions (B, 3) of knots in the world, and how far they may be off by the frame's rounding."""
+        """Return positions (B, 3) of knots in the world, and bounds of their rounding errors by the frame."""
         points = self.knots[knots]
         if self.frame is None:
             return points, np.zeros_like(points)
         return self.frame.positions(points), self.frame.off_positions(points)
 
     def _circles(self, k: NDArray[np.intp]) -> Iterator[_CircleRows]:
-        """Yield each coordinate in the world of arcs that turns: the other ones are linear.
+        """Yield each world coordinate of arcs that is not linear.
 
         Args:
             k: (A,) segments of the arcs.
@@ -183,11 +187,11 @@ class PathCover:
     def derivatives(self, pieces: FloatArray, order: int = 1) -> tuple[FloatArray, FloatArray]:
         """Return the ends (B, 6) of derivatives of the pose by the parameter, over pieces (B, 3).
 
-        They are of positions, and of the angles roll, pitch and yaw, or else angular velocities in the world frame.
+        They are derivatives of positions, and of roll, pitch and yaw, or else angular velocities in the world frame.
 
         Args:
-            pieces: indices of segments, and ends of the parameter.
-            order: 1, or of roll, pitch and yaw also 2.
+            pieces: indices of segments, and both ends of the parameter.
+            order: order of the derivative, 1; for roll, pitch and yaw also 2.
         """
         k = pieces[:, 0].astype(int)
         turns = self.turns.derivatives(k, pieces[:, 1:]) if order == 1 else np.zeros((2, len(k), 3))
@@ -203,7 +207,7 @@ class PathCover:
             s = pieces[arcs, 1:]
             radii = radius[:, None] + s * growth[:, None]
             angles = angle[:, None] + s * sweep[:, None]
-            # Each derivative turns by a right angle: (r c)' = g c + r w c', (r c)'' = 2 g w c' + r w^2 c''.
+            # Each derivative shifts the cosine: (r c)' = g c + r w c', (r c)'' = 2 g w c' + r w^2 c''.
             by_growth = order * growth * sweep ** (order - 1)
             by_radius = radii * (sweep**order)[:, None]
             size = np.abs(by_growth) + np.abs(by_radius).max(axis=1)
@@ -221,7 +225,7 @@ class PathCover:
         return np.hstack([low, turns[0]]), np.hstack([high, turns[1]])
 
     def rates(self, pieces: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the ends (B, 6) of these derivatives by seconds, over pieces (B, 3)."""
+        """Return the ends (B, 6) of these derivatives by time in seconds, over pieces (B, 3)."""
         seconds = self.seconds[pieces[:, 0].astype(int), None]
         low, high = (each / seconds for each in self.derivatives(pieces))
         return low - _OUTWARDS * np.abs(low), high + _OUTWARDS * np.abs(high)
@@ -241,10 +245,10 @@ class PathCover:
 
 
 def _cosines(angles: FloatArray) -> FloatArray:
-    """Return the ends (B, 2) of the cosines over ranges (B, 2) of angles, whose ends may be exchanged."""
+    """Return the ends (B, 2) of the cosines over ranges (B, 2) of angles, with ends in any order."""
     low, high = angles.min(axis=1), angles.max(axis=1)
     ends = np.cos(angles)
-    # Multiples of pi in the range, with room for their rounding.
+    # Multiples of pi in the range, with a margin for rounding.
     has_one = np.floor(high / (2 * np.pi) + 1e-12) >= np.ceil(low / (2 * np.pi) - 1e-12)
     has_minus = np.floor(high / (2 * np.pi) - 0.5 + 1e-12) >= np.ceil(low / (2 * np.pi) - 0.5 - 1e-12)
     least = np.where(has_minus, -1.0, ends.min(axis=1))

@@ -1,11 +1,11 @@
-"""Rotations along a path as ranges of the coordinates of a :class:`~.pose_box.PoseBox`.
+"""Rotations along a tool path as ranges of the coordinates of a :class:`~.pose_box.PoseBox`.
 
 Roll, pitch and yaw that change linearly have monotone tangents of their halves. Other rotations have Cayley vectors
-``r = v / w`` of quaternions ``(w, v)``, relative to a reference to which the whole path is nearer than half a turn. A
-turn about a fixed axis moves the quaternion along a great circle, and so r along a straight line. With angles in any
-convention the quaternion is a product of three; r is off the chord between two points by a bound of its second
-derivative. The rotation of a frame of the path, which is one more factor on the left, changes no size. Where no
-reference is near the whole path, pieces of it have one each; see :mod:`.long_turns`.
+``r = v / w`` of quaternions ``(w, v)``, relative to a reference at less than half a turn from the whole path. A turn
+about a fixed axis moves the quaternion along a great circle, and r along a straight line. For angles in any convention
+the quaternion is a product of three; a bound of the second derivative bounds the distance of r from a chord. The
+rotation of the path's frame, one more factor on the left, does not change norms. If no reference is near the whole
+path, each piece has its reference; see :mod:`.long_turns`.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ if TYPE_CHECKING:
 
     from ....path.frame import PathFrame
 
-#: Part of a tangent's, and its angle's, sizes by which its ends move outwards: more than the rounding of its formulas.
+#: Outward shift of an end, relative to a tangent and its angle, more than the rounding of its formulas.
 _OUTWARDS = 2.0**-48
-#: By which an end that is not 0 moves too: more than the rounding of numbers that are so small that they lack digits.
+#: Outward shift of an end that is not 0, more than the rounding of subnormal numbers.
 TINY = float(np.finfo(float).tiny)
-#: By which a computed unit quaternion may be off, and more of it for each radian of the angles it is computed from.
+#: Error bound of a computed unit quaternion, and its increase for each radian of the angles.
 ROUNDED, PER_RADIAN = 2.0**-47, 2.0**-51
-#: Part of itself by which a bound of a chord's error is more than its rounding.
+#: Outward factor of the bound of a chord's error, for rounding.
 _UP = 1 + 1e-12
-#: Sum of the changes of three angles over which a chord is taken at most, radians.
+#: Largest sum of the changes of three angles over one chord, radians.
 CHORD = 0.25
 
 
@@ -54,7 +54,7 @@ class PathTurns(Protocol):
 
     @property
     def counts(self) -> NDArray[np.intp] | None:
-        """Numbers (N,) of equal parts of segments with a reference each; None for one reference."""
+        """Number (N,) of equal parts of each segment, with one reference for each part; None for one reference."""
         ...
 
     def boxes(
@@ -63,14 +63,14 @@ class PathTurns(Protocol):
         """Return the ends (B, c) of ranges over pieces of segments (B,) between ends (B, 2) of the parameter.
 
         Args:
-            segments: the segments.
-            ends: of the pieces.
-            within: (B, 2) ends of the pieces whose references are used; those of the pieces themselves if left out.
+            segments: indices of the segments.
+            ends: ends of the pieces.
+            within: (B, 2) ends of the pieces that define the references; the pieces themselves if left out.
         """
         ...
 
     def derivatives(self, segments: NDArray[np.intp], ends: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the ends (B, 3) of derivatives by the parameter: of roll, pitch and yaw, or angular velocities.
+        """Return the ends (B, 3) of derivatives by the parameter: roll, pitch and yaw rates, or angular velocities.
 
         Angular velocities are in the world frame.
         """
@@ -82,7 +82,7 @@ class Tangents:
     """Roll, pitch and yaw that change linearly, as tangents of their halves.
 
     Attributes:
-        angles: (N + 1, 3) at the knots.
+        angles: (N + 1, 3) angles at the knots, radians.
         off: error bound of each angle, radians.
     """
 
@@ -101,7 +101,7 @@ class Tangents:
         """Return ranges over pieces; see :class:`PathTurns`."""
         start, change = self.angles[segments], self.angles[segments + 1] - self.angles[segments]
         low, high = np.sort([start + s[:, None] * change for s in ends.T], axis=0)
-        # Fixed coordinates stay so.
+        # Fixed coordinates stay fixed.
         slack = np.where(change == 0, 0.0, _OUTWARDS * (np.abs(start) + np.abs(change))) + self.off
         low, high = np.tan(0.5 * (low - slack)), np.tan(0.5 * (high + slack))
         tiny = np.where((start == 0) & (change == 0) & (self.off == 0), 0.0, TINY)
@@ -119,12 +119,12 @@ class ShortestTurns:
     """Turns about fixed axes as Cayley vectors.
 
     Attributes:
-        quaternions: (N + 1, 4) at the knots, relative to the reference; each is the nearer one to that before.
-        off: (N + 1,) by which they may be off.
-        halves: (N,) half the angles of the turns.
+        quaternions: (N + 1, 4) quaternions at the knots, relative to the reference; each near the one before.
+        off: (N + 1,) error bounds of the quaternions.
+        halves: (N,) half angles of the turns, radians.
         velocities: (N, 3) axes in the world frame times the angles.
-        vary, turning: (3,) 1 for the coordinates, and the velocities, that are not zero at all points, else 0.
-        reference: of the vectors.
+        vary, turning: (3,) 0 for coordinates, and velocities, that are zero at all points; else 1.
+        reference: reference of the Cayley vectors.
     """
 
     quaternions: FloatArray
@@ -145,22 +145,22 @@ class ShortestTurns:
     ) -> tuple[FloatArray, FloatArray]:
         """Return ranges over pieces; see :class:`PathTurns`.
 
-        Between two points of a great circle with scalars of one sign r moves straight from the one to the other.
+        Between two points of a great circle with scalars of one sign, r moves on a straight line.
         """
         quaternions, off = self._quaternions(segments, ends), self._off(segments)
-        # Scalars are concave.
+        # Scalars are concave along a great circle.
         least = np.abs(quaternions[:, :, 0]).min(axis=0) - off
         with np.errstate(divide="ignore"):
             return _hull(quaternions, least, _vector_slack(off, least), self.vary)
 
     def _quaternions(self, segments: NDArray[np.intp], ends: FloatArray) -> FloatArray:
-        """Return quaternions (2, B, 4) at ends of pieces, of sizes of at most 1."""
+        """Return quaternions (2, B, 4) at ends of pieces, of norm at most 1."""
         half = self.halves[segments, None]
         before, after = ((s * _sine_ratio(s * half)).T[:, :, None] for s in (1 - ends, ends))
         return np.asarray(before * self.quaternions[segments] + after * self.quaternions[segments + 1])
 
     def _off(self, segments: NDArray[np.intp]) -> FloatArray:
-        """Return by how much such quaternions, and velocities, (B,) may be off by quaternions of both knots."""
+        """Return error bounds (B,) of these quaternions and velocities, from errors at both knots."""
         return np.asarray(16 * np.maximum(self.off[segments], self.off[segments + 1]))
 
     def derivatives(self, segments: NDArray[np.intp], ends: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002
@@ -174,9 +174,9 @@ class LinearAngles:
     """Angles of any convention that change linearly, as Cayley vectors.
 
     Attributes:
-        angles: (N + 1, 3) at the knots.
-        order: of the convention.
-        reference: of the vectors.
+        angles: (N + 1, 3) angles at the knots, radians.
+        order: convention of the angles.
+        reference: reference of the Cayley vectors.
         frame: frame of the angles; None for the world.
     """
 
@@ -189,12 +189,12 @@ class LinearAngles:
 
     @cached_property
     def _vary(self) -> FloatArray:
-        """1 for the coordinates (3,) that are not zero at all points, else 0."""
+        """0 for coordinates (3,) that are zero at all points; else 1."""
         return varying(self.angles, self.order, self.reference, self.frame)
 
     @cached_property
     def _rounded(self) -> float:
-        """By how much a quaternion may be off beside the rounding of its angles: a frame is one more factor."""
+        """Error bound of a quaternion without the rounding of its angles; a frame is one more factor."""
         return ROUNDED if self.frame is None else 2 * ROUNDED
 
     def boxes(
@@ -212,7 +212,7 @@ class LinearAngles:
         own = [in_world(quaternions_from_angles(at, self.order), self.frame) for at in each]
         quaternions = np.stack([relative(at, self.reference) for at in own])
         off = self._rounded + PER_RADIAN * (np.abs(start) + np.abs(change)).sum(axis=1)
-        # A quaternion's derivative is at most half the sum of those of the angles, its second one that squared.
+        # A quaternion's derivative is at most half the sum of the angles' rates, its second derivative that squared.
         bend = (0.5 * np.abs(change).sum(axis=1) * (parts[:, 1] - parts[:, 0])) ** 2 / 8 * _UP
         least = np.abs(quaternions[:, :, 0]).min(axis=0) - bend - off
         with np.errstate(divide="ignore"):
@@ -226,10 +226,10 @@ class LinearAngles:
         start, change = self.angles[segments], self.angles[segments + 1] - self.angles[segments]
         first, second, third = np.abs(change[:, list(self.order)]).T
         middle = _angular_velocities(start + ends.mean(axis=1)[:, None] * change, change, self.order)
-        # A rate turns with the angles before it.
+        # The axis of a rate turns with the angles before it.
         turned = (first * second + (first + second) * third) * (ends[:, 1] - ends[:, 0]) / 2
         off = (self._rounded + PER_RADIAN * (np.abs(start) + np.abs(change)).sum(axis=1)) * 4 * (first + second + third)
-        # The slack bounds the size of a vector, so that it holds in any frame.
+        # The slack bounds the norm of a vector, so it is valid in any frame.
         vary = varying(self.angles, self.order, UNTURNED)
         if self.frame is not None:
             middle, vary = self.frame.vectors(middle), turning_in_world(vary, self.frame)
@@ -238,7 +238,7 @@ class LinearAngles:
 
 
 def relative(quaternions: FloatArray, reference: Reference) -> FloatArray:
-    """Return quaternions (n, 4) after the reference is undone: q with ``q reference`` equal to the given ones."""
+    """Return quaternions (n, 4) relative to a reference: q with ``q reference`` equal to the given quaternions."""
     if reference == UNTURNED:
         return quaternions
     inverse = np.array(reference) * [1.0, -1, -1, -1] / math.hypot(*reference)
@@ -246,29 +246,29 @@ def relative(quaternions: FloatArray, reference: Reference) -> FloatArray:
 
 
 def in_world(quaternions: FloatArray, frame: PathFrame | None) -> FloatArray:
-    """Return quaternions (n, 4) in the world of those in a frame; None for the world."""
+    """Return quaternions (n, 4) of a frame in the world; frame None is the world."""
     return quaternions if frame is None else frame.orientations(quaternions)
 
 
 def turning_in_world(turning: FloatArray, frame: PathFrame | None) -> FloatArray:
-    """Return 1 for components (3,) in the world of vectors that are not exactly zero at all points, else 0.
+    """Return 0 for components (3,) in the world that are exactly zero at all points; else 1.
 
     Args:
-        turning: (3,) the same of their components in a frame.
+        turning: (3,) 0 for components in the frame that are exactly zero at all points; else 1.
         frame: the frame; None for the world.
     """
     return turning if frame is None else np.asarray((frame.pattern @ turning > 0).astype(float))
 
 
 def varying(angles: FloatArray, order: Order, reference: Reference, frame: PathFrame | None = None) -> FloatArray:
-    """Return 1 for components (3,) of vectors that are not exactly zero at all points, else 0.
+    """Return 0 for components (3,) of Cayley vectors that are exactly zero at all points; else 1.
 
-    The product of the units i and j is the unit of the bits of both, exclusive, but for its sign.
+    The product of the quaternion units i and j is, up to its sign, the unit with index ``i XOR j``.
 
     Args:
         angles: (n, 3) angles at points, radians.
         order: convention of the angles.
-        reference: reference of the vectors.
+        reference: reference of the Cayley vectors.
         frame: frame of the angles; None for the world.
     """
     factors = [(axis, angles[:, axis].any()) for axis in order]
@@ -284,13 +284,13 @@ def varying(angles: FloatArray, order: Order, reference: Reference, frame: PathF
 def _hull(
     quaternions: FloatArray, least: FloatArray, slack: FloatArray, vary: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return ranges (B, 3) of Cayley vectors, infinite where the scalar is not surely of one sign.
+    """Return ranges (B, 3) of Cayley vectors; infinite where the scalar is not provably of one sign.
 
     Args:
-        quaternions: (2, B, 4) at both ends.
-        least: (B,) sizes of scalars between them.
-        slack: (B,) distances of the vectors from the line between those of the ends.
-        vary: (3,) 1 for the coordinates that are not zero at all points, else 0.
+        quaternions: (2, B, 4) quaternions at both ends.
+        least: (B,) smallest absolute scalars between the ends.
+        slack: (B,) distances of the vectors from the line between the ends.
+        vary: (3,) 0 for coordinates that are zero at all points; else 1.
     """
     with np.errstate(all="ignore"):
         points = quaternions[:, :, 1:] / quaternions[:, :, :1]
@@ -301,11 +301,11 @@ def _hull(
 
 
 def divided(ends: FloatArray, counts: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
-    """Return equal parts of ranges: the indices (P,) of the ranges, in their order, and the ends (P, 2) of the parts.
+    """Return equal parts of ranges: the index (P,) of each part's range, in order, and the ends (P, 2) of the parts.
 
     Args:
-        ends: (B, 2) of the ranges.
-        counts: (B,) numbers of parts; 0 is 1.
+        ends: (B, 2) ends of the ranges.
+        counts: (B,) number of parts of each range; 0 counts as 1.
     """
     numbers = np.maximum(counts, 1).astype(int)
     rows = np.repeat(np.arange(len(ends)), numbers)
@@ -316,7 +316,7 @@ def divided(ends: FloatArray, counts: FloatArray) -> tuple[NDArray[np.intp], Flo
 
 
 def _angular_velocities(angles: FloatArray, rates: FloatArray, order: Order) -> FloatArray:
-    """Return the angular velocities (B, 3) in the world frame of angles (B, 3) with rates."""
+    """Return the angular velocities (B, 3) in the world frame from angles (B, 3) and their rates."""
     found, turn = np.zeros_like(angles), np.broadcast_to([1.0, 0, 0, 0], (len(angles), 4))
     for axis in order:
         about = np.zeros_like(turn)
@@ -329,11 +329,11 @@ def _angular_velocities(angles: FloatArray, rates: FloatArray, order: Order) -> 
 
 
 def _vector_slack(off: FloatArray, least: FloatArray) -> FloatArray:
-    """Return by how much the Cayley vectors (B,) of unit quaternions may be off.
+    """Return error bounds (B,) of the Cayley vectors of unit quaternions.
 
     Args:
-        off: (B,) errors of the quaternions, of which that of ``v / w`` has ``1 / w`` times the size of (1, v / w).
-        least: (B,) their least scalars.
+        off: (B,) errors of the quaternions; ``v / w`` has this error times ``1 / w`` and the norm of (1, v / w).
+        least: (B,) smallest scalars of the quaternions.
     """
     return off / least**2 * _UP
 

@@ -1,13 +1,13 @@
-"""A box of poses in the coordinates of the search: three of position, three or four of rotation.
+"""Box of poses in the coordinates of a search: three of position, three or four of rotation.
 
-Rotations are covered in coordinates in which ``s R``, with a positive number ``s``, is a polynomial:
+Rotations have coordinates in which ``s R``, with a positive ``s``, is a polynomial:
 
-* any axis: Cayley vector ``tan(angle / 2) axis``, within a ball, of the turn that follows a reference;
+* any axis: Cayley vector ``tan(angle / 2) axis``, within a ball, of the rotation relative to a reference;
 * one axis: ``tan(angle / 2)``, the first of the three coordinates;
-* roll, pitch and yaw: the tangents of half of each;
-* all rotations: a quaternion ``(w, x, y, z)`` of any size but zero.
+* roll, pitch and yaw: tangents of the half angles;
+* all rotations: a quaternion ``(w, x, y, z)`` of any norm but zero.
 
-Ends are moved outwards by rounding, so that the box of coordinates holds every pose of the workspace.
+Ends are rounded outwards, so that the box contains every pose of the workspace.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ from ...statement.tolerance import PoseCoordinates
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: A rotation as a quaternion ``(w, x, y, z)`` of integers, of any size.
+#: A rotation as a quaternion ``(w, x, y, z)`` of integers, of any norm but zero.
 Reference: TypeAlias = "tuple[int, int, int, int]"
 UNTURNED: Reference = (1, 0, 0, 0)
-#: Part of itself by which a tangent may be off: several times the error of a library's function.
+#: Relative error bound of a tangent: several times the error of the library function.
 _TANGENT = 2.0**-50
-#: Unit by which ends move outwards: several roundings.
+#: Relative unit by which ends move outwards, several roundings.
 _ULP = 2.0**-51
 
 
@@ -49,7 +49,7 @@ class PoseNumbers:
         position: (3,) origin of the platform frame in the world frame, length.
         rotation: (3, 3) platform to world coordinates.
         axis: (3,) unit axis of the rotation; z without rotation.
-        angle: of the rotation, radians, not negative.
+        angle: angle of the rotation, radians, not negative.
     """
 
     position: FloatArray
@@ -66,10 +66,10 @@ class PoseBox:
         kind: coordinates of rotations.
         axis: (3,) unit axis of rotations about one axis.
         lower, upper: (c,) ends of the coordinates: position, then rotation. There are six, or seven with quaternions.
-        ball: largest squared size of a Cayley vector, rounded up; infinite where rotations are no ball.
-        reference: the rotation with the Cayley vector zero.
-        dependent: indices of the coordinates that follow from the others: their ends are where a search begins, and
-            leave no pose out. A ball is one of the other components.
+        ball: largest squared norm of a Cayley vector, rounded up; infinite if rotations are not in a ball.
+        reference: rotation with Cayley vector zero.
+        dependent: indices of the dependent coordinates: their ends only start a search, and exclude no pose. A ball
+            concerns the other components.
     """
 
     kind: TurnKind
@@ -86,16 +86,16 @@ class PoseBox:
         return tuple(np.flatnonzero(self.upper > self.lower).tolist())
 
     def symbols(self, z: SX) -> SX:
-        """Return the coordinates (c, 1), of which those that vary are the first symbols of z (n, 1)."""
+        """Return the coordinates (c, 1); the first symbols of z (n, 1) stand for those that vary."""
         y = SX((0.5 * self.lower + 0.5 * self.upper).tolist())
         y[list(self.free)] = z[: len(self.free)]
         return y
 
     @cached_property
     def _inner(self) -> tuple[FloatArray, FloatArray, float]:
-        """Ends, and the largest squared size of a Cayley vector, of poses that are surely those of the workspace.
+        """Ends, and the largest squared norm of a Cayley vector, of poses that are provably in the workspace.
 
-        Ends of rotations are about 4 roundings outwards; the ball's square as many again.
+        Ends of rotations were moved outwards by about 4 roundings, the squared radius of the ball by as many again.
         """
         sizes = np.maximum(np.abs(self.lower), np.abs(self.upper)) * (np.arange(len(self.lower)) > 2)
         slack = np.where(self.upper > self.lower, 8 * _TANGENT * sizes, 0.0)
@@ -114,7 +114,7 @@ class PoseBox:
         return [k for k in range(3, 6) if k not in self.dependent]
 
     def holds(self, y: FloatArray) -> NDArray[np.bool_]:
-        """Return whether points (..., c) are surely poses of the workspace, not only of the box rounded outwards."""
+        """Return whether points (..., c) are provably poses of the workspace, without the outward rounding."""
         lower, upper, ball = self._inner
         inside = ((y >= lower) & (y <= upper)).all(axis=-1)
         return np.asarray(inside & (np.square(y[..., self._turns]).sum(axis=-1) <= ball))
@@ -131,7 +131,7 @@ class PoseBox:
         return PoseNumbers(frozen_array(y[:3], (3,)), rotation, axis, angle)
 
     def coordinates(self, pose: PoseNumbers) -> FloatArray:
-        """Return the point (c,) of a pose, which is one of this box: fixed coordinates are those of the box."""
+        """Return the coordinates (c,) of a pose in this box; fixed coordinates are taken from the box."""
         turn = self._turn(pose)
         y = np.concatenate([pose.position, turn])
         return np.asarray(np.where(self.lower == self.upper, self.lower, y))
@@ -150,13 +150,13 @@ class PoseBox:
             return np.asarray(r if self.kind is TurnKind.ANY_AXIS else np.array([r @ self.axis, 0.0, 0.0]))
         pitch = math.asin(min(max(-R[2, 0], -1.0), 1.0))
         roll, yaw = math.atan2(R[2, 1], R[2, 2]), math.atan2(R[1, 0], R[0, 0])
-        # The same rotation has two such triples.
+        # Two triples of angles describe the same rotation.
         other = [math.remainder(each, 2 * math.pi) for each in (roll + math.pi, math.pi - pitch, yaw + math.pi)]
         both = [np.tan(0.5 * np.array(each)) for each in ((roll, pitch, yaw), other)]
         return min(both, key=lambda r: float(np.maximum(self.lower[3:] - r, r - self.upper[3:]).max()))
 
     def contracted(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-        """Return boxes (B, c) with their ends moved to the ball of rotations, and whether nothing is left, (B,)."""
+        """Return boxes (B, c) contracted to the ball of rotations, and whether a box is empty then, (B,)."""
         lower, upper = np.array(lower), np.array(upper)
         if not self.ball < np.inf:
             return lower, upper, np.zeros(len(lower), dtype=bool)
@@ -175,7 +175,7 @@ class PoseBox:
         lower, upper, ball = self._inner
         points = np.clip(points, lower, upper)
         if math.isfinite(ball):
-            # A little inside, so that rounding leaves no point outside.
+            # Slightly inside, so that rounding moves no point outside.
             radius = math.sqrt(ball) * (1 - _TANGENT)
             turns = self._turns
             sizes = np.sqrt((points[:, turns] ** 2).sum(axis=1, keepdims=True))
@@ -183,7 +183,7 @@ class PoseBox:
         return np.asarray(points)
 
     def random(self, count: int, rng: np.random.Generator) -> FloatArray:
-        """Return random points (count, 6) of the workspace, those of rotations within the ball."""
+        """Return random points (count, 6) of the workspace, with rotations within the ball."""
         points = rng.uniform(self.lower, self.upper, (count, 6))
         while math.isfinite(self.ball):
             outside = np.flatnonzero((points[:, self._turns] ** 2).sum(axis=1) > self._inner[2])
@@ -217,7 +217,7 @@ def pose_box(workspace: Workspace) -> PoseBox:
 
 
 def pose_coordinates(box: PoseBox) -> PoseCoordinates:
-    """Return the coordinates of a box as those of a layout."""
+    """Return the coordinates of a box for a layout."""
     middle = 0.5 * box.lower + 0.5 * box.upper
     values: list[Value] = [float(each) for each in (*middle[:3], *(2 * np.arctan(middle[3:])))]
     for k in box.free:
@@ -226,7 +226,7 @@ def pose_coordinates(box: PoseBox) -> PoseCoordinates:
 
 
 def scaled(workspace: Workspace, factor: float) -> Workspace:
-    """Return a workspace that is larger by a factor about its centre, ranges of angles too; dependent ones are kept."""
+    """Return a workspace scaled about its centre, ranges of angles too; ranges of dependent coordinates are kept."""
     turns, dependent = workspace.turns, [each.index for each in workspace.dependent]
     is_ball = turns.kind is TurnKind.ANY_AXIS
     values = [
@@ -237,7 +237,7 @@ def scaled(workspace: Workspace, factor: float) -> Workspace:
 
 
 def _scaled(value: Value, factor: float, about_zero: bool = False) -> Value:
-    """Return a range that is larger by a factor about its centre, or about zero."""
+    """Return a range scaled about its centre, or about zero."""
     if not isinstance(value, Free):
         return value
     centre = 0.0 if about_zero else (value.lower + value.upper) / 2
@@ -286,7 +286,7 @@ def polynomial_rotation(box: PoseBox, turn: SX) -> tuple[SX, SX]:
 
 
 def _reference_matrix(reference: Reference) -> tuple[FloatArray, float]:
-    """Return the rotation matrix (3, 3) of a quaternion times its squared size, exactly, and this."""
+    """Return the rotation matrix (3, 3) of a quaternion times its squared norm, exactly; and the squared norm."""
     return matrices_from_quaternions(np.array([reference], dtype=np.float64))[0], float(sum(k * k for k in reference))
 
 
@@ -296,7 +296,7 @@ def cayley_rotation(r: SX) -> tuple[SX, SX]:
 
 
 def quaternion_rotation(y: SX) -> tuple[SX, SX]:
-    """Return ``s R`` (3, 3) and ``s`` (1, 1) of the rotation R with a quaternion (4, 1) of any size but zero."""
+    """Return ``s R`` (3, 3) and ``s`` (1, 1) of the rotation R with a quaternion (4, 1) of any norm but zero."""
     w, v = y[0], y[1:]
     square = ca.sumsqr(v)
     return (w * w - square) * SX.eye(3) + 2 * (v @ v.T) + 2 * w * ca.skew(v), w * w + square

@@ -1,23 +1,23 @@
-"""Matrices of motions: their full column rank means that the limbs of a robot resist every motion.
+"""Matrices with full column rank exactly where the limbs of a robot resist every motion of the platform.
 
-With actuators locked, the platform's twist x is resisted unless each row ``L`` of a limb does no work in it, ``L.x =
+With actuators locked, a twist x of the platform is free only if each row ``L`` of a limb does no work in it, ``L.x =
 0``, and it is a motion of the passive joints of each member: ``x - sum_j w_j S_j = 0`` with rates ``w``. Together these
-are ``M (x, w) = 0`` with entries that are rows and screws themselves, neither normalised nor made orthogonal. J has
-full rank, and the passive screws of every member are independent, exactly where M has full column rank.
+are ``M (x, w) = 0``, with rows and screws as entries, neither normalised nor orthogonalised. J has full rank, and the
+passive screws of every member are independent, exactly where M has full column rank.
 
-With free actuators of rates ``u``, each row and member sees ``x - A u`` in the place of x, with the screws ``A`` of
-those actuators that move its member; and the relations of rates that loops demand are rows of their own. The null space
-of this matrix N has as many dimensions as the robot has freedoms and rates of actuators without a motion, more only
-where the constraint wrenches lose their rank, or passive screws theirs.
+With free actuators of rates ``u``, ``x - A u`` replaces x for each row and member, with the screws ``A`` of the
+actuators that move the member; relations of rates from loops are additional rows. The null space of this matrix N has
+as many dimensions as the robot has degrees of freedom and rates of actuators without a motion; it has more only where
+the constraint wrenches, or the passive screws, lose their rank.
 
-The screws of members with nested loops follow from ``L q = 0`` with the rank that L has at almost all poses. They do
-not show a pose at which L loses it, and the member resists less. So both matrices have, as blocks of their own, as many
-rows of L as its rank, transposed: full column rank means that L keeps its rank too.
+The screws of members with nested loops follow from ``L q = 0`` with the generic rank of L. They do not show a pose at
+which L loses rank and the member resists less. So both matrices also contain as many rows of L as its rank, transposed,
+as separate blocks: full column rank means that L keeps its rank too.
 
 Twists are ``(v, length omega)`` with the velocity v of the platform's origin.
 
-Rows that are linear in the rotation R, such as those of straight legs, are multiplied by the s of ``R = (s R) / s`` and
-so lose the division: their forms over a box are then exact but for terms of third order.
+Rows that are linear in the rotation R, such as rows of straight legs, are multiplied by the s of ``R = (s R) / s``, to
+avoid the division: their forms over a box are then exact up to terms of third order.
 """
 
 from __future__ import annotations
@@ -43,11 +43,11 @@ from .pose_box import PoseBox, polynomial_rotation, rotation_of
 
 @dataclass(frozen=True, eq=False)
 class RankMatrix:
-    """A matrix of expressions whose rank is judged.
+    """A matrix of expressions with its generic nullity.
 
     Attributes:
-        matrix: (m, c) sparse: the first six columns are the platform's twist.
-        nullity: dimension of its null space at almost all poses: 0, or the robot's freedoms and idle rates.
+        matrix: (m, c) sparse matrix; the first six columns are the platform's twist.
+        nullity: dimension of the null space at almost all poses: 0, or the number of degrees of freedom and idle rates.
     """
 
     matrix: SX
@@ -59,12 +59,12 @@ class Limbs:
     """Rows and members of a robot at a pose, with its actuators.
 
     Attributes:
-        wrenches: rows.
-        members: members; those columns of each that are independent.
+        wrenches: rows of J.
+        members: members, with independent screws.
         actuators: actuated joints.
-        loops: (m, k) each, the equations of nested loops in the rates of a member's passive joints.
-        position: (3, 1) the platform's origin, length.
-        length: by which rotations are multiplied.
+        loops: (m, k) equations of nested loops in the rates of a member's passive joints, for each member.
+        position: (3, 1) origin of the platform, length.
+        length: length that multiplies rotations.
     """
 
     wrenches: Sequence[Wrench]
@@ -78,9 +78,9 @@ class Limbs:
         """Return the limbs with some of the screws and loop equations of each member, and another length.
 
         Args:
-            columns: indices of the screws that are kept.
-            rows: indices of the equations that are kept.
-            length: by which rotations are multiplied.
+            columns: indices of the screws of each member that are kept.
+            rows: indices of the loop equations of each member that are kept.
+            length: length that multiplies rotations.
         """
         members = [
             replace(each, screws=each.screws[:, list(kept)], groups=())
@@ -99,7 +99,7 @@ class Limbs:
 
 
 def free_matrix(limbs: Limbs) -> SX:
-    """Return N, with the actuators free; of a robot given by its rows the couples alone, which are its constraints."""
+    """Return N, with the actuators free; for a robot given by rows only the couples, which are its constraints."""
     if limbs.actuators:
         return _matrix(limbs, limbs.actuators)
     couples = [row for row in limbs.wrenches if row.kind is WrenchKind.COUPLE]
@@ -108,10 +108,10 @@ def free_matrix(limbs: Limbs) -> SX:
 
 def _matrix(limbs: Limbs, driven: Sequence[Actuator]) -> SX:
     """Return the matrix (m, c), sparse, with one column for each driven joint at its end."""
-    # What rows and members see of the platform's twist, and the passive screws that they see it less.
+    # For each row and member: the map of the platform's twist, and the map of the passive rates to subtract.
     parts = [(row.label.member, limbs.about_platform(row), SX(6, 0)) for row in limbs.wrenches]
     for member in limbs.members:
-        # A pinned member sees the velocity of its centre alone: v + omega x (centre - p).
+        # A pinned member constrains only the velocity of its centre: v + omega x (centre - p).
         arm = (member.centre - limbs.position) / limbs.length
         seen = ca.horzcat(SX.eye(3), -ca.skew(arm)) if member.is_pinned else SX.eye(6)
         parts.append((member.label, seen, member.screws))
@@ -130,18 +130,18 @@ def _matrix(limbs: Limbs, driven: Sequence[Actuator]) -> SX:
 
 
 def _rate(limbs: Limbs, seen: SX, screw: SX | None) -> SX:
-    """Return the column (k, 1) of a driven joint; zeros where it does not move what is seen."""
+    """Return the column (k, 1) of a driven joint; zeros if it does not move this row or member."""
     return SX(seen.shape[0], 1) if screw is None else -seen @ limbs.twists(screw)
 
 
 class ScaledRows(NamedTuple):
-    """J as rows divided by their sizes, moments about the platform's origin in parts of a length.
+    """J as rows divided by norms, with moments about the platform's origin divided by a length.
 
     The row of a leg times its length is a polynomial of the pose, and so nearer to a linear function than the unit row.
 
     Attributes:
-        rows: (m, 6) rows of any size.
-        sizes: (m, 1) positive.
+        rows: (m, 6) rows of any norm.
+        sizes: (m, 1) positive norms.
     """
 
     rows: SX
@@ -154,13 +154,13 @@ class ScaledRows(NamedTuple):
 
 
 class Chosen(NamedTuple):
-    """What is kept of a model where the rest follows from it.
+    """Independent equations and screws of a model.
 
     Attributes:
-        equations: indices of the closure's equations.
-        columns: indices of the screws of each member.
-        rows: indices of the equations of each member's nested loops.
-        length: by which rotations are multiplied, of the order of the robot's.
+        equations: indices of the kept loop equations.
+        columns: indices of the kept screws of each member.
+        rows: indices of the kept equations of each member's nested loops.
+        length: length that multiplies rotations, of the order of the robot's size.
     """
 
     equations: Sequence[int]
@@ -171,14 +171,14 @@ class Chosen(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PosedModel:
-    """A model as expressions of the coordinates: Substitution's numbers put in.
+    """A model as expressions of the coordinates of a search, with values for its parameters.
 
     Attributes:
-        loops: equations of order 1 in the coordinates.
-        free: indices of the pose's numbers, which are the first coordinates.
+        loops: loop equations, scaled to order 1.
+        free: indices of the pose coordinates that are the first coordinates of the search.
         limbs: rows, members and actuators, with symbols for the rotation.
-        characteristic_length: by which couples are multiplied in J.
-        rotation: (3, 3) these symbols of the rotation R.
+        characteristic_length: length that multiplies couples in J.
+        rotation: (3, 3) symbols for the rotation R.
         turned: R, ``s R`` and the polynomial ``s`` in the coordinates.
     """
 
@@ -195,32 +195,32 @@ class PosedModel:
         return self.loops.z
 
     def plain(self, expression: SX) -> SX:
-        """Return an expression of the limbs in the coordinates."""
+        """Return an expression of the limbs in the coordinates of the search."""
         return ca.substitute(expression, self.rotation, self.turned[0])
 
     def values(self, expression: SX, z: FloatArray) -> FloatArray:
-        """Return a matrix of expressions of the limbs at a point (n,); at points (n, P) side by side."""
+        """Return the value of a matrix of the limbs at a point (n,); at points (n, P) the values side by side."""
         return np.asarray(ca.Function("values", [self.z], [ca.densify(self.plain(expression))])(z).full())
 
     def reduced(self, chosen: Chosen) -> PosedModel:
-        """Return the model with the equations and screws that are chosen."""
+        """Return the model with the chosen equations and screws."""
         return replace(self, loops=self.loops.some(chosen.equations), limbs=self.limbs.reduced(*chosen[1:]))
 
     @property
     def locked(self) -> RankMatrix:
-        """The matrix with locked actuators, rows that are linear in the rotation without a division."""
+        """The matrix M with locked actuators, without a division in rows that are linear in the rotation."""
         return RankMatrix(self.polynomial(_matrix(self.limbs, [])), 0)
 
     @property
     def unlocked(self) -> SX:
-        """The matrix with free actuators."""
+        """The matrix N with free actuators."""
         return ca.sparsify(self.plain(free_matrix(self.limbs)))
 
     @property
     def driven_rows(self) -> tuple[SX, SX]:
         """A (m, n) and D (m, a) with ``A y = D u`` for the rates u of actuators, and the platform's twist first in y.
 
-        The actuators of a robot without given ones are its legs, whose rates are those of its rows of forces.
+        Without given actuators, the legs are the actuators; their rates belong to the rows of forces.
         """
         limbs = self.limbs
         if limbs.actuators:
@@ -233,7 +233,7 @@ class PosedModel:
     def scaled(self) -> ScaledRows:
         """J with moments about the platform's origin divided by the length of the limbs."""
         L, limbs = SX(self.characteristic_length), self.limbs
-        # Rows of forces and couples, and 1 in a last column: the factor that makes them polynomials.
+        # Rows of forces and couples; the last column is 1, for the factor that makes them polynomials.
         wrenches = [ca.horzcat(limbs.about_platform(row), 1) for row in limbs.wrenches]
         rows = ca.densify(self.polynomial(ca.vertcat(SX(0, 7), *wrenches)))
         factors = [L if row.kind is WrenchKind.COUPLE else SX(1) for row in limbs.wrenches]
@@ -244,9 +244,9 @@ class PosedModel:
         return ScaledRows(ca.vertcat(rows[:, :6], of_members), ca.vertcat(SX(0, 1), *sizes, ones))
 
     def polynomial(self, matrix: SX) -> SX:
-        """Return a matrix (m, c) of the limbs in the coordinates.
+        """Return a matrix (m, c) of the limbs in the coordinates of the search.
 
-        Rows that are linear in the rotation are multiplied by its scale, without a division.
+        Rows that are linear in the rotation are multiplied by its scale, to avoid the division.
         """
         (_, turned, scale), inverse, plain = self.turned, SX.sym("1 / s"), self.plain(matrix)
         whole = ca.substitute(matrix, self.rotation, inverse * turned)
@@ -263,11 +263,11 @@ def posed_model(case: Case, model: Model, box: PoseBox, z: SX | None = None, err
     """Return a model as expressions of the coordinates.
 
     Args:
-        case: with fixed dimensions.
-        model: its robot; its parameters may be followed by errors of joint centres.
-        box: the poses.
+        case: case with fixed dimensions.
+        model: robot of the case; joint-centre errors may follow its parameters.
+        box: box of poses.
         z: (n, 1) symbols of the coordinates; new ones if left out.
-        errors: (3 m, 1) symbols in the place of the errors.
+        errors: (3 m, 1) symbols of the joint-centre errors.
     """
     free, errors = box.free, SX(0, 1) if errors is None else errors
     if z is None:

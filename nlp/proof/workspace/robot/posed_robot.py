@@ -1,12 +1,12 @@
 """A robot with fixed dimensions over a workspace: loop equations and matrices in the coordinates of a search.
 
-The coordinates z are those numbers of a :class:`~.pose_box.PoseBox` that vary, then the robot's unknowns. Equations
-that follow from others in this workspace are left out. Of the coordinates as many are *dependent* as there are
-equations: all unknowns, and some numbers of the pose of a robot with fewer freedoms.
+The coordinates z are the varying coordinates of a :class:`~.pose_box.PoseBox`, then the robot's unknowns. Equations
+that follow from others in this workspace are left out. The other equations determine as many *dependent* coordinates:
+all unknowns, and some coordinates of the pose if the robot has fewer than six degrees of freedom.
 
-Where every machine within a tolerance on joint centres is meant, the errors of each centre are three further
-coordinates, with the design's choice of equations and screws. They are never bisected: an expression's linear part in
-the error of a centre, a vector, changes it by at most the vector's length times the tolerance.
+For all robots within the joint-centre tolerance, three errors of each centre are additional coordinates, with the
+design's choice of equations and screws. Errors are never bisected: a gradient g by the error of one centre changes an
+expression by at most ``|g|`` times the tolerance.
 """
 
 from __future__ import annotations
@@ -25,53 +25,52 @@ from ....case.case import Case
 from ....case.workspace import TurnKind
 from ....evidence.closed_loops import DEPENDENT, Loops, closed_from_home
 from ....program.layout import robot_length
-from ...statement.machine import INSIDE, JointErrors
+from ...statement.fixed_robot import INSIDE, JointErrors
 from ...statement.tolerance import BuiltModel
 from .path_cover import PathCover
 from .pose_box import PoseBox
 from .posed_model import Chosen, PosedModel, RankMatrix, posed_model
 
-#: Points of the workspace at which the equations that are needed are found, beside its middle, and number of machines
-#: in which those that were left out are tested.
+#: Number of points of the workspace, beside its middle, at which independent equations are chosen; and number of robots
+#: with joint-centre errors in which the other equations are tested.
 _POINTS = 4
-#: Part of the workspace, about its middle, in which these points lie, and errors of the machines in parts of the
-#: robot's length.
+#: Part of the workspace, about its middle, with these points; and joint-centre errors relative to the robot's size.
 _SPREAD, _OFF = 0.5, 1e-2
-#: Largest residual of an equation of order 1 that follows from others.
+#: Largest residual of a dependent equation of order 1.
 _CLOSED = 1e-9
-#: Singular values below this part of the largest are zero.
+#: Relative singular value that counts as zero.
 _ZERO = 1e-9
 _SEED = 0
-#: Parts of a length, or radians, by which a number of the pose is moved at most where an equation that was left out is
-#: tested, and the largest change of its left side then: several roundings.
+#: Largest change of a coordinate of the pose, in parts of a length or radians, in the test of an equation that was left
+#: out; and the largest change of its left side, several roundings.
 _NEAR, _ROUNDING = 1e-3, 1e-12
 
 
 class NotJudgedError(ValueError):
-    """Error of a robot whose loops or limbs are singular where a search begins; the message is a clause."""
+    """The robot cannot be judged, for example because its loops are singular at the start; the message is a clause."""
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A robot over a workspace: the design, or every machine within a tolerance.
+    """A robot over a workspace: the design, or all robots within the tolerance.
 
     Attributes:
-        box: the poses.
-        loops: k equations in the coordinates; errors are the last ones.
-        free: indices of the pose's numbers, among those of the box, that are the first coordinates.
-        independent, dependent: indices of the coordinates of the design, of which k are dependent.
-        start: (n,) closed loops of the design at the middle of the workspace, or near it.
-        locked: rows and members with the actuators locked.
-        unactuated: the same with free actuators; None for a robot without constraints.
-        posed: its limbs, with the loops of the design or of the machines.
-        chosen: what is kept of the model.
-        names: of the m joint centres whose errors are coordinates.
-        tolerance: largest size of each error, length.
-        design: the design alone, of all machines.
-        cover: of the path that is meant; None for the whole box.
-        rates: indices of the coordinates that are rates, by seconds, of the pose in the path's motion: those of
-            :attr:`rated`, or none.
-        resting: the design without rates, of a design with them.
+        box: box of poses.
+        loops: k loop equations in the coordinates; joint-centre errors are the last coordinates.
+        free: indices of the pose coordinates, among those of the box, that are the first coordinates.
+        independent, dependent: indices of the independent and of the k dependent coordinates of the design.
+        start: (n,) point of the design with closed loops, at or near the middle of the workspace.
+        locked: matrix of rows and members with locked actuators.
+        unactuated: matrix of rows and members with free actuators; None for a robot without constraints.
+        posed: limbs, with the loops of the design or of the robots within the tolerance.
+        chosen: independent equations and screws of the model.
+        names: names of the m joint centres with errors as coordinates.
+        tolerance: largest norm of each joint-centre error, length.
+        design: the design, if this is a problem of all robots within the tolerance; else None.
+        cover: boxes of the path; None for the whole box.
+        rates: indices of the coordinates that are rates of the pose per second along the path, as in :attr:`rated`;
+            else empty.
+        resting: the design without rates, for a design with rates; else None.
     """
 
     box: PoseBox
@@ -93,22 +92,22 @@ class Problem:
 
     @property
     def problem(self) -> Problem:
-        """The design alone."""
+        """The design."""
         return self.design or self
 
     @property
     def has_following(self) -> bool:
-        """Whether numbers of the pose follow from others, so that each machine has its own."""
+        """Whether the pose has dependent coordinates, which differ between robots within the tolerance."""
         return bool(self.box.dependent)
 
     @property
     def stated(self) -> list[int]:
-        """Indices of the coordinates that are independent ones of the pose."""
+        """Indices of the independent coordinates of the pose."""
         return [j for j, k in enumerate(self.free) if k not in self.box.dependent]
 
     @property
     def length(self) -> float:
-        """A length of the order of the robot's."""
+        """Characteristic size of the robot, length."""
         return self.chosen.length
 
     @property
@@ -118,7 +117,7 @@ class Problem:
 
     @property
     def size(self) -> FloatArray:
-        """Sizes (n,) by which coordinates are comparable: of the order of their ranges."""
+        """Scales (n,) of the coordinates, of the order of their ranges."""
         return self.loops.size
 
     @property
@@ -134,12 +133,12 @@ class Problem:
     @property
     def errors(self) -> SX:
         """Symbols (3 m, 1) of the errors."""
-        # With both indices a column stays one where it is empty.
+        # Both indices keep an empty column a column.
         return self.z[len(self.start) - 3 * len(self.names) :, :]
 
     @property
     def rated(self) -> list[int]:
-        """Rates that a path has, among those of :meth:`.path_cover.PathCover.rates`."""
+        """Indices of the rates that vary along a path, among those of :meth:`.path_cover.PathCover.rates`."""
         stated = [self.free[j] for j in self.stated]
         turns = [k for k in stated if k >= 3]
         if turns and self.box.kind is not TurnKind.ROLL_PITCH_YAW:
@@ -148,13 +147,13 @@ class Problem:
 
     @property
     def of_path(self) -> list[int]:
-        """Indices of the coordinates that a place of a path determines."""
+        """Indices of the coordinates that a place on a path determines."""
         return [*self.stated, *self.rates]
 
     def path_boxes(
         self, cover: PathCover, pieces: FloatArray, within: FloatArray | None = None
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the ends (B, c) of these coordinates over pieces (B, 3) of a path; see :meth:`.PathCover.boxes`."""
+        """Return the ends (B, c) of :attr:`of_path` over pieces (B, 3) of a path; see :meth:`.PathCover.boxes`."""
         low, high = (each[:, [self.free[j] for j in self.stated]] for each in cover.boxes(pieces, within))
         if self.rates:
             slow, fast = (each[:, self.rated] for each in cover.rates(pieces))
@@ -162,7 +161,7 @@ class Problem:
         return low, high
 
     def path_points(self, cover: PathCover, pieces: FloatArray, part: float) -> FloatArray:
-        """Return these coordinates (B, c) at computed points of pieces."""
+        """Return the coordinates :attr:`of_path`, (B, c), at computed points of pieces."""
         s = pieces[:, 1] + part * (pieces[:, 2] - pieces[:, 1])
         low, high = self.path_boxes(cover, np.stack([pieces[:, 0], s, s], axis=1), pieces)
         return 0.5 * low + 0.5 * high
@@ -174,11 +173,11 @@ class Problem:
         return y
 
     def exact(self, z: FloatArray) -> FloatArray:
-        """Return the coordinates (..., n) of the design at points of the design alone."""
+        """Return points (..., n) of this problem without errors, from points of the design."""
         return np.concatenate([z, np.zeros((*z.shape[:-1], len(self.of_errors)))], axis=-1)
 
     def errors_of(self, z: FloatArray) -> JointErrors:
-        """Return the errors of the machine at a point (n,)."""
+        """Return the joint-centre errors at a point (n,)."""
         own = z[self.of_errors].reshape(-1, 3)
         return JointErrors(self.names, frozen_array(own, own.shape))
 
@@ -211,15 +210,15 @@ def build_problem(
     """Return a robot over a workspace.
 
     Args:
-        case: with fixed dimensions.
-        model: its robot, some of whose unknowns may have been replaced by expressions.
-        box: the poses.
-        at: (c,) coordinates of the pose at which closed loops are looked for; the middle of the workspace if left out.
-        near: returns positions of the unknowns there, in the assembly of home; None where they are not known. It is
-            called where the straight way from those at home does not lead there.
+        case: case with fixed dimensions.
+        model: robot of the case; some unknowns may be replaced by closed forms.
+        box: box of poses.
+        at: (c,) coordinates of the start pose, where the loops are closed; the middle of the workspace if left out.
+        near: function that returns the unknowns at the start pose in the home assembly mode, or None. It is called if
+            the straight motion from home does not reach the start pose.
 
     Raises:
-        NotJudgedError: no closed loops are found there, or they leave a joint free.
+        NotJudgedError: the loops do not close at the start pose, or leave a joint free.
     """
     posed = posed_model(case, model, box)
     loops, count = posed.loops, len(posed.free)
@@ -231,11 +230,11 @@ def build_problem(
         start = loops.all_closed(middle[:, None], range(count, len(middle)), zero=DEPENDENT)[:, 0]
         start = start if loops.is_closed(start) else None
     if start is None:
-        raise NotJudgedError("the loops could not be closed in the assembly of home in the middle of the workspace")
+        raise NotJudgedError("no solution of the loop equations in the home assembly mode at the workspace centre")
     needed = _needed(loops, start, count)
     loops = loops.some(needed)
     dependent = _dependent(loops, start, posed.free, box)
-    # Where numbers of the pose follow from others, the closed loops that were found may be beside a narrow box.
+    # With dependent coordinates of the pose, the start point may lie outside of a narrow box.
     middle[list(dependent)] = start[list(dependent)]
     moved = loops.all_closed(middle[:, None], dependent)[:, 0]
     start = moved if loops.is_closed(moved) else start
@@ -258,9 +257,9 @@ def build_problem(
 
 
 def _check_left_out(loops: Loops, start: FloatArray, dependent: tuple[int, ...], box: PoseBox, length: float) -> None:
-    """Refuse a robot with a loop equation that was left out and does not hold where a number of the pose moves.
+    """Check that loop equations that were left out hold when coordinates of the pose move.
 
-    An equation of a number that hardly changes in a narrow workspace counts as one that follows from others.
+    An equation whose coordinate hardly changes in a narrow workspace looks dependent on others.
 
     Raises:
         NotJudgedError: an equation does not hold.
@@ -268,28 +267,30 @@ def _check_left_out(loops: Loops, start: FloatArray, dependent: tuple[int, ...],
     own = [j for j in range(len(box.free)) if j not in dependent]
     if loops.every.numel() == loops.count or not own:
         return
-    # Each number alone, to both ends of its range, or so near that the loops stay in their assembly.
+    # Each coordinate by itself, to both ends of its range, or so near that the assembly mode stays the same.
     points = np.repeat(start[:, None], 2 * len(own), axis=1)
     for k, j in enumerate(own):
         at, near = box.free[j], _NEAR * (length if box.free[j] < 3 else 1.0)
         points[j, 2 * k : 2 * k + 2] = np.clip([box.lower[at], box.upper[at]], start[j] - near, start[j] + near)
     moved = loops.all_closed(points, dependent) if dependent else points
-    # Constants of a robot that should be 0 may be rounding of its numbers.
+    # Constants of a robot that should be 0 may be rounding errors.
     if (np.abs(loops.every_value(moved) - loops.every_value(start[:, None])) > _ROUNDING).any():
-        raise NotJudgedError("its loops do not close all over the workspace: the platform cannot move in all numbers")
+        raise NotJudgedError(
+            "its loops do not close all over the workspace: the robot does not control all coordinates with ranges"
+        )
 
 
 def family_of(case: Case, built: BuiltModel, design: Problem, tolerance: float) -> Problem:
-    """Return all machines within a tolerance on joint centres; the design as the only one where there are no errors.
+    """Return all robots within the joint-centre tolerance over a workspace; without errors the design only.
 
     Args:
-        case: with fixed dimensions.
-        built: its robot with errors.
-        design: its robot over a workspace.
+        case: case with fixed dimensions.
+        built: robot of the case with joint-centre errors.
+        design: robot of the case over the workspace.
         tolerance: largest error of each joint centre, length.
 
     Raises:
-        NotJudgedError: the machines do not have the freedoms that the design has over the workspace.
+        NotJudgedError: joint-centre errors remove degrees of freedom that the design has over the workspace.
     """
     errors = ca.vertcat(SX(0, 1), *[SX.sym(f"e{k}", 3) for k in range(len(built.names))])
     whole = posed_model(case, built.model, design.box, design.z, errors)
@@ -312,10 +313,10 @@ def family_of(case: Case, built: BuiltModel, design: Problem, tolerance: float) 
 
 
 def _check_freedoms(family: Problem, whole: PosedModel) -> None:
-    """Refuse machines in which equations or screws that were left out do not follow from the others.
+    """Check that equations and screws that were left out still depend on the others with joint-centre errors.
 
     Raises:
-        NotJudgedError: they do not follow at random errors.
+        NotJudgedError: left-out equations or screws are independent at random errors.
     """
     loops, own, errors = family.loops, list(family.independent), family.of_errors
     members = [each for each in whole.limbs.members if each.rank < each.screws.shape[1]]
@@ -323,23 +324,23 @@ def _check_freedoms(family: Problem, whole: PosedModel) -> None:
     function = ca.Function("every", [family.z], [ca.densify(each) for each in (loops.every, *columns)])
     rng = np.random.default_rng(_SEED)
     for _ in range(_POINTS):
-        # At home every machine closes, whatever its errors.
+        # At home the loops close with any errors.
         z = family.start.copy()
         z[own] += _SPREAD * family.size[own] * rng.uniform(-1, 1, len(own))
         z[errors] = _OFF * family.length * rng.uniform(-1, 1, len(errors))
         found = loops.all_closed(z[:, None], family.dependent)[:, 0]
         if not np.isfinite(found).all():
-            raise NotJudgedError("the loops do not close with errors of joint centres in the middle of the workspace")
+            raise NotJudgedError("the loops do not close with joint-centre errors at the workspace centre")
         every, *screws = (np.array(each) for each in function.call([ca.DM(found)]))
         if float(np.abs(every).max(initial=0.0)) > _CLOSED:
-            fault = "with errors of joint centres the robot does not have the poses of the workspace exactly"
-            raise NotJudgedError(f"{fault}: state ranges for its dependent numbers of the pose")
+            fault = "with joint-centre errors the robot does not reach the poses of the workspace exactly"
+            raise NotJudgedError(f"{fault}: state ranges for its dependent coordinates")
         if any(_rank_of(values) != member.rank for member, values in zip(members, screws, strict=True)):
-            raise NotJudgedError("errors of joint centres take freedoms from the robot: its limbs change")
+            raise NotJudgedError("joint-centre errors remove degrees of freedom (overconstrained robot): limbs change")
 
 
 def _needed(loops: Loops, start: FloatArray, count: int) -> tuple[int, ...]:
-    """Return the indices of the equations that do not follow from others in the workspace."""
+    """Return the indices of independent equations in the workspace."""
     if not loops.count:
         return ()
     rng = np.random.default_rng(_SEED)
@@ -356,7 +357,7 @@ def _needed(loops: Loops, start: FloatArray, count: int) -> tuple[int, ...]:
 
 
 def _dependent(loops: Loops, start: FloatArray, free: Sequence[int], box: PoseBox) -> tuple[int, ...]:
-    """Return the coordinates that the equations determine: dependent ones of the pose, and all unknowns.
+    """Return the indices of the coordinates that the equations determine: dependent ones of the pose, all unknowns.
 
     Raises:
         NotJudgedError: the equations leave an unknown free, or determine other coordinates of the pose.
@@ -367,24 +368,24 @@ def _dependent(loops: Loops, start: FloatArray, free: Sequence[int], box: PoseBo
     if k < len(unknowns):
         raise NotJudgedError("the pose does not determine every joint")
     if k != len(unknowns) + len(following):
-        raise NotJudgedError("the platform cannot choose all coordinates of the pose that are stated")
+        raise NotJudgedError("the robot does not control all stated coordinates of the pose independently")
     if not k:
         return ()
     slopes = loops.slopes(start[:, None])[0] * loops.size
     if unknowns:
         values = np.linalg.svd(slopes[:, unknowns], compute_uv=False)
         if not values[-1] > _ZERO * values[0]:
-            raise NotJudgedError("the pose does not determine every joint in the middle of the workspace")
+            raise NotJudgedError("the pose does not determine every joint at the workspace centre")
     values = np.linalg.svd(slopes[:, [*following, *unknowns]], compute_uv=False)
     if not values[-1] > _ZERO * values[0]:
-        raise NotJudgedError("the loops are singular in the middle of the workspace")
+        raise NotJudgedError("the loops are singular at the workspace centre")
     return (*following, *unknowns)
 
 
 def _chosen(posed: PosedModel, model: Model, start: FloatArray, needed: tuple[int, ...], otherwise: float) -> Chosen:
-    """Return what is kept with some equations: screws that span the others where they are independent, and a length.
+    """Return the given equations with independent screws, independent nested equations, and a length.
 
-    Screws that loops hold still are rounding alone.
+    Screws of joints that loops hold still are only rounding errors.
 
     Raises:
         NotJudgedError: the screws or the nested loops of a limb are singular at the start.
@@ -404,19 +405,19 @@ def _chosen(posed: PosedModel, model: Model, start: FloatArray, needed: tuple[in
 
 
 def _independent(values: FloatArray, rank: int, what: str) -> tuple[int, ...]:
-    """Return the indices of as many rows of a matrix as have its rank.
+    """Return the indices of independent rows of a matrix, as many as its expected rank.
 
     Raises:
-        NotJudgedError: they have another rank.
+        NotJudgedError: the matrix has another rank.
     """
     chosen = independent_rows([values]) if rank else ()
     if len(chosen) != rank:
-        raise NotJudgedError(f"{what} are singular in the middle of the workspace")
+        raise NotJudgedError(f"{what} are singular at the workspace centre")
     return tuple(sorted(chosen))
 
 
 def _length(posed: PosedModel, start: FloatArray, size: float) -> float:
-    """Return the median arm of rows and screws about the platform's origin; 0 where they have none beside a size."""
+    """Return the median moment arm of rows and screws about the platform's origin; 0 if all are small."""
     lines = [(row.force, row.moment) for row in posed.limbs.wrenches]
     lines += [(screw[:3], screw[3:]) for each in posed.limbs.members for screw in ca.horzsplit(each.screws)]
     pairs = [
@@ -430,7 +431,7 @@ def _length(posed: PosedModel, start: FloatArray, size: float) -> float:
 
 
 def _unactuated(model: Model, posed: PosedModel, start: FloatArray) -> RankMatrix | None:
-    """Return rows and members with free actuators; None for a robot without constraints."""
+    """Return the matrix of rows and members with free actuators; None for a robot without constraints."""
     generic, limbs = model.generic, posed.limbs
     if (generic is not None and generic.constraints == 0) or (not limbs.actuators and model.members):
         return None
@@ -440,7 +441,7 @@ def _unactuated(model: Model, posed: PosedModel, start: FloatArray) -> RankMatri
     if generic is not None:
         freedoms, idle = 6 - generic.constraints, generic.idle
     else:
-        # Any pose of a robot given by rows is closed, and the middle may be singular.
+        # A robot given by rows has no loops, and the middle may be singular.
         away = np.random.default_rng(_SEED).uniform(-_SPREAD, _SPREAD, (_POINTS, len(start))) * (not model.unknowns)
         every = posed.values(matrix, (start + away * posed.loops.size).T)
         freedoms, idle = matrix.shape[1] - max(map(_rank_of, np.hsplit(every, _POINTS))), 0
@@ -454,7 +455,7 @@ def _rank_of(values: FloatArray) -> int:
 
 
 def steepest(slopes: FloatArray, tolerance: float) -> FloatArray:
-    """Return errors (..., 3) as large as a tolerance along derivatives by them; none along derivatives of zero."""
+    """Return errors (..., 3) with the norm of a tolerance along derivatives; zero for zero derivatives."""
     sizes = np.linalg.norm(slopes, axis=-1, keepdims=True)
-    # A sum with zero has no negative zero.
+    # Adding zero removes negative zeros.
     return np.asarray(INSIDE * tolerance * slopes / np.maximum(sizes, np.finfo(float).tiny) + 0.0)

@@ -1,8 +1,8 @@
-"""Reach and limits over the boxes of a slice: each kept, or violated, at every pose of a box, or open.
+"""Reach and limits over the boxes of a slice: satisfied, or violated, at every pose of a box, or open.
 
-Reach and limits on expressions are decided by their ranges, those on the clearance of legs by its bounds from below and
-from above. A limit on singular values, or on a number of an actuator, is proved to be kept by its bound; it counts as
-violated where it is so at the corners and at the middle of the box, which is no proof.
+Reach and limits on expressions are decided by ranges, clearances of legs by lower and upper bounds. A limit on singular
+values, or on an actuator quantity, is proved by a lower bound; it counts as violated if it is violated at the corners
+and at the middle of the box, which is not a proof.
 """
 
 from __future__ import annotations
@@ -32,23 +32,23 @@ from ...statement.motors import motor_claims
 from ..numbers.bound_search import Number
 from ..numbers.clearance import Clearance
 from ..numbers.expressions import ranges
-from ..numbers.machines import Machines
 from ..numbers.motors import Motors
 from ..numbers.searched import Subject
+from ..numbers.within_tolerance import RobotsWithinTolerance
 from ..ranks.krawczyk import Coordinates, Relation, relation_of, with_relation
 from ..ranks.loop_boxes import LoopBoxes
 from ..robot.pose_box import pose_box
 from ..robot.posed_robot import NotJudgedError, build_problem
 from ..verdict import slack_of
 
-#: Limits of a box: all are proved to be kept, or nothing is proved; else the index of a limit that is violated.
+#: Values in place of the index of a violated limit of a box: all limits are proved, or nothing is proved.
 KEPT, UNDECIDED = -1, -2
-#: Points to each side of a slice, and on each way from its middle, at which limits are tried for the first violated.
+#: Number of grid points along each side of a slice, and along each line from its middle, for the first violated limit.
 POINTS, _STEPS = 65, 96
 
 
 class LimitState(enum.IntEnum):
-    """A limit over a box."""
+    """State of a limit over a box."""
 
     KEPT = 0
     OPEN = 1
@@ -60,10 +60,10 @@ class SliceLimit:
     """A limit of a slice.
 
     Attributes:
-        key: dotted key, below ``limits``, in the case.
-        limit: the limit, radians for angles.
-        dimension: of the limit.
-        is_enclosed: whether boxes where it is violated are proved so, and not by samples.
+        key: dotted key below ``limits`` in the case.
+        limit: value of the limit, radians for angles.
+        dimension: dimension of the limit.
+        is_enclosed: whether violations over boxes are proved, and not only sampled.
     """
 
     key: str
@@ -75,13 +75,12 @@ class SliceLimit:
 class SliceLimits:
     """Reach of limbs, and limits of a case, over boxes.
 
-    Both have *claims*, such as that about the distance of one pair of legs: first those about reach, then those about
-    limits on expressions, then others.
+    Claims, such as the distance of one pair of legs, are ordered: reach, limits on expressions, other limits.
 
     Args:
-        case: with fixed dimensions.
-        closed: its robot without unknowns in closed form.
-        workspace: with the robot's dependent coordinates.
+        case: case with fixed dimensions.
+        closed: robot of the case, with closed forms in place of unknowns.
+        workspace: box of poses, with the robot's dependent coordinates.
 
     Attributes:
         problem: the robot over the workspace.
@@ -90,13 +89,13 @@ class SliceLimits:
 
     Raises:
         NotJudgedError: the loops are not closed in the middle of the workspace.
-        UncoveredError: a loop equation, or the reach of a limb, holds an operation without a rule.
+        UncoveredError: a loop equation, or the reach of a limb, has an operation without an interval rule.
     """
 
     def __init__(self, case: Case, closed: ClosedForm, workspace: Workspace) -> None:
         case = replace(case, joint_centre_tolerance=None)
         self.problem = problem = build_problem(case, closed.model, pose_box(workspace))
-        alone = Machines(case, closed, problem)
+        alone = RobotsWithinTolerance(case, closed, problem)
         reaches, claims = alone.symbols.claims((), with_objective=False)
         claims += dependent_claims(alone.symbols.layout.robots[0], workspace)
         known = [claim for claim in claims if claim.limit is not None and alone.is_covered(claim)]
@@ -127,21 +126,21 @@ class SliceLimits:
         self._of = Coordinates(list(problem.independent), list(problem.dependent), [])
         self._leasts = np.array([_least(claim) for claim in (*reaches, *known)])
         numbers = ca.vertcat(SX(0, 1), *map(alone.number, (*reaches, *known)))
-        # A last entry that is not used, for a robot without any.
+        # The last entry is not used; it makes the vector nonempty.
         self._encloser = Encloser(problem.z, ca.vertcat(SX(0, 1), problem.equations, numbers, problem.z[0]))
         self._function = ca.Function("numbers", [problem.z], [ca.densify(numbers)])
 
     @property
     def unknown(self) -> NDArray[np.int8]:
-        """(1, K) states of the claims before anything is known."""
+        """Initial states (1, K) of the claims."""
         return np.full((1, self._reaches + len(self._places)), LimitState.OPEN, dtype=np.int8)
 
     def examine(self, boxes: LoopBoxes, relation: Relation, known: NDArray[np.int8]) -> NDArray[np.int8]:
         """Return the states (B, K) of the claims over boxes.
 
         Args:
-            boxes: (B,) boxes. Of those whose dependent coordinates are not known nothing more is said.
-            relation: of the dependent coordinates, to which it is set.
+            boxes: (B,) boxes; states of boxes with unknown dependent coordinates stay as they are.
+            relation: relation of the dependent coordinates, which is updated.
             known: (B, K) states over larger boxes.
         """
         states, enclosed, k = known.copy(), len(self._leasts), len(self._of.dependent)
@@ -165,18 +164,18 @@ class SliceLimits:
         return states
 
     def reached(self, states: NDArray[np.int8]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Return whether all limbs reach every pose of each box, and whether one reaches none, from claims (B, K)."""
+        """Return whether all limbs reach every pose of each box, and whether a limb reaches none; states are (B, K)."""
         own = states[:, : self._reaches]
         return np.asarray((own == LimitState.KEPT).all(axis=1)), np.asarray((own == LimitState.VIOLATED).any(axis=1))
 
     def of_limits(self, states: NDArray[np.int8]) -> NDArray[np.int8]:
-        """Return the states (M, B) of the limits, each the worst of its claims (B, K)."""
+        """Return the states (M, B) of the limits: the worst state of the claims (B, K) of each limit."""
         found = np.full((len(self.limits), len(states)), LimitState.KEPT, dtype=np.int8)
         np.maximum.at(found, self._places, states[:, self._reaches :].T)
         return found
 
     def violated(self, z: FloatArray) -> NDArray[np.bool_]:
-        """Return whether each limit is violated at points (P, n) with closed loops: (M, P); not where it is NaN."""
+        """Return whether each limit is violated at points (P, n) with closed loops, (M, P); False for NaN."""
         found = np.zeros((len(self.limits), len(z)), dtype=np.bool_)
         with np.errstate(all="ignore"):
             numbers = values_at(self._function, z)[0][:, :, 0].T
@@ -188,30 +187,30 @@ class SliceLimits:
 
 
 def _least(claim: Claim) -> float:
-    """Return the smallest value allowed of a claim's number, or of minus it for a largest one; 0 without a limit."""
+    """Return the smallest allowed value of a claim's quantity, negated for a largest value; 0 without a limit."""
     limit = claim.limit or 0.0
     return (limit if claim.sense is Sense.MIN else -limit) - slack_of(limit)
 
 
 def _states_of(kept: NDArray[np.bool_], violated: NDArray[np.bool_]) -> NDArray[np.int8]:
-    """Return states from whether claims are proved to be kept, or violated."""
+    """Return states from arrays of proved and violated claims."""
     return np.where(kept, LimitState.KEPT, np.where(violated, LimitState.VIOLATED, LimitState.OPEN)).astype(np.int8)
 
 
 class _Other:
-    """Limits on numbers with bounds of their own.
+    """Limits on quantities that are not expressions of the pose.
 
     Args:
-        keys: of the limits, K.
-        number: the numbers.
-        leasts: (K,) their smallest values allowed.
+        keys: keys of the K limits.
+        number: the quantities.
+        leasts: (K,) smallest allowed values.
 
     Attributes:
-        keys: as given.
-        is_enclosed: whether boxes where they are violated are proved so, and not by samples.
+        keys: keys of the K limits.
+        is_enclosed: whether violations over boxes are proved, and not only sampled.
 
     Raises:
-        UncoveredError: an expression holds an operation without a rule.
+        UncoveredError: an expression has an operation without an interval rule.
     """
 
     def __init__(self, keys: Sequence[str], number: Number, leasts: FloatArray) -> None:
@@ -219,9 +218,9 @@ class _Other:
         self.is_enclosed = isinstance(number, Clearance) and not number.problem.dependent
 
     def states(self, boxes: LoopBoxes) -> NDArray[np.int8]:
-        """Return the states (B, K) over boxes whose dependent coordinates are known.
+        """Return the states (B, K) over boxes with known dependent coordinates.
 
-        A number that is bounded from below only is violated where it is so at the corners and the middle of a box.
+        Without an upper bound, a limit counts as violated if it is violated at the corners and the middle of a box.
         """
         kept = self._examiner.examine(boxes).smallest >= self._leasts
         if isinstance(self._number, Clearance) and self.is_enclosed:
@@ -237,18 +236,18 @@ class _Other:
         return _states_of(kept, violated)
 
     def violated(self, points: FloatArray) -> NDArray[np.bool_]:
-        """Return whether each is violated at points (P, n) with closed loops: (P, K)."""
+        """Return whether each limit is violated at points (P, n) with closed loops: (P, K)."""
         return np.asarray(self._number.values(points) < self._leasts)
 
 
 class FirstViolated:
-    """The limit that is violated first on the straight line from the middle of a slice.
+    """First violated limit on the straight line from the middle of a slice.
 
-    The limit's violation in a box is that of its enclosure; which of several comes first is taken from points.
+    Violations over boxes are proved by enclosures; which of several limits comes first is sampled at points.
 
     Args:
         limits: the limits.
-        grid: (N, N, n) closed loops at the points of the slice's grid.
+        grid: (N, N, n) points with closed loops on the grid of the slice.
         lower: (2,) lower ends of the slice.
         upper: (2,) upper ends of the slice.
     """
@@ -264,10 +263,10 @@ class FirstViolated:
     def of(
         self, states: NDArray[np.int8], lower: FloatArray, upper: FloatArray
     ) -> tuple[NDArray[np.int16], NDArray[np.bool_]]:
-        """Return the limit of each box, ``KEPT``, ``UNDECIDED`` or an index, and whether it is that of the whole box.
+        """Return the limit of each box (``KEPT``, ``UNDECIDED`` or an index), and whether it holds for the whole box.
 
         Args:
-            states: (M, B) of the limits over the boxes.
+            states: (M, B) states of the limits over the boxes.
             lower: (B, 2) lower ends of the boxes.
             upper: (B, 2) upper ends of the boxes.
         """
@@ -278,7 +277,7 @@ class FirstViolated:
         if not rows.size:
             return limit, is_same
         limit[rows] = np.argmax(violated[:, rows], axis=0)
-        # Another limit that is open may be violated first in a part of the box.
+        # Another open limit may be violated first in a part of the box.
         is_same[rows] = (states[:, rows] == LimitState.KEPT).sum(axis=0) == len(states) - 1
         several = rows[~is_same[rows]]
         if several.size:
@@ -291,12 +290,12 @@ class FirstViolated:
         return limit, is_same
 
     def _first(self, candidates: NDArray[np.bool_], ends: FloatArray) -> NDArray[np.int16]:
-        """Return which of the candidates (M, C) is violated first on the way to each end (C, 2)."""
+        """Return which of the candidates (M, C) is violated first on the line to each end (C, 2)."""
         middle = 0.5 * (self._lower + self._upper)
         way = middle + np.linspace(0.0, 1.0, _STEPS)[:, None, None] * (ends - middle)
         place = np.rint((way - self._lower) / (self._upper - self._lower) * (POINTS - 1)).astype(np.intp)
         on_way = self._violated[:, place[..., 0], place[..., 1]] & candidates[:, None]
-        # One that is violated at no point of the way comes last.
+        # A limit that is violated at no point of the line comes last.
         begins = np.where(on_way.any(axis=1), np.argmax(on_way, axis=1), _STEPS)
         begins = np.where(candidates, begins, _STEPS + 1)
         return np.asarray(np.argmin(begins, axis=0), dtype=np.int16)

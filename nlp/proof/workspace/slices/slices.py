@@ -1,9 +1,9 @@
-"""Slices of a box of poses: where J is proved to be regular, where it is beyond a singular pose, and where limits hold.
+"""Slices of a box of poses: regions of proved full rank, regions beyond singular poses, and violated limits.
 
-A slice has two coordinates of the box; the others stay at the middle, or follow from these two. The slice is covered by
-boxes of its own, so that its colours are proved for the poses of the slice alone. It is wider than the workspace, to
-show the poses around. Where several limits are violated, a box has the one that is violated first on the straight line
-from the middle. Loops without a closed form are followed from the middle.
+A slice has two coordinates of the box; the other coordinates stay at the middle, or are dependent on these two. Boxes
+cover the slice, so its colours are proved only for poses of the slice. It is wider than the workspace, to show the
+surrounding poses. If several limits are violated, a box shows the first violated limit on the straight line from the
+middle. Loops without a closed form are followed from the middle.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from ....case.limits.legs import Actuator
 from ....case.workspace import TurnKind, Workspace
 from ....errors import CaseError, UncoveredError
 from ...boxes.search import Boxes, BoxResults, Order, Search, bisected, joined, some
-from ...statement.machine import workspace_of_case
+from ...statement.fixed_robot import workspace_of_case
 from ..ranks.loop_boxes import Examiner, Followed, LoopBoxes, LoopRule, loop_boxes_of, one_assembly
 from ..ranks.rank_rule import RankTest, is_polynomial
 from ..robot.pose_box import PoseBox, pose_box, scaled
@@ -33,7 +33,7 @@ from .slice_limits import POINTS, UNDECIDED, FirstViolated, SliceLimit, SliceLim
 
 #: Factor by which a slice is wider than the workspace.
 _WIDER = 3.0
-#: Smallest boxes to each side of a slice.
+#: Number of smallest boxes along each side of a slice.
 _SIDE = 256
 #: Names of the coordinates of a pose, by the kind of its rotations.
 _NAMES = {
@@ -46,13 +46,13 @@ _NAMES = {
 class Region(enum.Enum):
     """Verdict on a box of a slice."""
 
-    REGULAR = "proved regular"
-    BEYOND = "regular, with a singular pose on the way from the middle"
-    OTHER_SIGN = "regular, with the other sign of the determinant"
-    SINGULAR = "singular, as at every pose"
-    OPEN = "open: too close to a singular pose"
-    UNREACHED = "out of reach, proved"
-    UNKNOWN = "open: reach or closed loops are not proved"
+    REGULAR = "proved: full rank"
+    BEYOND = "full rank, but a singularity between here and the centre"
+    OTHER_SIGN = "full rank, opposite sign of the determinant"
+    SINGULAR = "singular at every pose"
+    OPEN = "undecided: close to a singularity"
+    UNREACHED = "out of reach (proved)"
+    UNKNOWN = "undecided: reach or loop closure"
 
 
 #: Order of the regions in arrays.
@@ -64,17 +64,17 @@ class Slice:
     """A slice of a box of poses.
 
     Attributes:
-        names: of its two coordinates.
-        are_angles: whether each is an angle; angles are radians.
-        ball: largest angle of a workspace of rotations about any axis, radians, where both coordinates are such angles:
-            an angle is then twice the arc tangent of a component of a Cayley vector; None elsewhere.
+        names: names of the two coordinates.
+        are_angles: whether each coordinate is an angle, radians.
+        ball: largest angle, radians, of a workspace of rotations about any axis, if both coordinates are such angles:
+            an angle is then twice the arc tangent of a component of a Cayley vector. Else None.
         workspace: (2, 2) lower and upper ends of the workspace in the slice.
-        whole: (2, 2) those of the slice.
-        boxes: (B, 4) lower ends, then upper ends of its boxes.
+        whole: (2, 2) lower and upper ends of the slice.
+        boxes: (B, 4) lower ends, then upper ends of the boxes.
         regions: region of each box.
-        limits: the limits at a pose that the slice shows.
-        binding: (B,) for each box the index of the limit that is violated first, ``KEPT`` or ``UNDECIDED``.
-        left_out: keys of limits that the slice does not show: those over several poses, and those without bounds.
+        limits: limits that the slice shows.
+        binding: (B,) index of the first violated limit of each box, ``KEPT`` or ``UNDECIDED``.
+        left_out: keys of limits that the slice does not show: limits over several poses, and limits without bounds.
     """
 
     names: tuple[str, str]
@@ -93,11 +93,11 @@ def slices_of(case: Case) -> tuple[Slice, ...]:
     """Return the slices of a case's workspace: each pair of positions, and each pair of rotations.
 
     Args:
-        case: a case with fixed dimensions.
+        case: case with fixed dimensions.
 
     Raises:
-        CaseError: the case has no workspace, a free dimension, fewer than two numbers that the robot can choose, or a
-            robot whose loops are not closed in the middle of the workspace.
+        CaseError: the case has no workspace, a free dimension, or fewer than two independent coordinates; or the loops
+            are not closed in the middle of the workspace.
     """
     case = replace(case, joint_centre_tolerance=None)
     workspace = workspace_of_case(case)
@@ -109,10 +109,10 @@ def slices_of(case: Case) -> tuple[Slice, ...]:
     if not pairs:
         pairs = [(k, each) for k in moving for each in turning]
     if not pairs:
-        fault = "has no slices: they need two numbers of the pose, given as { min, max }, that the robot can choose"
+        fault = "has no slices: they need two independent coordinates of the pose with { min, max }"
         raise CaseError("workspace", fault, source=case.source)
     limit = next((each for each in case.limits if isinstance(each, Actuator)), None)
-    # No single pose keeps or violates these limits.
+    # No single pose satisfies or violates these limits.
     over_poses = tuple(
         f"actuator.{name}" for name in ("stroke_max", "dead_length") if getattr(limit, name, None) is not None
     )
@@ -120,20 +120,20 @@ def slices_of(case: Case) -> tuple[Slice, ...]:
 
 
 class _Robot:
-    """A robot of which slices are drawn.
+    """A robot with its ranks and limits for slices.
 
     Args:
-        case: with fixed dimensions.
-        workspace: with its dependent coordinates.
+        case: case with fixed dimensions.
+        workspace: box of poses, with the dependent coordinates.
 
     Attributes:
         problem: the robot over the workspace.
-        limits: its limits.
-        examiners: of its ranks.
+        limits: limits of the case.
+        examiners: examiners of the ranks.
         is_singular: whether J is singular at every pose.
-        sign: of the determinant in the middle; 0 for a matrix that is not square.
-        other: region of regular boxes with another sign: of a matrix of polynomials a singular pose is between.
-        free: indices of those numbers of the pose, among the six of a box, that the robot can choose.
+        sign: sign of the determinant in the middle; 0 for a matrix that is not square.
+        other: region of regular boxes with the other sign; for polynomial entries a singular pose lies between.
+        free: indices, among the six coordinates of a box, of the independent coordinates with a range.
 
     Raises:
         CaseError: the loops are not closed in the middle of the workspace, or have an operation without a rule.
@@ -156,7 +156,7 @@ class _Robot:
 
 
 def _slice(robot: _Robot, wide: PoseBox, pair: tuple[int, int], over_poses: tuple[str, ...]) -> Slice:
-    """Return the slice of two coordinates."""
+    """Return the slice along two coordinates."""
     chosen, box = list(pair), robot.problem.box
     rule = _SliceRule(robot, chosen, wide.lower[chosen], wide.upper[chosen])
     parts, region, binding = rule.cover()
@@ -184,21 +184,21 @@ def _slice(robot: _Robot, wide: PoseBox, pair: tuple[int, int], over_poses: tupl
 
 
 class _SliceRule(LoopRule):
-    """Rule of ranks, reach and limits over the boxes of a slice, which are bisected along both of its coordinates.
+    """Rule for ranks, reach and limits over the boxes of a slice, which are bisected along both coordinates.
 
-    Boxes carry the states of claims, whether all ranks are proved, and the sign of the determinant where they are.
+    Boxes carry the states of claims, a flag for proved ranks, and the sign of the determinant.
 
     Args:
         robot: the robot.
-        chosen: the coordinates of the slice, among the six of a pose.
-        lower, upper: (2,) its ends.
+        chosen: indices of the coordinates of the slice, among the six of a pose.
+        lower, upper: (2,) ends of the slice.
     """
 
     def __init__(self, robot: _Robot, chosen: list[int], lower: FloatArray, upper: FloatArray) -> None:
         problem = robot.problem
         super().__init__(problem, robot.examiners[0])
         self._more = robot.limits.unknown, np.zeros(1, dtype=bool), np.zeros(1, dtype=np.int32)
-        # Boxes without loops are examined in C: many at once.
+        # Boxes without loops are examined in C, many at once.
         self.block = 512 if problem.dependent else 4096
         self._robot, self._limits, self._dependent = robot, robot.limits, list(problem.dependent)
         self._places = [problem.free.index(k) for k in chosen]
@@ -228,7 +228,7 @@ class _SliceRule(LoopRule):
         return bisected(halves._replace(split=np.full(len(halves.split), self._places[1])))
 
     def examine(self, boxes: Boxes[Followed]) -> BoxResults[Followed]:
-        """Return the boxes that are not decided."""
+        """Return the boxes that stay open."""
         low, high = boxes.lower[:, self._places], boxes.upper[:, self._places]
         known, has_ranks, signs = (each.copy() for each in boxes.more.more)
         inside, is_empty = loop_boxes_of(boxes), np.zeros(len(signs), dtype=bool)
@@ -257,7 +257,7 @@ class _SliceRule(LoopRule):
         return BoxResults(left, -math.inf, len(done))
 
     def _with_ranks(self, boxes: LoopBoxes, is_regular: NDArray[np.bool_], signs: NDArray[np.int32]) -> LoopBoxes:
-        """Return boxes with dependent coordinates where they are known; set whether ranks are proved, and signs."""
+        """Return boxes with their dependent coordinates where known; update ``is_regular`` and ``signs``."""
         boxes = some(boxes, np.arange(len(is_regular)))
         rows = np.flatnonzero(~is_regular)
         for k, examiner in enumerate(self._robot.examiners):
@@ -273,9 +273,9 @@ class _SliceRule(LoopRule):
         return boxes
 
     def _with_near(self, boxes: LoopBoxes, low: FloatArray, high: FloatArray) -> tuple[LoopBoxes, NDArray[np.bool_]]:
-        """Return boxes with closed loops of the nearest point of the grid, and whether none of their parts is tried.
+        """Return boxes with joint positions from the nearest grid point, and whether each box is not bisected further.
 
-        The loops of the grid are those of the middle, followed without a jump; they may be closed nowhere in a box.
+        Grid points are followed from the middle without a jump; the loops may be closed nowhere in a box.
         """
         at = np.rint(self._in_grid(0.5 * (low + high))).astype(np.intp)
         closed = self._grid[at[:, 0], at[:, 1]]
@@ -289,11 +289,11 @@ class _SliceRule(LoopRule):
         return boxes._replace(near=np.where(use[:, None], closed, boxes.near)), ~boxes.is_known & ~(count > 0)
 
     def _in_grid(self, points: FloatArray, steps: int = POINTS - 1) -> FloatArray:
-        """Return points (B, 2) of the slice as fractional indices of a grid with steps to each side."""
+        """Return points (B, 2) of the slice as fractional indices of a grid, with a number of steps along each side."""
         return (points - self._lower) / (self._upper - self._lower) * steps
 
     def _closed_grid(self) -> FloatArray:
-        """Return closed loops (N, N, n) at the points of the grid, followed from the middle; NaN where they end."""
+        """Return grid points (N, N, n) with loops closed from the middle outwards; NaN where they do not close."""
         start, dependent = self._problem.start, self._dependent
         grid = np.broadcast_to(start, (POINTS, POINTS, len(start))).copy()
         axes = [np.linspace(low, high, POINTS) for low, high in zip(self._lower, self._upper, strict=True)]
@@ -314,9 +314,9 @@ class _SliceRule(LoopRule):
         return grid
 
     def _is_of_middle(self, boxes: LoopBoxes) -> NDArray[np.bool_]:
-        """Return for each box (B,) of the cover whether its closed points surely belong to the assembly of the middle.
+        """Return whether each box (B,) of the cover is provably in the assembly mode of the middle.
 
-        Boxes that touch are found on the grid of the smallest ones.
+        Neighbours are found on the grid of the smallest boxes.
         """
         ends = (each[:, self._places] for each in (boxes.lower, boxes.upper))
         low, high = (np.rint(self._in_grid(each, _SIDE)).astype(np.intp) for each in ends)

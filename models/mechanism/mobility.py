@@ -1,8 +1,8 @@
-"""Twists of the platform that some joints of a mechanism allow: the platform's part of the null space of their loops.
+"""Platform twists that free joints of a mechanism allow: image of the null space of their loop equations.
 
 Unknowns are the rates of the free joints along a spanning tree from the base. Each joint that closes a loop gives six
-equations, and each coupling one. Twists are in the mechanism's own scale: about the middle of its joints, with
-velocities in parts of its size.
+equations, and each coupling one. Twists are scaled: about the middle of the joints, with velocities relative to the
+mechanism's size.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def null_space(matrix: FloatArray) -> FloatArray:
 
 
 def column_space(matrix: FloatArray, scale: float) -> FloatArray:
-    """Return an orthonormal basis (m, r) of the span of columns, with rounding errors of a scale left out."""
+    """Return an orthonormal basis (m, r) of the column span, without rounding errors of a scale."""
     left, values, _ = np.linalg.svd(matrix, full_matrices=False)
     return np.asarray(left[:, : rank_of(values, scale)])
 
@@ -36,8 +36,9 @@ class AllowedTwists:
     """Motions of a mechanism's platform and joints.
 
     Attributes:
-        twists: (6, r) basis of the platform's twists: angular velocity, then velocity of its point at the world origin.
-        platform: (6, d) the platform's twist in each of the motions, in the same coordinates.
+        twists: (6, r) basis of the platform twists: angular velocity, then velocity of the platform point at the world
+            origin.
+        platform: (6, d) platform twist in each motion, in the same coordinates.
         rates: (n, d) rates of the free coordinates in each motion, radians or length per unit of time.
         columns: index of the joint of each coordinate.
     """
@@ -48,11 +49,11 @@ class AllowedTwists:
     columns: tuple[int, ...]
 
 
-class Freedoms:
-    """Allowed twists of a mechanism at its configuration.
+class Mobility:
+    """Allowed platform twists of a mechanism at its configuration.
 
     Args:
-        mechanism: with closed loops.
+        mechanism: mechanism with closed loops.
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
@@ -65,11 +66,11 @@ class Freedoms:
         self._index = {joint.name: k for k, joint in enumerate(joints)}
 
     def allowed(self, joints: Collection[int], free: Collection[int]) -> AllowedTwists:
-        """Return the twists of the platform that free joints allow.
+        """Return the platform twists that free joints allow.
 
         Args:
-            joints: indices of the joints that count; welds always do.
-            free: indices of those among them that move.
+            joints: indices of the joints in use; welds are always in use.
+            free: indices of the joints among these that move.
         """
         own = [k for k, each in enumerate(self.mechanism.joints) if k in joints or each.kind == "weld"]
         widths = [WIDTHS[self.mechanism.joints[k].kind] if k in free else 0 for k in own]
@@ -97,15 +98,15 @@ class Freedoms:
         basis = column_space(platform, 1.0) if count else np.zeros((6, 0))
         return AllowedTwists(self.unscaled(basis), self.unscaled(platform), units[:, None] * motions, columns)
 
-    def _couplings(self, own: Sequence[int], free: Collection[int], widths: Sequence[int]) -> FloatArray:
-        """Return the equations (c, n) of the couplings all of whose moving joints count."""
+    def _couplings(self, used: Sequence[int], free: Collection[int], widths: Sequence[int]) -> FloatArray:
+        """Return the equations (c, n) of the couplings with all moving joints in use."""
         ends = np.cumsum([0, *widths])
-        place = {k: int(ends[i]) for i, k in enumerate(own) if widths[i]}
+        place = {k: int(ends[i]) for i, k in enumerate(used) if widths[i]}
         rows = [np.zeros((0, int(ends[-1])))]
         for coupling in self.mechanism.couplings:
             factors = {self._index[name]: factor for name, factor in coupling.factors}
             moving = {k: factor * self._units[k] for k, factor in factors.items() if k in free}
-            if not moving or not set(factors) <= set(own):
+            if not moving or not set(factors) <= set(used):
                 continue
             row = np.zeros((1, int(ends[-1])))
             for k, factor in moving.items():
@@ -114,7 +115,7 @@ class Freedoms:
         return np.vstack(rows)
 
     def angle(self, joint: MechanismJoint) -> float:
-        """Return the length by which a joint's rate becomes a velocity: the size for an angle, 1 for a slide."""
+        """Return the factor from a joint's rate to a velocity: the size for an angle, 1 for a slide."""
         return 1.0 if joint.kind == "P" else self.size
 
     def _unit_screws(self, k: int) -> FloatArray:
@@ -122,11 +123,11 @@ class Freedoms:
         return self._screws[k] * self._units[k]
 
     def scaled(self, twists: FloatArray) -> FloatArray:
-        """Return twists (6, n) about the middle of the joints, with velocities in parts of the size."""
+        """Return scaled twists (6, n): about the middle of the joints, with velocities relative to the size."""
         velocities = twists[3:] + np.cross(twists[:3].T, self.middle).T
         return np.vstack([twists[:3], velocities / self.size])
 
     def unscaled(self, twists: FloatArray) -> FloatArray:
-        """Return twists (6, n) with velocities at the world's origin, the inverse of the scale."""
+        """Return twists (6, n) with velocities at the world origin from scaled ones."""
         velocities = self.size * twists[3:] - np.cross(twists[:3].T, self.middle).T
         return np.vstack([twists[:3], velocities])

@@ -1,12 +1,12 @@
-"""Claims about every machine within a tolerance of joint centres, for any robot.
+"""Claims about every robot within the joint-centre tolerance, for robots of any type.
 
-With the derivatives g_j by the error of centre j, a number g of a machine within the tolerance t is at most
+With the derivatives g_j by the error of centre j, a quantity g of a robot within the tolerance t is at most
 
     g + t sum_j |g_j| + rest
 
-at each pose, and at least ``g - t sum_j |g_j| - rest``. The rest bounds terms of second order over the workspace. So
-the number of all machines is an expression of the pose, which the search of ``certify`` bounds. Where coordinates
-follow from others, or a number has kinks, boxes of poses are searched for all machines.
+at each pose, and at least ``g - t sum_j |g_j| - rest``. The rest bounds second-order terms over the workspace. So the
+worst value within the tolerance is an expression of the pose, which the search of ``certify`` bounds. Robots with
+dependent coordinates, and quantities with kinks, are bounded by a search of boxes of poses instead.
 """
 
 from __future__ import annotations
@@ -32,15 +32,15 @@ from ....program.layout import Layout
 from ...boxes.tree import TreeRecord
 from ...enclosure.tape import compile_tape
 from ...statement.claims import Claim
-from ...statement.machine import JointErrors
+from ...statement.fixed_robot import JointErrors
 from ...statement.tolerance import (
     BuiltModel,
-    MachineLayout,
+    ToleranceLayout,
     built_model,
     design_layout,
     is_smooth,
-    machine_layout,
     second_order_name,
+    tolerance_layout,
 )
 from ..proof_record import ProofRecord
 from ..robot.pose_box import PoseNumbers, pose_coordinates
@@ -51,33 +51,33 @@ from .expressions import Expressions
 from .extremes import DEFAULT, NumberSearch, goal_of, prove_extreme, verdict_of
 from .second_order_change import second_order_change
 
-#: Part of itself by which a bound of a change moves outwards: its own rounding.
+#: Outward factor of the bound of a change, for rounding.
 _OUTWARDS = 1 + 1e-12
-#: Length, in parts of the robot's, or angle, that counts as small.
+#: Length, in parts of the robot's size, or angle, that counts as small.
 _SMALL = 0.01
-#: The same for a dependent rotation of the platform. It is often 0 at all poses, where a narrow gap takes many boxes.
+#: The same for a dependent rotation of the platform. It is often 0 at all poses, and a small gap takes many boxes then.
 _SMALL_TURN = 0.03
-#: Poses from whose first-order changes the size is taken beside which terms of second order are small.
+#: Number of random poses at which the first-order change is sampled, to compare with second-order terms.
 _POSES, _SEED = 32, 0
 
 
-class Machines:
-    """Every machine within a tolerance; the design alone without one.
+class RobotsWithinTolerance:
+    """All robots within the joint-centre tolerance; without a tolerance only the design.
 
     Args:
-        case: with fixed dimensions.
-        closed: its robot without unknowns in closed form.
+        case: case with fixed dimensions.
+        closed: robot of the case, with closed forms in place of unknowns.
         design: this robot over the workspace.
 
     Attributes:
         case: the case.
-        built: the robot with errors of its joint centres.
-        model: the robot without unknowns in closed form.
-        family: the machines over the workspace.
-        symbols: the machines as symbols of one pose and of errors.
+        built: the robot with joint-centre errors as parameters.
+        model: the robot with closed forms in place of unknowns.
+        family: the robots within the tolerance over the workspace.
+        symbols: the case as expressions of one pose and of joint-centre errors.
 
     Raises:
-        NotJudgedError: the machines are not known, or do not have the freedoms of the design.
+        NotJudgedError: joint-centre errors cannot be modelled, or remove degrees of freedom of the design.
     """
 
     def __init__(self, case: Case, closed: ClosedForm, design: Problem) -> None:
@@ -89,19 +89,19 @@ class Machines:
         except RobotError as error:
             raise NotJudgedError(str(error)) from None
         self.family: Problem = family_of(case, self.built, design, tolerance)
-        self.symbols: MachineLayout = machine_layout(case, self.built, tolerance, self._at)
+        self.symbols: ToleranceLayout = tolerance_layout(case, self.built, tolerance, self._at)
         self._rests: dict[tuple[str, str], float] = {}
 
     @cached_property
     def _design(self) -> Layout:
-        """The design as symbols of the pose."""
+        """The design as expressions of the pose."""
         return design_layout(self.case, self.model, self._at)
 
     def extreme(self, claim: Claim, search: NumberSearch = DEFAULT) -> Verdict:
-        """Prove the smallest or the largest value of a number over all machines and poses.
+        """Prove the smallest or the largest value of a quantity over all robots within the tolerance and all poses.
 
         Args:
-            claim: the number, in the symbols of machines.
+            claim: claim about the quantity, in the symbols of ``symbols``.
             search: gap, threads and record.
         """
         if is_requested():
@@ -116,30 +116,30 @@ class Machines:
             return verdict_of(claim, Minimum(reason=str(error)))
 
     def followed(self, claims: Sequence[Claim], gap: float) -> Iterator[Verdict]:
-        """Yield the extremes of those limits that have rules, by one search in which bounds within limits are enough.
+        """Yield the verdicts on the limits with interval rules, by one search that ends when the limits are decided.
 
         Args:
-            claims: the limits, in the symbols of machines.
-            gap: allowed distance of the bound from a value beyond its limit, as a part of it.
+            claims: claims with limits, in the symbols of ``symbols``.
+            gap: largest relative gap of a quantity that violates its limit.
         """
         covered = [claim for claim in claims if self.is_covered(claim)]
         if covered:
-            with suppress(UncoveredError):  # an equation of loops
+            with suppress(UncoveredError):  # in a loop equation
                 yield from self._by_search(covered, gap, is_enough=True)
 
     def searched(self, claims: Sequence[Claim], search: NumberSearch, *, is_enough: bool = True) -> list[Verdict]:
-        """Return the extremes of numbers that have rules, all by one search.
+        """Return the verdicts on quantities with interval rules, all by one search.
 
         Args:
-            claims: the numbers, in the symbols of machines.
+            claims: claims about the quantities, in the symbols of ``symbols``.
             search: gap and record.
-            is_enough: whether bounds within limits are enough whatever the gap is.
+            is_enough: If true, a bound within its limit is sufficient, whatever its gap.
         """
         small = _SMALL if is_enough else 0.0
         return list(self._by_search(claims, search.gap, is_enough=is_enough, small=small, record=search.record))
 
     def is_covered(self, claim: Claim) -> bool:
-        """Return whether a number has no operation without a rule."""
+        """Return whether all operations of a quantity have interval rules."""
         try:
             compile_tape(ca.Function("number", [self.family.z], [self.number(claim)]))
         except UncoveredError:
@@ -147,17 +147,17 @@ class Machines:
         return True
 
     def number(self, claim: Claim) -> SX:
-        """Return a number in the coordinates of machines, times -1 where the largest value is meant."""
+        """Return a quantity as expression of the coordinates of ``family``, negated for a largest value."""
         return -claim.sense.sign * self.symbols.of(claim.expression, self.family.errors, self.family.problem.z)
 
     def _by_first_order(self, claim: Claim, number: SX, search: NumberSearch) -> Verdict | None:
-        """Return the extreme of a number and its change as an expression of the pose; None where it is not bounded.
+        """Return the verdict on a quantity with its change, as an expression of the pose; None if it has no bound.
 
         Raises:
-            UncoveredError: the expression holds an operation without a rule.
+            UncoveredError: the expression has an operation without an interval rule.
         """
         family, symbols, design, sign = self.family, self.symbols, self._design, claim.sense.sign
-        whole, machine = claim.expression, None
+        whole, worst = claim.expression, None
         if any(ca.which_depends(number, family.errors, 1, True)):
             values = Expressions(family, number)
             rest = self._rest(claim, number, values)
@@ -167,25 +167,25 @@ class Machines:
             sizes = enumerate(symbols.near_zero(whole, design).tolist())
             change = sum((ca.norm_2(ca.vertcat(gradient[3 * j : 3 * j + 3], size)) for j, size in sizes), SX(0))
             whole += sign * (family.tolerance * change * _OUTWARDS + rest)
-            machine = partial(self._worst, values, sign)
+            worst = partial(self._worst, values, sign)
             if search.record is not None:
                 search.record.rests[second_order_name(claim.name), claim.sense.value] = rest
         pose = design.table.variables_vector
         of_design = replace(claim, expression=symbols.of(whole, SX.zeros(symbols.errors.numel()), pose))
-        return replace(prove_extreme(design, of_design, search, machine=machine), claim=claim)
+        return replace(prove_extreme(design, of_design, search, worst=worst), claim=claim)
 
     def _worst(self, values: Expressions, sign: float, pose: PoseNumbers) -> tuple[JointErrors, float]:
-        """Return the errors that are worst at a pose to first order, and the number with them."""
+        """Return the joint-centre errors that are worst at a pose to first order, and the quantity with them."""
         problem = self.family.problem
         z = self.family.exact(problem.box.coordinates(pose)[list(problem.free)])[None]
         z = values.worst(z, values.slopes(z, np.zeros(1, dtype=np.intp)))
         return self.family.errors_of(z[0]), -sign * float(values.values(z)[0, 0])
 
     def _rest(self, claim: Claim, number: SX, values: Expressions) -> float:
-        """Return a bound of the terms of second order of a claim's number, the same for both senses; or infinite.
+        """Return a bound of the second-order terms of a quantity, the same for both senses; infinite without one.
 
         Raises:
-            UncoveredError: an expression holds an operation without a rule.
+            UncoveredError: an expression has an operation without an interval rule.
         """
         family, key = self.family, (claim.name, claim.key.rpartition(".")[0])
         if key not in self._rests:
@@ -205,22 +205,23 @@ class Machines:
         small: float = 0.0,
         record: ProofRecord | None = None,
     ) -> Iterator[Verdict]:
-        """Yield the extremes of numbers by one search of boxes of poses for all machines.
+        """Yield the verdicts on quantities by one search of boxes of poses for all robots within the tolerance.
 
         Args:
-            claims: the numbers, in the symbols of machines.
-            gap: as a part of a number.
-            is_enough: whether bounds within limits are enough whatever the gap is.
-            small: length, in parts of the robot's, or angle, of which the gap is a part too: numbers may be 0 at home.
-            record: record of the search for a proof; along a path also of one that stopped.
+            claims: claims about the quantities, in the symbols of ``symbols``.
+            gap: largest relative gap.
+            is_enough: If true, a bound within its limit is sufficient, whatever its gap.
+            small: value, in parts of the robot's size or as an angle, below which the gap is relative to this value:
+                quantities may be 0 at home.
+            record: record of the search for a proof; along a path also of a stopped search.
 
         Raises:
-            UncoveredError: an expression holds an operation without a rule.
+            UncoveredError: an expression has an operation without an interval rule.
         """
         problem = self.family.problem
         sizes = {LENGTH: small * problem.length, Reading(Dimension.ANGLE): small}
         least = [
-            # Rotations about the pose's axes are angles, or halves of angles in Cayley vectors.
+            # Rotations are angles, or Cayley vectors with tangents of half angles.
             _SMALL_TURN if claim.is_coordinate and claim.reading != LENGTH else sizes.get(claim.reading, 0.0)
             for claim in claims
         ]

@@ -1,4 +1,4 @@
-"""Coordinates of a pose that a robot chooses about it, and those that follow."""
+"""Independent and dependent coordinates of a robot's pose, near a given pose."""
 
 from __future__ import annotations
 
@@ -18,56 +18,61 @@ from .robot.posed_robot import NotJudgedError, Problem, build_problem
 
 #: The six coordinates of a pose, in order: the position, and ``Rz(yaw) Ry(pitch) Rx(roll)``.
 AXES = ("x", "y", "z", "roll", "pitch", "yaw")
-#: Part of the robot's size, or angle, by which the coordinates are moved to see which of them are independent, and
-#: the largest work of a constraint, as a part, that is none.
+#: Part of the robot's size, or angle, by which coordinates move in the test for independence; and the relative work of
+#: a constraint wrench that counts as 0.
 _NEAR, _ZERO = 1e-3, 1e-9
 
 
-class Coordinates(NamedTuple):
-    """Indices of the independent coordinates of a pose.
+class LocalCoordinates(NamedTuple):
+    """Indices of the independent and of the dependent coordinates of a pose, in the order of ``AXES``.
 
     Attributes:
-        alone: those that the robot chooses.
-        others: those that follow from these, and move with them.
+        independent: indices of the coordinates that the robot controls independently.
+        dependent: indices of the coordinates that follow from the independent ones.
     """
 
-    alone: list[int]
-    others: list[int]
+    independent: list[int]
+    dependent: list[int]
 
 
 def box_about(start: FloatArray, ends: dict[int, tuple[float, float]]) -> Workspace:
-    """Return the box of poses in which some coordinates have ranges."""
+    """Return the box of poses about a pose in which some coordinates have ranges.
+
+    Args:
+        start: (6,) the pose: position, length, and roll, pitch and yaw, radians.
+        ends: both ends of the range of a coordinate, by its index; the other coordinates are fixed.
+    """
     values: list[Value] = start.tolist()
     for k, (low, high) in ends.items():
         values[k] = Free(low, high)
     return Workspace(values[:3], Turns(TurnKind.ROLL_PITCH_YAW, tuple(values[3:])))
 
 
-def coordinates_alone(case: Case, start: FloatArray, length: float) -> Coordinates:
-    """Return the coordinates by which a robot's freedoms are counted.
+def local_coordinates(case: Case, start: FloatArray, length: float) -> LocalCoordinates:
+    """Return which coordinates of the pose the robot controls independently near a pose, and which ones follow.
 
     Args:
-        case: the machine.
+        case: the robot with fixed dimensions.
         start: (6,) the pose: position, length, and roll, pitch and yaw, radians.
-        length: of the order of the robot's.
+        length: characteristic size of the robot, length.
     """
     half = _NEAR * np.array([length] * 3 + [1.0] * 3)
     about = box_about(start, {k: (start[k] - half[k], start[k] + half[k]) for k in range(6)})
     chosen = independent_coordinates(case, about) or list(range(6))
     if len(chosen) < len(AXES):
         moved = dependent_of(case, box_about(start, {k: (start[k] - half[k], start[k] + half[k]) for k in chosen}))
-        return Coordinates(chosen, [each.index for each in moved.dependent])
+        return LocalCoordinates(chosen, [each.index for each in moved.dependent])
     try:
         problem = build_problem(case, closed_form(case.model).model, pose_box(about))
     except NotJudgedError:
-        return Coordinates(list(range(len(AXES))), [])
-    # Loops of a robot that is given by its rows are not known: its constraint wrenches must do no work.
+        return LocalCoordinates(list(range(len(AXES))), [])
+    # A robot that is given by its rows has no loop equations: independent motions do no work on constraint wrenches.
     work = np.zeros(6) if problem.unactuated is None else _work(problem, problem.unactuated.matrix, start)
-    return Coordinates(np.flatnonzero(work <= _ZERO).tolist(), [])
+    return LocalCoordinates(np.flatnonzero(work <= _ZERO).tolist(), [])
 
 
 def _work(problem: Problem, matrix: ca.SX, start: FloatArray) -> FloatArray:
-    """Return the largest work (6,) of unit constraint wrenches of a robot without loops as each coordinate changes."""
+    """Return the largest work (6,) of unit constraint wrenches of a robot without loops, by coordinate of the pose."""
     turn = ca.SX.sym("turn", 3)
     rotation = rotation_of(problem.box, turn)
     slopes = ca.Function("slopes", [turn], [ca.jacobian(ca.vec(rotation), turn), rotation])

@@ -1,4 +1,4 @@
-"""A robot with its dimensions: a case all of whose parameters are fixed, and its legs as numbers."""
+"""Robots with fixed dimensions: the checks of their cases, and joint centres of straight legs."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from ...case.workspace import Workspace
 from ...errors import CaseError, InputError
 from ...evidence.dependent import with_dependent
 
-#: Number of legs, as many as the platform has freedoms.
+#: Number of legs of a hexapod: the degrees of freedom of a rigid body.
 LEGS = 6
-#: Part of a tolerance that the errors of a machine within it have, so that rounding leaves none outside.
+#: Factor of the tolerance for computed joint-centre errors, so that rounding does not exceed the tolerance.
 INSIDE = 1 - 1e-12
 
 
@@ -25,9 +25,9 @@ class Legs(NamedTuple):
     """Joint centres of a robot's k legs.
 
     Attributes:
-        base: (k, 3) in the world frame, length.
-        platform: (k, 3) in the platform frame, length.
-        tolerance: largest error of each centre in the machines that are meant, length; 0 for the exact machine.
+        base: (k, 3) base joint centres in the world frame, length.
+        platform: (k, 3) platform joint centres in the platform frame, length.
+        tolerance: joint-centre tolerance, length; 0 for the design.
     """
 
     base: FloatArray
@@ -40,11 +40,11 @@ class Legs(NamedTuple):
 
 
 class JointErrors(NamedTuple):
-    """Errors of the joint centres of one machine.
+    """Joint-centre errors of one robot.
 
     Attributes:
-        names: of the m joint centres; of straight legs that on the base, then that on the platform, leg by leg.
-        vectors: (m, 3) in the world frame at home, length; of platform joints of legs in the platform's frame.
+        names: names of the m joint centres; for straight legs the base centre, then the platform centre, leg by leg.
+        vectors: (m, 3) errors in the world frame at home, length; in the platform frame for platform centres of legs.
     """
 
     names: tuple[str, ...]
@@ -52,12 +52,12 @@ class JointErrors(NamedTuple):
 
 
 def workspace_of_case(case: Case) -> Workspace:
-    """Return a case's workspace in world coordinates, with those that its robot cannot choose.
+    """Return a case's workspace in world coordinates, with the dependent coordinates of its robot.
 
     Raises:
-        CaseError: the case has none, a dimension of its robot is free, limits need a motion that it does not state, a
-            number of the pose is free that the workspace is about, or the pose does not determine its driven joints;
-            or as :func:`~...evidence.dependent.with_dependent`.
+        CaseError: the case has no workspace, a dimension of its robot is free, limits need a motion that the case does
+            not state, or the pose does not determine its driven joints; and for the reasons of
+            :func:`~...evidence.dependent.with_dependent`.
     """
     if case.workspace is None:
         raise CaseError("workspace", "is missing: it states the poses to be judged", source=case.source)
@@ -68,29 +68,29 @@ def workspace_of_case(case: Case) -> Workspace:
 
 
 def check_leg_error(case: Case, leg_error: float) -> None:
-    """Refuse an error of the lengths of legs that is none, or that no claim about the robot has.
+    """Check a leg-length error.
 
     Raises:
-        InputError: it is negative or not finite, or is given for a robot that is not six straight legs.
+        InputError: the error is negative or not finite, or the robot does not have six straight legs.
     """
     if not 0 <= leg_error < float("inf"):
         raise InputError(f"--leg-error {leg_error:g}: must be finite and not negative")
     if leg_error and not has_straight_legs(case.model):
-        raise InputError(f"--leg-error {leg_error:g}: is for six straight legs, which {case.model.name!r} is not")
+        raise InputError(f"--leg-error {leg_error:g}: is only for six straight legs, which {case.model.name!r} is not")
 
 
 def has_straight_legs(model: Model) -> bool:
-    """Return whether a robot that is given by its rows is six straight legs and nothing else."""
+    """Return whether a robot that is given by its rows consists of six straight legs."""
     return len(model.legs) == LEGS == len(model.wrenches) and not (model.members or model.unknowns or model.structure)
 
 
 def legs_of(case: Case) -> Legs | None:
-    """Return the legs of a robot that is six straight legs, as :func:`joint_centres` does; None for another one."""
+    """Return the legs of a robot with six straight legs, as :func:`joint_centres` does; None for other robots."""
     return joint_centres(case) if has_straight_legs(case.model) else None
 
 
 def joint_centres(case: Case) -> Legs:
-    """Return the straight legs, if any, of a robot with fixed dimensions, with the case's tolerance."""
+    """Return the joint centres of the straight legs, if any, of a robot with fixed dimensions, with the tolerance."""
     model = case.model
     symbols = model.symbols
     parts = [value for name in case.parameters for value in case.components(name)]
