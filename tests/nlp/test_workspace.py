@@ -401,7 +401,7 @@ def test_slices_show_where_the_determinant_has_which_sign(case: Case, cli: Run, 
     output_of(cli("workspace", str(machine), "--gap", "0.05", "--plot", str(picture)))
     text = picture.read_text(encoding="utf-8")
     assert 'id="workspace"' in text
-    assert 'id="proved: regular, and every limit is kept"' in text
+    assert 'id="proved: no singularity, all limits satisfied"' in text
 
 
 def random_errors(robot: Legs, box: PoseBox, eps: float, count: int, *, extreme: bool) -> tuple[FloatArray, FloatArray]:
