@@ -8,9 +8,9 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from builders import Run, saved
+from builders import Run, saved, starter_text, turn_about
 
-from screwsynth.models import robot
+from screwsynth.models import robot, robot_function
 from screwsynth.nlp import Case, Task, inverse
 from screwsynth.nlp.formats.reading.importing import Request, import_robot
 from screwsynth.nlp.formats.reading.reduction import Ends
@@ -145,3 +145,22 @@ def test_a_chain_without_coupled_motors_stays_refused(tmp_path: Path, cli: Run) 
     status, _, err = cli("import", str(path), "--platform", "torso", "--base", "pelvis", "--out", "-")
     assert status == 2
     assert "at the end of an open chain" in " ".join(err.split())
+
+
+def test_a_differential_that_was_exported_comes_back(tmp_path: Path, cli: Run) -> None:
+    model = robot_function("differential-waist")()
+    text = starter_text("differential-waist").replace(
+        "{ angle = { min = -20, max = 20 } }", "{ axis = [0, 0, 1], angle = 0 }"
+    )
+    case = saved(tmp_path / "waist.toml", text)
+    assert cli("export", str(case), "--format", "mjcf", "--out", str(tmp_path / "out"), "--starts", "1")[0] == 0
+    (path,) = (tmp_path / "out").glob("*.xml")
+    found = import_robot(Request(path, Ends("platform", "base")))
+    couplings = [each["factors"] for each in found.tables["coupling"]]
+    assert len(couplings) == 3
+    poses = np.zeros((1, 3)), [turn_about([0.3, -0.5, 0.7], 0.4)]
+    values = {item.name: item.typical for item in model.parameters}
+    case_of_model = Case(model, values, model.home, [Task(np.eye(6)[0])], units=Units(angle="rad"))
+    own = inverse(case_of_model, *poses)
+    again = motors_at(found.tables, *poses)
+    np.testing.assert_allclose([again[name][0] for name in own.actuators], own.coordinates[0], rtol=0, atol=1e-11)
