@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from builders import Array, case_from, starter_text
 
-from screwsynth.models import robot_function
+from screwsynth.models import robot, robot_function
+from screwsynth.models.catalog import gallery_tables
 from screwsynth.nlp import Case, InversePoses, Task, inverse, result_of, solve
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.units import Units
@@ -315,3 +316,14 @@ def test_a_starter_of_slides_has_no_torques(name: str) -> None:
 def test_a_starters_workspace_has_the_angles_that_the_robot_changes(name: str, angles: str) -> None:
     (line,) = [each for each in starter_text(name).splitlines() if each.startswith("# rotation = { roll")]
     assert [name for name in ("roll", "pitch", "yaw") if f"{name} = {{" in line] == angles.split()
+
+
+def test_a_robot_of_rank_five_is_told_of_the_passive_limb() -> None:
+    tables = gallery_tables("pentapod")
+    tables["limb"] = tables["limb"][:5]
+    model = robot(**tables)
+    assert model.rank == 5
+    (note,) = model.remarks
+    assert note.startswith("J has rank 5 at all poses: with all actuators locked, the platform still moves")
+    assert note.endswith("add a passive limb that allows all other motions, as in the robot pentapod")
+    assert robot(**gallery_tables("pentapod")).remarks == ()
