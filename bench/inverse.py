@@ -5,7 +5,7 @@
 MuJoCo and pinocchio get a Stewart platform of universal joints, slides and ball joints with the same joint centres, and
 close its loops at each pose by Newton's method on the eighteen joints of its legs, from those of the pose before; their
 own functions give positions and Jacobians, and NumPy solves. Times are CPU times of this process, the best of three,
-because the machine may be shared. The leg lengths of all must agree.
+because the machine may be shared. The leg lengths of all must be equal.
 """
 
 import sys

@@ -95,7 +95,10 @@ def reached(milestone: Milestone) -> None:
 
 
 def say_on_leaving(sentence: Callable[[], str]) -> None:
-    """Declare a function with the sentence on kept results for the end of this process, not of its child processes."""
+    """Register a function that returns the sentence about kept results.
+
+    It is printed at the end of this process, not of a child process.
+    """
     _parting[:] = [(os.getpid(), sentence)]
 
 

@@ -336,7 +336,7 @@ class Attack:
         """Attack verdicts on ranks: by all samples, and at the poses that refute them."""
         spectra = self.mechanism.ranks(self.q, self.errors)
         for word, verdict, taken in zip(("regular", "constraints"), self.judgement.ranks, self.taken, strict=False):
-            key, last = ("locked", 5) if word == "regular" else ("free", 5 - self.mechanism.mobility)
+            key, last = ("locked", 5) if word == "regular" else ("free", 5 - self.mechanism.freedoms)
             self.counts[f"{self.robot}: {word} {verdict.outcome.value}"] += 1
             least, signs = getattr(spectra, key)[:, last].min(), set(spectra.sign.tolist())
             if verdict.outcome is Outcome.PROVED and (least < ROUNDING or (key == "locked" and len(signs) > 1)):

@@ -111,7 +111,7 @@ class RobotWrenches:
     Attributes:
         members: members of the mechanism.
         ranks: ranks at the configuration.
-        units: rate of each actuated joint, by name, that moves the platform with a velocity of order 1.
+        units: rate of each actuated joint, by name, that moves the platform with a velocity of about 1.
         feasible: (6, f) basis of the platform twists with free actuators.
     """
 

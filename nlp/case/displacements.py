@@ -97,7 +97,7 @@ def _read_list(written: Sequence[DisplacementTable], key: str) -> tuple[Displace
 def written_displacements(
     displacements: Sequence[Displacement], tasks: Sequence[Task], units: Units
 ) -> dict[str, TomlValue]:
-    """Return the keys of a pose's table for its displacements, the inverse of :func:`read_displacements`.
+    """Return the keys for the displacements in the table of a pose: inverse of :func:`read_displacements`.
 
     Args:
         displacements: displacements of a stated pose.

@@ -104,10 +104,10 @@ def refuse_free(workspace: Workspace, pose: Pose, source: str | None) -> None:
     numbers["rotation.angle"] = "angle", rotation.angle
     for key, (name, value) in numbers.items():
         if isinstance(value, Free):
-            fault = f"is free, but the workspace is about the pose: fix it with --set {name}=..., or use --of RESULT"
+            fault = f"must be fixed, as the workspace is relative to the pose: use --set {name}=... or --of RESULT"
             raise CaseError(f"pose.{key}", fault, source=source)
     if rotation.axis is None and rotation.angle != 0.0:
-        fault = "is free, but the workspace is about the pose: fix it with --set axis=..., or use --of RESULT"
+        fault = "must be fixed, as the workspace is relative to the pose: use --set axis=... or --of RESULT"
         raise CaseError("pose.rotation.axis", fault, source=source)
 
 

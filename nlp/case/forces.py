@@ -19,7 +19,7 @@ from ...models.parts import Dimension
 from ...models.statics import DrivenJoint, Statics, degrees_of_freedom, driven_joints
 from .loads import LoadCase, Loading, Motion
 
-#: Smoothing of the norm of a vector at 0: the norm is too large by at most this part of a typical norm.
+#: Smoothing of the norm of a vector at 0: the norm is too large by at most this fraction of a typical norm.
 _SMOOTH = 1e-12
 
 
@@ -34,7 +34,7 @@ class CaseForces(NamedTuple):
             positive in the sense of the actuator's rate.
         spread: (a, 1) largest change of each actuator force by loads of unknown direction, times the magnitude of the
             divisor.
-        divisor: (1, 1) common divisor of the platform's motions by the actuators.
+        divisor: (1, 1) common divisor of the motions of the platform that the actuators drive.
     """
 
     case: LoadCase
@@ -164,7 +164,7 @@ def _speeds(model: Model, statics: Statics, motion: Motion, joints: Sequence[Dri
 
 
 def _size(vector: SX, typical: SX) -> SX:
-    """Return the norm of a vector (3, 1), smooth where it is 0; ``typical`` (1, 1) is a norm of its order."""
+    """Return the norm of a vector (3, 1), smooth where it is 0; ``typical`` (1, 1) is a typical norm."""
     return SX(0) if vector.is_zero() else ca.sqrt(ca.sumsqr(vector) + (_SMOOTH * typical) ** 2)
 
 

@@ -23,7 +23,7 @@ class Motor(NamedTuple):
         place: index of the actuator.
         actuator: name of the actuator.
         load: name of the load case; empty for a quantity that does not depend on loads.
-        is_backwards: If true, a power is that of negative forces.
+        is_backwards: If true, the power is that of negative forces.
     """
 
     number: ActuatorQuantity = ActuatorQuantity.FORCE

@@ -19,7 +19,7 @@ def verify_proof(
     proof: Annotated[str, Argument("PROOF", "Proof file of certify, workspace or path --proof.")],
     case: Annotated[
         str | None,
-        Argument("[CASE]", "The case that the proof must be about, - is stdin; the case in the proof if left out."),
+        Argument("[CASE]", "Case that the proof must prove, - is stdin; the case in the proof if left out."),
     ] = None,
     settings: options.SettingTexts = None,
     of: options.ResultFile = None,
@@ -41,7 +41,7 @@ def verify_proof(
     The claims are derived again from the case and the options: give the options of the command that wrote the proof.
     """
     from .. import __version__
-    from ..errors import InputError
+    from ..errors import InputError, listing
     from ..proof.checker.proof_file import LARGEST_PROOF, PathPremises, Statement, read_proof
     from ..system.reading import read_limited
     from ..words.text import Line
@@ -63,7 +63,7 @@ def verify_proof(
     )
     for name in is_given:
         if is_given[name] and name not in own:
-            raise InputError(f"{name}: is no option for this kind of proof, which another command wrote")
+            raise InputError(f"{name}: does not apply to this kind of proof; allowed: {listing(sorted(own))}")
     if case is not None:
         loaded = options.read_changed_case(case, settings, of).file.case
     elif settings or of:

@@ -84,7 +84,7 @@ def compare(
     jobs: int | None = None,
     progress: CompareProgress | None = None,
 ) -> Comparison:
-    """Compare robots on one case: each robot replaces that of the case, is scaled to a common size, and solved.
+    """Compare robots on one case: each robot replaces the robot of the case, is scaled to a common size, and solved.
 
     The size of a robot is the largest distance between two of its points at home. Each robot is placed with its home at
     the starting value of the case's first pose, with axes parallel to those of the world.
@@ -98,7 +98,7 @@ def compare(
         certified: If true, also compute a certificate for each robot.
         time_limit: seconds for the whole call; each robot takes at most an equal part of the remaining time. Without a
             limit, the certificate of a robot ends after 60 s, and its proof over the workspace too.
-        starts: number of starting points that replaces that of the case.
+        starts: number of starting points; by default the number of the case.
         seed: seed that replaces the seed of the case.
         jobs: number of threads; the result does not depend on it.
         progress: function called before each robot.
@@ -140,7 +140,7 @@ def compare(
     answers = [each for each in entries if each.has_answer]
     if answers and not is_stopped and all(each.can_move is False for each in answers):
         names = listing(dict.fromkeys(task.name for each in answers for task in each.tasks if task.can_move is False))
-        fault = "no robot of the comparison has the degrees of freedom for its motion"
+        fault = "no compared robot has the degrees of freedom for the motion"
         raise InputError(f"{case.source or case.name}: task {names}: {fault}")
     return Comparison(case, common, part, length, _in_order(entries), time.perf_counter() - began)
 
@@ -165,7 +165,7 @@ def _size_of_case(case: Case) -> float:
         return size_at_start(case)
     except EvaluationError as error:
         source = case.source or case.name
-        raise EvaluationError(f"{source}: its robot has no size at the first starting point: {error}") from None
+        raise EvaluationError(f"{source}: the robot has no size at the first starting point: {error}") from None
 
 
 def _solved(
@@ -229,7 +229,7 @@ def _proof_seconds() -> float | None:
 
 
 def _with_certificate(entry: Entry, jobs: int | None) -> Entry:
-    """Return a robot with the certificate of its optimum, or with the reason why there is none."""
+    """Return a robot with the certificate of its optimum, or with the reason for the missing certificate."""
     if entry.solution is None or not entry.has_answer:
         return entry
     try:

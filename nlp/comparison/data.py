@@ -47,7 +47,7 @@ def entry_sentences(entry: Entry) -> list[str]:
     """Return sentences on missing results of a robot, and on results that cannot be compared."""
     found = []
     if entry.fault:
-        found.append(f"The case contradicts itself with this robot: {entry.fault}.")
+        found.append(f"The case is inconsistent with this robot: {entry.fault}.")
     elif not entry.has_answer:
         found.append(_no_answer(entry))
     for fit in entry.tasks:

@@ -51,8 +51,8 @@ class TaskFit(NamedTuple):
         name: name of the task.
         F: objective; None without an optimum.
         can_move: True if the platform can follow the motion with free actuators; None if unknown.
-        constraint: part of F from constraint wrenches, 0 to 1; above 0 the platform cannot follow the motion. None if
-            unknown.
+        constraint: fraction of F from constraint wrenches, 0 to 1; above 0 the platform cannot follow the motion.
+            None if unknown.
         rates: rates of the actuators; empty if the robot's actuators are unknown.
     """
 
@@ -83,14 +83,14 @@ class Entry:
             optimum; None if unknown.
         tasks: tasks at the design; empty without an optimum.
         singularities: descriptions of singularities of the design.
-        fault: reason why there is no solution; else empty.
+        fault: reason why there is no solution; otherwise empty.
         certified: certificates; None if not requested or impossible.
-        certificate_fault: reason why there is no certificate; else empty.
+        certificate_fault: reason why there is no certificate; otherwise empty.
         judgement: judgement of the design over the workspace; None without a workspace or without a proof.
         outcome: verdict on ranks and limits over the workspace; None without a proof.
-        workspace_fault: reason why there is no verdict over the workspace; else empty.
+        workspace_fault: reason why there is no verdict over the workspace; otherwise empty.
         seconds: wall time.
-        strokes: largest stroke by quantity: over the workspace from proved bounds, else over several poses.
+        strokes: largest stroke of each quantity: proved over the workspace; without a workspace, over several poses.
     """
 
     contender: Contender
@@ -118,7 +118,7 @@ class Entry:
 
     @property
     def keeps_limits(self) -> bool:
-        """True if the optimum satisfies all limits of the case, so that none is omitted."""
+        """True if the optimum satisfies all limits of the case, without omitted limits."""
         return self.placed is not None and not self.placed.left_out
 
     @property
@@ -163,7 +163,7 @@ def generic_degrees_of_freedom(contender: Contender) -> int | None:
 
 
 def _is_legs(contender: Contender) -> bool:
-    """Return whether each row of a robot defined by its rows is the force of an actuated leg."""
+    """Return whether all rows of a robot defined by rows of J are forces of actuated legs."""
     model = contender.model
     return not model.has_couples and 0 < len(model.legs) == len(model.wrenches) and not model.members
 

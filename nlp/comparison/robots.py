@@ -41,8 +41,8 @@ class Contender:
     """Robot of a comparison.
 
     Attributes:
-        label: name in tables, of the robot or of its file.
-        model: model of the robot; for ``case`` that of the case.
+        label: name of the robot, or of its file, in tables.
+        model: model of the robot; for ``case``, the model of the case.
         is_of_case: True for the unchanged robot of the case.
         file: robot file; None for a robot by name.
     """
@@ -176,7 +176,7 @@ class Placed:
     Attributes:
         case: case with the new robot, in the robot's frame.
         offset: (3,) origin of this frame in the frame of the original case, length.
-        left_out: omitted limits, which do not apply to the robot.
+        left_out: omitted limits, because they do not apply to the robot.
     """
 
     case: Case
@@ -191,7 +191,7 @@ def placed(case: Case, contender: Contender, factor: float, part: float, length:
         case: original case.
         contender: new robot.
         factor: scale factor of its typical lengths.
-        part: relative range of a dimension about its typical value; 0 fixes the dimensions.
+        part: relative range of each dimension about its typical value; 0 fixes the dimensions.
         length: characteristic length.
 
     Raises:
@@ -242,7 +242,11 @@ def _limits(case: Case, bare: Case) -> tuple[Limits, list[LeftOut]]:
             Limits(limit).check(bare.as_limited)
             own, other = (limit.ranges(each.model) for each in (case, bare))
             if [each.dimension for each in own.values()] != [each.dimension for each in other.values()]:
-                raise CaseError(f"limits.{limit.name}", "is for another kind of actuators")
+                raise CaseError(
+                    f"limits.{limit.name}",
+                    "cannot be compared: actuators of this robot have another unit (length or angle) "
+                    "than those of the case",
+                )
         except CaseError as error:
             left_out.append(LeftOut(f"limits.{limit.name}", error.fault, limit.needs_legs))
         else:

@@ -124,7 +124,7 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
 
 
 def size_words(case: Case, files: Mapping[str, str]) -> str:
-    """Return the size of generated C in words, and for large C the limit that causes most of it.
+    """Return the size of generated C in words; for large C, also the limit that causes most of the code.
 
     Args:
         case: the case.
@@ -142,7 +142,7 @@ def size_words(case: Case, files: Mapping[str, str]) -> str:
         key = next((key.partition(".")[0] for key in constraint.keys if key), constraint.name)
         operations[key] = operations.get(key, 0) + slopes.n_instructions()
     key = max(operations, key=lambda name: operations[name], default="F")
-    return f"{words}, most of it for {key} and its derivatives: compiling it may take a minute"
+    return f"{words}, most of it for {key} and its derivatives; compilation may take a minute"
 
 
 def budget_files(prefix: str) -> dict[str, str]:

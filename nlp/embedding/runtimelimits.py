@@ -39,7 +39,7 @@ class RunTimeLimit:
     Attributes:
         key: dotted key below ``limits``; for the angle of a rotation with a free axis, the constraint's name with
             ``.min`` or ``.max``.
-        name: suffix of its name in C.
+        name: suffix of the limit's C identifier.
         dimension: dimension of the limit.
         default: value in the case, radians for an angle.
         above: exclusive lower bound of allowed values.
@@ -189,7 +189,7 @@ def _equal(expressions: Sequence[SX], wanted: SX) -> list[int]:
 
 
 def _limit(key: str, reading: Reading, value: float) -> RunTimeLimit:
-    """Return a limit with its range, which includes the value in the case, and without a name in C."""
+    """Return a limit with its range, which includes the value in the case, and without a C identifier."""
     above = reading.above if value > reading.above else float(np.nextafter(value, -math.inf))
     return RunTimeLimit(key, "", reading.dimension, value, above, max(reading.most, value))
 

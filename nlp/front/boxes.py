@@ -1,4 +1,4 @@
-"""Search region of a front: the part of the space of goals that can contain further points, as boxes.
+"""Search region of a front: boxes of goal values that can contain further points.
 
 Goals are costs here: smaller is better. A local upper bound is a corner ``u`` with no known point below it in all
 goals; every point that no known point dominates is below one of these corners. Each new point splits the corners above

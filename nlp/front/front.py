@@ -69,8 +69,8 @@ class Front:
     Attributes:
         case: case of the front.
         goals: k goals.
-        points: points that do not dominate each other, in the order of the first goal, with its best value last.
-        gaps: gaps of a front of two goals, each as the index of the neighbour before it.
+        points: nondominated points, from the worst to the best value of the first goal.
+        gaps: for two goals, indices of the points after which the front has a gap.
         failed: number of searches without an optimum.
         seconds: wall time.
     """
@@ -100,8 +100,8 @@ def pareto(
     Args:
         case: case of the front; every point satisfies all its limits.
         goals: texts of the goals, such as ``["max F:drive", "min limits.leg_length.max"]``.
-        points: number of points, at least 2; a front with gaps may have fewer.
-        starts: number of starting points that replaces that of the case.
+        points: number of points, 2 or more; a front with gaps may have fewer points.
+        starts: number of starting points; by default the number of the case.
         seed: seed that replaces the seed of the case.
         jobs: number of threads; the result does not depend on it.
         certified: If true, also compute a certificate for each point.
@@ -126,7 +126,9 @@ def pareto(
     for k in (1, 0, *range(2, len(wanted))):
         end = builder.solve(k, nothing, [])
         if is_requested():
-            raise InputError(f"{case.source or case.name}: {why_stopped()} before the ends of the front are computed")
+            raise InputError(
+                f"{case.source or case.name}: {why_stopped()} before the extreme points of the front are computed"
+            )
         if end is None:
             fault = f"the goal {wanted[k].label} has no separate optimum within the limits"
             raise EvaluationError(f"{case.source or case.name}: {fault}")
@@ -148,7 +150,7 @@ def pareto(
 def _spread_between(
     builder: _Builder, ends: list[FrontPoint], size: FloatArray, count: int, progress: Callable[[int, int], None]
 ) -> tuple[list[FrontPoint], list[int]]:
-    """Return the points of a front of two goals, and the pairs of neighbours without a point between them."""
+    """Return the points of a front of two goals, and the pairs of neighbours that enclose a gap."""
     found, closed = list(ends), set[tuple[int, int]]()
     while len(found) < count and not is_requested():
         progress(len(found), count)
@@ -313,7 +315,7 @@ def _widest(points: list[FrontPoint], closed: set[tuple[int, int]], size: FloatA
 
 
 def _undominated(points: list[FrontPoint], goals: tuple[Goal, ...], size: FloatArray) -> list[FrontPoint]:
-    """Return the points that no other point dominates, in the order of the first goal, with its best value last."""
+    """Return the nondominated points, from the worst to the best value of the first goal."""
     signs = np.array([goal.sign for goal in goals])
     costs = [signs * point.values / size for point in points]
     kept = []
@@ -330,7 +332,7 @@ def _undominated(points: list[FrontPoint], goals: tuple[Goal, ...], size: FloatA
 
 
 def _certificate(point: FrontPoint, jobs: int | None, left: int) -> Certificate:
-    """Return the certificate of the optimised goal of a point, in an equal part of the time for ``left`` points."""
+    """Return the certificate of the optimised goal of a point; ``left`` points share the remaining time equally."""
     with within(seconds_left() / left):
         nlp, x = point.solution.nlp, point.solution.x
         return kept_certificate(nlp, x, partial(certify_program, nlp, x, claimed=point.solution.F, jobs=jobs))

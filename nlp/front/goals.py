@@ -81,7 +81,7 @@ def _read_goal(text: str, case: Case) -> Goal:
     if label.startswith(_LIMIT):
         return Goal(sense, label, key=label.removeprefix(_LIMIT))
     if case.tasks[0].measure:
-        raise InputError(f"--goal {text!r}: the case optimises {case.tasks[0].measure} instead of F")
+        raise InputError(f"--goal {text!r}: F is not the objective; the case optimises {case.tasks[0].measure}")
     names = [task.name for task in case.tasks]
     name = label.removeprefix(_TASK) if label != "F" else (names[0] if len(names) == 1 else "")
     if name not in names:
@@ -214,7 +214,7 @@ def _range(layout: Layout, goal: Goal) -> tuple[float, float]:
     if not found:
         side = int(goal.sense is Sense.MIN)
         keys = sorted({item.constraint.keys[side] for item in layout.constraints} - {""})
-        fault = "is not a limit of the case that can be a goal in this sense"
+        fault = f"the case has no such limit that can be {'minimised' if side else 'maximised'}"
         raise InputError(f"--goal {goal.sense.value} {goal.label}: {fault}; allowed: {listing(keys)}")
     reading = found[0].constraint.reading
     if any(item.constraint.exact is not None or item.constraint.measure is not None for item in found):
@@ -226,12 +226,14 @@ def _range(layout: Layout, goal: Goal) -> tuple[float, float]:
         upper = [reading.from_value(item.upper) for item in found if math.isfinite(item.upper)]
         most = min([most, *upper])
     if not (math.isfinite(least) and math.isfinite(most) and least < most):
-        raise InputError(f"--goal {goal.label}: is unbounded in this direction; set the other end of the limit too")
+        raise InputError(
+            f"--goal {goal.label}: the range of this goal is infinite; set both .min and .max of the limit"
+        )
     return least, most
 
 
 def _moved(item: BoundedConstraint, goal: Goal, bound: float) -> BoundedConstraint:
-    """Return a constraint, with a goal's value as its bound if it belongs to the goal's limit."""
+    """Return a constraint; if it belongs to the limit of a goal, its bound is the value of the goal."""
     if not _is_of(item, goal):
         return item
     value = float(item.constraint.reading.to_value(SX(bound)))

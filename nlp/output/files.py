@@ -65,7 +65,7 @@ def write_bytes(target: str, content: bytes) -> None:
 
 @contextmanager
 def write_whole(target: str) -> Iterator[Path]:
-    """Yield the path of a temporary file, which gets the target's name when the block ends without an error.
+    """Yield the path of a temporary file, which is renamed to the target if the block ends without an error.
 
     The temporary name is the same at each run, so the next run replaces the file of a killed run.
 
@@ -89,7 +89,7 @@ def write_whole(target: str) -> Iterator[Path]:
 
 
 def write_folder(target: str, files: Mapping[str, str], *, force: bool = False) -> None:
-    """Write texts into the files of a folder, which is made if missing.
+    """Write texts into the files of a folder; a missing folder is created.
 
     All files are complete before the first gets its name; other files in the folder stay. A manifest in the folder has
     the names of the written files. Two runs at the same time write one after the other.
@@ -157,7 +157,7 @@ def _refuse_foreign(folder: Path, target: str, files: Iterable[str]) -> None:
 
 
 def check_outputs(inputs: Mapping[Path, str], outputs: Mapping[str, str | None]) -> None:
-    """Refuse outputs that cannot be written, would overwrite an input, or are one file, before the work begins.
+    """Refuse, before the work begins, outputs that are not writable, overwrite an input, or share a file.
 
     Links are resolved first. Pipes and devices take any number of outputs.
 

@@ -72,7 +72,7 @@ def is_written(target: str, sweep: Sweep) -> bool:
 
 
 def write_table(target: str, sweep: Sweep, rows: Iterable[Row]) -> None:
-    """Write all rows of a sweep; the file gets its name when it is complete.
+    """Write all rows of a sweep to a temporary file, which is renamed when complete.
 
     Args:
         target: path of the file, with the extension ``.parquet`` or ``.csv``.
@@ -202,7 +202,7 @@ def sweep(
         starts: number of starts per point, 8 by default.
         seed: seed that replaces the seed of the case.
         jobs: number of threads of the compiled engine, or of processes of Ipopt.
-        engine: ``"compiled"`` or ``"ipopt"``; by default the compiled engine where it covers the sweep.
+        engine: ``"compiled"`` or ``"ipopt"``; by default the compiled engine if it covers the sweep.
         certified: If true, also compute a certificate for each point, which needs the engine ``"ipopt"``.
         time_limit: seconds for the whole call; if they end before all points are solved, there is no table. The
             certificate of a point takes an equal part of the remaining time, at most 60 s, and then has its best bound.
@@ -250,7 +250,7 @@ def _points(over: Over | None, points: Mapping[str, Sequence[float]] | None) -> 
             the columns have different lengths.
     """
     if (not over) == (not points):
-        raise InputError("a sweep needs either over or points, a mapping from names to values")
+        raise InputError("a sweep needs exactly one of over and points: a mapping from names to values")
     axes = axes_of(over) if over else axes_of(points or {}, "points", repeated=True)
     if over:
         return grid_of(tuple(axes), list(axes.values()))

@@ -107,7 +107,7 @@ def _more_lines(names: Iterable[str], width: int) -> list[_Styled]:
 
 
 def _answer_lines(items: Sequence[Line | TextTable], width: int, room: int) -> list[_Styled]:
-    """Return the lines of an answer; where there is no room, its tables are shortened, the last ones first."""
+    """Return the lines of an answer; without room, tables are shortened, beginning with the last."""
     blocks = [list(_item_lines(item, width)) for item in items]
     over = sum(map(len, blocks)) - room
     for k in reversed(range(len(items))):
@@ -172,7 +172,7 @@ def _command_lines(item: Line, width: int) -> Iterator[_Styled]:
 
 
 def _broken(line: _Styled, width: int) -> Iterator[_Styled]:
-    """Yield a line, wrapped between words where it is too wide; continuation lines are indented."""
+    """Yield a line; a line that is too wide is wrapped between words, with indented continuation lines."""
     text = "".join(part for part, _ in line)
     if cell_len(text) <= width:
         yield line

@@ -81,7 +81,7 @@ def _read_table(text: str, source: str) -> NumberTable:
     left_out = [{header.index(name): _LEFT_OUT.get(name, "0") for name in names} for names in turns]
     table = number_table(records, header, source, left_out)
     for name, column in table.columns.items():
-        table.refuse(~(np.abs(column) <= LARGEST), name, f"must be finite and at most {LARGEST:g} in size")
+        table.refuse(~(np.abs(column) <= LARGEST), name, f"must be finite and at most {LARGEST:g} in magnitude")
     return table
 
 

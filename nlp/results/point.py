@@ -42,7 +42,7 @@ from .parts import (
 )
 from .rounding import TURNED
 
-#: Size of violations, as a part of the worst one, below which they are left out: a failed solve leaves small ones.
+#: Size of violations, as a fraction of the worst one, below which they are left out: a failed solve leaves small ones.
 _SMALL = 1e-3
 
 
@@ -52,7 +52,7 @@ def head_data(case: Case) -> HeadData:
 
 
 def stated_pose_notice(case: Case) -> str | None:
-    """Return the notice that limits over a workspace or path are taken at the stated pose only; else None."""
+    """Return the notice that limits over a workspace or path are taken at the stated pose only; otherwise None."""
     if case.tasks[0].measure:  # its bound covers poses of the workspace or path
         return None
     return case.stated_pose_notice or None

@@ -52,16 +52,16 @@ class RegularData(JsonObject):
     Attributes:
         outcome: ``proved``; ``refuted``, with a singular pose; ``open`` (undecided), with the centre of the widest
             undecided box.
-        pose: singular pose, or centre of the widest undecided box; absent where the claim is proved.
-        between: two poses at which the determinant of the rows is proved to have opposite signs; absent where the
+        pose: singular pose, or centre of the widest undecided box; absent if the claim is proved.
+        between: two poses at which the determinant of the rows is proved to have opposite signs; absent if the
             claim is not refuted in this way.
         boxes: number of boxes examined.
         open: number of undecided boxes.
-        share: volume of the undecided boxes, as a part of the box of poses.
+        share: volume of the undecided boxes, as a fraction of the box of poses.
         seconds: wall time.
         engine: ``c``, or ``none`` where no search was made.
         reason: reason for an early end, or method of a singular pose that is not between two poses; absent without one.
-        machine: joint-centre errors of the singular robot; absent where the claim is not refuted, or the exact robot is
+        machine: joint-centre errors of the singular robot; absent if the claim is not refuted, or the exact robot is
             singular.
     """
 
@@ -84,7 +84,7 @@ class VerdictData(JsonObject):
         name: name of the claim.
         unit: unit of the values; empty for a plain number, absent for a rank.
         sense: smallest or largest value; absent for a rank.
-        bound: proved bound: no pose has a smaller, or larger, value; null where nothing is proved, and for a rank.
+        bound: proved bound: no pose has a smaller, or larger, value; null if nothing is proved, or for a rank.
         reached: smallest or largest known value; null without one, and for a rank.
         key: dotted key, below ``limits``, of the limit in the case; absent without one.
         limit: the limit; absent without one.
@@ -148,7 +148,7 @@ def verdict_data(each: "Verdict", case: "Case") -> VerdictData:
 
 
 def posed_fields(each: "Verdict", case: "Case") -> dict[str, Any]:
-    """Return the fields of a verdict that depend on its kind and its robot, in a case's units, by name."""
+    """Return the fields of a verdict that depend on its kind and robot, by name, in the units of the case."""
     return {
         "unit": None if each.is_rank else unit_of_claim(case, each.name, each.dimension),
         "sense": None if each.is_rank else each.sense,

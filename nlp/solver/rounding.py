@@ -28,7 +28,7 @@ from .solution import Rounding, Solution
 from .solve import solve
 from .status import Status
 
-#: Numbers of additional multiples on each side of the nearest ones, in the order in which they are tried.
+#: Numbers of additional multiples on each side of the nearest multiples, in the order of the attempts.
 _FARTHEST = 3
 #: Largest number of solves for each of these: with many dimensions not every combination can be searched.
 _MOST = 200
@@ -58,7 +58,7 @@ def round_design(
     jobs: int | None = None,
     compiled: bool = False,
 ) -> Solution:
-    """Return a solution with rounded lengths and angles of its robot; everything else is solved again.
+    """Return a solution with rounded lengths and angles of the robot; all other variables are solved again.
 
     Args:
         solution: answer to a case; a solution without an answer is returned unchanged.
@@ -147,7 +147,7 @@ def _places(case: Case, solution: Solution) -> Iterator[_Place]:
 
 
 def _multiples(place: _Place, step: float, farther: int, case: Case, option: str) -> Value:
-    """Return the multiples of a step near a value: the nearest ones, and ``farther`` more on each side.
+    """Return the nearest multiples of a step to a value, and ``farther`` more multiples on each side.
 
     Raises:
         InputError: there is no multiple within the bounds of the value.

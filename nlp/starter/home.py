@@ -130,7 +130,7 @@ def read_home(model: Model, size: float) -> Home:
 
     Args:
         model: the robot.
-        size: length of the order of the robot's size.
+        size: length comparable to the robot's size.
     """
     reach = round_number(_REACH * size)
     every, any_axis = (True, True, True), Turning(3)

@@ -38,7 +38,7 @@ class SweepColumns:
 
     Attributes:
         numbers: (N,) values of each varied parameter, bound or limit, by name.
-        status: status of each solve; ``refused`` where the case contradicts itself.
+        status: status of each solve; ``refused`` if the case contradicts itself.
         F: (N,) objective; for several tasks the value of their combination.
         design: (N,) values of each design variable by name, in the case's units.
         active: active sides of bounds and limits of each design.
@@ -160,7 +160,7 @@ def sweep_columns(sweep: Sweep, case: Case | None = None) -> Iterator[Column[Row
 
     Args:
         sweep: sweep of the table.
-        case: case at one of the points, for labels and units; None for a table without them.
+        case: case at one of the points, for labels and units; None for a table without labels and units.
     """
     nlp = None if case is None else formulate_each(case)[0]
     yield Column("index", lambda row: row.point, holds=int, label="point", text=lambda row: str(row.point))
@@ -331,5 +331,5 @@ def sweep_result(case: Case, columns: SweepColumns) -> SweepResult:
 
 
 def _numbers(values: FloatArray) -> Numbers:
-    """Return numbers (N,) with None for numbers that are not finite."""
+    """Return numbers (N,); infinite and undefined numbers become None."""
     return tuple(finite_or_none(value) for value in values.tolist())

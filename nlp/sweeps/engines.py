@@ -132,7 +132,7 @@ class Solved(NamedTuple):
 
 
 class CompiledEngine:
-    """Engine that solves blocks of points by compiled C, and by Ipopt where the evidence does not accept the result.
+    """Engine that solves blocks of points by compiled C; points without evidence of optimality are solved by Ipopt.
 
     Args:
         source: case as text.
@@ -290,7 +290,7 @@ class EngineKind(enum.Enum):
 
 
 class Job(NamedTuple):
-    """A sweep without its points.
+    """Sweep without points: case, names and settings.
 
     Attributes:
         source: the case.

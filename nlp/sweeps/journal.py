@@ -33,7 +33,7 @@ class Row(NamedTuple):
         multipliers: multipliers of the active sides, in F per unit of the limit.
         verdict: kind of the point, such as a strict local maximum.
         stationarity: largest scaled derivative of the Lagrangian.
-        feasibility: largest violation of a side, relative to half of its range.
+        feasibility: largest violation of a bound or limit, in half ranges.
         curvature: smallest eigenvalue of the reduced Hessian; None without a free direction, or if it is not computed.
         starts: number of searches.
         converged: number of searches that converged to an optimum.
@@ -86,7 +86,7 @@ class Journal(JournalFile):
     """File with the solved rows of a sweep.
 
     Args:
-        path: path of the file, which is made if missing.
+        path: path of the file; a missing file is created.
         fingerprint: fingerprint of the sweep.
         count: number of points of the sweep.
 

@@ -66,7 +66,7 @@ class Places:
         arguments: index of a parameter, and factor of its value, by column of the points.
         bounds: index of a variable, True for its upper bound, and factor of the value, by column.
         limited: index in ``limits``, and factor of the value, by column.
-        task: key of a task entry, and index in it, None for a scalar, by column.
+        task: for each column, key of a task entry and index in the entry; None for a scalar.
         written: table of the task in the case.
     """
 

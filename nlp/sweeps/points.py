@@ -57,7 +57,7 @@ class Points:
         return dict(zip(self.names, self.values[k].tolist(), strict=True))
 
     def chosen(self) -> Points:
-        """Return the points with the smallest and the largest value of each name, and some points between them.
+        """Return the points with the smallest and the largest value of each name, and some intermediate points.
 
         A case allows an interval of values: if it allows these points, it allows almost all others.
         """

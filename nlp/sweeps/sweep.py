@@ -113,7 +113,7 @@ def run_sweep(
     Args:
         sweep: sweep to run.
         journal: journal of the sweep.
-        engine: requested engine; None for the compiled engine where it covers the sweep.
+        engine: requested engine; None for the compiled engine if it covers the sweep.
         jobs: number of threads, or of processes for Ipopt; None for the number of processors.
         dask: address of a Dask cluster for the computation; None for this computer.
         progress: function called after each block.
@@ -172,7 +172,7 @@ def _blocks(
 
 
 def _answer_in_threads(job: Job, blocks: Iterator[PointBlock], threads: int | None) -> Iterator[list[Row]]:
-    """Solve blocks by the compiled engine: the next block is solved while the evidence of the last is computed."""
+    """Solve blocks by the compiled engine, while the evidence for the previous block is computed."""
     engine = compiled_engine(job, threads)
     with ThreadPoolExecutor(1) as ahead:
         following = next(blocks, None)

@@ -156,7 +156,9 @@ def answer_on_cluster(job: Job, blocks: Iterable[PointBlock], address: str) -> I
     try:
         client = dask.Client(address, timeout=_WAIT, set_as_default=False)
     except (OSError, ValueError, TypeError):
-        raise InputError(f"--dask {address}: no Dask scheduler answers there within {_WAIT} seconds") from None
+        raise InputError(
+            f"--dask {address}: no Dask scheduler answers at this address within {_WAIT} seconds"
+        ) from None
     source = iter(blocks)
     with client:
         given: dict[str, tuple[PointBlock, int]] = {}

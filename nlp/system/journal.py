@@ -48,7 +48,7 @@ def row_of(kind: type[Kind], line: str | bytes) -> Kind:
     """
     data, fields = json_tree(line), fields_of(kind)
     if not isinstance(data, list) or len(data) != len(fields):
-        raise ValueError("the line is not a row of this journal")
+        raise ValueError(f"expected a row of {len(fields)} values")
     return kind(*(value_of(of, value, name) for (name, of), value in zip(fields, data, strict=True)))
 
 
@@ -131,7 +131,7 @@ class JournalFile:
         self._file.close()
 
     def remove(self) -> None:
-        """Remove the file, after its rows are in a result."""
+        """Remove the file, when a result contains its rows."""
         self.path.unlink(missing_ok=True)
         self._file.close()
 

@@ -18,24 +18,24 @@ from .text import Line, TextTable, Tone
 if TYPE_CHECKING:
     from ..results.workspace import MotorData, MotorEndData
 
-#: Word of each outcome for people, of a limit or of another quantity.
+#: Word for each outcome of a claim.
 OUTCOME_WORDS = {Outcome.PROVED: "proved", Outcome.REFUTED: "violated", Outcome.OPEN: "undecided"}
 #: Tone of each outcome.
 TONES = {Outcome.PROVED: Tone.HOLDS, Outcome.REFUTED: Tone.FAULT, Outcome.OPEN: Tone.CAUTION}
 #: Outcomes, the worst one first.
 _ORDER = (Outcome.REFUTED, Outcome.OPEN, Outcome.PROVED)
 _NOTHING = "no bound"
-#: Size below which a bound is 0: the proved bound of a quantity that is 0 lies slightly above underflow.
+#: Largest magnitude of a bound that is shown as 0: the proved bound of a zero quantity is a tiny number.
 _UNDERFLOW = 1e-90
 
 
 def ends_of_motor(motor: MotorData) -> tuple[MotorEndData, ...]:
-    """Return the verdicts on the smallest value of an actuator's quantity, where it has one, and on the largest."""
+    """Return the verdicts on the smallest value of an actuator quantity, if there is one, and on the largest value."""
     return tuple(each for each in (motor.smallest, motor.largest) if each is not None)
 
 
 def motor_tables(case: Case, motors: Sequence[MotorData]) -> Iterator[TextTable]:
-    """Yield the motor requirements, a row for each actuator: one table for linear actuators, one for rotary ones.
+    """Yield two tables of motor requirements with a row for each actuator: linear actuators, then rotary actuators.
 
     The values are proved bounds over all poses and all load cases.
     """

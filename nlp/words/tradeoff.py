@@ -55,7 +55,7 @@ def tradeoff_designs(result: TradeoffResult, case: Case, found: Tradeoff | None 
 
 
 def _columns(result: TradeoffResult, throughout: Sequence[str]) -> Iterator[Column[TradeoffPointData]]:
-    """Yield the columns: varied value, F, F of each of several tasks, slope, active limits, and the design."""
+    """Yield the columns: varied value, F, F of each task, slope, active limits, and the design."""
     objective, names = ColumnKind.OBJECTIVE, result.tasks
     yield Column(
         result.over,
@@ -88,7 +88,7 @@ def _columns(result: TradeoffResult, throughout: Sequence[str]) -> Iterator[Colu
         lambda point: " ".join(point.active),
         ColumnKind.ACTIVE,
         holds=str,
-        label="also active" if throughout else "active",
+        label="other active limits" if throughout else "active",
         text=lambda point: _listed(name for name in point.active if name not in throughout),
     )
     answer = next((point for point in result.points if point.parameters is not None), None)

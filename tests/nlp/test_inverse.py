@@ -205,7 +205,7 @@ def test_the_command_ends_with_status_1_where_poses_are_not_closed(tmp_path: Pat
     [
         ("x,y,z\n0,0,a\n", ("poses.csv", "row 2, column z", "must be a number")),
         ("x,y,z\n0,0,inf\n", ("poses.csv", "row 2, column z", "finite")),
-        ("x,y\n0,0\n", ("poses.csv", "column z missing")),
+        ("x,y\n0,0\n", ("poses.csv", "column z is missing")),
         ("x,y,z,qw,qx,qy,qz\n0,0,20,1,1,0,0\n", ("poses.csv", "row 2", "unit quaternion")),
         ("x,y,z,angle\n0,0,20,1\n", ("poses.csv", "row 2", "axis")),
         ("", ("poses.csv", "no rows")),

@@ -154,7 +154,7 @@ def test_two_limits_as_goals(tmp_path: Path) -> None:
         (("up", "max F:side"), "must be 'max F:TASK', 'min F:TASK', 'min limits.KEY' or 'max limits.KEY'"),
         (("max F", "max F:side"), "the case has no such task"),
         (("max F:up", "max F:side", "min F:up"), "F:up is given twice"),
-        (("max F:up", "min limits.x"), "can be a goal in this sense; allowed: leg_length.max"),
+        (("max F:up", "min limits.x"), "the case has no such limit that can be minimised; allowed: leg_length.max"),
         (("max F:up", "max limits.leg_length.max"), "allowed: leg_length.min"),
     ],
 )  # fmt: skip

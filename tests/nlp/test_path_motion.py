@@ -153,7 +153,7 @@ def test_limits_on_speeds_and_powers_need_a_motion_of_the_case_or_of_the_path(cl
         str(saved(tmp_path / f"{word}.ngc", f"G20 {word} X1 Y0 Z20\n{word} Z21\nM2")) for word in ("G1 F60", "G0")
     )
     assert "verdict  PROVED at every point" in output_of(cli("path", case, "--along", timed))
-    fault = "case.toml: limits.actuator_speed: needs [motion], the largest speeds"
+    fault = "case.toml: limits.actuator_speed: needs [motion], the largest speeds of the platform"
     refusal_of(cli("path", case, "--along", rapid), f"{fault}, or a path that states times")
     for words in (["workspace", case], ["solve", case], ["path", case, "--range"]):
         assert refusal_of(cli(*words)).strip().endswith(fault)

@@ -542,4 +542,4 @@ def test_the_command_proves_and_refutes_reach_constraints_and_angles(tmp_path: P
     run = ran("workspace", file_of(1.5), "--time", "0.05")
     assert run.code == 1
     assert "reach limb 1" in run.output
-    assert "refuted" in run.output
+    assert "NOT PROVED: a singularity" in run.output

@@ -260,7 +260,7 @@ def test_the_command_proves_and_refutes(cli: Run, machine: Path, tmp_path: Path)
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        ({"position": [0, 0, 20]}, "workspace: is one pose"),
+        ({"position": [0, 0, 20]}, "workspace: is only one pose"),
         ({"position": [0, 0, {"min": 5, "max": 4}]}, "workspace.position[2].min"),
         ({"position": [0, 0, 20], "rotation": {"angle": 10}}, "workspace.rotation.angle"),
         ({"position": [0, 0, 20], "rotation": {"angle": {"min": -5, "max": 9}}}, "workspace.rotation.angle"),

@@ -248,7 +248,7 @@ def test_no_time_and_no_box_are_no_number(tmp_path: Path, cli: Run) -> None:
     path, target, page = tmp_path / "c.toml", tmp_path / "r.json", tmp_path / "p.html"
     for text, time, words, reason in (
         (HORNS, "1e-6", "largest proved box  none found within the time limit", "the time is over"),
-        (edited(HORNS, IMPOSSIBLE), "0.4", "even the smallest box tried is not proved", None),
+        (edited(HORNS, IMPOSSIBLE), "0.4", "even the smallest examined box is not proved", None),
     ):
         pages = ("--html", str(page)) if reason else ()
         found = cli("workspace", str(saved(path, text)), "--scale", "--time", time, "--json", str(target), *pages)
@@ -482,8 +482,8 @@ def test_the_page_has_verdicts_poses_and_slices(refuted: tuple[str, WorkspaceRes
     assert claim_words(worst) in page.words
     assert 'id="limb 1+"' in (folder / "worst.svg").read_text(encoding="utf-8")
     headline = drawing_at(load_case(limited, {"x3": 6}), worst).headline
-    assert headline.startswith(f"refuted: {claim_words(worst)}; shown at ")
-    said = [float(each) for each in re.findall(r"-?[\d.]+(?:e-?\d+)?", headline.partition("shown at ")[2])]
+    assert headline.startswith(f"refuted: {claim_words(worst)}; at ")
+    said = [float(each) for each in re.findall(r"-?[\d.]+(?:e-?\d+)?", headline.partition("; at ")[2])]
     assert said[:3] == pytest.approx(list(worst.pose.position), rel=1e-4, abs=1e-4)
 
 

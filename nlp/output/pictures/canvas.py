@@ -26,7 +26,7 @@ _END_ON = 0.02
 
 
 class Canvas:
-    """Axes in parallel projection, with labels that are placed last, where they cover no line and no other label.
+    """Axes in parallel projection; labels are placed last, so that they cover no line and no other label.
 
     Args:
         axes: empty Matplotlib axes.
@@ -109,7 +109,7 @@ class Canvas:
         self.keep_free(np.array([start, end]))
 
     def is_end_on(self, start: FloatArray, end: FloatArray) -> bool:
-        """Return whether an arrow between two points (3,) is seen from its end."""
+        """Return whether an arrow between two points (3,) is seen end-on."""
         way = end - start
         return bool(np.linalg.norm(self.view.project(way)) <= _END_ON * np.linalg.norm(way))
 

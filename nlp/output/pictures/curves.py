@@ -39,7 +39,7 @@ _LOOKS = (("#08519c", "o"), ("#b34700", "s"), ("#3f86c4", "^"), ("#e08a3c", "D")
 
 
 def numbers_of(column: Column[Row], rows: Sequence[Row]) -> FloatArray:
-    """Return the numbers (n,) of a column, NaN for missing ones."""
+    """Return the numbers (n,) of a column; a missing number is NaN."""
     return np.array([math.nan if (cell := column.cell(row)) is None else float(cell) for row in rows])
 
 

@@ -27,7 +27,7 @@ def designs_figure(designs: Designs[Row], *, is_on_page: bool = False) -> Figure
 
     Args:
         designs: table of designs.
-        is_on_page: If true, the page has the sentences of :func:`legend_of`, so the picture has none.
+        is_on_page: If true, the page shows the sentences of :func:`legend_of`, and the picture does not.
 
     Raises:
         EvaluationError: no design can be drawn.

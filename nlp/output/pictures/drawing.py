@@ -53,7 +53,7 @@ class LimbRate:
         kind: force or couple.
         member: name of the member that applies the wrench.
         rate: work rate ``L_i ^ chi``.
-        share: share of F, ``rate^2 / F``; nan where F is 0.
+        share: share of F, ``rate^2 / F``; nan if F is 0.
         driving: work rate of the wrench for a unit rate of an actuated joint of the limb; 0 for a constraint.
     """
 
@@ -160,7 +160,7 @@ class Drawing:
         return None if link.row is None or link.row >= len(own) else own[link.row]
 
     def link_rows(self, limb: str) -> list[LimbRate]:
-        """Return the rows of those links of a limb, such as rods, that have only one row, in order."""
+        """Return the rows of the links of a limb that have only one row, such as rods, in order."""
         found = (self.link_row(link) for _, _, link in self.links if link.limb == limb)
         return [self.rows[k] for k in sorted({k for k in found if k is not None})]
 
@@ -218,7 +218,9 @@ def drawing_of(
     """
     case, model = nlp.case, nlp.program.model
     if state is None:
-        raise EvaluationError(f"{case.source or case.name}: the robot does not exist at the point reached: no picture")
+        raise EvaluationError(
+            f"{case.source or case.name}: no picture: the robot has no configuration at the last point"
+        )
     linkage, posture = _posture(nlp, x, state, pose)
     chosen = case.tasks[task]
     twist = frozen_array(chosen.twist, (6,))
@@ -279,7 +281,7 @@ def _posture(nlp: Nlp, x: FloatArray, state: RobotState, pose: int) -> tuple[Lin
 
 
 def _reference(nlp: Nlp, posture: Posture, size: float, pose: int) -> Posture | None:
-    """Return the posture at the starting point; None if it is the shown posture, or the robot does not exist."""
+    """Return the posture at the starting point; None for the shown posture, or if the robot does not exist."""
     if nlp.is_fixed:
         return None
     x = close_equations(nlp, nlp.start)

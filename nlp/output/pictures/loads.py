@@ -39,7 +39,7 @@ class ForceArrow(NamedTuple):
 
     @property
     def is_beside(self) -> bool:
-        """True if the arrow is drawn beside a leg or a slide; false for the load."""
+        """True for an arrow beside a leg or a slide; False for an arrow of the load."""
         return self.kind not in ("load", "moment")
 
 

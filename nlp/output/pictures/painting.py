@@ -51,12 +51,12 @@ def rate_colour_map() -> LinearSegmentedColormap:
 
 
 def largest_rate(drawing: Drawing) -> float:
-    """Return the largest rate of a drawing; 0 where F is 0, because the rates are then rounding errors."""
+    """Return the largest rate of a drawing; 0 if F is 0, because the rates are then rounding errors."""
     return max((abs(row.rate) for row in drawing.rows if not math.isnan(row.share)), default=0.0)
 
 
 def _end_on(colour: str) -> Line2D:
-    """Return the mark of a legend for an axis that is seen from its end."""
+    """Return the mark of a legend for an axis that is seen end-on."""
     return Line2D([], [], linestyle="none", marker="o", markersize=8, markeredgecolor=colour, markerfacecolor="white")
 
 
@@ -372,7 +372,7 @@ class Panel:
         return red, green, blue, alpha
 
     def _link_colour(self, link: Link, rates: Mapping[str, float]) -> Colour:
-        """Return the colour of a link, from its rate or else from its limb's rate."""
+        """Return the colour of a link, from the rate of the link or of its limb."""
         if link.limb is None or link.limb not in rates:
             return PLAIN
         own = self._link_rate(link)

@@ -223,7 +223,7 @@ def _coordinates(judged: Judgement, samples: PathSamples) -> Iterator[PathPanel]
 
 
 def _speeds(judged: Judgement, samples: PathSamples) -> Iterator[PathPanel]:
-    """Yield charts of actuator speeds: along a path with times, or else the largest ones in the case's motions."""
+    """Yield charts of actuator speeds: along a timed path, or otherwise the largest speeds in the case's motions."""
     units, every = judged.case.units, motor_numbers(samples.numbers, ActuatorQuantity.SPEED).get("", [])
     limited = {each.claim.motor.actuator: each.limit for each in every if each.claim.motor and each.limit is not None}
     timed = [(k, each) for k, each in enumerate(driven_joints(judged.case.model)) if k < samples.speeds.shape[1]]
@@ -265,7 +265,7 @@ def _of_motors(judged: Judgement, every: Sequence[SampledNumber], title: str) ->
 
 
 def _without_peaks(panel: PathPanel) -> PathPanel:
-    """Return a chart whose curves have gaps where they are much larger than usual."""
+    """Return a chart whose curves have gaps at values far above the typical ones."""
     sizes = np.abs(np.concatenate([each.values for each in panel.curves]))
     sizes = sizes[np.isfinite(sizes)]
     if not sizes.size:
@@ -289,7 +289,7 @@ def _marks(result: PathResult, way: Progress) -> Iterator[PathMark]:
 
 
 def _bands(samples: PathSamples, result: PathResult, way: Progress) -> Iterator[PathBand]:
-    """Yield the segments that are not proved, as far as they are known."""
+    """Yield the known segments without a proof."""
     state = np.zeros(len(way.knots) - 1, dtype=int)
     state[samples.points.segments[samples.is_apart]] = 1
     for each in checked_claims(result):

@@ -216,7 +216,7 @@ def _spread(part: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _inwards(part: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Return the cells (k, 2) of a region (n, m), the farthest from its edge first."""
+    """Return the cells (k, 2) of a region (n, m), ordered by descending distance from the edge."""
     depth, inner = np.zeros(part.shape), part
     while inner.any():
         depth += inner

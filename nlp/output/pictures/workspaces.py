@@ -56,7 +56,10 @@ def drawing_at(case: Case, claim: PosedClaim) -> Drawing:
         if case.joint_centre_tolerance is None:
             raise
         # Dependent coordinates of the pose belong to the other robot: the nominal design's loops do not close there.
-        raise EvaluationError("the worst pose belongs to another robot within the tolerance") from None
+        raise EvaluationError(
+            "the worst pose was found for joint centres displaced within the tolerance, and the "
+            "nominal robot does not reach it"
+        ) from None
     x = closed_start(nlp)
     headline = f"{claim.outcome.value}: {claim_words(claim)}; at {pose_words(case, pose)}"
     return drawing_of(nlp, x, evaluate(nlp, x), headline=headline, is_answer=claim.outcome is not Outcome.REFUTED)

@@ -19,7 +19,7 @@ class Curve:
     """Line of a chart.
 
     Attributes:
-        x, y: coordinates of the points; the line has a gap where ``y`` is not finite.
+        x, y: coordinates of the points; the line has a gap at points with an infinite or undefined ``y``.
         kind: CSS class of the line.
         steps: If true, the line is a step function, constant up to each point.
     """

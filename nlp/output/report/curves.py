@@ -32,7 +32,7 @@ def _over(designs: Designs[Row]) -> Column[Row]:
 
 
 def _numbers(column: Column[Row], rows: Sequence[Row]) -> list[float]:
-    """Return the numbers of a column, NaN for missing ones."""
+    """Return the numbers of a column; a missing number is NaN."""
     return [math.nan if (cell := column.cell(row)) is None else float(cell) for row in rows]
 
 

@@ -66,7 +66,7 @@ def _sections(table: Designs[Row]) -> Iterator[tuple[str, str, Markup]]:
 
 
 def _picture(designs: Designs[Row]) -> Markup:
-    """Return the picture of a page, or a sentence with the reason why there is none."""
+    """Return the picture of a page, or a sentence with the reason for the missing picture."""
     page = designs.page
     if designs.join is Join.CURVE and designs.of_kind(ColumnKind.VARIED):
         return curve_figures(designs)
@@ -121,7 +121,7 @@ def chosen_designs(active: Sequence[frozenset[str]]) -> list[int]:
 
 
 def changed_words(before: Sequence[str], after: Sequence[str]) -> str:
-    """Return the sides that become active or inactive as text; empty if there is no change."""
+    """Return the names of bounds and limits that become active or inactive; empty without a change."""
     new = [each for each in after if each not in before]
     gone = [each for each in before if each not in after]
     parts = [f"{', '.join(new)} become{'s' * (len(new) == 1)} active"] if new else []

@@ -145,20 +145,20 @@ def _slice(part: Part, each: Slice) -> Markup:
     finite = np.isfinite(each.F)
     if finite.any():
         kept = np.isfinite(inside)
-        words = f"{variable.name}: F from {np.nanmin(each.F):.5g} to {np.nanmax(each.F):.5g} on the slice"
+        words = f"{variable.name}: F from {np.nanmin(each.F):.5g} to {np.nanmax(each.F):.5g} along the slice"
         if kept.any():
             k = int(np.nanargmax(inside) if nlp.sign < 0 else np.nanargmin(inside))
             best = "largest" if nlp.sign < 0 else "smallest"
-            words += f", {best} within the limits at {number(values[k], width, digits=5)} {unit}".rstrip()
+            words += f"; {best} F within the limits at {number(values[k], width, digits=5)} {unit}".rstrip()
             if kept.sum() == 1:
                 words += ", the only point within the limits"
             elif not kept[finite].all():
-                words += f"; all limits satisfied on {100 * np.mean(kept):.0f} % of the slice"
+                words += f"; all limits are satisfied on {100 * np.mean(kept):.0f} % of the slice"
         else:
             words += "; no point satisfies all limits"
         words += f". This design: F = {here:.6g} {part.unit}".rstrip() + f" at {at:.5g} {unit}".rstrip() + "."
     else:
-        words = f"{variable.name}: no slice, as it cannot change while the other variables are fixed."
+        words = f"{variable.name}: no slice, as this variable cannot change while all others are fixed."
     chart = line_chart(
         [Curve(values, each.F.tolist(), "curve outside"), Curve(values, inside.tolist(), "curve")],
         [

@@ -248,7 +248,7 @@ class PoseView(NamedTuple):
         poses: number of poses of the case.
         is_worst: True at the pose with the worst F.
         views: number of views of the page, which share its size.
-        size: size of F without cancellation; F is shown as 0 where it is rounding error relative to this size.
+        size: sum of the magnitudes of the terms of F; an F within the rounding error of ``size`` is shown as 0.
         words: value and unit of the optimised actuator quantity at the pose; empty if F is optimised.
     """
 
@@ -319,7 +319,7 @@ def first_eye(drawing: Drawing) -> list[float]:
 
 
 def _force_data(drawing: Drawing, forces: DrawnForces | None) -> list[ForceData]:
-    """Return the arrows of forces; those of legs and slides are moved outwards, away from the robot's centre."""
+    """Return the arrows of forces; arrows of legs and slides are moved outwards from the robot's centre."""
     found: list[ForceData] = []
     for arrow in () if forces is None else forces.arrows:
         ends = arrow.ends
@@ -374,7 +374,7 @@ def _postures_along_motion(drawing: Drawing, count: int) -> _PostureSequence:
 
 
 def _largest_time(drawing: Drawing) -> float:
-    """Return the largest ``t``, where the rotation or the displacement of a corner reaches its limit."""
+    """Return the largest ``t``, at which the rotation or the displacement of a corner reaches its limit."""
     twist = np.zeros(6) if drawing.motion is None else drawing.motion.twist
     turn = float(np.linalg.norm(twist[:3]))
     velocities = drawing.velocities_at(drawing.posture)
@@ -421,7 +421,7 @@ def _few_digits(value: Any) -> Any:  # noqa: ANN401 - whatever JSON can hold
 
 
 def _noise(drawing: Drawing, posture: Posture) -> float:
-    """Return the size below which a rate is rounding error of its summands."""
+    """Return the magnitude below which a rate is rounding error of its summands."""
     if drawing.motion is None:
         return 0.0
     terms = np.abs(posture.jacobian) @ np.abs(np.concatenate([drawing.motion.twist[3:], drawing.motion.twist[:3]]))

@@ -171,7 +171,7 @@ def whole_page(
         contents: list of links to the sections.
         styles: names of further style sheets.
         scripts: names of further scripts.
-        data: data for these scripts.
+        data: data for the scripts.
         plotly: packed Plotly library, or an empty text.
     """
     parts = {
@@ -190,7 +190,7 @@ def whole_page(
 
 
 def answer_box(lines: Iterable[str], *, is_answer: bool = True) -> Markup:
-    """Return the element with the main result of a page, or with the reason why there is none."""
+    """Return the element with the main result of a page, or with the reason for a missing result."""
     return tag("div", paragraphs(lines), class_="answer" if is_answer else "answer none", id="answer")
 
 

@@ -50,7 +50,7 @@ def path_page(picture: PathPicture, text: str, command: Callable[[WorkspacePose]
     Args:
         picture: path with its verdicts and curves.
         text: text of the case file.
-        command: function from a pose to the command that shows it.
+        command: function that returns the command for a pose.
     """
     case, result = picture.judged.case, picture.result
     title = case.title or case.name
@@ -219,7 +219,7 @@ def _swatch(colour: str) -> Markup:
 
 
 def _refuted(picture: PathPicture, command: Callable[[WorkspacePose], str]) -> Markup:
-    """Return each violated claim with its first known violation and a command that shows it; empty without any."""
+    """Return each violated claim with its first known violation and a command for the pose."""
     case = picture.judged.case
     refuted = [(each, each.fault) for each in checked_claims(picture.result)]
     return join_markup(

@@ -46,7 +46,7 @@ class Part:
         nlp: nonlinear program of the task.
         x: (n,) variables at the design.
         solution: separate solution of the task.
-        views: data of the 3-D view, for each pose where the robot exists.
+        views: data of the 3-D view, for each pose at which the robot can be assembled.
         drawings: drawings of the robot, in the order of the views.
         slices: F along each variable.
         planes: F over pairs of variables.
@@ -165,7 +165,7 @@ def _part(outcome: TaskOutcome, x: FloatArray, task: int, tasks: int, *, is_answ
 
 
 def _measured(nlp: Nlp, x: FloatArray, states: Sequence[RobotState | None]) -> list[float]:
-    """Return the optimised quantity of the actuators at each pose where the robot exists."""
+    """Return the optimised quantity of the actuators at each pose at which the robot can be assembled."""
     return [pose_objective(nlp.case, loads_at(nlp, x, state, k)) for k, state in enumerate(states) if state is not None]
 
 

@@ -35,7 +35,7 @@ class Slice:
         variable: index of the variable in the nonlinear program.
         values: (k,) values of the variable, in the units of the nonlinear program.
         F: (k,) objective; nan where the robot does not exist.
-        inside: (k,) 1 where all constraints are satisfied, else 0.
+        inside: (k,) 1 if all constraints are satisfied, otherwise 0.
     """
 
     variable: int
@@ -58,7 +58,7 @@ class Plane:
         first: (k,) values of the first variable.
         second: (m,) values of the second variable.
         F: (m, k) objective; nan where the robot does not exist.
-        inside: (m, k) 1 where all constraints are satisfied, else 0.
+        inside: (m, k) 1 if all constraints are satisfied, otherwise 0.
     """
 
     variables: tuple[int, int]
@@ -149,7 +149,7 @@ def _points_with(nlp: Nlp, x: FloatArray, changed: Sequence[int], values: FloatA
 
 
 class _Values(NamedTuple):
-    """F (k,), nan without a value; and 1 where all constraints are satisfied, else 0, (k,)."""
+    """F (k,), nan if undefined; and (k,) 1 if all constraints are satisfied, otherwise 0."""
 
     F: FloatArray
     inside: FloatArray

@@ -43,7 +43,7 @@ class WorkspaceReport:
         text: text of the case file.
         result: verdicts over the workspace.
         slices: slices of the workspace; empty for a robot without slices.
-        command: function from a pose to the command that shows it.
+        command: function that returns the command for a pose.
     """
 
     case: Case
@@ -88,7 +88,7 @@ def _verdicts(report: WorkspaceReport) -> Markup:
 
 
 def _refuted(report: WorkspaceReport) -> Markup:
-    """Return each violated claim with its pose and a command that shows it; empty without any."""
+    """Return each violated claim with its pose and a command for the pose."""
     return join_markup(
         refuting_place(claim_words(claim), pose_words(report.case, claim.pose), report.command(claim.pose))
         for claim in refuted_claims(report.result)
@@ -110,7 +110,7 @@ def _dimensions(report: WorkspaceReport) -> Markup:
 
 
 def _robot(report: WorkspaceReport) -> Markup:
-    """Return a picture of the robot at the worst pose, or a sentence with the reason why there is none."""
+    """Return a picture of the robot at the worst pose, or a sentence with the reason for the missing picture."""
     worst = worst_claim(report.result, report.case.tasks[0].sense)
     if worst is None:
         return Markup("")

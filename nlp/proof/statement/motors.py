@@ -25,8 +25,8 @@ from .claims import ACTUATED, Claim, ClaimKind
 def motor_claims(case: Case) -> Iterator[Claim]:
     """Yield the claims about a case's actuators with their limits, grouped by actuator and load.
 
-    Names are the same as for constraints at a pose. If one limit concerns all actuators and another one a single
-    actuator, the tighter one counts.
+    Names are the same as for constraints at a pose. If one limit applies to all actuators and another limit to a
+    single actuator, the tighter limit counts.
     """
     yield from _tightest(_claims(case))
 
@@ -97,7 +97,7 @@ def _speeds(case: Case, k: int, joint: DrivenJoint) -> Iterator[Claim]:
 
 
 def _limits(case: Case, kind: type[ActuatorLimit], actuator: str) -> list[ActuatorLimit | None]:
-    """Return the limits of a kind on an actuator: for all actuators and for this one; None stands for no limit."""
+    """Return the limits of a kind that apply to an actuator; None stands for no limit."""
     found: list[ActuatorLimit | None] = []
     found += [each for each in case.limits if isinstance(each, kind) and each.actuator in ("", actuator)]
     return found or [None]
@@ -112,7 +112,7 @@ def _claim(
     end: str = "max",
     value: float | None = None,
 ) -> Claim:
-    """Return the claim about a quantity of an actuator; without a value its limit is the end of the limit."""
+    """Return the claim about a quantity of an actuator; without a value, the bound of the case's limit is used."""
     if end == "max" and value is None:
         value = getattr(limit, "max", None)
     key = "" if limit is None or value is None else f"{limit.name}.{end}"

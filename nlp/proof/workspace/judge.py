@@ -35,7 +35,8 @@ from .verdict import Outcome, Verdict, not_judged
 if TYPE_CHECKING:
     from .proof_record import ProofRecord
 
-#: Default time limit of all searches together, in seconds: singular values in six dimensions need one. Each search
+#: Default time limit of all searches together, in seconds; singular values in six dimensions would take longer. Each
+#: search
 #: takes at most half of the time left.
 TIME_LIMIT = 60.0
 _PART = 0.5
@@ -43,7 +44,8 @@ _PART = 0.5
 _AS_NEEDED = 1.0
 #: Reason for quantities of a robot that may not reach all poses.
 _OUT_OF_REACH = "not proved: a robot within the joint-centre tolerance may not reach every pose"
-#: Called before each quantity with its name, the count of completed ones, and the count of all of its kind.
+#: Function that is called before each quantity, with the name of the quantity, the number of completed quantities of
+#: this kind, and the number of all.
 Progress = Callable[[str, int, int], None]
 
 
@@ -64,7 +66,7 @@ def judge_workspace(
     progress: Progress | None = None,
     record: ProofRecord | None = None,
 ) -> Judgement:
-    """Judge a robot over a box of poses: prove full rank and all limits, or give a pose that refutes them.
+    """Judge a robot over a box of poses: prove full rank and all limits, or find a pose that refutes a claim.
 
     Args:
         case: case with fixed dimensions.
@@ -76,9 +78,9 @@ def judge_workspace(
         jobs: number of threads.
         with_limits: If false, judge only ranks.
         with_objective: If true, bound F of each task, and quantities of actuators without a limit.
-        until_fault: If true, stop at the first rank or limit that is not proved.
-        leg_error: largest leg-length error, length. With it, or with a joint-centre tolerance, pose errors are bounded
-            if ``with_objective`` is true.
+        until_fault: If true, stop at the first claim about a rank or limit that is not proved.
+        leg_error: largest leg-length error, length. If this error or the joint-centre tolerance is not 0 and
+            ``with_objective`` is true, pose errors are bounded.
         rank_progress: function that is called during the search for singular poses.
         progress: function that is called before each quantity.
         record: record of the searches for a proof.
@@ -116,7 +118,7 @@ class _OverBox(Judging):
         super().__init__(case, workspace, measures, search, until_fault=until_fault)
         self._box, self._closed = pose_box(workspace), closed_form(case.model)
         self._names = [name for name in measures if name not in SPECTRAL]
-        # All robots within the tolerance; None without a tolerance.
+        # Robots within the tolerance; None without a tolerance.
         self._robots: RobotsWithinTolerance | None = None
         self._problem: Problem | None = None
         self._reason = ""
@@ -128,7 +130,7 @@ class _OverBox(Judging):
         except NotJudgedError as error:
             self._reason = str(error)
         self._homes = Homes(case, self._box, self._names, self._robots)
-        # Proves a claim about a leg length with a smaller gap; set by the search that proved the leg lengths.
+        # Function that proves a claim about a leg length with a smaller gap; the search of the leg lengths sets it.
         self._prove: Callable[[Claim, NumberSearch], Verdict] | None = None
 
     def ranks(self) -> Iterator[Verdict]:
@@ -181,7 +183,8 @@ class _OverBox(Judging):
             layout, reaches = reach_claims(case, closed, workspace)
             yield from self._proved(reaches, partial(prove_extreme, layout))
         is_reached = not any(each.fails for each in self.verdicts.values() if not each.is_rank)
-        # Closed forms reduce the number of coordinates. If a limb may not reach a pose, its loop equations are kept.
+        # Closed forms reduce the number of coordinates. The loop equations of a limb that may not reach a pose are
+        # kept.
         is_closed = closed.reaches and is_reached
         layout = closed_layout(case, closed, workspace) if is_closed else posed_layout(case, workspace)
         claims = claims_of(layout, self._names, with_objective=self.with_objective)
@@ -211,10 +214,10 @@ class _OverBox(Judging):
         yield from self._proved(every, robots.extreme, decided)
 
     def _in_home(self, design: Problem, *, is_reached: bool) -> Iterator[Verdict]:
-        """Yield the verdicts on expressions of a design with loops that are decided in the home assembly mode.
+        """Yield the verdicts on expressions of a design with loops, decided in the home assembly mode.
 
-        Loop equations as constraints of a program hold in every assembly mode, and F is unbounded if one of these modes
-        is singular. This search follows the loops in the home assembly mode.
+        In a nonlinear program, loop equations as constraints admit every assembly mode, and F is unbounded if one of
+        these modes is singular. This search follows the loops in the home assembly mode only.
         """
         robots = RobotsWithinTolerance(self.case, self._closed, design)
         claims = robots.symbols.claims(self._names, with_objective=self.with_objective)[1]
@@ -227,7 +230,7 @@ class _OverBox(Judging):
     def _proved(
         self, claims: Sequence[Claim], prove: Callable[[Claim, NumberSearch], Verdict], decided: Iterable[Verdict] = ()
     ) -> Iterator[Verdict]:
-        """Yield the verdicts on claims; decided claims are searched again only for the proof record."""
+        """Yield the verdicts on claims. Decided claims are searched again only for the proof record."""
         self._prove = prove
         # A proof for the design does not cover other robots within the tolerance.
         uncovered = self._reason if self.case.joint_centre_tolerance else ""

@@ -19,7 +19,7 @@ from .verdict import Outcome
 ACCURACY = 0.01
 #: Largest and smallest factor. The smallest is judged first.
 _MOST, _LEAST = 64.0, 2.0**-10
-#: Time for one box, in times of the longest proved box, if an even share of the time is less.
+#: Time for one box, as a multiple of the longest time of a proved box, if an even share of the time is less.
 _LONGER = 8.0
 
 
@@ -29,11 +29,11 @@ class Scale:
 
     Attributes:
         factor: scale factor of the largest proved box; None if no box was proved.
-        failed: smallest known scale factor of a box that is not proved; infinite without one.
-        refuted: whether a claim is refuted in the failed box, and not only open.
-        claim: claim that fails in the failed box; empty without one.
-        pose: pose of the failed claim; None without one.
-        reason: reason for a search that ended before the factor was known to 1 %; else empty.
+        failed: smallest known scale factor of a box that is not proved; infinite without such a box.
+        refuted: whether a claim about the failed box is refuted, and not only open.
+        claim: claim that fails in the failed box; empty without a failed box.
+        pose: pose at which the claim fails; None without a pose.
+        reason: reason why the search ended before the factor was known to 1 %; otherwise empty.
     """
 
     factor: float | None
@@ -109,7 +109,7 @@ def _next(proved: float, failed: float, most: float) -> float | None:
 def _trials(proved: float, failed: float) -> int:
     """Return the largest number of boxes until the factor is known, by bisection of its logarithm.
 
-    Without a proved box it is 1: no box is smaller than the first.
+    Without a proved box this number is 1, because no box is smaller than the first.
     """
     return 1 if proved == 0 else 1 + math.ceil(math.log2(max(math.log(failed / proved) / ACCURACY, 1.0)))
 

@@ -31,8 +31,8 @@ def premises_of(
         file: name of the path's file.
         text: text of the file.
         options: options of reading that the file leaves open.
-        of_case: If true, the path belongs to the case, at its place.
-        with_angles: whether closed forms replace joint angles.
+        of_case: If true, the path is that of the case.
+        with_angles: If true, closed forms replace joint angles.
 
     Raises:
         ProofError: the text is longer than a checker accepts.
@@ -69,7 +69,7 @@ def carried_path(case: Case, given: PathPremises) -> ProgrammedPath:
     if not given.of_case:
         return path
     if case.path is None:
-        raise ProofError("the proof is for the path of its case, but this case has none")
+        raise ProofError("the proof is for the path of its case, but this case has no path")
     try:
         return in_place_of_case(path, case)
     except CaseError as error:
@@ -77,7 +77,7 @@ def carried_path(case: Case, given: PathPremises) -> ProgrammedPath:
 
 
 def check_path_premises(given: PathPremises, own: PathPremises) -> None:
-    """Refuse a proof about another path, or with other reading options, than the given ones."""
+    """Refuse a proof about another path, or with other reading options, than given."""
     if given.of_case != own.of_case:
         whose = "the path of its case" if given.of_case else "a path that was given in addition to the case"
         raise ProofError(f"the proof is for {whose}: see --along")
