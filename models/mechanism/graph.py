@@ -158,7 +158,8 @@ def check_mechanism(mechanism: Mechanism) -> None:
     if not any(joint.actuated for joint in mechanism.joints):
         raise MechanismError("actuated", "is given at no joint; at least one actuator must drive the robot")
     path = bridges_between(mechanism.base, mechanism.platform, edges)
-    if path.is_open:
+    coupled = {name for coupling in mechanism.couplings for name, _ in coupling.factors}
+    if path.is_open and not any(mechanism.joints[k].name in coupled for k in path.bridges):
         names = _listing([mechanism.joints[k].name for k in path.bridges])
         fault = f"is {mechanism.platform!r}, at the end of an open chain ({names}); a parallel robot has closed loops"
         raise MechanismError("platform", fault)

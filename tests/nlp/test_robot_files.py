@@ -448,7 +448,12 @@ def test_the_gallery_is_found_by_name_and_each_robot_has_a_starter() -> None:
     # The starter of each is in test_gallery.py.
 
 
-METRES = {"3-puu", "6-rss", "6-sps", "delta", "delta-parallelogram", "five-bar"}
+UNITS = {
+    **dict.fromkeys(("3-puu", "6-rss", "6-sps", "delta", "delta-parallelogram", "five-bar"), "m"),
+    **dict.fromkeys(("ankle", "differential-waist"), "m"),
+    **dict.fromkeys(("five-bar-pen", "five-bar-plotter", "linear-delta", "pentapod"), "mm"),
+    **dict.fromkeys(("rotary-delta", "servo-hexapod"), "mm"),
+}
 
 
 def tables_of(name: str) -> dict[str, object]:
@@ -457,7 +462,7 @@ def tables_of(name: str) -> dict[str, object]:
 
 def test_starters_say_the_unit_of_the_robot_file() -> None:
     files = {name: tables_of(name).get("length_unit", "") for name in gallery_names()}
-    assert files == {name: "m" if name in METRES else "" for name in gallery_names()}
+    assert files == {name: UNITS.get(name, "") for name in gallery_names()}
     for name, unit in (("delta", "m"), ("3-rps", "unit"), ("stewart-gough", "cm")):
         starter = starter_text(name)
         assert tomllib.loads(starter)["units"]["length"] == unit

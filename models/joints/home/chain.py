@@ -371,7 +371,8 @@ def _check_graph(graph: GraphWords) -> None:
         if link not in joined:
             raise RobotError(f"links, {link}", "is not connected to the base, neither directly nor through other links")
     path = bridges_between(graph.base, graph.platform, edges)
-    if path.is_open:
+    coupled = {name for coupling in graph.couplings for name in coupling.factors}
+    if path.is_open and not any(graph.joints[k].name in coupled for k in path.bridges):
         names = ", ".join(graph.joints[k].name for k in path.bridges)
         raise RobotError("platform", f"is at the end of an open chain ({names}); a parallel robot has closed loops")
 

@@ -39,6 +39,8 @@ from ..posed.resistance import Ranks
 
 #: Number of wrenches from which a member resists nearly all motions equally.
 _MANY_WRENCHES = 5
+#: Rank of J of a robot whose platform has one motion with all actuators locked.
+_ONE_MOTION_LEFT = 5
 #: Magnitude below which components of orthonormal motions are zero.
 _ROUNDING = 1e-9
 
@@ -251,6 +253,15 @@ def member_remarks(structures: Sequence[PathStructure]) -> list[str]:
     who = f"member {names[0]} resists" if len(names) == 1 else f"members {', '.join(names)} resist"
     words = f"{who} with {_MANY_WRENCHES} wrenches or more, so their part of F is not informative"
     return [f"{words}: within a member F weighs all directions alike"]
+
+
+def rank_remarks(rank: int, structures: Sequence[PathStructure]) -> list[str]:
+    """Return the remark on a robot of several members whose actuators leave its platform one motion everywhere."""
+    if rank != _ONE_MOTION_LEFT or sum(each.wrenches > 0 for each in structures) == 1:
+        return []
+    words = f"J has rank {rank} at all poses: with all actuators locked, the platform still moves"
+    advice = "add a passive limb that allows all other motions, as in the robot pentapod"
+    return [f"{words}; if that motion does not matter, such as a turn of a spindle about itself, {advice}"]
 
 
 def _opened(path: OpenedPath) -> str:

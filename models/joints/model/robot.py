@@ -47,6 +47,7 @@ from .modelparts import (
     member_remarks,
     parameters,
     quantities,
+    rank_remarks,
     structure_of,
     with_all_relations,
     with_kept,
@@ -375,7 +376,8 @@ def model_of_home(
         links=with_shared_places(builder.links, frame),
         remarks=(*remarks, *builder.remarks, *member_remarks(builder.structure)),
     )
-    return replace(model, generic=generic_ranks(model, at_home, loops.points))
+    ranks = generic_ranks(model, at_home, loops.points)
+    return replace(model, generic=ranks, remarks=(*model.remarks, *rank_remarks(ranks.jacobian, builder.structure)))
 
 
 def _check_carrying(builder: _Builder) -> None:
