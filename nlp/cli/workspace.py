@@ -28,7 +28,9 @@ def workspace(
     gap: options.RangeGap = 1e-3,
     time: Annotated[float | None, options.time("60 for the proofs if left out")] = None,
     leg_error: options.LegError = 0.0,
-    scale: Annotated[bool, options.flag("--scale", "Find the largest proved box, to 1 %")] = False,
+    scale: Annotated[
+        bool, options.flag("--scale", "Find the largest proved box, to 1 %, or radius, to 0.05 %")
+    ] = False,
     proof: options.ProofFile = None,
     jobs: options.Jobs = None,
     json_file: options.JsonFile = None,

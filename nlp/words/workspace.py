@@ -180,7 +180,10 @@ def _search_lines(case: Case, regular: RegularData, label: str) -> Iterator[Line
 def _scale_lines(case: Case, scale: ScaleData) -> Iterator[Line]:
     """Yield the largest proved box, and the claim that fails on the next larger one."""
     ended = f"; the search ended early: {scale.reason}" if scale.reason else ""
-    if scale.factor is not None:
+    if scale.factor is not None and scale.diameter is not None:
+        words = f"diameter {scale.diameter:.6g} {case.units.length}, {scale.factor:.4g} times the stated one"
+        yield Line(words, label="largest proved diameter", tone=Tone.ANSWER, after=ended)
+    elif scale.factor is not None:
         words = f"{scale.factor:.4g} times the workspace"
         yield Line(words, label="largest proved box", tone=Tone.ANSWER, after=ended)
     else:

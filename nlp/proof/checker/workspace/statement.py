@@ -50,7 +50,7 @@ from ...statement.tolerance import (
     tolerance_layout,
 )
 from ..premises import exact
-from ..proof_file import PathPremises, Premises, ProofClaim, ProofError, workspace_numbers
+from ..proof_file import PathPremises, Premises, ProofClaim, ProofError, set_numbers, workspace_numbers
 from .motion_matrix import Root, turned_rotation
 from .path_root import PathRoot
 from .pose_boxes import pose_root
@@ -126,7 +126,7 @@ class RobotClaims:
             None for the nominal design, or where robots cannot be assembled.
         dependent: claims about dependent coordinates of the pose.
         followed: symbols of quantities of a robot whose loops are followed in the home assembly mode, for dependent
-            coordinates and within a tolerance; else None.
+            coordinates, a set of positions, and within a tolerance; else None.
     """
 
     legs: Legs | None
@@ -150,7 +150,7 @@ def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> 
             pass
         else:
             return _followed(legs, closed.model, workspace, robots.symbols, is_open=is_open, within_tolerance=robots)
-    if workspace.dependent:
+    if workspace.dependent or workspace.position_set is not None:
         symbols = tolerance_layout(
             case, BuiltModel(closed.model, (), closed.reaches), 0.0, coordinates_of(pose_root(workspace))
         )
@@ -311,7 +311,7 @@ def refuse_other_premises(
     case: Case, workspace: Workspace, legs: Legs | None, leg_error: float, given: Premises
 ) -> None:
     """Refuse a proof whose file has other premises than the case; the check itself does not use them."""
-    if workspace_numbers(workspace) != given.workspace:
+    if workspace_numbers(workspace) != given.workspace or set_numbers(workspace) != given.position_set:
         raise ProofError("the proof is for another workspace than this case's")
     if given.leg_error != leg_error:
         stated = f"the proof is for leg errors of at most {exact(given.leg_error)} {case.units.length}"

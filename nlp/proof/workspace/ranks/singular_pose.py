@@ -46,6 +46,8 @@ if TYPE_CHECKING:
 SINGULAR = 1e-10
 #: Reason of a verdict with a singular pose of Newton's method.
 BY_NEWTON = "found singular to 1e-10 by Newton's method"
+#: Reason of a verdict with a singular pose in a set that may not contain the line between the two poses.
+BY_SIGNS = "the determinant changes its sign at the pose, on the line between two poses"
 #: Largest number of Newton steps: where a determinant touches 0, each step halves the distance.
 _STEPS = 60
 #: Number of steps in which the smallest singular value must decrease by a tenth; at the edge of a workspace it may not.
@@ -433,8 +435,13 @@ class SingularSearch:
             new = points[np.sign(values) == sign][:_SIGNED]
             known[:] = [*new[problem.box.holds(problem.pose_of(new))], *known][:_SIGNED]
         for ends in itertools.product(*self._signed.values()):
-            sides = frozen_array(problem.pose_of(np.stack(ends)), (2, 6))
-            shown = self._shown(signs.change(*ends), "", sides)
+            change, positions = signs.change(*ends), problem.box.positions
+            if positions is not None and not positions.positions.is_convex:
+                is_held = change is not None and bool(problem.box.holds(problem.pose_of(change)))
+                shown = self._shown(change, BY_SIGNS) if is_held else None
+            else:
+                sides = frozen_array(problem.pose_of(np.stack(ends)), (2, 6))
+                shown = self._shown(change, "", sides)
             if shown is not None:
                 return shown
         return None
