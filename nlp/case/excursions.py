@@ -167,10 +167,10 @@ def _faults(workspace: Workspace, pose: Pose, units: Units, *, by_ranges: bool) 
     positions = workspace.position_set
     if positions is not None and not any(isinstance(each, Free) for each in pose.position):
         # Coordinates that the shape does not couple were compared before.
-        used, at = list(positions.coordinates), np.array(workspace.middle)
-        at[used] = np.array([ends_of(each)[0] for each in pose.position])[used]
-        if not positions.contains(at):
-            place = ", ".join(units.text(value, Dimension.LENGTH) for value in at[used].tolist())
+        used, point = list(positions.coordinates), np.array(workspace.middle)
+        point[used] = np.array([ends_of(each)[0] for each in pose.position])[used]
+        if not positions.contains(point):
+            place = ", ".join(units.text(value, Dimension.LENGTH) for value in point[used].tolist())
             yield NotHeld(f"the position at the pose ({place}) is outside of its {positions.kind.value}", False)
 
 

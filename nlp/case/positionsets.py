@@ -145,7 +145,7 @@ class PositionSet:
         """Return ranges after the displacement; they are rounded outwards."""
         if not any(self.shift):
             return spans
-        found = []
+        found = list[Value]()
         for value, by in zip(spans, self.shift, strict=True):
             if not isinstance(value, Free):
                 found.append(value + by)
@@ -196,6 +196,7 @@ class PositionSet:
         ends = np.array([ends_of(each) for each in self.box])
         points = rng.uniform(ends[:, 0], ends[:, 1], (count, 3))
         share, turn = rng.uniform(size=(2, count))
+        r: float | FloatArray
         r, about = self.radius * (1 - _INWARDS), np.stack([np.cos(2 * np.pi * turn), np.sin(2 * np.pi * turn)], axis=1)
         origin = np.array(self.centre) + np.array(self.shift)
         if self.kind is SetKind.DISC:

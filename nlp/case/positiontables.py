@@ -158,15 +158,15 @@ class PositionSetTable(Table):
     def read(self, units: Units) -> PositionSet:
         """Return the set of positions."""
         kind = next(each for each in SetKind if getattr(self, each.value) is not None)
-        given = getattr(self, kind.value)
+        given: DiscTable | RingTable | CylinderTable | BallTable | ConeTable | list[Span] = getattr(self, kind.value)
         halves = tuple(HalfSpace(_triple(each.normal, None), _triple(each.point, units)) for each in self.half_spaces)
-        if not isinstance(given, _Round):
+        if isinstance(given, list):
             first, second, third = (internal_value(each, units, Dimension.LENGTH) for each in given)
             return PositionSet(kind, spans=(first, second, third), half_spaces=halves)
         size, is_diameter = given.size(units), given.is_diameter
         if isinstance(given, DiscTable):
             centre, spans = _triple([*given.centre, 0.0], units), (0.0, 0.0, _height(given.z, units))
-            inner, angles = 0.0, ()
+            inner, angles = 0.0, tuple[float, ...]()
             if isinstance(given, RingTable):
                 inner = _radius(given.inner_diameter, given.inner_radius, units)
                 if given.angle is not None:
@@ -184,9 +184,9 @@ class PositionSetTable(Table):
             )
         if isinstance(given, BallTable):
             return PositionSet(kind, size, _triple(given.centre, units), half_spaces=halves, is_diameter=is_diameter)
-        first, last = (given.start, given.end) if isinstance(given, CylinderTable) else (given.apex, given.base)
-        ends = _triple(first, units), _triple(last, units)
-        return PositionSet(kind, size, *ends, half_spaces=halves, is_diameter=is_diameter)
+        points = (given.apex, given.base) if isinstance(given, ConeTable) else (given.start, given.end)
+        one, other = (_triple(each, units) for each in points)
+        return PositionSet(kind, size, one, other, half_spaces=halves, is_diameter=is_diameter)
 
 
 def _radius(diameter: float | None, radius: float | None, units: Units) -> float:

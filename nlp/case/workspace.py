@@ -105,7 +105,7 @@ class Workspace:
         cls,
         positions: PositionSet,
         turns: Turns | None = None,
-        has_limits: bool = False,  # noqa: FBT001, FBT002 - the order of the constructor
+        has_limits: bool = False,
         *,
         about_pose: bool = False,
     ) -> Workspace:

@@ -1,14 +1,12 @@
-"""Workspaces with sets of positions: disc, ring, cylinder, ball, cone, half spaces, in search, checker and case files."""
+"""Workspaces with sets of positions: disc, ring, cylinder, ball, cone and half spaces."""
 
-import json
 import math
 from dataclasses import replace
-from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import case_from
+from builders import case_from, shipped_tables
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from workspace_cases import on_paper, only, rejected, stating
@@ -19,7 +17,7 @@ from screwsynth.nlp.case.positionsets import HalfSpace, PositionSet, SetKind
 from screwsynth.nlp.proof.checker.proof_file import set_numbers, workspace_numbers
 from screwsynth.nlp.proof.checker.tree import Node
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
-from screwsynth.nlp.proof.checker.workspace.pose_boxes import pose_root
+from screwsynth.nlp.proof.checker.workspace.pose_boxes import PoseRoot, pose_root
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box, scaled
 from screwsynth.nlp.proof.workspace.scale import largest_scale
 
@@ -111,7 +109,7 @@ def test_corners_of_the_box_outside_of_the_disc_refute_nothing(tmp_path: Path) -
     corners = np.array([[x, y, z] for x in (-110.0, 110.0) for y in (-110.0, 110.0)])
     with np.errstate(invalid="ignore"):
         assert np.isnan(heights(corners)).any()
-    assert LOWEST < heights(rim).min()
+    assert heights(rim).min() > LOWEST
     round_case, square = delta(tmp_path, disc), delta(tmp_path, ends)
     judged = judge_workspace(round_case)
     assert judged.is_proved
@@ -156,3 +154,158 @@ def test_proof_of_a_disc(tmp_path: Path) -> None:
     tight = delta(tmp_path, {"disc": {"radius": 112.9, "z": -235.0}})
     proof = only(on_paper(tight)[1], "actuator_length limb 1", "min")
     assert check_workspace_proof(proof, tight).claims[0].limit == LOWEST
+
+
+AXES = st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda axis: math.hypot(*axis) > 0.1)
+UNITS = st.sampled_from([1e-6, 1.0, 1e3])
+
+
+@st.composite
+def position_sets(draw: st.DrawFn) -> PositionSet:
+    """Random sets of positions of all shapes, with up to two half spaces, in several units."""
+    kind, unit = draw(st.sampled_from(list(SetKind))), draw(UNITS)
+    x, y, z = (unit * draw(st.floats(-2, 2)) for _ in range(3))
+    radius, axis = unit * draw(st.floats(0.2, 2)), [unit * each for each in draw(AXES)]
+    if draw(st.booleans()):
+        axis = [0.0, 0.0, unit]
+    angles = ()
+    if kind is SetKind.RING and draw(st.booleans()):
+        first = draw(st.floats(-6, 3))
+        angles = (first, first + draw(st.floats(0.2, 6)))
+    spans = tuple(Free(at - unit * half, at + unit * half) for at, half in zip((x, y, z), (0.3, 0.5, 0.2), strict=True))
+    halves = []
+    for _ in range(draw(st.integers(0, 2))):
+        # The centre of the shape stays inside, so that something is left.
+        n = np.array(draw(AXES))
+        at = np.array([x, y, z]) + unit * draw(st.floats(0.05, 1)) * n / np.linalg.norm(n)
+        halves.append(HalfSpace(tuple(n.tolist()), tuple(at.tolist())))
+    end = tuple((np.array([x, y, z]) + axis).tolist())
+    given = PositionSet(
+        kind,
+        radius=radius,
+        centre=(x, y, z),
+        end=end,
+        inner=radius * draw(st.floats(0.1, 0.9)),
+        angles=angles,
+        spans=spans,
+        shift=tuple(unit * draw(st.sampled_from([0.0, 0.1])) for _ in range(3)),
+    )
+    if kind is SetKind.RING or kind in (SetKind.CYLINDER, SetKind.CONE):
+        halves = [
+            replace(each, point=tuple((given.middle - given.shift + np.array(each.point) - (x, y, z)).tolist()))
+            for each in halves
+        ]
+    return replace(given, half_spaces=tuple(halves))
+
+
+def excess(given: PositionSet, points: FloatArray) -> FloatArray:
+    """How far points (N, 3) are outside of a set, by plain formulas; negative inside."""
+    p = points - np.array(given.shift)
+    d = p - np.array(given.centre)
+    parts = [(p - each.point) @ np.array(each.normal) / math.hypot(*each.normal) for each in given.half_spaces]
+    low, high = np.array([[each.lower, each.upper] for each in given.spans]).T
+    if given.kind is SetKind.BOX:
+        parts += [*(low - p).T, *(p - high).T]
+    elif given.kind is SetKind.BALL:
+        parts.append(np.linalg.norm(d, axis=1) - given.radius)
+    elif given.kind in (SetKind.DISC, SetKind.RING):
+        parts += [np.hypot(d[:, 0], d[:, 1]) - given.radius, low[2] - p[:, 2], p[:, 2] - high[2]]
+    if given.kind is SetKind.RING:
+        size = np.hypot(d[:, 0], d[:, 1])
+        parts.append(given.inner - size)
+        if given.angles:
+            first, last = given.angles
+            at = np.mod(np.arctan2(d[:, 1], d[:, 0]) - first, 2 * math.pi)
+            beyond = np.minimum(at - (last - first), 2 * math.pi - at)
+            parts.append(np.where(at <= last - first, -np.minimum(at, last - first - at), beyond) * size)
+    if given.kind in (SetKind.CYLINDER, SetKind.CONE):
+        axis = np.subtract(given.end, given.centre)
+        length = np.linalg.norm(axis)
+        along = d @ axis / length
+        across = np.linalg.norm(np.cross(d, axis), axis=1) / length
+        radius = given.radius * (np.clip(along / length, 0, 1) if given.kind is SetKind.CONE else 1.0)
+        parts += [across - radius, -along, along - length]
+    return np.max(parts, axis=0)
+
+
+@settings(max_examples=25, deadline=None)
+@given(position_sets(), st.integers(0, 2**31))
+def test_boxes_are_contracted_to_the_set_and_never_past_a_position(positions: PositionSet, seed: int) -> None:
+    rng, workspace = np.random.default_rng(seed), Workspace.within(positions)
+    box, root = pose_box(workspace), pose_root(workspace)
+    size = float((box.upper - box.lower)[:3].max())
+    rounding = 1e-12 * float(np.abs([box.lower, box.upper]).max())
+    middle = np.array(workspace.middle)
+    assert excess(positions, middle[None])[0] < 0
+    points = box.random(400, rng)
+    moved = box.clipped(
+        np.hstack([rng.uniform(box.lower[:3] - size, box.upper[:3] + size, (400, 3)), np.zeros((400, 3))])
+    )
+    for each in (points, moved):
+        assert box.holds(each).all()
+        assert (excess(positions, each[:, :3]) <= rounding).all()
+        assert all(root.holds(y) for y in each[:10])
+        assert all(positions.contains(y[:3]) for y in each[:10])
+    # Random boxes, many of them at the surface.
+    centre = np.concatenate([moved, points])[rng.integers(0, 800, 40), :3] + size * 0.02 * rng.normal(size=(40, 3))
+    half = size * 10.0 ** rng.uniform(-3, -0.3, (40, 1)) * rng.uniform(0.2, 1, (40, 3))
+    lower, upper = (
+        np.hstack([np.clip(end, box.lower[:3], box.upper[:3]), np.zeros((40, 3))])
+        for end in (centre - half, centre + half)
+    )
+    inside = rng.uniform(lower[:, None, :3], upper[:, None, :3], (40, 200, 3))
+    far = excess(positions, inside.reshape(-1, 3)).reshape(40, 200)
+    low, high, outside = box.contracted(lower, upper)
+    least, most, kept = root.contracted(lower, upper)
+    for k in range(40):
+        members = inside[k][far[k] <= -rounding]
+        assert not (len(members) and outside[k])
+        assert not (len(members) and not kept[k])
+        for a, b in ((low[k], high[k]), (least[k], most[k])):
+            assert (members >= a[:3]).all()
+            assert (members <= b[:3]).all()
+    # What the search discards, the checker discards too, at the latest on parts of the box.
+    for k in np.flatnonzero(outside)[:2]:
+        assert root.is_outside(lower[k], upper[k])
+    for k in np.flatnonzero((far <= -rounding).any(axis=1))[:1]:
+        assert not root.is_outside(lower[k], upper[k])
+    beyond = inside.reshape(-1, 3)[(far > 1e-9 * size).ravel()][:20]
+    assert not any(root.holds(np.append(p, [0, 0, 0])) for p in beyond)
+
+
+@settings(max_examples=20, deadline=None)
+@given(position_sets())
+def test_bisection_converges_to_the_set(positions: PositionSet) -> None:
+    workspace = Workspace.within(positions)
+    size = float(max(each.upper - each.lower for each in positions.box if isinstance(each, Free)))
+    for bounds in (pose_box(workspace), pose_root(workspace)):
+        low, high = bounds.lower[None], bounds.upper[None]
+        for k in range(15):
+            middle = 0.5 * (low[:, k % 3] + high[:, k % 3])
+            below, above = high.copy(), low.copy()
+            below[:, k % 3] = above[:, k % 3] = middle
+            low, high = np.concatenate([low, above]), np.concatenate([below, high])
+            low, high, mark = bounds.contracted(low, high)
+            kept = mark if isinstance(bounds, PoseRoot) else ~mark
+            low, high = low[kept], high[kept]
+        centre = 0.5 * (low + high)[:, :3]
+        half = 0.5 * np.linalg.norm(high - low, axis=1)
+        # Every remaining box is at the set: its middle is at most some diagonals away, from a cone along its base.
+        slope = positions.radius / float(np.linalg.norm(positions.axis)) if positions.kind is SetKind.CONE else 1.0
+        assert (excess(positions, centre) <= 6 * (1 + slope) ** 2 * half + 1e-9 * size).all()
+
+
+@settings(max_examples=25, deadline=None)
+@given(position_sets())
+def test_sets_in_a_case_file_and_back(positions: PositionSet) -> None:
+    case = case_from(shipped_tables("hexapod-linuxcnc"), "set")
+    for about_pose in (False, True):
+        workspace = Workspace.within(positions, about_pose=about_pose)
+        again = case_from(replace(case, workspace=workspace).to_toml()).workspace
+        assert again is not None
+        assert again.about_pose is about_pose
+        assert again.position_set is not None
+        assert again.position_set.to_table(case.units) == positions.to_table(case.units)
+        assert again.turns == workspace.turns
+        points = pose_box(workspace).random(50, np.random.default_rng(0))[:, :3]
+        assert all(again.position_set.contains(p) for p in points)

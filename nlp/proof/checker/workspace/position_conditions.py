@@ -1,7 +1,7 @@
 """Conditions of a set of positions: quadratic polynomials in fractions, and the contraction of boxes to them.
 
-With ``d = p - origin`` a condition is ``d' Q d + b . d <= c``. For a point it is decided in fractions. Over a box it is a
-quadratic inequality in one coordinate, with ends of its other terms; its roots are ends of this coordinate.
+With ``d = p - origin`` a condition is ``d' Q d + b . d <= c``. For a point it is decided in fractions. Over a box it is
+a quadratic inequality in one coordinate, with ends of its other terms; its roots are ends of this coordinate.
 """
 
 from __future__ import annotations
@@ -84,9 +84,9 @@ class PositionConditions:
         kept = np.ones(len(lower), dtype=bool)
         for _ in range(_PASSES):
             for each in self._rounded:
-                lower, upper, some = each.contracted(lower, upper)
-                kept &= some & (lower <= upper).all(axis=1)
-                lower, upper = np.minimum(lower, upper), np.maximum(lower, upper)
+                low, high, some = each.contracted(lower, upper)
+                kept &= some & (low <= high).all(axis=1)
+                lower, upper = (np.where(kept[:, None], new, old) for new, old in ((low, lower), (high, upper)))
         if self._rounded_any:
             kept &= np.any([each.contracted(lower, upper)[2] for each in self._rounded_any], axis=0)
         return lower, upper, kept
@@ -199,10 +199,10 @@ def conditions_of(given: PositionSet) -> tuple[list[_Condition], list[_Condition
         every.append(_square(origin, _diagonal(-1, -1, 0), -(Fraction(given.inner) ** 2)))
         if given.angles:
             first, last = given.angles
-            (s, c), (t, e) = sine_cosine_ends(first), sine_cosine_ends(last)
+            (sine, cosine), (far_sine, far_cosine) = sine_cosine_ends(first), sine_cosine_ends(last)
             zero = Fraction(0)
-            begin = _between(origin, (s[0], -c[1], zero), (s[1], -c[0], zero))
-            end = _between(origin, (-t[1], e[0], zero), (-t[0], e[1], zero))
+            begin = _between(origin, (sine[0], -cosine[1], zero), (sine[1], -cosine[0], zero))
+            end = _between(origin, (-far_sine[1], far_cosine[0], zero), (-far_sine[0], far_cosine[1], zero))
             (any_of if last - first > math.pi else every).extend([begin, end])
     for each in given.half_spaces:
         at = _vector([Fraction(a) + Fraction(b) for a, b in zip(each.point, given.shift, strict=True)])

@@ -262,8 +262,8 @@ def scaled(workspace: Workspace, factor: float) -> Workspace:
 
     Only the radius of a set of positions is scaled.
     """
-    if workspace.position_set is not None and workspace.position_set.has_radius:
-        positions = workspace.position_set.scaled(factor)
+    positions = None if workspace.position_set is None else workspace.position_set.scaled(factor)
+    if positions is not None and positions.has_radius:
         return replace(workspace, position=positions.box, position_set=positions)
     turns, dependent = workspace.turns, [each.index for each in workspace.dependent]
     is_ball = turns.kind is TurnKind.ANY_AXIS
@@ -271,9 +271,7 @@ def scaled(workspace: Workspace, factor: float) -> Workspace:
         value if k in dependent and not (is_ball and k >= 3) else _scaled(value, factor, is_ball and k >= 3)
         for k, value in enumerate((*workspace.position, *turns.angles))
     ]
-    positions = workspace.position_set
     if positions is not None:
-        positions = positions.scaled(factor)
         values[:3] = positions.box
     turned = replace(turns, angles=tuple(values[3:]))
     return replace(workspace, position=tuple(values[:3]), turns=turned, position_set=positions)

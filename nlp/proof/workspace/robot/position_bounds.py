@@ -79,7 +79,7 @@ class _Part:
                 parts = [self._linear(lower, upper, [k]) for k in range(len(self.rows))]
                 gone = [np.where(outside[:, [k]], np.inf, part[0]) for k, part in enumerate(parts)]
                 kept = [np.where(outside[:, [k]], -np.inf, part[1]) for k, part in enumerate(parts)]
-                all_gone = outside.all(axis=1)
+                all_gone = np.asarray(outside.all(axis=1))
                 least, most = np.min(gone, axis=0), np.max(kept, axis=0)
                 least, most = np.where(all_gone[:, None], lower, least), np.where(all_gone[:, None], upper, most)
                 return least, most, all_gone
@@ -110,7 +110,8 @@ class _Part:
         least, most = lower.copy(), upper.copy()
         scale = np.maximum(np.abs(before[0]), np.abs(before[1]))
         for i, row in enumerate(self.rows):
-            for k in np.flatnonzero(row):
+            # Coordinates with tiny factors would move only by rounding.
+            for k in np.flatnonzero(np.abs(row) > _ROUNDING * np.abs(row).max()):
                 low, high = (row[k] * (end[:, k] - self.origin[k]) for end in (lower, upper))
                 own = np.minimum(low, high), np.maximum(low, high)
                 # The other terms of the form have the rest of its ends.
@@ -159,9 +160,9 @@ class PositionBounds:
         outside = np.zeros(len(lower), dtype=bool)
         for _ in range(_PASSES):
             for part in self._parts:
-                lower, upper, gone = part.contracted(lower, upper)
-                outside |= gone | (lower > upper).any(axis=1)
-                lower, upper = np.minimum(lower, upper), np.maximum(lower, upper)
+                low, high, gone = part.contracted(lower, upper)
+                outside |= gone | (low > high).any(axis=1)
+                lower, upper = (np.where(outside[:, None], old, new) for new, old in ((low, lower), (high, upper)))
         return lower, upper, outside
 
     def holds(self, points: FloatArray) -> NDArray[np.bool_]:
@@ -171,6 +172,15 @@ class PositionBounds:
         for part in self._parts:
             inside &= part.holds(flat)
         return np.asarray(inside.reshape(points.shape[:-1]))
+
+    def excess(self, points: FloatArray) -> FloatArray:
+        """Return numbers (N,) that are negative for points (N, 3) inside of the set, and positive outside."""
+        parts = []
+        for part in self._parts:
+            values = part.values(points)
+            values = values / max(float(np.abs(values).max(initial=0.0)), np.finfo(float).tiny)
+            parts.append(values.min(axis=1) if part.is_any else values.max(axis=1))
+        return np.asarray(np.max(parts, axis=0)) if parts else np.full(len(points), -1.0)
 
     def clipped(self, points: FloatArray) -> FloatArray:
         """Return points (N, 3) moved into the set."""
