@@ -25,7 +25,7 @@ from screwsynth.nlp.embedding import ctext
 from screwsynth.nlp.embedding.codegen import _casadi_files, generate_c
 from screwsynth.nlp.embedding.ctext import identifier
 from screwsynth.nlp.embedding.loops import Loop
-from screwsynth.nlp.embedding.runtimelimits import held_by_fixed_numbers, run_time_limits
+from screwsynth.nlp.embedding.runtimelimits import fixed_conditions, run_time_limits
 from screwsynth.nlp.embedding.stages import StagedFunctions, _columns, stage_functions
 from screwsynth.nlp.embedding.subject import find_subject, magnitude_of
 
@@ -186,7 +186,7 @@ def by_maps(case: Case, files: dict[str, str], *, skips: bool) -> dict[str, str]
     """Return the files of a case with its loops by maps."""
     subject = find_subject(case)
     nlp, prefix = subject.nlp, identifier(case.name)
-    staged = stage_functions(nlp.program, magnitude_of(nlp), f"{prefix}_CASADI", held_by_fixed_numbers(nlp))
+    staged = stage_functions(nlp.program, magnitude_of(nlp), f"{prefix}_CASADI", fixed_conditions(nlp))
     if not staged.loops or staged.loops.spectra:
         raise SystemExit(f"{case.name}: it has no loops, or limits on singular values, which are not by maps here")
     made = mapped(staged, (nlp.n, len(nlp.program.constraints)), f"{prefix}_CASADI", skips=skips)

@@ -5,7 +5,7 @@
 MuJoCo and pinocchio get a Stewart platform of universal joints, slides and ball joints with the same joint centres, and
 close its loops at each pose by Newton's method on the eighteen joints of its legs, from those of the pose before; their
 own functions give positions and Jacobians, and NumPy solves. Times are CPU times of this process, the best of three,
-because the machine may be shared. The leg lengths of all must agree.
+because the machine may be shared. The leg lengths of all must be equal.
 """
 
 import sys
@@ -15,7 +15,7 @@ from collections.abc import Callable
 import numpy as np
 
 from screwsynth.nlp import Case, Rotation, Task, build_model, inverse, load_case
-from screwsynth.nlp.proof.statement.machine import joint_centres
+from screwsynth.nlp.proof.statement.fixed_robot import joint_centres
 
 CLOSED, STEPS, REPEATS = 1e-10, 20, 3
 #: Robots given joint by joint, with the motions that their platforms can make: shares of a small displacement.

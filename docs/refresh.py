@@ -31,7 +31,7 @@ _put(
     ROOT / "docs" / "limits.md",
     f"<!-- begin: screwsynth {' '.join(limited)} -->",
     "<!-- end -->",
-    f"```text\n{''.join(lines[first : last + 1])}```\n",
+    f"```text\n{''.join(lines[first - 1 : last + 1])}```\n",
 )
 check = ("check", "--markdown")
 _put(
@@ -51,7 +51,7 @@ page = (ROOT / "docs" / "robots.md").read_text(encoding="utf-8")
 with tempfile.TemporaryDirectory() as folder:
     (Path(folder) / "delta.toml").write_text(shown, encoding="utf-8")
     lines = _output_of("solve", str(Path(folder) / "delta.toml"), "--all").splitlines(keepends=True)
-words = ("largest F", "        value", "rb ", "arm ", "p_z ", "actuator rates", "freedoms", "rank of J")
+words = ("largest F", "        value", "rb ", "arm ", "p_z ", "actuator rates", "degrees of freedom", "rank of J")
 kept = "".join(line for line in lines if line.startswith(words))
 _put(ROOT / "docs" / "robots.md", "<!-- begin: solve -->", "<!-- end -->", f"```text\n{kept}```\n")
 part = ("path", "hexapod-pocket")

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 Flags: TypeAlias = NDArray[np.bool_]
 
-#: Relative size of a rate below which it is a rounding error of the null-space basis.
+#: Relative rate below which an entry of the null-space basis is a rounding error.
 _TAKES_PART = 1e-6
 
 
@@ -48,10 +48,10 @@ class Velocities(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """Actuation of a limb at a point, in actuator rates of order 1 (rates of angles times a length of the robot).
+    """Actuation of a limb at a point, in scaled actuator rates (rates of angles times a length of the robot).
 
     Attributes:
-        works: (m, a) ``D`` restricted to the rates that ``B`` allows; 0 for rates orthogonal to these.
+        works: (m, a) ``D`` restricted to the rates that ``B`` allows; 0 for orthogonal rates.
         driving: (r, m) orthonormal combinations of rows in which the actuators do work.
         constraints: (k, m) orthonormal combinations of rows that do no work in the actuated joints.
         idle: (a, d) orthonormal actuator rates with which the platform does not move.
@@ -67,7 +67,7 @@ class Drive:
     _inverse: FloatArray
 
     def rates(self, resisted: FloatArray) -> FloatArray:
-        """Return the actuator rates (a,) that fit the work rates (m,) of the rows best, by least squares.
+        """Return the actuator rates (a,) that best fit the work rates (m,) of the rows, by least squares.
 
         A rate is infinite for an actuator that cannot drive the platform, and NaN where it is undetermined.
         """
@@ -81,7 +81,7 @@ class Drive:
         return np.asarray(np.linalg.norm(self.idle, axis=1) > _TAKES_PART)
 
     def driven_part(self, resisted: FloatArray) -> FloatArray:
-        """Return the component (m,) of the rows' work rates that the actuators can follow."""
+        """Return the component (m,) of the rows' work rates that the actuators can produce."""
         return np.asarray(self.driving.T @ (self.driving @ resisted))
 
 
@@ -91,7 +91,7 @@ def drive_of(driven: FloatArray, relations: FloatArray, unit: FloatArray, size: 
     Args:
         driven: (m, a) ``D``, work rates of the rows for unit actuator rates.
         relations: (r, a) ``B``; rows of zeros have no effect.
-        unit: (a,) actuator rates that move the platform with a velocity of order 1.
+        unit: (a,) actuator rates that each move the platform with a velocity of about 1.
         size: magnitude of the rows, 1 for unit forces; the rank tolerance is relative to it.
     """
     scaled = relations * unit
@@ -116,9 +116,9 @@ class PathScrews(NamedTuple):
 
     Attributes:
         path: symbolic screws of the path.
-        screws: (6, k) screws of its joints.
-        loops: (m, k) matrix of its loop equations.
-        centre: (3,) centre of its member, length.
+        screws: (6, k) screws of the path's joints.
+        loops: (m, k) matrix of the path's loop equations.
+        centre: (3,) centre of the path's member, length.
     """
 
     path: JointScrews
@@ -235,7 +235,7 @@ def limb_drive(model: Model, velocities: Velocities, centre: FloatArray, limb: s
 
 
 def rates_expression(driven: SX, relations: SX, resisted: SX) -> SX:
-    """Return the actuator rates (a, n) of a limb for work rates (m, n) of its rows, where they are determined.
+    """Return the actuator rates (a, n) of a limb for work rates (m, n) of its rows, if these rates are determined.
 
     Args:
         driven: (m, a) ``D``, work rates of the rows for unit actuator rates.

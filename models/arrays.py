@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 FloatArray: TypeAlias = "NDArray[np.float64]"
 
-#: Relative difference below which two sizes count as equal, so that rounding does not choose between them.
+#: Relative difference below which two values count as equal, so that rounding does not choose between them.
 _TIE = 1e-6
 
 
@@ -48,7 +48,9 @@ def frozen_vector(values: Sequence[float] | FloatArray) -> FloatArray:
 
 
 def buffer_on(function: ca.Function, inputs: Sequence[FloatArray], outputs: Sequence[FloatArray]) -> tuple[Any, Any]:
-    """Return CasADi's buffer of a dense function and its evaluator; keep function, buffer and arrays while it is used.
+    """Return CasADi's buffer of a dense function, and its evaluator.
+
+    Function, buffer and arrays must stay alive while the evaluator is used.
 
     Args:
         function: the function.

@@ -1,9 +1,9 @@
-"""Rows of the Jacobian in results: an orthonormal basis of each member's wrenches in place of its projector.
+"""Rows of the Jacobian in results: each member has an orthonormal basis of its wrenches instead of a projector.
 
 The scaled coordinates of a wrench about a member's centre are its force, and its moment about the centre divided by the
 characteristic length. The basis begins with the constraint wrenches: pure couples, then forces through the centre, then
-the rest. The actuation wrenches follow. The basis of each of these spaces depends on the space only, so that results
-depend neither on rounding nor on the unit of length.
+the rest. The actuation wrenches follow. The basis of each space depends only on the space, so that results depend
+neither on rounding nor on the unit of length.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .model import Model
 from .rows import rank_of
 from .wrench import WrenchKind
 
-#: Components of unit wrenches below this are zero: rounding errors of a nearly singular limb are about 1e-12.
+#: Value below which components of unit wrenches are zero; rounding errors of a nearly singular limb are about 1e-12.
 _ZERO = 1e-9
 
 
@@ -100,7 +100,7 @@ def rank_of_rows(rows: FloatArray, centre: FloatArray, length: float) -> int:
 
 
 def is_apart(rows: FloatArray, of_limb: Flags, centre: FloatArray, length: float) -> bool:
-    """Return True if the wrenches of a limb are independent of all others, so that statics determines them.
+    """Return True if a limb's wrenches are independent of those of all other limbs, so that statics determines them.
 
     Args:
         rows: (m, 6) wrenches of all limbs.

@@ -40,7 +40,7 @@ SHIPPED: Mapping[str, RobotFunction] = MappingProxyType(
 )
 
 
-#: Folder of the robot files of this package, one for each robot given joint by joint.
+#: Folder of this package's robot files, one for each robot given joint by joint.
 _GALLERY = Path(__file__).parent / "robots"
 
 
@@ -116,7 +116,9 @@ def robot_function(name: str) -> RobotFunction:
     if not offers:
         raise UnknownModelError(name)
     if len(offers) > 1:
-        raise AmbiguousModelError(f"the packages {' and '.join(sorted(offers))} offer it; uninstall all but one")
+        raise AmbiguousModelError(
+            f"the packages {' and '.join(sorted(offers))} offer this robot; uninstall all but one"
+        )
     (point,) = offers.values()
     function: RobotFunction = point.load()
     return function

@@ -49,11 +49,11 @@ class Link:
 
     Attributes:
         start: name of the first point.
-        end: name of the second one.
+        end: name of the second point.
         body: the body with which the link moves.
         limb: name of the limb to which the link belongs; None for a link of no limb.
         kind: bar, rod or rail.
-        row: index among the rows of the limb, if the link carries the force of this row only; None if it carries
+        row: index, among the rows of the limb, of the row whose force the link carries; None if the link carries
             several.
     """
 

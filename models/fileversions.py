@@ -1,4 +1,4 @@
-"""Versions of file formats: the key ``schema``, the versions that are read, and the message about any other version.
+"""Versions of file formats: the key ``schema``, the supported versions, and the message about other versions.
 
 A version changes when a key changes its meaning or is removed; a new optional key needs no new version.
 """
@@ -16,8 +16,8 @@ class FileVersions(NamedTuple):
 
     Attributes:
         kind: kind of file, in the plural.
-        newest: version that is written; also the newest version that is read.
-        oldest: oldest version that is read.
+        newest: version of written files; also the newest version that can be read.
+        oldest: oldest version that can be read.
     """
 
     kind: str
@@ -25,7 +25,10 @@ class FileVersions(NamedTuple):
     oldest: int = 1
 
     def fault(self, version: object) -> str | None:
-        """Return the reason why a file's version is not read, as the second half of a sentence; None if it is read."""
+        """Return the reason why a version is not supported, as the second half of a sentence.
+
+        None if it is supported.
+        """
         read = f"this screwsynth reads {self.kind} of schema {_range(self.oldest, self.newest)}"
         # True and 1.0 equal 1 in Python, but neither is a version number.
         if type(version) is not int or version < 1:

@@ -1,4 +1,4 @@
-"""Hexapod given by twelve joint centres, each coordinate of which a case fixes or frees.
+"""Hexapod given by twelve joint centres; a case fixes or frees each of their coordinates.
 
 ``base_i`` is the centre of leg i's base joint in the world frame, ``platform_i`` the centre of its platform joint in
 the platform frame. With a symmetry, some legs are given and the others are their images in both frames: the coordinates

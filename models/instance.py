@@ -40,7 +40,7 @@ class Substitution:
         unknowns: (u, 1) unknowns of the closure equations, in the model's order.
         rotation: (3, 3) ``R``, platform to world coordinates.
         position: (3, 1) ``p``, origin of the platform frame in the world frame, length.
-        reference: (n,) values of the parameters that determine the sizes of loop equations; None for the values of
+        reference: (n,) parameter values from which the scales of loop equations are computed; None for the values of
             ``parameters``.
     """
 
@@ -95,7 +95,7 @@ class RobotInstance:
             characteristic length. Rows of single wrenches come first, then all rows of the members' projectors.
         rates: (m, tasks) work rates ``L_i ^ chi_j``.
         F: (tasks, 1) objective of each task (equation 14).
-        squares: (w, 1) squared length of the direction of each single wrench; 0 for a limb of zero length.
+        squares: (w, 1) squared norm of the direction of each single wrench; 0 for a limb of zero length.
         magnitude: (tasks, 1) upper bound on F without cancellation; see :func:`magnitude`.
         quantities: (n, 1) values of each quantity of the model.
         legs: the model's legs.
@@ -103,7 +103,7 @@ class RobotInstance:
         rows: rows before normalisation.
         inputs: (k, 1) all arguments: parameters, unknowns, rotation column by column, position, characteristic length,
             twists.
-        loops: (k, 1) left sides of all loop equations, including those that are not in ``closure``.
+        loops: (k, 1) left sides of all loop equations, including the equations that ``closure`` omits.
         driven: (m, a) work rate of each row for a unit rate of each actuator.
         relations: (r, a) coefficients of the equations of the actuator rates only, which loops impose.
         signs: (s, 1) expressions that are positive in the home assembly mode.
@@ -111,7 +111,7 @@ class RobotInstance:
         joints: joints of the model's limbs.
         links: links of the model's limbs.
         size: (1, 1) characteristic size of the robot, length.
-        reference: values of the parameters that determine the sizes of the loop equations; None for ``parameters``.
+        reference: parameter values from which the scales of the loop equations are computed; None for ``parameters``.
     """
 
     parameters: SX
@@ -159,7 +159,7 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
     rows, members, actuators, *equations = found
 
     def left_sides(parts: Sequence[Closure], replaced: Sequence[Closure]) -> SX:
-        """Return the left sides (k, 1) of equations, scaled to order 1."""
+        """Return the left sides (k, 1) of equations, scaled to values of about 1."""
         sizes = ca.vertcat(SX(0, 1), *[each.size for each in replaced])
         sides = ca.vertcat(SX(0, 1), *[each.expression for each in replaced])
         return sides / sizes_at(model, parts, substitution.reference, sizes)
@@ -197,13 +197,14 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
 def sizes_at(
     model: Model, parts: Sequence[Closure | Unknown], reference: tuple[float, ...] | None, otherwise: SX
 ) -> SX:
-    """Return the sizes (k, 1) of loop equations or unknowns for values of the parameters.
+    """Return the scales (k, 1) of loop equations or unknowns for values of the parameters.
 
     Args:
         model: the model.
         parts: the k equations or unknowns.
         reference: (n,) values of the parameters, empty for a robot of literal numbers; None for no reference.
-        otherwise: (k, 1) sizes if there is no reference, or where a size is not positive there.
+        otherwise: (k, 1) scales to use without a reference, or in place of a scale that is not positive at the
+            reference.
     """
     if reference is None or not parts:
         return otherwise

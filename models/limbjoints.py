@@ -63,10 +63,10 @@ class LimbJoint:
         name: name of the joint in the robot file; empty for none.
         limb: name of the limb.
         type: letter of the joint type: ``R, P, H, C, U, S`` or ``Pa``.
-        coordinates: coordinates of the joint from home, from the base side on; empty for a spherical joint, and where
-            they are not known.
-        cone: directions of a universal or spherical joint; None for other joints, and where they are not known.
-        unknown: reason why coordinates or cone are not known, as a clause; empty if they are known.
+        coordinates: coordinates of the joint from home, from the base side on; empty for a spherical joint, and if the
+            coordinates are not known.
+        cone: directions of a universal or spherical joint; None for other joints, and if the directions are not known.
+        unknown: reason why coordinates or cone are not known, as a clause; empty if both are known.
     """
 
     label: str

@@ -1,10 +1,10 @@
 """Wrench space of a limb member with locked actuators, and the projector onto it.
 
 With all actuators locked, a member allows platform motions in the span of its passive joint screws. It resists all
-others with the wrenches reciprocal to these screws. In *scaled coordinates* about the member's centre ``c``, with a
-length ``l``, a twist is ``x = (v + w x c, l w)`` and a wrench ``y = (f, (m - c x f)/l)``; their work rate is ``y . x``.
-With ``P`` the orthogonal projector on the complement of the passive screws, ``|P x|^2`` is the sum of squared work
-rates of any orthonormal basis of the wrenches, so that no basis is needed.
+other motions with the wrenches reciprocal to these screws. In *scaled coordinates* about the member's centre ``c``,
+with a length ``l``, a twist is ``x = (v + w x c, l w)`` and a wrench ``y = (f, (m - c x f)/l)``; their work rate is
+``y . x``. With ``P`` the orthogonal projector on the complement of the passive screws, ``|P x|^2`` is the sum of
+squared work rates of any orthonormal basis of the wrenches, so that no basis is needed.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ class Member:
         kinds: kind of each wrench of a basis, for almost all dimensions and poses: ``6 - rank`` wrenches, or ``3 -
             rank`` of a pinned member.
         is_pinned: True if a spherical joint at the centre transmits only forces through the centre.
-        slide: (3, 1) current unit axis of the last passive joint, if the centre is an arbitrary point of it; None for a
-            centre that the joints or the user determine.
+        slide: (3, 1) current unit axis of the last passive joint, if the centre is an arbitrary point of this axis;
+            None for a centre that the joints or the user determine.
         name: name of the member if the limb has several; empty for the name of the limb.
         groups: groups of dependent screws, processed one after the other; empty to process all at once.
     """
@@ -70,7 +70,7 @@ class _Powers(NamedTuple):
     """Faddeev-LeVerrier recursion after a number of steps equal to the rank.
 
     Attributes:
-        last, before: (m, m) matrices of the last step and of the step before.
+        last, before: (m, m) matrices of the last step and of the preceding step.
         coefficient: (1, 1) the last coefficient.
         scale: (1, 1) divisor of ``A A'``.
     """

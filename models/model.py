@@ -50,7 +50,7 @@ class Model(Whole, Shown):
     Attributes:
         name: name of the robot in case files.
         description: one sentence for people.
-        options: options of the robot function for this model.
+        options: options with which the robot function made this model.
         legs: legs between joint centres, for limits on joints, plates and clearances; empty for other limbs.
         built: rows with joint-centre errors of the legs, for manufacturing tolerances; empty for a robot without them.
         parameters: dimensions that a case fixes or frees.
@@ -60,9 +60,9 @@ class Model(Whole, Shown):
         members: limb members, which resist with a space of wrenches; their rows follow those of ``wrenches``.
         quantities: named quantities for results and limits.
         scene: drawing of the robot.
-        unknowns: unknowns of the closure equations; empty for robots with rows that follow from parameters and pose.
+        unknowns: unknowns of the closure equations; empty for robots whose rows follow from parameters and pose.
         closure: independent equations that determine the unknowns, given the free actuator coordinates.
-        loops: all loop equations; empty if they are those of ``closure``.
+        loops: all loop equations; empty if ``closure`` contains all of them.
         signs: expressions that are positive in the home assembly mode, where they are known.
         distances: equations that follow from the loop equations and speed up searches over boxes.
         actuators: actuated joints of a robot given joint by joint; empty for a robot given by its rows.
@@ -196,7 +196,7 @@ def _check_shapes(model: Model) -> None:
         if len(parameter.typical) not in (1, 3):
             raise _model_error(model, f"parameter {parameter.name!r} should have 1 or 3 components")
         if len(parameter.starter or parameter.typical) != len(parameter.typical):
-            raise _model_error(model, f"parameter {parameter.name!r} should have as many components in a starter case")
+            raise _model_error(model, f"parameter {parameter.name!r} needs as many components in a starter case")
     expected: list[tuple[str, SX, tuple[int, int]]] = [
         ("pose rotation", model.pose.rotation, (3, 3)),
         ("pose position", model.pose.position, (3, 1)),

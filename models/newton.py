@@ -26,7 +26,7 @@ class Linear(NamedTuple):
     Attributes:
         residual: (m,) left sides, zero at a solution.
         slopes: (m, n) derivatives of the left sides with respect to the coordinates of a step.
-        damping: term added to the squared singular values: 0 for a full step.
+        damping: term added to the squared singular values; 0 for a full step.
     """
 
     residual: FloatArray
@@ -61,7 +61,7 @@ def newton(
         at: first point.
         steps: largest number of steps.
         zeros: relative sizes below which singular values count as zero, one for each trial; None for rounding.
-        parts: fractions of the step, one for each further trial with the same singular values.
+        parts: fractions of the step to try in turn, with the same zero singular values.
     """
     for _ in range(steps):
         linear = equations.linear(at)
@@ -103,7 +103,7 @@ class VectorEquations:
         values: function of a vector (n,), which returns left sides (m,) or (m, 1), and derivatives (m, n or more).
         closed: largest left side at a solution.
         moving: indices of the variable components; all by default.
-        size: scale of each variable component; 1 by default.
+        size: scale of each variable component, for shortest steps; 1 by default.
     """
 
     def __init__(

@@ -86,8 +86,8 @@ class Unknown:
         symbol: (1, 1) CasADi symbol.
         dimension: length, angle (radians) or dimensionless number.
         description: a few words for people.
-        lower: finite lower bound of the search for assembly modes, in parts of ``size``.
-        upper: finite upper bound of this search, in parts of ``size``.
+        lower: finite lower bound in the search for assembly modes, relative to ``size``.
+        upper: finite upper bound in the search for assembly modes, relative to ``size``.
         size: (1, 1) order of magnitude of the unknown as an expression of the parameters: 1, or a length of the robot.
         joint: label, such as ``2:3``, of the actuated joint, for a free actuator coordinate; empty for a determined
             unknown.
@@ -118,7 +118,8 @@ class Closure:
     Attributes:
         name: unique name within the model.
         expression: (1, 1) left side of the equation.
-        size: (1, 1) positive expression of the parameters that scales the equation to order 1.
+        size: (1, 1) positive expression of the parameters by which the equation is divided, so that its values are
+            about 1.
     """
 
     name: str
@@ -127,7 +128,7 @@ class Closure:
 
     @property
     def scaled(self) -> SX:
-        """Left side of the equation (1, 1), scaled to order 1."""
+        """Left side of the equation (1, 1), divided by its scale."""
         return self.expression / self.size
 
 
@@ -139,7 +140,7 @@ class AssemblySign:
         name: unique name within the model.
         limb: name of the limb.
         value: (1, 1) expression; only its sign has a meaning.
-        is_mode: True if a negative value is another working mode; False if it is no assembly.
+        is_mode: True if a negative value means another working mode; False if it means that joints do not fit together.
     """
 
     name: str
@@ -190,8 +191,8 @@ class Leg:
         platform: (3, 1) centre of the leg's platform joint in the platform frame, length.
         base_error: (3, 1) symbols of the joint-centre error on the base, in the frame of that centre, length.
         platform_error: (3, 1) symbols of the joint-centre error on the platform, in the frame of that centre, length.
-        centres: names of both joint centres in a :class:`~.displaced.DisplacedRobot`: labels of joints of a limb given
-            joint by joint; empty for the name of the leg and its plate.
+        centres: names of both joint centres in a :class:`~.displaced.DisplacedRobot`. For a limb given joint by joint,
+            these are labels of joints. Empty names stand for the name of the leg and its plate.
     """
 
     name: str
@@ -221,8 +222,8 @@ class Actuator:
         name: unique name within the model.
         limb: name of the limb with the joint.
         members: labels of the members that the actuator moves.
-        screws: (6, k) platform twist about the world origin for a unit rate of this actuator while the others stand
-            still, one column for each member, up to the twists that the member allows.
+        screws: (6, k) platform twist about the world origin for a unit rate of this actuator while the other actuators
+            stand still. There is one column for each member, determined up to the twists that the member allows.
         dimension: length for a prismatic joint or a parallelogram, angle for a revolute joint.
         relations: (r, 1) coefficients of the actuator in the equations of the actuator rates only, which loops impose:
             the same number for all actuators of a robot; none unless nested loops have more actuators than degrees of
@@ -263,7 +264,7 @@ class JointScrews:
         passive_rank: rank of the platform motions by passive joints, at almost all dimensions and poses.
         all_rank: rank of the platform motions by all joints, at almost all dimensions and poses.
         member: name of the member of nested loops; empty for a path of joints.
-        loops: (m, k) matrix ``L`` of nested loops, dimensionless for rates of order 1.
+        loops: (m, k) matrix ``L`` of nested loops, dimensionless for scaled rates.
         loop_rank: rank of the passive columns of ``L``, at almost all dimensions and poses.
         centre: (3, 1) centre of the member, length.
     """
@@ -309,7 +310,7 @@ class GenericRanks:
 
     Attributes:
         jacobian: rank of all rows.
-        constraints: rank of the constraint wrenches; the platform has six degrees of freedom less this rank.
+        constraints: rank of the constraint wrenches; the platform has six minus this rank degrees of freedom.
         idle: dimension of the space of actuator rates with which the platform does not move.
         undetermined: names of the actuators with undetermined rates.
         motions: motions of the platform at some of these configurations; empty for six degrees of freedom.

@@ -22,7 +22,7 @@ _SAME = 1e-9
 
 
 class ColumnGroup(NamedTuple):
-    """Indices of columns of a matrix, and the rank that they add to that of the groups before."""
+    """Indices of columns of a matrix, and the rank that these columns add to the preceding groups."""
 
     columns: tuple[int, ...]
     rank: int
@@ -74,9 +74,9 @@ def column_groups(matrices: Sequence[FloatArray], rank: int) -> tuple[ColumnGrou
     """Return groups of columns with ranks that add up at every point where the varying matrix has its full rank.
 
     First come rotations with axes at constant angles to each other, one by one: such columns are independent
-    everywhere. Then come the smallest groups that depend on no column of another group, beyond those before. Each group
-    keeps its rank where the whole matrix does, so that the choice of columns causes no singularity. Columns that are
-    zero are in the first group: there are more of them where the loops of their joints are singular.
+    everywhere. Then come the smallest groups that depend on no column outside this group and the preceding groups.
+    Each group keeps its rank where the whole matrix does, so that the choice of columns causes no singularity. Columns
+    that are zero are in the first group: there are more of them where the loops of their joints are singular.
 
     Args:
         matrices: (size, n) each: the same columns at different points, velocities and, if the size is 6, rotations of

@@ -9,8 +9,8 @@ force or torque
 with moments about the platform's origin and v its velocity. The motions ``x_k`` span all platform motions. The rates of
 all actuators in a motion ``chi = X qdot`` are ``(X' S X)^-1 X' S chi`` for any weights S.
 
-``J x_k = d_k`` has a solution if the robot has as many actuators as degrees of freedom, for any number of rows of J. It
-is solved by the normal equations with one step of refinement, without a choice of rows.
+``J x_k = d_k`` has a solution if the robot has as many actuators as degrees of freedom, for any number of rows of J.
+The solution uses the normal equations with one step of refinement, without a choice of rows.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def driven_joints(model: Model) -> tuple[DrivenJoint, ...]:
     return tuple(DrivenJoint(each.name, each.name, Dimension.LENGTH) for each in model.legs)
 
 
-def freedoms_of(model: Model) -> int:
+def degrees_of_freedom(model: Model) -> int:
     """Return the degrees of freedom of the platform with free actuators, at almost all dimensions and poses."""
     if model.generic is not None:
         return 6 - model.generic.constraints
@@ -53,7 +53,7 @@ def freedoms_of(model: Model) -> int:
 
 def statics_hindrance(model: Model) -> str:
     """Return the reason why loads do not determine the actuator forces, as a clause; empty if they do."""
-    count, freedoms = len(driven_joints(model)), freedoms_of(model)
+    count, freedoms = len(driven_joints(model)), degrees_of_freedom(model)
     if not count:
         return "its actuators are not known"
     if not freedoms:
@@ -180,7 +180,9 @@ def _without_zeros(relations: SX) -> SX:
 
 
 def posed_statics(model: Model, robot: RobotInstance) -> Statics:
-    """Return the platform motions for unit actuator rates at a pose, by minors for six rows of legs and couples.
+    """Return the platform motions for unit actuator rates at a pose.
+
+    If J has six rows, only of straight legs and couples, the motions are quotients of minors of J.
 
     Args:
         model: robot for which :func:`statics_hindrance` returns an empty text.

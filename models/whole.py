@@ -31,7 +31,7 @@ def expressions_of(value: object) -> list[SX]:
 
 
 def with_expressions(value: Value, expressions: Iterator[SX]) -> Value:
-    """Return a value with its expressions, as of :func:`expressions_of`, replaced by the next ones of an iterator."""
+    """Return a value whose expressions, see :func:`expressions_of`, are replaced by the next ones of an iterator."""
     parts = {key: with_expressions(part, expressions) for key, part in _parts(value).items()}
     found: Any = value
     if isinstance(value, SX):

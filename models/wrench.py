@@ -25,7 +25,8 @@ class RowLabel(NamedTuple):
     Attributes:
         limb: name of the limb that applies the wrench.
         kind: kind of the wrench.
-        member: name of the member that applies the wrench: that of the limb, with a number if the limb has several.
+        member: name of the member that applies the wrench: the limb's name, with a number if the limb has several
+            members.
     """
 
     limb: str

@@ -1,10 +1,10 @@
-"""Programs over the robots of :mod:`screwsynth.models`: cases, formulation, solution, evidence and output."""
+"""Cases, nonlinear programs, solutions, evidence, proofs and output for the robots of :mod:`screwsynth.models`."""
 
 from .system.lazynames import lazy_names
 
 __version__ = "0.1.0"
 
-# The public names stand in ``__init__.pyi``.
+# ``__init__.pyi`` lists the public names.
 __all__, __getattr__ = lazy_names(__name__, __name__, __file__)
 
 

@@ -1,4 +1,4 @@
-"""``python -m screwsynth.nlp`` is the command line."""
+"""Command line as ``python -m screwsynth.nlp``."""
 
 from .cli.main import main
 

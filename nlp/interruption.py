@@ -1,13 +1,12 @@
-"""Requests to stop: at once, such as by Ctrl-C, or at the end of a time; and the work that answers them itself.
+"""Interrupts such as Ctrl-C and time limits, with partial results.
 
-The time of a command, or of a call, is stated once, with :func:`within`; every search of its block takes from what is
-left of it, and ends by itself.
+:func:`within` states the time of a command or call once; every search in its block uses a part of the remaining time.
 
-A request ends the process, unless work with partial results has begun: such work checks regularly whether it is
-requested to stop. The command line listens, with :func:`listen`; a program that imports this package gets Python's own
-``KeyboardInterrupt``. A search takes note of it instead, ends after the present step, and returns the state that its
-last complete step left; the searches that follow in the same call (:func:`one_call`) end at once. Elsewhere, and at a
-second interrupt in one step, it ends the call.
+An interrupt ends the process, unless work with partial results has begun, which checks regularly for requests to stop.
+The command line handles interrupts with :func:`listen`; a program that imports this package gets Python's
+``KeyboardInterrupt``. A search instead ends after its current step, and returns the state after its last complete step;
+further searches of the same call (:func:`one_call`) end at once. Other work, and a second interrupt in one step, ends
+the call.
 """
 
 from __future__ import annotations
@@ -29,19 +28,19 @@ from typing import NamedTuple, ParamSpec, TypeVar
 
 Inputs = ParamSpec("Inputs")
 Result = TypeVar("Result")
-#: Exit status of an interrupted command, by the convention of shells: 128 and the number of the signal.
+#: Exit status of an interrupted command, by the convention of shells: 128 plus the number of the signal.
 INTERRUPTED = 130
-#: Seconds that interrupted work may take to show what it has, and that a file may take to be complete.
+#: Seconds for interrupted work to show partial results, and for a file to become complete.
 _TO_SHOW = 5.0
 _TO_WRITE = 0.5
-#: Ends the line of progress and shows the cursor, which that line hides.
+#: Control sequence that ends the line of progress and shows the cursor, which the line hides.
 _CLEAR = "\r\x1b[K\x1b[?25h"
-#: Reason for which an interrupted search stops.
+#: Reason of an interrupted search.
 STOPPED = "interrupted"
 
 
 class Milestone(enum.Enum):
-    """Progress of the work from which on there is something to show."""
+    """Progress from which on the work has partial results."""
 
     START = "a start of a search is done"
     BOUND = "the search of the whole box has begun"
@@ -51,28 +50,28 @@ class Milestone(enum.Enum):
     CASE = "a case is checked"
 
 
-#: Held while a file is written, so that none is left half written.
+#: Lock during the writing of a file, so that no file stays half written.
 WRITING = Lock()
-#: Files that are being written under names that are not theirs, and names of those that are written.
+#: Temporary files that are being written, and names of written files.
 _unfinished: set[Path] = set()
 _written: list[str] = []
 _awaited: set[Milestone] = set()
 _answers = Event()
 _requested = Event()
-#: Set once a search of the present call was interrupted by Python.
+#: Set after Python interrupted a search of the current call.
 _call: ContextVar[Event | None] = ContextVar("call", default=None)
 
 
 class _StoppedError(Exception):
-    """End of a search in the middle of its set-up."""
+    """End of a search during its set-up."""
 
 
-#: Whether the work is that of a search, which answers a stop.
+#: True during a search, which handles a request to stop.
 _in_search: ContextVar[bool] = ContextVar("in_search", default=False)
 
 
 class _End(NamedTuple):
-    """When the work of a block ends, by the clock, and the part of the time left that one search of it may take."""
+    """End of the work of a block, by the clock, and fraction of the remaining time for one search."""
 
     at: float = math.inf
     part: float = 1.0
@@ -80,12 +79,12 @@ class _End(NamedTuple):
 
 _FOREVER = _End()
 _end: ContextVar[_End] = ContextVar("end", default=_FOREVER)
-#: Process that has something to say where it is ended, and the function that returns its sentence.
+#: Process with a sentence for its end, and function that returns the sentence.
 _parting: list[tuple[int, Callable[[], str]]] = []
 
 
 def answer_after(milestone: Milestone) -> None:
-    """Declare that requests after a milestone are answered by the work, which shows what it has."""
+    """Declare that after a milestone the work handles requests to stop, and shows partial results."""
     _awaited.add(milestone)
 
 
@@ -96,13 +95,16 @@ def reached(milestone: Milestone) -> None:
 
 
 def say_on_leaving(sentence: Callable[[], str]) -> None:
-    """Declare a function that says what is kept where a request ends this process, but none that it starts."""
+    """Register a function that returns the sentence about kept results.
+
+    It is printed at the end of this process, not of a child process.
+    """
     _parting[:] = [(os.getpid(), sentence)]
 
 
 @contextmanager
 def unfinished(path: Path) -> Iterator[None]:
-    """Declare a file that is removed where a request ends the process in this block."""
+    """Declare a file that is removed if a request ends the process in this block."""
     _unfinished.add(path)
     try:
         yield
@@ -116,7 +118,7 @@ def wrote(name: str) -> None:
 
 
 def kept() -> str:
-    """Return what is kept of the work that a request ended."""
+    """Return a sentence on the kept results of interrupted work."""
     for process, sentence in _parting:
         if process == os.getpid():
             return sentence()
@@ -124,7 +126,7 @@ def kept() -> str:
 
 
 def is_requested() -> bool:
-    """Return whether the work is to stop: it is interrupted, or its time is over."""
+    """Return whether the work must stop, because it is interrupted or its time is over."""
     return is_interrupted() or seconds_left() <= 0
 
 
@@ -135,29 +137,29 @@ def is_interrupted() -> bool:
 
 
 def why_stopped() -> str:
-    """Return why work that is requested to stop does so."""
+    """Return the reason of a request to stop."""
     return STOPPED if is_interrupted() else "the time is over"
 
 
 def seconds_left() -> float:
-    """Return the seconds until the time of this block is over; infinite without a limit."""
+    """Return the remaining seconds of this block; infinite without a limit."""
     end = _end.get().at
     return end if end == math.inf else max(end - time.perf_counter(), 0.0)
 
 
 @contextmanager
 def within(seconds: float | None, part: float = 1.0) -> Iterator[None]:
-    """Let the work of this block end after so many seconds, and no later than that of the block around it.
+    """Limit the time of the work in this block, also by the time of the enclosing block.
 
-    No block yields values of a generator, whose reader would be within the block too.
+    A generator must not yield in such a block, because its reader would be within the block too.
 
     Args:
-        seconds: the time; None for that of the block around it.
-        part: of the time left that one search takes at most, so that those after it have some too.
+        seconds: time limit; None for that of the enclosing block.
+        part: largest fraction of the remaining time for one search, so that later searches have time too.
     """
     left = seconds_left()
     limit = left if seconds is None else min(seconds, left)
-    # The clock is asked only where there is a limit.
+    # Read the clock only if there is a limit.
     token = _end.set(_End(limit if limit == math.inf else time.perf_counter() + limit, part))
     try:
         yield
@@ -166,16 +168,16 @@ def within(seconds: float | None, part: float = 1.0) -> Iterator[None]:
 
 
 def one_search(seconds: float | None = None) -> AbstractContextManager[None]:
-    """Let the work of a block be one search: it takes its part of the time left, and so many seconds at most."""
+    """Limit the work of a block as one search: to its fraction of the remaining time, and to ``seconds``."""
     left, part = seconds_left(), _end.get().part
     return within(left * part if seconds is None else min(seconds, left * part))
 
 
 def one_call(function: Callable[Inputs, Result]) -> Callable[Inputs, Result]:
-    """Let an interrupt that ends a search of a function, or of the outermost one, end all its others at once too.
+    """Decorate a function so that an interrupt of one of its searches ends all its other searches at once.
 
-    The outermost call runs in a copy of its context: an interrupt at any moment of it leaves no time limit and no
-    request behind in a program that goes on.
+    Of nested calls the outermost counts. It runs in a copy of its context: after an interrupt, no time limit and no
+    request remain in the program.
     """
 
     @wraps(function)
@@ -190,19 +192,18 @@ def one_call(function: Callable[Inputs, Result]) -> Callable[Inputs, Result]:
 
 
 def reason_of(search: Callable[[], str]) -> str:
-    """Run a search; return its reason for stopping before its end, or that Python interrupted it.
+    """Run a search; return its reason for an early stop, such as an interrupt by Python.
 
-    Its set-up may stop it too, with :func:`stop_if_requested`. Only a search that has returned an empty text is
-    complete. What it claims otherwise must hold in the middle of a step too: a step changes what is claimed by one
-    assignment, its last.
+    The set-up may stop it too, with :func:`stop_if_requested`. Only a search with an empty reason is complete. Partial
+    results must be valid in the middle of a step too: a step changes them by one assignment, its last.
     """
     before, call = _in_search.get(), _call.get()
     noted = Event() if call is None else call
-    # CasADi loses an exception that a signal raises in one of its functions.
+    # CasADi loses exceptions that a signal raises in its functions.
     listens = current_thread() is main_thread() and signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
     def note(number: int, frame: FrameType | None) -> None:
-        """Take note of an interrupt; a second one is Python's."""
+        """Register an interrupt; Python handles a second one."""
         if noted.is_set():
             signal.default_int_handler(number, frame)
         noted.set()
@@ -226,13 +227,13 @@ def reason_of(search: Callable[[], str]) -> str:
 
 
 def stop_if_requested() -> None:
-    """End the search around this call, in the middle of its set-up, where it is to stop; do nothing in other work."""
+    """End the current search during its set-up if it must stop; do nothing in other work."""
     if _in_search.get() and is_requested():
         raise _StoppedError
 
 
 def reason_to_stop(seconds: float, boxes: int = 0, most_boxes: int | None = None) -> str:
-    """Return the reason for stopping a search that began some seconds ago before its end; empty for none."""
+    """Return the reason for an early stop of a search after some seconds and boxes; empty for none."""
     if is_interrupted():
         return STOPPED
     if seconds_left() <= 0:
@@ -243,13 +244,13 @@ def reason_to_stop(seconds: float, boxes: int = 0, most_boxes: int | None = None
 
 
 def listen() -> None:
-    """Listen to interrupts from now on; a process that was started without them, as in the background, stays so."""
+    """Handle interrupts from now on; a process that ignores interrupts, as in the background, still ignores them."""
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, _on_interrupt)
 
 
 def _on_interrupt(_number: int, _frame: FrameType | None) -> None:
-    """Request the work to stop, where it can answer; end the process otherwise, and at a second request."""
+    """Request the work to stop if it can; otherwise, and at a second request, end the process."""
     if not _answers.is_set() or _requested.is_set():
         leave()
     _requested.set()
@@ -259,13 +260,13 @@ def _on_interrupt(_number: int, _frame: FrameType | None) -> None:
 
 
 def leave() -> None:
-    """End the process once a file that is being written is complete, and say on stderr what is kept."""
+    """End the process after the current file is complete, and report the kept results on stderr."""
     WRITING.acquire(timeout=_TO_WRITE)
     try:
         # Only a bar of progress hides the cursor.
         is_shown = "rich.progress" in sys.modules and os.isatty(2)
         os.write(2, f"{_CLEAR if is_shown else ''}\nscrewsynth: interrupted: {kept()}\n".encode())
-    except OSError:  # nobody reads any more
+    except OSError:  # stderr is closed
         pass
     for path in list(_unfinished):
         with suppress(OSError):

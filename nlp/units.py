@@ -1,4 +1,7 @@
-"""Units of a case: labels for lengths and forces, and degrees or radians for people. Computations are in radians."""
+"""Units of a case: labels of lengths and forces, and degrees or radians in files and tables.
+
+Computations use radians.
+"""
 
 from __future__ import annotations
 
@@ -9,13 +12,13 @@ from typing import Literal
 from ..models import Dimension
 from ..models.values import dataclass
 
-#: Largest distance from 1 of the size of a unit screw, whose motion is measured by its angle, or by its translation.
+#: Largest difference from 1 of the magnitude of a unit screw, whose motion is measured by its angle or translation.
 _UNIT = 1e-9
 
 
 @dataclass(frozen=True)
 class Units:
-    """The units of a case.
+    """Units of a case.
 
     Attributes:
         length: label of the length unit for every output; lengths are never converted.
@@ -28,20 +31,20 @@ class Units:
     force: str = "N"
 
     def to_internal(self, value: float, dimension: Dimension) -> float:
-        """Return a number in the case's unit as computations use it, in radians for an angle."""
+        """Return a value in the case's unit as used in computations, in radians for an angle."""
         return math.radians(value) if self._is_degrees(dimension) else float(value)
 
     def shown(self, value: float, dimension: Dimension) -> float:
-        """Return a number from a computation in the case's unit.
+        """Return a computed value in the case's unit.
 
         Degrees are rounded to 15 significant digits, so that 30 stays 30 and does not become 29.999999999999996.
         """
         return float(f"{math.degrees(value):.15g}") if self._is_degrees(dimension) else float(value)
 
     def written(self, value: float, dimension: Dimension) -> float:
-        """Return the number in the case's unit from which :meth:`to_internal` makes a value again, to the last bit.
+        """Return the value in the case's unit that :meth:`to_internal` converts back exactly, to the last bit.
 
-        Where no number of degrees does so, the result is the nearest one.
+        If no value in degrees does so, the result is the nearest one.
         """
         number = self.shown(value, dimension)
         if not self._is_degrees(dimension):
@@ -51,16 +54,16 @@ class Units:
         return min(near, key=lambda each: abs(math.radians(each) - value))
 
     def per_unit(self, derivative: float, dimension: Dimension) -> float:
-        """Return a derivative with respect to a number of a computation as that with respect to it in the case's unit.
+        """Return a derivative with respect to a computed value, converted to the case's unit of the value.
 
         Args:
-            derivative: per radian for an angle.
-            dimension: dimension of the number.
+            derivative: derivative, per radian for an angle.
+            dimension: dimension of the value.
         """
         return derivative * self.to_internal(1.0, dimension)
 
     def label(self, dimension: Dimension) -> str:
-        """Return the label of the unit; an empty one for a plain number."""
+        """Return the label of the unit; empty for a dimensionless value."""
         return {
             Dimension.LENGTH: self.length,
             Dimension.ANGLE: self.angle,
@@ -73,7 +76,7 @@ class Units:
         }[dimension]
 
     def text(self, value: float, dimension: Dimension) -> str:
-        """Return a number from a computation with its unit, for messages."""
+        """Return a computed value with its unit, for messages."""
         return f"{self.shown(value, dimension):.10g} {self.label(dimension)}".strip()
 
     def _is_degrees(self, dimension: Dimension) -> bool:
@@ -81,30 +84,30 @@ class Units:
 
 
 def rate_unit(twist: Iterable[float], units: Units, dimension: Dimension = Dimension.LENGTH) -> str:
-    """Return the unit of a rate: per radian or length of a unit screw, or else per unit of time.
+    """Return the unit of a rate: per radian or length of a unit screw, else per unit of time.
 
     Args:
         twist: (6,) angular velocity, then velocity at the world origin.
         units: units of the case.
-        dimension: of the coordinate that has the rate: of a limb's wrench or a slide a length, of a hinge an angle,
-            whose rates are in radians.
+        dimension: dimension of the coordinate with the rate: length for a limb's wrench or a slide, angle for a hinge,
+            with rates in radians.
     """
     own = "rad" if dimension is Dimension.ANGLE else units.length
     return own + _per_motion(twist, units)
 
 
 def slope_unit(label: str | None) -> str:
-    """Return the unit of a derivative of F by a number with a unit; a plain number has none."""
+    """Return the unit of the derivative of F with respect to a value with the given unit label, if any."""
     if not label:
         return "F per 1"
     return f"F/({label})" if "/" in label else f"F per {label}" if " " in label else f"F/{label}"
 
 
 def twist_units(twist: Iterable[float], units: Units) -> tuple[str, ...]:
-    """Return the units of a twist's six numbers: angular velocity, then velocity at the world origin.
+    """Return the units of a twist's six components: angular velocity, then velocity at the world origin.
 
     Args:
-        twist: (6,) the numbers.
+        twist: (6,) components of the twist.
         units: units of the case.
     """
     per = _per_motion(twist, units)
@@ -112,7 +115,7 @@ def twist_units(twist: Iterable[float], units: Units) -> tuple[str, ...]:
 
 
 def _per_motion(twist: Iterable[float], units: Units) -> str:
-    """Return the end of a unit that is per radian or length of a unit screw, or else per unit of time."""
+    """Return the denominator of a unit: per radian or length of a unit screw, else per unit of time."""
     parts = [float(part) for part in twist]
     omega, v = math.hypot(*parts[:3]), math.hypot(*parts[3:])
     if abs(omega - 1) <= _UNIT:
@@ -123,10 +126,10 @@ def _per_motion(twist: Iterable[float], units: Units) -> str:
 
 
 def objective_unit(twists: Iterable[Iterable[float]], units: Units) -> str:
-    """Return the unit of F: that of the rates, squared; an empty text where tasks do not agree in it.
+    """Return the unit of F, the squared unit of the rates; empty if it differs between tasks.
 
     Args:
-        twists: (6,) of each task over which F is taken.
+        twists: twists (6,) of the tasks in F.
         units: units of the case.
     """
     found = {rate_unit(twist, units) for twist in twists}

@@ -4,7 +4,7 @@ The modules in order, each of which imports only those before it: ``topology`` (
 trees), ``graph`` (links, joints and couplings, and checks of a mechanism), ``motions`` (links and screws at any
 coordinates), ``descent`` (joints moved until equations are satisfied), ``closing`` (closed loops at a pose or at
 actuator coordinates), ``decomposition`` (limbs, branches, and parts that resist the platform), ``limbs`` (tables of a
-robot file), ``freedoms`` (twists that joints allow), ``centre`` (centre of a member), ``wrenches`` (wrenches, F, rates
+robot file), ``mobility`` (twists that joints allow), ``centre`` (centre of a member), ``wrenches`` (wrenches, F, rates
 and ranks), ``singularities`` (ranks compared with generic ones). Mechanisms of robot files are made in
 :mod:`screwsynth.models.joints.home.mechanisms`.
 """

@@ -24,14 +24,14 @@ _SHORTEST = 1 / 1024
 #: Largest number of Newton steps at each point of the path, and the step lengths of the line search.
 _STEPS = 40
 _PARTS = [0.5**k for k in range(12)]
-#: Ratio of residuals above which the iteration stops: no solution is near.
+#: Ratio of successive residuals above which the iteration stops, because no solution is near.
 _STUCK = 0.999
 #: Residual below which Newton's method stops; it also stops when the residual no longer falls.
 _EXACT = 2e-16
 #: Relative size below which singular values of the derivatives are zero: those of dependent loops, and of rods that
 #: spin freely, are rounding errors.
 _ZERO = 1e-9
-#: Largest change of a coordinate of order 1 in a step: a larger one may be a jump to another assembly mode.
+#: Largest change of a scaled coordinate in a step; a larger change may be a jump to another assembly mode.
 _LARGE = 0.6
 
 
@@ -43,8 +43,9 @@ class ClosedMechanism:
         mechanism: mechanism at the closed configuration, in which positions, axes and ranges of its joints are stated.
         coordinates: coordinate of each joint R, P and H from the start configuration, radians or length.
         residual: largest error of a loop, radians or relative to the mechanism's size.
-        nearness: smallest singular value of the loops' derivatives along the path, relative to its start; values that
-            are zero everywhere do not count. Near 0, the path comes close to a singularity of the joints.
+        nearness: smallest singular value of the loops' derivatives along the path, relative to its value at the start.
+            Values that are zero everywhere do not count. If nearness is close to 0, the path comes close to a
+            singularity of the joints.
         points: number of closed configurations on the path.
     """
 
@@ -98,7 +99,7 @@ def close(
             continue
         if found is None:
             fault = f"its loops do not close at the requested pose or actuators: after {100 * done:.0f} % of the way"
-            raise MechanismError("", f"{fault} they stay open by {values[0]:.3g}")
+            raise MechanismError("", f"{fault} the loops stay open by {values[0]:.3g}")
         at, done, step = found, part, 2 * step
         spectra.append(values)
     return _closed(path, at, _nearness(spectra), len(spectra))
@@ -142,7 +143,7 @@ class _Path:
 
     Args:
         motions: kinematics of the mechanism.
-        held: prescribed coordinates at the end of the path, of order 1, by column.
+        held: prescribed scaled coordinates at the end of the path, by column.
         pose: platform pose as a function of the fraction of the path; None for a free pose.
     """
 

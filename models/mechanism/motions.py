@@ -2,7 +2,7 @@
 
 Links are placed along a spanning tree from the base. A joint outside the tree closes a loop: its residual is the
 displacement between its two sides. Angles are in radians and lengths relative to the mechanism's size, so that
-residuals and coordinates are of order 1.
+residuals and coordinates are dimensionless.
 """
 
 from __future__ import annotations
@@ -80,8 +80,8 @@ class Equations(NamedTuple):
     """Equations of a mechanism at given coordinates.
 
     Attributes:
-        residual: (m,) left sides of order 1, zero at a solution.
-        slopes: (m, n) derivatives with respect to coordinates of order 1, exact at a solution.
+        residual: (m,) scaled left sides, zero at a solution.
+        slopes: (m, n) derivatives with respect to scaled coordinates, exact at a solution.
     """
 
     residual: FloatArray
@@ -147,7 +147,7 @@ class Motions:
         unit = [
             self.size if joint.kind == "P" else 1.0 for joint in mechanism.joints for _ in range(WIDTHS[joint.kind])
         ]
-        #: (n,) factors from coordinates of order 1 to radians and lengths.
+        #: (n,) factors from scaled coordinates to radians and lengths.
         self.units = np.array(unit)
 
     @property
@@ -209,7 +209,7 @@ class Motions:
         return Coordinates(values, balls)
 
     def at_point(self, twists: FloatArray, point: FloatArray) -> FloatArray:
-        """Return twists (6, n) with the velocities of a point relative to the size, for coordinates of order 1."""
+        """Return twists (6, n) with the velocities of a point relative to the size, for scaled coordinates."""
         velocities = twists[3:] + np.cross(twists[:3].T, point).T
         return np.asarray(np.vstack([twists[:3], velocities / self.size]) * self.units)
 

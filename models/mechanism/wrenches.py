@@ -20,8 +20,8 @@ from ..rows import RANK_TOLERANCE, rank_of
 from ..wrench import WrenchKind
 from .centre import centre_of, centre_rule
 from .decomposition import MemberGraph, robot_graph
-from .freedoms import Mobility
 from .graph import Mechanism, check_mechanism
+from .mobility import Mobility
 
 
 def scaled_twists(twists: FloatArray, centre: FloatArray, length: float) -> FloatArray:
@@ -111,7 +111,7 @@ class RobotWrenches:
     Attributes:
         members: members of the mechanism.
         ranks: ranks at the configuration.
-        units: rate of each actuated joint, by name, that moves the platform with a velocity of order 1.
+        units: rate of each actuated joint, by name, that moves the platform with a velocity of about 1.
         feasible: (6, f) basis of the platform twists with free actuators.
     """
 

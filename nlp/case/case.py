@@ -30,14 +30,14 @@ from .checks import (
     check_value,
     check_vector,
 )
-from .excursions import NotHeld, check_excursions, in_world, not_held, refuse_free
-from .existence import fault_of_dimensions
+from .excursions import OutsideWorkspace, check_excursions, in_world, outside_workspace, refuse_free
+from .existence import assembly_fault
 from .limits.limit import Limit, LimitedCase
 from .limits.limits import Limits
 from .loads import NO_LOADING, Loading
 from .names import parameter_name, pose_prefixes
 from .pathfile import PathFile
-from .pose import HERE, LARGEST, MAX_FREE_ROTATION, Free, OverPoses, Pose, Rotation, Value
+from .pose import LARGEST, MAX_FREE_ROTATION, NO_DISPLACEMENT, Free, OverPoses, Pose, Rotation, Value
 from .radians import angles_of, check_radians, with_radians
 from .settings import Expectation, Published, Search
 from .task import MEASURES, Method, Sense, Task
@@ -91,7 +91,7 @@ class Case(Whole, Shown):
     units: Units = field(default_factory=Units)
     characteristic_length: float = 1.0
     limits: Limits = field(default_factory=Limits)
-    displacements: tuple[Displacement, ...] = (HERE,)
+    displacements: tuple[Displacement, ...] = (NO_DISPLACEMENT,)
     further: Sequence[Pose] = ()
     over_poses: OverPoses = OverPoses.SUM
     worst_everywhere: bool = False
@@ -129,7 +129,7 @@ class Case(Whole, Shown):
         """
         store = object.__setattr__
         store(self, "parameters", MappingProxyType(_check_parameters(self)))
-        if fault := fault_of_dimensions(self.model, self.parameters, self.units):
+        if fault := assembly_fault(self.model, self.parameters, self.units):
             raise NoRobotError("robot.parameters", fault, source=self.source)
         store(self, "position", _check_position(self, self.position, "pose"))
         store(self, "rotation", _check_rotation(self, self.rotation, "pose"))
@@ -309,12 +309,12 @@ class Case(Whole, Shown):
         return in_world(self.workspace, self.poses[0])
 
     @property
-    def not_held(self) -> NotHeld | None:
+    def outside_workspace(self) -> OutsideWorkspace | None:
         """Reason why the workspace contains no stated pose; None if it contains one, or without a workspace."""
         if self.workspace is None:
             return None
         follows = self.model.generic is not None and self.model.generic.constraints > 0
-        return not_held(self.workspace, self.poses, self.units, by_ranges=follows)
+        return outside_workspace(self.workspace, self.poses, self.units, by_ranges=follows)
 
     @property
     def stated_pose_notice(self) -> str:

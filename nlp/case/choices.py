@@ -14,7 +14,7 @@ from .pose import Free, Value
 Ranges: TypeAlias = tuple[tuple[int, int], ...]
 
 
-class ListedNumber(NamedTuple):
+class CatalogueDimension(NamedTuple):
     """Dimension with catalogue values.
 
     Attributes:
@@ -32,7 +32,7 @@ class ListedNumber(NamedTuple):
     values: tuple[float, ...]
 
 
-class ChosenNumber(JsonObject):
+class ChosenDimension(JsonObject):
     """Dimension with a chosen catalogue value, or with a rounded value.
 
     Attributes:
@@ -52,22 +52,22 @@ class ChosenNumber(JsonObject):
     dimension: Hidden[Dimension] = Dimension.NUMBER
 
 
-def listed_numbers(case: Case) -> tuple[ListedNumber, ...]:
+def catalogue_dimensions(case: Case) -> tuple[CatalogueDimension, ...]:
     """Return the dimensions of a case with catalogue values, in the robot's order."""
     return tuple(
-        ListedNumber(item.name, k, name, item.dimension, value.values)
+        CatalogueDimension(item.name, k, name, item.dimension, value.values)
         for item in case.model.parameters
         for k, (name, value) in enumerate(zip(case.component_names(item), case.components(item.name), strict=True))
         if isinstance(value, Free) and value.values
     )
 
 
-def all_values(numbers: Sequence[ListedNumber]) -> Ranges:
+def all_values(numbers: Sequence[CatalogueDimension]) -> Ranges:
     """Return the slices of all values."""
     return tuple((0, len(each.values)) for each in numbers)
 
 
-def within_ranges(case: Case, numbers: Sequence[ListedNumber], ranges: Ranges) -> Case:
+def within_ranges(case: Case, numbers: Sequence[CatalogueDimension], ranges: Ranges) -> Case:
     """Return a case in which each catalogue dimension is free between two of its values, or fixed at a single value.
 
     Args:
@@ -95,17 +95,17 @@ def chosen_settings(case: Case, fixed: Case) -> Mapping[str, float]:
     """
     return {
         each.name: case.units.shown(value, each.dimension)
-        for each in listed_numbers(case)
+        for each in catalogue_dimensions(case)
         if not isinstance(value := fixed.components(each.parameter)[each.component], Free)
     }
 
 
-def check_no_choice(case: Case) -> None:
+def check_no_catalogue(case: Case) -> None:
     """Refuse a case with catalogue values, for commands that need continuous dimensions.
 
     Raises:
         CaseError: a dimension has catalogue values.
     """
-    for each in listed_numbers(case):
+    for each in catalogue_dimensions(case):
         fault = "has catalogue values, and only solve, report, export and certify choose one: fix it with --set"
         raise CaseError(f"robot.parameters.{each.name}", fault, source=case.source)

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from ...models import Dimension, Displacement, axis_from_screw
 from ..errors import CaseError, listing
 from ..units import Units
-from .pose import HERE, along_screw, over_grid
+from .pose import NO_DISPLACEMENT, along_screw, over_grid
 from .schema import AlongTable, DisplacementTable, GridTable, OffsetsTable, PoseTable
 from .task import Task
 from .toml import TomlValue
@@ -44,7 +44,7 @@ def read_displacements(written: PoseTable, tasks: Sequence[Task], units: Units, 
         return _read_list(written.displacements, f"{key}.displacements")
     if written.along_task is not None:
         return _read_trajectory(written.along_task, tasks, units, f"{key}.along_task")
-    return (HERE,) if written.grid is None else _read_grid(written.grid, f"{key}.grid")
+    return (NO_DISPLACEMENT,) if written.grid is None else _read_grid(written.grid, f"{key}.grid")
 
 
 def _read_trajectory(written: AlongTable, tasks: Sequence[Task], units: Units, key: str) -> tuple[Displacement, ...]:
@@ -97,7 +97,7 @@ def _read_list(written: Sequence[DisplacementTable], key: str) -> tuple[Displace
 def written_displacements(
     displacements: Sequence[Displacement], tasks: Sequence[Task], units: Units
 ) -> dict[str, TomlValue]:
-    """Return the keys of a pose's table for its displacements, the inverse of :func:`read_displacements`.
+    """Return the keys for the displacements in the table of a pose: inverse of :func:`read_displacements`.
 
     Args:
         displacements: displacements of a stated pose.

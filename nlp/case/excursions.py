@@ -107,14 +107,14 @@ def refuse_free(workspace: Workspace, pose: Pose, source: str | None) -> None:
     numbers["rotation.angle"] = "angle", rotation.angle
     for key, (name, value) in numbers.items():
         if isinstance(value, Free):
-            fault = f"is free, but the workspace is about the pose: fix it with --set {name}=..., or use --of RESULT"
+            fault = f"must be fixed, as the workspace is relative to the pose: use --set {name}=... or --of RESULT"
             raise CaseError(f"pose.{key}", fault, source=source)
     if rotation.axis is None and rotation.angle != 0.0:
-        fault = "is free, but the workspace is about the pose: fix it with --set axis=..., or use --of RESULT"
+        fault = "must be fixed, as the workspace is relative to the pose: use --set axis=... or --of RESULT"
         raise CaseError("pose.rotation.axis", fault, source=source)
 
 
-class NotHeld(NamedTuple):
+class OutsideWorkspace(NamedTuple):
     """Report that a workspace in world coordinates contains no stated pose of the case.
 
     Attributes:
@@ -126,7 +126,9 @@ class NotHeld(NamedTuple):
     may_be_excursions: bool
 
 
-def not_held(workspace: Workspace, poses: Sequence[Pose], units: Units, *, by_ranges: bool = False) -> NotHeld | None:
+def outside_workspace(
+    workspace: Workspace, poses: Sequence[Pose], units: Units, *, by_ranges: bool = False
+) -> OutsideWorkspace | None:
     """Return the reason why a workspace in world coordinates contains no stated pose; None if it contains one.
 
     A free coordinate of a pose may have any value in its range. Rotations are compared if both are fixed, or about the
@@ -147,10 +149,10 @@ def not_held(workspace: Workspace, poses: Sequence[Pose], units: Units, *, by_ra
     sentence = f"the workspace does not contain the pose{'' if is_one else 's'}: {fault}"
     if is_one and holds_zero:
         sentence += '; write about = "pose" in [workspace] if its values are excursions from the pose'
-    return NotHeld(sentence, is_one and holds_zero)
+    return OutsideWorkspace(sentence, is_one and holds_zero)
 
 
-def _faults(workspace: Workspace, pose: Pose, units: Units, *, by_ranges: bool) -> Iterator[NotHeld]:
+def _faults(workspace: Workspace, pose: Pose, units: Units, *, by_ranges: bool) -> Iterator[OutsideWorkspace]:
     """Yield a report for each coordinate in which a pose is outside of a workspace, if it can be compared."""
     pairs = [
         (name, stated, at, Dimension.LENGTH)
@@ -163,7 +165,7 @@ def _faults(workspace: Workspace, pose: Pose, units: Units, *, by_ranges: bool) 
         is_compared = isinstance(stated, Free) or not by_ranges
         if is_compared and (least > high + slack or most < low - slack):
             ranges = [_span(each, units, dimension) for each in (stated, at)]
-            yield NotHeld(f"{name} is {ranges[0]} there and {ranges[1]} at the pose", low <= 0 <= high)
+            yield OutsideWorkspace(f"{name} is {ranges[0]} there and {ranges[1]} at the pose", low <= 0 <= high)
     positions = workspace.position_set
     if positions is not None and not any(isinstance(each, Free) for each in pose.position):
         # Coordinates that the shape does not couple were compared before.
@@ -171,7 +173,9 @@ def _faults(workspace: Workspace, pose: Pose, units: Units, *, by_ranges: bool) 
         point[used] = np.array([ends_of(each)[0] for each in pose.position])[used]
         if not positions.contains(point):
             place = ", ".join(units.text(value, Dimension.LENGTH) for value in point[used].tolist())
-            yield NotHeld(f"the position at the pose ({place}) is outside of its {positions.kind.value}", False)
+            yield OutsideWorkspace(
+                f"the position at the pose ({place}) is outside of its {positions.kind.value}", False
+            )
 
 
 def _angles(turns: Turns, rotation: Rotation) -> list[tuple[str, Value, Value]]:

@@ -23,13 +23,11 @@ if TYPE_CHECKING:
 _REMEMBERED = 64
 
 
-def fault_of_dimensions(
-    model: Model, parameters: Mapping[str, Value | Sequence[Value] | FloatArray], units: Units
-) -> str:
+def assembly_fault(model: Model, parameters: Mapping[str, Value | Sequence[Value] | FloatArray], units: Units) -> str:
     """Return the reason why a robot cannot be assembled with some dimensions, as a clause; empty for no known reason.
 
     Args:
-        model: the robot; robots given by the rows of their Jacobian are not examined.
+        model: the robot; robots defined by rows of J are not examined.
         parameters: values of the components of each parameter; expressions of free parameters are not examined.
         units: units of the message.
     """

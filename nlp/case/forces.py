@@ -16,10 +16,10 @@ from casadi import SX
 
 from ...models import Model
 from ...models.parts import Dimension
-from ...models.statics import DrivenJoint, Statics, driven_joints, freedoms_of
+from ...models.statics import DrivenJoint, Statics, degrees_of_freedom, driven_joints
 from .loads import LoadCase, Loading, Motion
 
-#: Smoothing of the norm of a vector at 0: the norm is too large by at most this part of a typical norm.
+#: Smoothing of the norm of a vector at 0: the norm is too large by at most this fraction of a typical norm.
 _SMOOTH = 1e-12
 
 
@@ -34,7 +34,7 @@ class CaseForces(NamedTuple):
             positive in the sense of the actuator's rate.
         spread: (a, 1) largest change of each actuator force by loads of unknown direction, times the magnitude of the
             divisor.
-        divisor: (1, 1) common divisor of the platform's motions by the actuators.
+        divisor: (1, 1) common divisor of the motions of the platform that the actuators drive.
     """
 
     case: LoadCase
@@ -153,7 +153,7 @@ def _reaches(joints: Sequence[DrivenJoint], size: SX) -> list[SX]:
 
 def _speeds(model: Model, statics: Statics, motion: Motion, joints: Sequence[DrivenJoint], size: SX) -> SX:
     """Return the largest speeds (a, 1) of the actuators."""
-    is_legs = freedoms_of(model) == 6 and not model.actuators
+    is_legs = degrees_of_freedom(model) == 6 and not model.actuators
     rates = statics.rows if is_legs else statics.rates(SX(motion.length(size)))
     return ca.vertcat(
         *[
@@ -164,7 +164,7 @@ def _speeds(model: Model, statics: Statics, motion: Motion, joints: Sequence[Dri
 
 
 def _size(vector: SX, typical: SX) -> SX:
-    """Return the norm of a vector (3, 1), smooth where it is 0; ``typical`` (1, 1) is a norm of its order."""
+    """Return the norm of a vector (3, 1), smooth where it is 0; ``typical`` (1, 1) is a typical norm."""
     return SX(0) if vector.is_zero() else ca.sqrt(ca.sumsqr(vector) + (_SMOOTH * typical) ** 2)
 
 

@@ -31,7 +31,7 @@ _MOST_SIGNS = 6
 _NONE = (0.0, 0.0, 0.0)
 #: A number or an expression.
 Length = TypeVar("Length", float, SX)
-#: Work below this part of the largest possible work of force and moment counts as zero.
+#: Work below this fraction of the largest possible work of force and moment counts as zero.
 _NO_WORK = 1e-9
 
 
@@ -134,7 +134,7 @@ class Motion:
 
 
 class SignedLoad(NamedTuple):
-    """Load with the sign of its force and moment of known direction: 1, or -1 for the opposite load."""
+    """Load, and the sign of its force and moment of known direction: 1, or -1 for the opposite load."""
 
     load: Load
     sign: float

@@ -6,7 +6,7 @@ import enum
 from typing import NamedTuple
 
 
-class MotorNumber(enum.Enum):
+class ActuatorQuantity(enum.Enum):
     """Kinds of quantities of an actuator; each value is the word in results."""
 
     COORDINATE = "coordinate"
@@ -23,10 +23,10 @@ class Motor(NamedTuple):
         place: index of the actuator.
         actuator: name of the actuator.
         load: name of the load case; empty for a quantity that does not depend on loads.
-        is_backwards: If true, a power is that of negative forces.
+        is_backwards: If true, the power is that of negative forces.
     """
 
-    number: MotorNumber = MotorNumber.FORCE
+    number: ActuatorQuantity = ActuatorQuantity.FORCE
     place: int = 0
     actuator: str = ""
     load: str = ""

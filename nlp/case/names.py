@@ -35,7 +35,7 @@ def pose_names(count: int) -> frozenset[str]:
 
 
 def parameter_name(name: str, count: int) -> str:
-    """Return the name of a parameter or component in a case; it differs from all coordinate names of poses.
+    """Return the name of a parameter or component in a case, which differs from all names of pose coordinates.
 
     Args:
         name: name of the parameter or component in the robot.

@@ -189,7 +189,7 @@ class Rotation:
 
 
 #: No displacement.
-HERE = Displacement.by(np.eye(3), np.zeros(3))
+NO_DISPLACEMENT = Displacement.by(np.eye(3), np.zeros(3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,7 +204,7 @@ class Pose:
 
     position: Sequence[Value]
     rotation: Rotation = field(default_factory=Rotation)
-    displacements: tuple[Displacement, ...] = (HERE,)
+    displacements: tuple[Displacement, ...] = (NO_DISPLACEMENT,)
 
 
 class OverPoses(enum.Enum):

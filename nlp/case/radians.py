@@ -1,4 +1,4 @@
-"""Check for angles in degrees where a case made in Python expects radians: an angle of more than a whole turn."""
+"""Check for angles in degrees instead of radians in cases made in Python: angles above a whole turn."""
 
 from __future__ import annotations
 

@@ -112,7 +112,7 @@ class ModelOption(NamedTuple):
         name: name of the option.
         allowed: description of the allowed values.
         default: default value as TOML; None if the option must be given.
-        choices: allowed values, if they can be listed; else empty.
+        choices: allowed values, if they can be listed; otherwise empty.
     """
 
     name: str

@@ -91,7 +91,7 @@ class Expectation:
 
 @dataclass(frozen=True)
 class Published:
-    """Value printed in the literature, and whether this program reproduces it.
+    """Value printed in the literature, and whether screwsynth reproduces this value.
 
     Attributes:
         quantity: dotted path in the JSON result, such as ``pose.angle``, or ``gain``: percentage by which F exceeds

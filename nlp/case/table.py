@@ -227,7 +227,7 @@ def _sentence_of_number(fault: ErrorDetails) -> str:
 
 
 def _hint_of_number(text: str) -> str:
-    """Return a hint for a text in the place of a number: without quotes, or without a unit; else empty."""
+    """Return a hint for a text instead of a number: remove quotes, or the unit; empty without a hint."""
     from ..system.slips import hint_of  # noqa: PLC0415 - only messages need it
 
     try:

@@ -32,7 +32,7 @@ def axes_of(over: Over, argument: str = "over", *, repeated: bool = False) -> di
     axes = {name: _values(name, values, argument) for name, values in over.items()}
     for name, values in axes.items():
         if not repeated and len(np.unique(values)) < len(values):
-            raise InputError(f"{argument} {name}: has a value twice; each point must be another one")
+            raise InputError(f"{argument} {name}: contains a value twice; the values must be different")
     return axes
 
 

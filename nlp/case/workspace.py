@@ -147,10 +147,10 @@ class Workspace:
                 and (angle.lower == 0 or math.isclose(-angle.lower, angle.upper))
             )
             if not whole:
-                fault = "must be { min = -a, max = a } or { min = 0, max = a }: about any axis its sign has no meaning"
+                fault = "must be { min = -a, max = a } or { min = 0, max = a }: about any axis the sign is arbitrary"
                 raise CaseError(f"{key}.angle", fault)
         if not any(isinstance(value, Free) for value in (*self.position, *turns.angles)):
-            raise CaseError("workspace", "is one pose: give at least one number as { min, max }")
+            raise CaseError("workspace", "is only one pose: give one coordinate or more as { min, max }")
 
     @property
     def names(self) -> tuple[str, ...]:

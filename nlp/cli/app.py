@@ -58,7 +58,7 @@ GROUPS = {
             "pareto hexapod-machining --goal 'max F' --goal 'min limits.leg_length.max'",
         ),
         "compare": (
-            "Compare robots on the task of a case, and rank them.",
+            "Compare robots on the task of a case, and order them by F.",
             "compare drilling-spindle case 6-ups delta --html robots.html",
         ),
     },

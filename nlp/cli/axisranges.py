@@ -27,7 +27,7 @@ def show_ranges(
     Args:
         case: case with fixed dimensions.
         start: pose: position, and roll, pitch and yaw in degrees; None for the pose of the case.
-        most: largest length and angle in degrees, with a comma; None for the size of the robot and a right angle.
+        most: text of ``--most``: largest length, comma, largest angle in degrees; None for robot size and 90 degrees.
         time: time limit, seconds; None for the default.
         files: files to write.
         report: function that is called with the name of each next step.
@@ -57,7 +57,7 @@ def _largest(text: str | None) -> tuple[float, float] | None:
     """Return the largest length and angle of ``--most``.
 
     Raises:
-        InputError: they are not two positive numbers.
+        InputError: the text is not two positive numbers.
     """
     from ..errors import InputError
 
@@ -68,5 +68,5 @@ def _largest(text: str | None) -> tuple[float, float] | None:
     except ValueError:
         length = angle = math.nan
     if not (0 < length < math.inf and 0 < angle < math.inf):
-        raise InputError(f"--most {text}: must be two positive numbers with a comma: a length, and an angle in degrees")
+        raise InputError(f"--most {text}: must be LENGTH,ANGLE: two positive numbers, the angle in degrees")
     return length, math.radians(angle)

@@ -44,7 +44,7 @@ class Option(NamedTuple):
         metavar: placeholder for the value in help; empty for a flag, which has no value.
         help: sentence of help.
         read: reader of the value; it raises InputError.
-        during: function from the value, or the default, to a context in which the command runs.
+        during: function that returns a context in which the command runs, from the value or the default.
     """
 
     name: str
@@ -115,7 +115,7 @@ class Command:
         name: name of the command.
         function: function that the command calls; its docstring is the text of the help.
         shown: example for help.
-        rewritten: function from the words of a command line to the words that are read.
+        rewritten: function that changes the words of a command line before reading.
     """
 
     def __init__(
@@ -156,7 +156,7 @@ class Command:
             self._function(**given)
 
     def read(self, words: list[str]) -> dict[str, Any] | None:
-        """Return the values of a command line by the names of the function's parameters; None where help is requested.
+        """Return the values of a command line by the names of the function's parameters; None if help is requested.
 
         Raises:
             InputError: an option or argument is missing, unknown, or has a value that is not allowed.
@@ -179,7 +179,7 @@ class Command:
         return given
 
     def _sorted(self, words: Iterable[str]) -> tuple[dict[str, list[str]], list[str], bool]:
-        """Return the texts of options by parameter, those of arguments, and whether help is requested."""
+        """Return texts of options by parameter, texts of arguments, and True if help is requested."""
         texts: dict[str, list[str]] = {}
         places: list[str] = []
         is_help, rest = False, iter(words)
@@ -226,6 +226,6 @@ def print_line(text: str) -> None:
 
 
 def print_notice(text: str) -> None:
-    """Write a line to standard error: a remark that is no part of the result."""
+    """Write a line to standard error: a remark that does not belong to the result."""
     sys.stderr.write(f"{text}\n")
     sys.stderr.flush()

@@ -39,7 +39,7 @@ def compare(
     plot: Annotated[str | None, options.plot("Draw the designs at the same scale")] = None,
     whole: options.ShowAll = False,
 ) -> None:
-    """Compare robots on the task of a case, and rank them.
+    """Compare robots on the task of a case, and order them by F.
 
     Robots are scaled to a common size, and their dimensions are optimised near typical values.
     """
@@ -75,7 +75,7 @@ def compare(
             )
         is_stopped = is_requested()
         if is_stopped:
-            begun = f"{len(found.entries)} of {len(robots)} robots are solved or begun, the last one is incomplete"
+            begun = f"{len(found.entries)} of {len(robots)} robots are complete or begun; the last robot is incomplete"
             print_notice(f"{why_stopped()}: {begun}")
         is_proved = not certified or all(
             each.certified is not None and each.certified.is_proved for each in found.ranked

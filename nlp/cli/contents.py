@@ -1,4 +1,4 @@
-"""What commands show and write: the functions of ``contents.pyi``, each imported when it is first used."""
+"""Contents of commands: functions of ``contents.pyi``, each imported at first use."""
 
 from ..system.lazynames import lazy_names
 

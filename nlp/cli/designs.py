@@ -31,10 +31,10 @@ def deliver(
     Args:
         files: the files.
         found: the table.
-        result: returns the result for JSON.
+        result: function that returns the result for JSON.
         whole: If true, everything is shown, not only the answer.
-        done: If true, the exit status is 0; else 1.
-        shown: returns the lines for the terminal; None for the table with the lines around it.
+        done: If true, the exit status is 0; otherwise 1.
+        shown: function that returns the lines for the terminal; None for the table with its lines.
 
     Raises:
         InputError: a file cannot be written.

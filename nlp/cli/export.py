@@ -61,7 +61,7 @@ def export(
         fault = "" if solution.status.is_answer else f"the solve is {solution.status.value}"
     else:
         nlp, x = fixed
-        fault = "" if loops_are_closed(nlp, x) else "the robot's loops do not close there"
+        fault = "" if loops_are_closed(nlp, x) else "the loops of the robot do not close at this point"
         if jacobian is not None and not fault:
             check_same_robot(nlp, x, jacobian)
     if fault:

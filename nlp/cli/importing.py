@@ -38,13 +38,14 @@ def import_(
     ] = None,
     out: Annotated[str | None, options.file("--out", "Robot file to write; - is stdout")] = None,
     close: Annotated[
-        bool, options.flag("--close", "Close loops that the model leaves open, by Newton's method from several starts")
+        bool, options.flag("--close", "Close open loops of the model, by Newton's method from several starts")
     ] = False,
     keyframe: Annotated[
         str, options.text("--keyframe", "NAME", "Home configuration: a keyframe of the MJCF file")
     ] = "",
     snap: Annotated[
-        float, options.number("--snap", "LENGTH", "Move axes by up to this length, so that they meet or are parallel")
+        float,
+        options.number("--snap", "LENGTH", "Move axes by up to this length, so that axes meet or become parallel"),
     ] = 0.0,
     loops: Annotated[
         str | None, options.file("--loops", "File of the loops of a URDF model, instead of the .yaml file next to it")

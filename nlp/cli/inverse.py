@@ -21,7 +21,7 @@ def inverse(
 ) -> None:
     """Compute actuator and joint coordinates at many poses.
 
-    The exit status is 1 if a pose has no solution: it is out of reach, or not a pose of the robot's degrees of freedom.
+    The exit status is 1 if a pose has no solution: a limb cannot reach it, or the robot lacks the degrees of freedom.
     """
     from pathlib import Path
 

@@ -137,7 +137,7 @@ def _open_standard_streams() -> None:
             os.fstat(descriptor)
         except OSError:
             os.open(os.devnull, flags)
-    output = sys.stdout  # None where it was closed
+    output = sys.stdout  # None if it was closed
     sys.stdout = io.TextIOWrapper(
         io.BufferedWriter(_Unread(1, "w", closefd=False)),
         encoding="utf-8" if output is None else output.encoding,

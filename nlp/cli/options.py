@@ -32,7 +32,7 @@ class WholeNumber:
 
     Attributes:
         option: name of the option.
-        least, most: smallest and largest allowed number; no largest number for None.
+        least, most: smallest and largest allowed number; None for no largest number.
     """
 
     def __init__(self, option: str, least: int, most: int | None = None) -> None:
@@ -61,7 +61,7 @@ class Number:
 
     Attributes:
         option: name of the option.
-        least: smallest allowed number; numbers must then be below 1. None where the command checks the number.
+        least: smallest allowed number, for numbers below 1; None if the command checks the number.
     """
 
     def __init__(self, option: str, least: float | None = None) -> None:
@@ -159,7 +159,7 @@ def _seconds(text: str) -> float:
 
 def time(left_out: str, end: str = "shows its results") -> Option:
     """Return the option ``--time``, with the default time, and the command's action at the end of the time."""
-    words = f"Time limit of the command in seconds; it then {end}; {left_out}."
+    words = f"Time limit in seconds, after which the command {end}; {left_out}."
     return Option("--time", "SECONDS", words, _seconds, within)
 
 
@@ -184,7 +184,7 @@ RangeGap = Annotated[
 ]
 AllAssemblies = Annotated[bool, flag("--all-assemblies", "Cover all working modes of the robot, not only that of home")]
 LegError = Annotated[
-    float, number("--leg-error", "LENGTH", "Also bound the pose error for leg length errors of up to this")
+    float, number("--leg-error", "LENGTH", "Also bound the pose error for leg-length errors up to this length")
 ]
 ProofFile = Annotated[str | None, file("--proof", "Write the proof file for verify-proof")]
 JsonFile = Annotated[str | None, file("--json", "Write the result as JSON; - is stdout")]
@@ -205,7 +205,7 @@ Force = Annotated[bool, flag("--force", "Overwrite files that screwsynth did not
 
 
 def read_settings(texts: list[str] | None) -> Settings:
-    """Return the values of ``--set`` by name; of a name that is given twice, the last value.
+    """Return the values of ``--set`` by name; for a repeated name, the last value.
 
     Raises:
         InputError: a text is neither ``NAME=NUMBER`` nor ``NAME=X,Y,Z``.
@@ -231,7 +231,7 @@ def _read_setting(text: str) -> tuple[str, float | list[float]]:
 
 
 class ChangedCase(NamedTuple):
-    """A case, and the values that replace those of its file."""
+    """Case, and the values that replace values of its file."""
 
     file: CaseFile
     settings: Settings
@@ -246,8 +246,8 @@ def read_changed_case(
         name: name of the case.
         texts: texts of ``--set``: values that replace those of the file, and of the result.
         of: file of the result; None without a result.
-        at_pose: If true, a result of this case gives the pose too.
-        claim: result and number of a violation that gives dimensions and pose; None without a violation.
+        at_pose: If true, a result of this case also gives the pose.
+        claim: result file and number of a violated claim, for dimensions and pose; None without a claim.
 
     Raises:
         InputError: a file cannot be read or has a fault, or the result is no answer for this robot in these units.
@@ -330,11 +330,11 @@ class Outputs:
                 check_library("matplotlib", "pages")
 
     def __getitem__(self, name: str) -> str | None:
-        """Return the file of an option; None where it is not requested."""
+        """Return the file of an option; None if it is not requested."""
         return self._targets[name]
 
     def check(self, inputs: Mapping[Path, str]) -> None:
-        """Refuse files that cannot be written, that are an input, or that two options name.
+        """Refuse files that cannot be written, that are inputs, or that are named by two options.
 
         Args:
             inputs: input files, with a word for each in messages.
@@ -359,11 +359,11 @@ class Outputs:
         Only requested contents are made. A file is written completely or not at all, in the order of the contents.
 
         Args:
-            shown: returns the lines and tables for the terminal.
+            shown: function that returns the lines and tables for the terminal.
             whole: If true, everything is shown, not only the answer.
-            done: If true, the exit status is 0; else 1.
-            contents: by option, a function that returns the content of its file: a result, which is written as JSON, a
-                text, or a figure; None for a file that is not written after all.
+            done: If true, the exit status is 0; otherwise 1.
+            contents: for each option, a function that returns the content of the file: a result for JSON, a text, or a
+                figure; None to leave the file unwritten.
 
         Raises:
             InputError: a file cannot be written.
@@ -379,7 +379,7 @@ class Outputs:
 
 
 def _write(target: str, make: Callable[[], JsonObject | str | Figure | None], *, is_picture: bool) -> None:
-    """Write the content that a function returns into a file, or to standard output for ``-``."""
+    """Write a file, or standard output for ``-``; ``make`` returns the content."""
     from ..output.files import write_bytes, write_text
 
     if is_picture:
@@ -429,7 +429,7 @@ def show(items: Iterable[Line | TextTable], *, whole: bool) -> None:
 
 
 def console() -> Console | None:
-    """Return a console on standard output for lines and tables; None where standard output shows no styles."""
+    """Return a console on standard output for lines and tables; None if standard output shows no styles."""
     # With one of these variables, the console itself decides whether it shows styles.
     if not sys.stdout.isatty() and not os.environ.keys() & {"FORCE_COLOR", "TTY_COMPATIBLE"}:
         return None

@@ -35,7 +35,7 @@ def pareto(
 ) -> None:
     """Compute the Pareto front of two or more goals.
 
-    One goal is optimised, the others keep bounds.
+    Each point optimises one goal, with bounds on all other goals.
     """
     from ..errors import InputError, UncoveredError
     from ..front.data import front_designs, front_result
@@ -65,7 +65,7 @@ def pareto(
             raise InputError(f"--certify: {error}") from None
         is_stopped = is_requested()
         if is_stopped:
-            print_notice(f"{why_stopped()}: {len(found.points)} of {points} points are found")
+            print_notice(f"{why_stopped()}: {len(found.points)} of {points} points are complete")
         is_proved = all(each.certificate is None or each.certificate.status.value == "proved" for each in found.points)
         result = front_result(found)
         designs.deliver(

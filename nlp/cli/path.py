@@ -59,7 +59,7 @@ def path(
 ) -> None:
     """Prove no singularity and no violated limit along a tool path.
 
-    The path is the case's, or that of --along: G-code, or poses in a CSV file.
+    The path is G-code or a CSV file of poses, from the case or from --along.
     """
     from functools import cache
     from pathlib import Path
@@ -139,7 +139,7 @@ def _refuse_elsewhere(along: Mapping[str, object], most: str | None, *, ranges: 
 
     for name, given in along.items() if ranges else [("--most", most)]:
         if given not in (None, []):
-            raise InputError(f"{name}: cannot be used with --range" if ranges else f"{name}: needs --range")
+            raise InputError(f"{name}: conflicts with --range" if ranges else f"{name}: needs --range")
 
 
 def _sampling(step: float | None, within: float | None, *, is_written: bool) -> Sampling | None:

@@ -33,7 +33,7 @@ BetweenPoints = Annotated[
 
 
 class PathChoices(NamedTuple):
-    """Texts of the options for reading a path's file; None for an option that is not given."""
+    """Texts of the options for reading a path file; None for missing options."""
 
     unit: str | None
     start: str | None
@@ -47,7 +47,7 @@ class PathChoices(NamedTuple):
         return any(each not in (None, []) for each in self)
 
     def over(self, own: PathOptions) -> PathOptions:
-        """Return the options of a case, replaced where options are given.
+        """Return the options of a case, with the given options in their place.
 
         Raises:
             InputError: an option is not allowed.

@@ -56,7 +56,7 @@ def spinner(first: str) -> Iterator[Callable[[str], None]]:
     from ..interruption import seconds_left
 
     class TimeLeft(ProgressColumn):
-        """Seconds until the end of the time."""
+        """Column with the remaining seconds of a time limit; empty without a time limit."""
 
         def render(self, task: Task) -> Text:
             left = task.fields.get("end", math.inf) - time.perf_counter()
@@ -87,13 +87,13 @@ class SolveOutcome(NamedTuple):
 
 
 def tell_workspace(case: Case) -> None:
-    """Warn on standard error that the workspace of a case contains no pose of the case, where this may be a mistake.
+    """Warn on standard error if the workspace of a case contains no pose of the case, probably by mistake.
 
-    A workspace without limits may lie elsewhere on purpose, unless its numbers look like excursions from the pose.
+    A workspace without limits may lie elsewhere on purpose, unless its ranges look like excursions from the pose.
     """
     from ..errors import one_line
 
-    found = case.not_held
+    found = case.outside_workspace
     if found is not None and (case.limits_over == "workspace" or found.may_be_excursions):
         sys.stderr.write(f"{one_line(found.sentence)}\n")
 
@@ -101,11 +101,11 @@ def tell_workspace(case: Case) -> None:
 def solve_with_progress(
     case: Case, jobs: int | None, *, certify: bool = False, gap: float = 1e-4, step: float | None = None
 ) -> SolveOutcome:
-    """Solve a case; round its dimensions to multiples of a given step; with ``certify``, certify the result.
+    """Solve a case, with rounded dimensions for a given step, and with certificates for ``certify``.
 
     Raises:
         CaseError: the case contradicts itself.
-        InputError: the objective is to be compiled, and cannot be.
+        InputError: the objective cannot be compiled.
     """
     from ..solver.solve import solve
 

@@ -47,7 +47,7 @@ def proof_text(
     quantities: Sequence[str],
     leg_error: float,
 ) -> str | None:
-    """Return the text of the proof file of a judgement; None without a proof.
+    """Return the text of the proof file of verdicts; None without a proof.
 
     Claims without a proof are named in notices.
 
@@ -96,7 +96,7 @@ def path_proof_text(
     text: str,
     premises: PathPremises | None,
 ) -> str | None:
-    """Return the proof of a judgement along a path, as :func:`proof_text` does.
+    """Return the text of the proof file of verdicts along a path; see :func:`proof_text`.
 
     Args:
         target: file name; ``-`` is standard output.
@@ -268,10 +268,10 @@ def _words(claim: CheckedClaim, case: Case) -> str:
     from ..proof.statement.claims import CONSTRAINTS
     from ..results.objective import unit_of_claim
 
-    if claim.by_machine:
+    if claim.is_within_tolerance:
         return "refuted: at the stated pose J is singular for a robot within the tolerance"
     if claim.is_refuted:
-        return "refuted: J is singular at a pose between the two stated ones"
+        return "refuted: J is singular at a pose between both stated poses"
     if claim.bound is None:
         whose = "the constraint wrenches keep their" if claim.name == CONSTRAINTS else "J has full"
         return f"{whose} rank at every pose"

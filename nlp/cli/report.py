@@ -23,7 +23,7 @@ def report(
 ) -> None:
     """Solve a case, and write an HTML report.
 
-    The report is one file, and opens without a network.
+    The report is one file, which opens without a network.
     """
     from ..case.choices import chosen_settings
     from ..case.reader import load_case

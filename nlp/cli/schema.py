@@ -15,7 +15,7 @@ def schema(
 ) -> None:
     """Print the JSON Schema of case files or results.
 
-    Editors use it to complete and check case files.
+    Editors complete and check case files with this schema.
     """
     import json
 

@@ -108,13 +108,13 @@ def _run(
     jobs: int | None,
     dask: str | None,
 ) -> None:
-    """Solve the points that neither the table nor the journal has, and write the table.
+    """Solve the points that are missing in the table and the journal, and write the table.
 
     Args:
         found: the sweep.
         table: file of the table.
         resume: file of the journal; None for a file next to the table.
-        is_kept: If true, the table and the journal next to it stay.
+        is_kept: If true, the table and its journal are kept after the command.
         engine: solver, as for :func:`.run_sweep`.
         jobs: number of threads or processes, as for :func:`.run_sweep`.
         dask: address of a cluster, as for :func:`.run_sweep`.
@@ -174,7 +174,7 @@ def _named_points(chosen: Points, file: str | None) -> Iterator[None]:
 
 
 def _points_file(over: list[str]) -> str | None:
-    """Return the file of points that ``--over`` names; None where it states a grid.
+    """Return the file of points that ``--over`` names; None for a grid.
 
     Raises:
         InputError: a range, a list or another file is given as well.

@@ -19,7 +19,7 @@ def verify_proof(
     proof: Annotated[str, Argument("PROOF", "Proof file of certify, workspace or path --proof.")],
     case: Annotated[
         str | None,
-        Argument("[CASE]", "The case that the proof must be about, - is stdin; the case in the proof if left out."),
+        Argument("[CASE]", "Case that the proof must prove, - is stdin; the case in the proof if left out."),
     ] = None,
     settings: options.SettingTexts = None,
     of: options.ResultFile = None,
@@ -41,7 +41,7 @@ def verify_proof(
     The claims are derived again from the case and the options: give the options of the command that wrote the proof.
     """
     from .. import __version__
-    from ..errors import InputError
+    from ..errors import InputError, listing
     from ..proof.checker.proof_file import LARGEST_PROOF, PathPremises, Statement, read_proof
     from ..system.reading import read_limited
     from ..words.text import Line
@@ -63,7 +63,7 @@ def verify_proof(
     )
     for name in is_given:
         if is_given[name] and name not in own:
-            raise InputError(f"{name}: is no option for this kind of proof, which another command wrote")
+            raise InputError(f"{name}: does not apply to this kind of proof; allowed: {listing(sorted(own))}")
     if case is not None:
         loaded = options.read_changed_case(case, settings, of).file.case
     elif settings or of:
@@ -105,7 +105,7 @@ def _hold_path(
     from ..path.options import PathOptions
     from ..path.reader import options_of, text_of_path
     from ..proof.checker.proof_file import ProofError
-    from ..proof.checker.workspace.path_premises import hold_path, premises_of
+    from ..proof.checker.workspace.path_premises import check_path_premises, premises_of
 
     stated = case.path if is_own and along is None and given.of_case else None
     if along is None and stated is None:
@@ -116,7 +116,7 @@ def _hold_path(
     file = along if stated is None else str(stated.name)
     try:
         text = text_of_path(file or "")
-        hold_path(given, premises_of(case, file or "", text, own, of_case=stated is not None))
+        check_path_premises(given, premises_of(case, file or "", text, own, of_case=stated is not None))
     except ProofError as error:
         print_notice(f"rejected: {error}")
         raise SystemExit(1) from None
@@ -132,13 +132,13 @@ def _verify(
         Exit: with status 1 where the proof does not hold.
     """
     from ..proof.checker.check import check_proof
-    from ..proof.checker.premises import claim_words, hold_statement, program_of, root_below
+    from ..proof.checker.premises import check_statement, claim_words, program_of, root_below
     from ..proof.checker.proof_file import ProofError
     from ..results.objective import unit_of_objective
     from ..words.text import Line
 
     try:
-        hold_statement(case, statement, above=above, all_assemblies=all_assemblies)
+        check_statement(case, statement, above=above, all_assemblies=all_assemblies)
         checked = check_proof(claim, program_of(case, statement))
         shown = root_below(-checked.bound) if case.tasks[0].measure else -checked.bound
         if above is not None and not shown > above:

@@ -51,7 +51,7 @@ def workspace(
     The case states the box of poses under [workspace]. Quantities without a limit are bounded for information.
     """
     from ..interruption import Milestone, answer_after, seconds_left, within
-    from ..proof.statement.machine import workspace_of_case
+    from ..proof.statement.fixed_robot import workspace_of_case
     from ..results.workspace import scale_data, workspace_of
     from ..words.poses import evaluate_command
     from .proofs import proof_record, proof_text
@@ -121,8 +121,8 @@ def _judge_with_progress(
 
 def _free_travel(case: Case) -> Iterator[Line | TextTable]:
     """Yield the table of free travel from the stated pose of a robot with six degrees of freedom."""
-    from ..errors import InputError
     from ...models.statics import freedoms_of
+    from ..errors import InputError
     from ..proof.workspace.axis_ranges import axis_ranges
     from ..results.axisranges import axis_ranges_result
     from ..words.axisranges import axis_ranges_tables

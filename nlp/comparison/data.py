@@ -1,4 +1,4 @@
-"""A comparison as a result and as a table of designs, with sentences about its rules and about what a robot lacks."""
+"""Comparison as a result and as a table of designs, with sentences on its rules and on missing results of robots."""
 
 from __future__ import annotations
 
@@ -32,22 +32,22 @@ from ..solver.status import Status
 from ..system.jsonvalues import finite_or_none
 from ..units import rate_unit
 from ..words.comparison import comparison_columns, comparison_lines
-from ..words.designs import DesignDetails, Designs, DrawnDesign, Join, PageWords, free_numbers
+from ..words.designs import DesignDetails, Designs, DrawnDesign, Join, PageWords, design_values
 from ..words.text import Line, TextTable, Tone
 from .compare import Comparison, part_of
 from .entry import Entry, TaskFit, driven_wrenches
 
-#: A part as a percentage.
+#: Factor from a fraction to percent.
 _PERCENT = 100
-#: Sizes that differ by more than this part are worth a sentence: F of a rotation then differs by twice as much.
+#: Relative difference of sizes above which a sentence warns: F of a rotation then differs by twice as much.
 _SAME_SIZE = 0.02
 
 
 def entry_sentences(entry: Entry) -> list[str]:
-    """Return sentences about what a robot lacks, and what cannot be compared."""
+    """Return sentences on missing results of a robot, and on results that cannot be compared."""
     found = []
     if entry.fault:
-        found.append(f"The case contradicts itself with this robot: {entry.fault}.")
+        found.append(f"The case is inconsistent with this robot: {entry.fault}.")
     elif not entry.has_answer:
         found.append(_no_answer(entry))
     for fit in entry.tasks:
@@ -59,177 +59,180 @@ def entry_sentences(entry: Entry) -> list[str]:
 
 
 def _left_out_sentences(entry: Entry) -> Iterator[str]:
-    """Yield sentences about the limits that a robot is solved without."""
+    """Yield sentences on the limits that do not apply to a robot."""
     model = entry.contender.model
     left_out = () if entry.placed is None else entry.placed.left_out
     of_legs = [each.key for each in left_out if each.is_of_legs and model.structure]
     others = [each.key for each in left_out if each.key not in of_legs]
     if of_legs:
         own = listing(each.name for each in model.quantities)
-        measures = f"; its own measures are {own}" if own else ""
+        measures = f"; its quantities are {own}" if own else ""
         yield (
-            f"Solved without {', '.join(of_legs)}: they speak of legs between joint centres, and this robot is given "
-            f"joint by joint{measures}."
+            f"Solved without {', '.join(of_legs)}: they apply to legs between joint centres, and this robot is defined "
+            f"by joints{measures}."
         )
     if others:
-        yield f"Solved without {', '.join(others)}: this robot has nothing that they speak of."
+        yield f"Solved without {', '.join(others)}: they do not apply to this robot."
 
 
 def _fit_sentences(entry: Entry, fit: TaskFit) -> list[str]:
-    """Return sentences about the freedom of a robot for a task, and about actuators that drive nothing."""
+    """Return sentences on a robot's degrees of freedom for a task, and on actuators that do not drive it."""
     found = []
     if fit.can_move is False:
-        freedoms = "" if entry.freedoms is None else f", which has {entry.freedoms} freedoms,"
+        mobility = "" if entry.freedoms is None else f" with {entry.freedoms} degrees of freedom"
         found.append(
-            f"The platform{freedoms} cannot make the motion of {fit.name}: constraints carry "
-            f"{_PERCENT * (fit.constraint or 0.0):.3g} % of its F, and no actuator can move with them."
+            f"The platform{mobility} cannot follow the motion of {fit.name}: "
+            f"{_PERCENT * (fit.constraint or 0.0):.3g} % of its F is constraint wrenches, not actuation."
         )
     elif fit.can_move is None:
-        found.append(f"Whether the platform can make the motion of {fit.name} is not known for this robot's rows.")
+        found.append(
+            f"Unknown for this robot, which is defined by its rows: can the platform follow the motion of {fit.name}?"
+        )
     largest = fit.largest_rate
     if largest is not None and math.isnan(largest.value):
-        found.append(f"The motion of the platform does not determine the rate of actuator {largest.actuator}.")
+        found.append(f"The task's motion does not determine the rate of actuator {largest.actuator}.")
     elif largest is not None and math.isinf(largest.value):
         found.append(f"Actuator {largest.actuator} cannot drive the platform at this design.")
     return found
 
 
 def _proof_sentences(entry: Entry) -> list[str]:
-    """Return sentences about proofs that a robot lacks."""
+    """Return sentences on missing proofs of a robot."""
     found = []
     if entry.certificate_fault:
         found.append(f"No certificate: {entry.certificate_fault}.")
     if entry.workspace_fault:
-        found.append(f"The workspace is not judged: {entry.workspace_fault}.")
+        found.append(f"No verdict over the workspace: {entry.workspace_fault}.")
     return found
 
 
 def _no_answer(entry: Entry) -> str:
-    """Return why a robot has no answer."""
+    """Return the reason why a robot has no optimum."""
     solution = entry.solution
     own = None if solution is None else solution.decided_by
     if solution is None or own is None:
-        return "No answer."
+        return "No optimum."
     status = solution.status.value
     if solution.status is Status.INTERRUPTED:
-        return f"No answer ({status})."
+        return f"No optimum ({status})."
     closure = {equation.name for equation in (*entry.contender.model.closure, *entry.contender.model.loops)}
     names = [row.name for row in violations(own.nlp, own.x)]
     if any(name.split(" at ")[0] in closure for name in names):
         few = entry.freedoms is not None and entry.freedoms < 6
-        reason = f": its platform has {entry.freedoms} freedoms" if few else ""
-        return f"No answer ({status}): its joints cannot be assembled at the poses of the case{reason}."
+        reason = f"; its platform has {entry.freedoms} degrees of freedom" if few else ""
+        return f"No optimum ({status}): its joints cannot be assembled at the poses of the case{reason}."
     keys = ", ".join(f"limits.{each.key}" for each in own.relaxation) or ", ".join(names[:3])
-    return f"No answer ({status}): no design within the ranges keeps {keys or 'the limits'}."
+    return f"No optimum ({status}): no design within the ranges satisfies {keys or 'the limits'}."
 
 
-def comparison_sentences(found: Comparison) -> list[str]:
-    """Return sentences about a whole comparison."""
-    return [*_rules(found), *_cautions(found), *_conventions(found)]
+def comparison_sentences(comparison: Comparison) -> list[str]:
+    """Return sentences on a comparison."""
+    return [*_rules(comparison), *_cautions(comparison), *_conventions(comparison)]
 
 
-def _rules(found: Comparison) -> list[str]:
-    """Return sentences about sizes and dimensions."""
-    case, lines = found.case, []
-    if found.size is not None:
-        size = case.units.text(found.size, Dimension.LENGTH)
+def _rules(comparison: Comparison) -> list[str]:
+    """Return sentences on sizes and dimensions."""
+    case, lines = comparison.case, []
+    if comparison.size is not None:
+        size = case.units.text(comparison.size, Dimension.LENGTH)
         lines.append(
-            "Size: robots are scaled so that with their typical dimensions the largest distance between two of their "
-            f"points at home is {size}."
+            "Size: with typical dimensions at home, the largest distance between two points of each robot is scaled to "
+            f"{size}."
         )
     else:
-        lines.append("The robots are not scaled: typical lengths count as lengths in the unit of the case.")
-    if found.part:
+        lines.append("The robots are not scaled: typical lengths are lengths in the unit of the case.")
+    if comparison.part:
         lines.append(
-            f"Dimensions are free within {_PERCENT * found.part:g} % of the typical ones; directions are fixed."
+            f"Dimensions vary within {_PERCENT * comparison.part:g} % of the typical values; directions are fixed."
         )
     else:
-        lines.append("Dimensions are fixed at the typical ones.")
-    if any(each.contender.is_own for each in found.entries):
-        lines.append("The robot of the case takes part as the case states it, with its own dimensions and ranges.")
+        lines.append("Dimensions are fixed at the typical values.")
+    if any(each.contender.is_of_case for each in comparison.entries):
+        lines.append("The robot of the case keeps its dimensions and ranges.")
     return lines
 
 
-def _cautions(found: Comparison) -> list[str]:
-    """Return sentences about what makes F of ranked robots differ beside the robots themselves."""
-    case, ranked, lines = found.case, found.ranked, []
+def _cautions(comparison: Comparison) -> list[str]:
+    """Return sentences on other reasons why F of ranked robots differs: sizes, numbers of terms, units."""
+    case, ranked, lines = comparison.case, comparison.ranked, []
     sizes = [each.final_size for each in ranked if each.final_size is not None]
     turns = any(np.any(np.asarray(task.twist, dtype=np.float64)[:3]) for task in case.tasks)
     if turns and sizes and max(sizes) > (1 + _SAME_SIZE) * min(sizes):
-        own = any(each.contender.is_own for each in ranked)
-        of_all = "one size of all but the case's robot, which keeps its own ranges" if own else "one size"
+        own = any(each.contender.is_of_case for each in ranked)
+        of_all = "a common size, except for the case's robot" if own else "a common size"
         lines.append(
-            "The designs have different sizes, and F of a rotation grows with the square of the size: see the column "
-            f"size, and --part 0 for {of_all}."
+            "The designs have different sizes (see the column size), and F of a rotation grows with the square of the "
+            f"size: use --part 0 for {of_all}."
         )
     terms = {each.contender.label: driven_wrenches(each.contender) for each in ranked}
     if len(set(terms.values())) > 1:
         counts = ", ".join(f"{label} {count}" for label, count in terms.items())
-        lines.append(
-            f"F adds a term for each wrench that actuators work in, and robots have different numbers: {counts}."
-        )
+        lines.append(f"F has one term for each actuation wrench, and the numbers of terms differ: {counts}.")
     kinds = {rate.dimension for each in ranked for fit in each.tasks for rate in fit.rates}
     if len(kinds) > 1:
-        lines.append("Rates of actuators that turn and of those that slide have different units, and do not compare.")
+        lines.append("Rates of rotary and of linear actuators have different units, and cannot be compared.")
     return lines
 
 
-def _conventions(found: Comparison) -> list[str]:
-    """Return sentences about units, and about robots that are not ranked."""
-    case, entries, lines = found.case, found.entries, []
+def _conventions(comparison: Comparison) -> list[str]:
+    """Return sentences on units, and on robots that are not ranked."""
+    case, entries, lines = comparison.case, comparison.entries, []
     if any(each.contender.model.has_couples for each in entries):
-        length = case.units.text(found.characteristic_length, Dimension.LENGTH)
-        lines.append(f"Couples count beside forces by the characteristic length {length}.")
+        length = case.units.text(comparison.characteristic_length, Dimension.LENGTH)
+        lines.append(f"Characteristic length between couples and forces: {length}.")
     if any(part_of(each) == "limits not kept" for each in entries):
-        lines.append("A robot that does not keep every limit of the case is not ranked: fewer limits let F be better.")
+        lines.append(
+            "A robot that does not satisfy all limits of the case is not ranked: F can be better with fewer limits."
+        )
     if any(part_of(each) == "no freedom" for each in entries):
         lines.append(
-            "F of a robot without the freedom for a task has a constraint part: it is not ranked, as the motion does "
-            "not happen."
+            "A robot without the degrees of freedom for a task is not ranked: constraint wrenches are part of its F."
         )
     if len(case.tasks) > 1 and all(each.value is None for each in entries):
-        lines.append("The tasks are averaged, so there is no one value to sort by: the order is the one given.")
+        lines.append(
+            "The tasks are averaged, so there is no common value for a ranking: the robots are in the given order."
+        )
     return lines
 
 
-def comparison_result(found: Comparison) -> ComparisonResult:
+def comparison_result(comparison: Comparison) -> ComparisonResult:
     """Return a comparison as a result."""
-    case = found.case
+    case = comparison.case
     return ComparisonResult.of(
-        found,
+        comparison,
         schema=SCHEMA,
         case=case.name,
         title=case.title,
         units=UnitsData.of(case.units),
         limits=len(case.limits),
-        range=found.part,
-        robots=tuple(_robot(case, each) for each in found.entries),
-        sentences=tuple(comparison_sentences(found)),
+        range=comparison.part,
+        robots=tuple(_robot(case, each) for each in comparison.entries),
+        sentences=tuple(comparison_sentences(comparison)),
         versions=versions(),
     )
 
 
-def comparison_designs(found: Comparison, result: ComparisonResult) -> Designs[ComparedRobotData]:
+def comparison_designs(comparison: Comparison, result: ComparisonResult) -> Designs[ComparedRobotData]:
     """Return a comparison as a table of designs.
 
     Args:
-        found: the comparison.
-        result: the same as a result.
+        comparison: comparison of robots.
+        result: comparison as a result.
     """
-    case, ranked = found.case, [each for each in result.robots if each.part == "ranked"]
+    case, ranked = comparison.case, [each for each in result.robots if each.part == "ranked"]
     words = f"{len(ranked)} of {len(result.robots)} robots can be compared"
     if others := sum(each.part == "limits not kept" for each in result.robots):
-        words += f", {others} {'does' if others == 1 else 'do'} not keep every limit"
+        words += f", {others} {'does' if others == 1 else 'do'} not satisfy all limits"
     if ranked and ranked[0].value is not None:
         unit = ranked[0].tasks[0].unit if len(ranked[0].tasks) == 1 else ""
         best = f"{ranked[0].name} has the best value, {f'{ranked[0].value:.7g} {unit}'.rstrip()}"
         if ranked[0].workspace is Outcome.REFUTED:
-            best += ", and is refuted over the workspace"
+            best += ", but violates limits over the workspace"
         words = f"{best}; {words}"
     return Designs(
         "comparison",
         case,
-        "robots, the best first",
+        "ranking of the robots",
         tuple(comparison_columns(result)),
         result.robots,
         Join.LIST,
@@ -237,22 +240,22 @@ def comparison_designs(found: Comparison, result: ComparisonResult) -> Designs[C
             f"{case.name}, robots {', '.join(each.name for each in result.robots)}",
             f"{words}.",
             ("drawings", "Designs"),
-            ("robots", "Robots in one table"),
+            ("robots", "Ranking"),
             rules=result.sentences,
-            below="Each robot at its design, all from one side, in one scale and with one scale of the colours.",
+            below="Each robot at its design, with common view, scale and colour scale.",
             is_answer=bool(ranked),
         ),
         before=[Line(case.title or case.name, tone=Tone.TITLE)],
         after=tuple(comparison_lines(result)),
         drawn=lambda: [
-            _drawn(case, each, each.solution) for each in found.entries if each.solution and each.has_answer
+            _drawn(case, each, each.solution) for each in comparison.entries if each.solution and each.has_answer
         ],
         details=tuple(_details(each) for each in result.robots),
     )
 
 
 def _details(robot: ComparedRobotData) -> DesignDetails:
-    """Return what a page says of a robot: its description, what it lacks, and its dimensions with their ranges."""
+    """Return the details of a robot for a page: description, missing results, and dimensions with their ranges."""
     rows = tuple(
         (
             each.name,
@@ -267,17 +270,17 @@ def _details(robot: ComparedRobotData) -> DesignDetails:
 
 
 def _drawn(case: Case, entry: Entry, solution: Solution) -> DrawnDesign:
-    """Return the design of a robot with an answer, with its F and its size."""
+    """Return the design of a solved robot for a drawing, with its F and size."""
     name, unit = ("F", unit_of_objective(case)) if len(entry.tasks) == 1 else ("value", "")
     words = "no common value" if entry.value is None else f"{name} = {entry.value:.5g} {unit}".rstrip()
     if entry.final_size is not None:
         words += f", size {entry.final_size:.4g} {case.units.length}"
     if entry.can_move is False:
-        words += ", cannot make the motion"
+        words += ", cannot follow the motion"
     elif not entry.keeps_limits:
-        words += ", does not keep every limit"
+        words += ", does not satisfy all limits"
     outcome, nlp = solution.outcomes[0], solution.outcomes[0].own.nlp
-    numbers, active = free_numbers(nlp, outcome.x), _active(entry)
+    numbers, active = design_values(nlp, outcome.x), _active(entry)
     return DrawnDesign(entry.contender.label, words, numbers, active, nlp, outcome.x, outcome.state)
 
 
@@ -325,7 +328,7 @@ def _task(case: Case, index: int, fit: TaskFit) -> ComparedTaskData:
 
 
 def _active(entry: Entry) -> tuple[str, ...]:
-    """Return the bounds and limits that a design lies on, without the joints and loops of the robot."""
+    """Return the active bounds and limits of a design, without joint coordinates and loop equations."""
     own = None if entry.solution is None else entry.solution.decided_by
     if own is None or own.evidence is None or not entry.has_answer:
         return ()
@@ -334,7 +337,7 @@ def _active(entry: Entry) -> tuple[str, ...]:
 
 
 def _dimensions(entry: Entry) -> tuple[ComparedDimensionData, ...]:
-    """Return the dimensions of a design with the ranges in which they were free."""
+    """Return the dimensions of a design with their ranges."""
     if entry.placed is None or entry.solution is None or not entry.has_answer or entry.solution.state is None:
         return ()
     case, rows = entry.placed.case, []
@@ -356,7 +359,7 @@ def _dimensions(entry: Entry) -> tuple[ComparedDimensionData, ...]:
 
 
 def _text(entry: Entry) -> str | None:
-    """Return the case with a robot as the text of a case file; None where no file can state it."""
+    """Return the case with a robot as the text of a case file; None if no file can represent it."""
     if entry.placed is None:
         return None
     try:

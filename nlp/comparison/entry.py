@@ -1,4 +1,4 @@
-"""One robot of a comparison with its answer: its freedom for the tasks, the rates of its actuators, its strokes."""
+"""Robot of a comparison with its results: degrees of freedom, tasks, actuator rates, strokes, proofs."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from .robots import Contender, Placed
 
 
 class Rate(NamedTuple):
-    """The rate of an actuator for a task.
+    """Rate of an actuator for a task.
 
     Attributes:
-        actuator: name of the actuator, or of the leg that is driven along its axis.
-        dimension: of its coordinate.
-        value: rate, radians or length per unit of the task's motion; infinite where it cannot drive the platform, and
-            not a number where the motion does not determine it.
+        actuator: name of the actuator, or of the actuated leg.
+        dimension: dimension of the actuator coordinate.
+        value: rate, radians or length per unit of the task's motion; infinite if the actuator cannot drive the
+            platform, NaN if the motion does not determine it.
     """
 
     actuator: str
@@ -38,22 +38,22 @@ class Rate(NamedTuple):
 
 
 class Stroke(NamedTuple):
-    """A stroke: a length, or radians."""
+    """Stroke of an actuator, a length or an angle in radians."""
 
     value: float
     dimension: Dimension
 
 
 class TaskFit(NamedTuple):
-    """A task at a robot's design, at the first pose.
+    """Task at a robot's design, at the first pose.
 
     Attributes:
-        name: of the task.
-        F: objective; None without an answer.
-        can_move: whether the platform can make the motion with free actuators; None where it is not known.
-        constraint: part of F that constraints carry, 0 to 1: the platform cannot make the motion where it is above 0;
-            None where it is not known.
-        rates: of the actuators; empty where the robot's actuators are not known.
+        name: name of the task.
+        F: objective; None without an optimum.
+        can_move: True if the platform can follow the motion with free actuators; None if unknown.
+        constraint: fraction of F from constraint wrenches, 0 to 1; above 0 the platform cannot follow the motion.
+            None if unknown.
+        rates: rates of the actuators; empty if the robot's actuators are unknown.
     """
 
     name: str
@@ -64,33 +64,33 @@ class TaskFit(NamedTuple):
 
     @property
     def largest_rate(self) -> Rate | None:
-        """The rate that is largest in size, one that is no number first; None where no rate is known."""
+        """Rate with the largest magnitude, or a rate that is NaN; None without known rates."""
         return max(self.rates, key=lambda each: (math.isnan(each.value), abs(each.value)), default=None)
 
 
 @dataclass(frozen=True, eq=False)
 class Entry:
-    """A robot of a comparison.
+    """Robot of a comparison with its results.
 
     Attributes:
-        contender: the robot.
-        factor: by which its typical lengths are multiplied.
-        size: at home with typical dimensions times the factor, length.
-        final_size: at the design, length; None without an answer.
-        placed: the case with this robot; None where the case contradicts itself with it.
-        solution: None where the case contradicts itself with this robot.
-        freedoms: of the platform at the first pose; those of almost all poses without an answer; None where they are
-            not known.
-        tasks: each task at the design; empty without an answer.
-        singularities: clauses about the design.
-        fault: sentence of the reason why there is no solution; else empty.
-        certified: certificates; None where none were asked for, or they are refused.
-        certificate_fault: sentence of the reason why there is no certificate; else empty.
-        judgement: of the design over the workspace; None where the case has none, or it is not judged.
-        outcome: verdict on the workspace: regular poses and limits; None where it is not judged.
-        workspace_fault: sentence of the reason why it is not judged; else empty.
+        contender: robot of the comparison.
+        factor: scale factor of the typical lengths.
+        size: size at home with scaled typical dimensions, length.
+        final_size: size at the design, length; None without an optimum.
+        placed: case with this robot; None if the case contradicts itself with the robot.
+        solution: solution of the case with this robot; None if the case contradicts itself.
+        freedoms: degrees of freedom of the platform at the first pose, or at almost all poses without an
+            optimum; None if unknown.
+        tasks: tasks at the design; empty without an optimum.
+        singularities: descriptions of singularities of the design.
+        fault: reason why there is no solution; otherwise empty.
+        certified: certificates; None if not requested or impossible.
+        certificate_fault: reason why there is no certificate; otherwise empty.
+        judgement: judgement of the design over the workspace; None without a workspace or without a proof.
+        outcome: verdict on ranks and limits over the workspace; None without a proof.
+        workspace_fault: reason why there is no verdict over the workspace; otherwise empty.
         seconds: wall time.
-        strokes: largest stroke by measure: over the workspace from proven bounds, else over several poses.
+        strokes: largest stroke of each quantity: proved over the workspace; without a workspace, over several poses.
     """
 
     contender: Contender
@@ -113,17 +113,17 @@ class Entry:
 
     @property
     def has_answer(self) -> bool:
-        """Whether the solve gave an answer."""
+        """True if the solve found an optimum."""
         return self.solution is not None and self.solution.status.is_answer
 
     @property
     def keeps_limits(self) -> bool:
-        """Whether an answer keeps every limit of the case: the robot can have them all."""
+        """True if the optimum satisfies all limits of the case, without omitted limits."""
         return self.placed is not None and not self.placed.left_out
 
     @property
     def can_move(self) -> bool | None:
-        """Whether the platform can make every task's motion; None where that is not known."""
+        """True if the platform can follow the motions of all tasks; None if unknown."""
         if not self.tasks:
             return None
         known = [task.can_move for task in self.tasks]
@@ -131,7 +131,7 @@ class Entry:
 
     @property
     def value(self) -> float | None:
-        """F of one task, or the value of the combination of several; None without one."""
+        """F of a single task, or the combined value of several tasks; None without a value."""
         if self.solution is None or not self.has_answer:
             return None
         combination = self.solution.combination
@@ -140,21 +140,21 @@ class Entry:
 
     @property
     def sense(self) -> Sense:
-        """Whether the value is maximised or minimised."""
+        """Maximisation or minimisation of the value."""
         if self.solution is None or self.solution.decided_by is None:
             return Sense.MAX
         return self.solution.decided_by.nlp.sense
 
     @property
     def certificate(self) -> Certificate | None:
-        """Certificate of the program that decides; None without one."""
+        """Certificate of the final nonlinear program; None without a certificate."""
         return None if self.certified is None else self.certified.certificate
 
 
-def generic_freedoms(contender: Contender) -> int | None:
-    """Return the freedoms of a robot's platform at almost all poses; None where the model does not tell them.
+def generic_degrees_of_freedom(contender: Contender) -> int | None:
+    """Return the degrees of freedom of a robot's platform at almost all poses; None if unknown.
 
-    A robot given by its rows tells them where each row is that of a driven leg.
+    They are known for a robot defined by its rows if each row is that of an actuated leg.
     """
     model = contender.model
     if model.generic is not None:
@@ -163,17 +163,17 @@ def generic_freedoms(contender: Contender) -> int | None:
 
 
 def _is_legs(contender: Contender) -> bool:
-    """Return whether each row of a robot given by its rows is the force of a leg that is driven along its axis."""
+    """Return whether all rows of a robot defined by rows of J are forces of actuated legs."""
     model = contender.model
     return not model.has_couples and 0 < len(model.legs) == len(model.wrenches) and not model.members
 
 
 def task_fit(contender: Contender, outcome: TaskOutcome) -> tuple[TaskFit, Mobility | None]:
-    """Return a task at a robot's design, and the robot's mobility there; no mobility for one given by its rows.
+    """Return a task at a robot's design, and the robot's mobility; None as mobility of a robot defined by its rows.
 
     Args:
-        contender: the robot.
-        outcome: of the task, whose robot exists at the design.
+        contender: robot of the comparison.
+        outcome: outcome of the task, with a robot that exists at the design.
     """
     nlp, x, state = outcome.own.nlp, outcome.x, outcome.state
     if state is None:
@@ -191,7 +191,7 @@ def task_fit(contender: Contender, outcome: TaskOutcome) -> tuple[TaskFit, Mobil
 
 
 def driven_wrenches(contender: Contender) -> int:
-    """Return the number of terms of F in a motion that a robot can make: wrenches that its actuators work in."""
+    """Return the number of actuation wrenches, the terms of F in a motion that the robot can follow."""
     model = contender.model
     if not model.structure:
         return len(model.rows)
@@ -206,12 +206,12 @@ def outcome_of(judgement: Judgement) -> Outcome:
 
 
 def strokes_over_poses(contender: Contender, outcome: TaskOutcome, quantities: tuple[str, ...]) -> dict[str, Stroke]:
-    """Return the largest stroke of each measure over the poses of a case; none for a single pose.
+    """Return the largest stroke of each quantity over the poses of a case; empty for a single pose.
 
     Args:
-        contender: the robot.
-        outcome: of a task, whose robot exists at the design.
-        quantities: names of the measures.
+        contender: robot of the comparison.
+        outcome: outcome of a task, with a robot that exists at the design.
+        quantities: names of the quantities.
     """
     nlp = outcome.own.nlp
     count = len(nlp.program.robots)
@@ -226,11 +226,11 @@ def strokes_over_poses(contender: Contender, outcome: TaskOutcome, quantities: t
 
 
 def proven_strokes(judgement: Judgement, quantities: tuple[str, ...]) -> Mapping[str, Stroke]:
-    """Return the largest stroke of each measure over a workspace, from proven bounds only.
+    """Return the largest stroke of each quantity over a workspace, from proved bounds only.
 
     Args:
-        judgement: of the design.
-        quantities: names of the measures.
+        judgement: judgement of the design.
+        quantities: names of the quantities.
     """
     ends: dict[str, dict[Sense, float]] = {}
     dimensions: dict[str, Dimension] = {}

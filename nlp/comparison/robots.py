@@ -1,9 +1,8 @@
-"""Robots of a comparison: found, measured, and put in the place of a case's own.
+"""Robots of a comparison: reading, size, scaling, and placement in a case.
 
-A robot is given by name, by robot file, or as a model. Its size is the largest distance between two of its points. In
-the place of the case's robot it is scaled, with its home at the case's pose, and with free dimensions. The tasks, the
-poses, the workspace and the limits stay those of the case. They are written in the robot's own frame, which is moved
-without a rotation, so that the robot is at home at the start of the case's first pose.
+A robot is a name, a robot file, or a model. Its size is the largest distance between two of its points. In a case it is
+scaled, has its home at the case's pose, and variable dimensions. Tasks, poses, workspace and limits are those of the
+case, in a frame of the robot that is shifted without rotation, so that home is the starting value of the first pose.
 """
 
 from __future__ import annotations
@@ -33,24 +32,24 @@ from ..evidence.state import evaluate
 from ..program.formulation import formulate
 from ..program.nlp import Nlp
 
-#: Stands for the case's own robot, which takes part as the case states it.
+#: Word for the robot of the case, which is compared unchanged.
 OWN = "case"
 
 
 @dataclass(frozen=True, eq=False)
 class Contender:
-    """A robot that takes part in a comparison.
+    """Robot of a comparison.
 
     Attributes:
-        label: name in tables: that of the robot, or of its file.
-        model: the robot; the case's own for ``case``.
-        is_own: whether it takes part as the case states it.
-        file: the robot file; None for a robot by name.
+        label: name of the robot, or of its file, in tables.
+        model: model of the robot; for ``case``, the model of the case.
+        is_of_case: True for the unchanged robot of the case.
+        file: robot file; None for a robot by name.
     """
 
     label: str
     model: Model
-    is_own: bool = False
+    is_of_case: bool = False
     file: Path | None = None
 
 
@@ -58,14 +57,14 @@ def read_robots(robots: Sequence[str | Path | Model], case: Case) -> list[Conten
     """Return the robots of a comparison.
 
     Args:
-        robots: names of robots, paths of robot files, models, or the word ``case`` for the case's own robot.
-        case: the case.
+        robots: names of robots, paths of robot files, models, or the word ``case`` for the robot of the case.
+        case: case of the comparison.
 
     Raises:
-        InputError: there are fewer than two robots, one is not found or given twice, or a robot file holds a fault.
+        InputError: there are fewer than two robots, a robot is unknown or given twice, or a robot file has an error.
     """
     if len(robots) < 2:
-        raise InputError(f"compare: needs at least two robots, and {len(robots)} is given")
+        raise InputError(f"compare: needs at least two robots, got {len(robots)}")
     found: list[Contender] = []
     for each in robots:
         contender = _read(each, case)
@@ -73,19 +72,19 @@ def read_robots(robots: Sequence[str | Path | Model], case: Case) -> list[Conten
             if contender.model is other.model or _is_same_file(contender, other):
                 raise InputError(f"compare: {each if isinstance(each, str) else contender.label} is given twice")
             if contender.label == other.label:
-                fault = "two robots have this name in tables: rename a file"
+                fault = "two robots have this name in tables; rename a file"
                 raise InputError(f"compare: {contender.label}: {fault}")
         found.append(contender)
     return found
 
 
 def _read(given: str | Path | Model, case: Case) -> Contender:
-    """Return one robot; the errors are those of :func:`read_robots`."""
+    """Return one robot; errors as for :func:`read_robots`."""
     if isinstance(given, Model):
         return Contender(given.name, given)
     text = str(given)
     if text == OWN:
-        return Contender(OWN, case.model, is_own=True)
+        return Contender(OWN, case.model, is_of_case=True)
     names = model_names()
     if text in names:
         return Contender(text, build_model(text))
@@ -106,22 +105,22 @@ def _is_same_file(one: Contender, other: Contender) -> bool:
 
 
 def size_of_home(model: Model) -> float:
-    """Return the size of a robot at home with its typical dimensions, in the unit of these.
+    """Return the size of a robot at home with its typical dimensions, in their unit.
 
     Raises:
         InputError: the robot has no points, or they coincide.
     """
     parameters = model.typical
-    # Joints of a robot that is given joint by joint count from home.
+    # Joint coordinates of a robot defined by joints are 0 at home.
     unknowns = np.zeros(len(model.unknowns))
     size = _size(model, parameters, unknowns, np.eye(3), np.array(model.home))
     if not (np.isfinite(size) and size > 0):
-        raise InputError(f"compare: {model.name}: has no points apart from each other, and so no size")
+        raise InputError(f"compare: {model.name}: has no size, because all its points coincide")
     return size
 
 
 def size_at(nlp: Nlp, x: FloatArray) -> float:
-    """Return the size of a program's robot at a point (n,), at the first pose.
+    """Return the size of the robot at a point (n,) of a nonlinear program, at the first pose.
 
     Raises:
         EvaluationError: the robot does not exist at the point.
@@ -133,11 +132,11 @@ def size_at(nlp: Nlp, x: FloatArray) -> float:
 
 
 def size_at_start(case: Case) -> float:
-    """Return the size of a case's robot where the first search begins.
+    """Return the size of a case's robot at its first starting point.
 
     Raises:
         CaseError: the case contradicts itself.
-        EvaluationError: the robot does not exist there.
+        EvaluationError: the robot does not exist at that point.
     """
     nlp = formulate(case)
     return size_at(nlp, close_equations(nlp, nlp.start) if nlp.n else nlp.start)
@@ -146,7 +145,7 @@ def size_at_start(case: Case) -> float:
 def _size(
     model: Model, parameters: FloatArray, unknowns: FloatArray, rotation: FloatArray, position: FloatArray
 ) -> float:
-    """Return the largest distance between two points of a robot's drawing and the platform's origin."""
+    """Return the largest distance between points of a robot's drawing, including the platform's origin."""
     own = Substitution.identity(model)
     places = ca.horzcat(*[point.position for point in model.scene.points], SX(model.pose.position))
     function = ca.Function("points", own.all, [ca.densify(places)])
@@ -157,12 +156,12 @@ def _size(
 
 @dataclass(frozen=True)
 class LeftOut:
-    """A limit of the case that a robot cannot have.
+    """Limit of the case that does not apply to a robot.
 
     Attributes:
-        key: its key in ``[limits]``, or ``tolerance.joint_centre``.
-        reason: a clause for people.
-        is_of_legs: whether it speaks of legs between joint centres.
+        key: key in ``[limits]``, or ``tolerance.joint_centre``.
+        reason: reason as a clause.
+        is_of_legs: True for a limit on legs between joint centres.
     """
 
     key: str
@@ -172,12 +171,12 @@ class LeftOut:
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """A robot in the place of a case's own.
+    """Case with another robot in the place of its robot.
 
     Attributes:
-        case: the case with this robot, in the robot's own frame.
-        offset: (3,) origin of this frame in the case's own, length.
-        left_out: limits of the case that this robot cannot have.
+        case: case with the new robot, in the robot's frame.
+        offset: (3,) origin of this frame in the frame of the original case, length.
+        left_out: omitted limits, because they do not apply to the robot.
     """
 
     case: Case
@@ -186,19 +185,19 @@ class Placed:
 
 
 def placed(case: Case, contender: Contender, factor: float, part: float, length: float) -> Placed:
-    """Return a robot in the place of a case's own.
+    """Return a case with another robot in the place of its robot.
 
     Args:
-        case: the case.
-        contender: the robot.
-        factor: by which its typical lengths are multiplied.
-        part: of a typical dimension by which it may be smaller or larger; 0 holds the dimensions fixed.
+        case: original case.
+        contender: new robot.
+        factor: scale factor of its typical lengths.
+        part: relative range of each dimension about its typical value; 0 fixes the dimensions.
         length: characteristic length.
 
     Raises:
         CaseError: the case contradicts itself with this robot.
     """
-    if contender.is_own:
+    if contender.is_of_case:
         return Placed(case, np.zeros(3), ())
     model = contender.model
     start = np.array([value.first if isinstance(value, Free) else value for value in case.position])
@@ -237,7 +236,7 @@ def placed(case: Case, contender: Contender, factor: float, part: float, length:
 
 
 def _limits(case: Case, bare: Case) -> tuple[Limits, list[LeftOut]]:
-    """Return the limits of a case that another robot can have, and the others."""
+    """Return the limits of a case that apply to another robot, and the omitted ones."""
     kept: list[Limit[Any]] = []
     left_out: list[LeftOut] = []
     for limit in case.limits:
@@ -245,7 +244,11 @@ def _limits(case: Case, bare: Case) -> tuple[Limits, list[LeftOut]]:
             Limits(limit).check(bare.as_limited)
             own, other = (limit.ranges(each.model) for each in (case, bare))
             if [each.dimension for each in own.values()] != [each.dimension for each in other.values()]:
-                raise CaseError(f"limits.{limit.name}", "is a number of another kind of actuators")
+                raise CaseError(
+                    f"limits.{limit.name}",
+                    "cannot be compared: actuators of this robot have another unit (length or angle) "
+                    "than those of the case",
+                )
         except CaseError as error:
             left_out.append(LeftOut(f"limits.{limit.name}", error.fault, limit.needs_legs))
         else:
@@ -254,7 +257,7 @@ def _limits(case: Case, bare: Case) -> tuple[Limits, list[LeftOut]]:
 
 
 def _values(item: Parameter, factor: float, part: float) -> tuple[Value, ...]:
-    """Return a value or a range of each component of a dimension; a direction stays fixed."""
+    """Return a value or a range of each component of a dimension; directions are fixed."""
     scale = factor if item.dimension is Dimension.LENGTH else 1.0
     starts = [scale * value for value in item.starter or item.typical]
     width = part * max(abs(value) for value in starts)
@@ -264,13 +267,13 @@ def _values(item: Parameter, factor: float, part: float) -> tuple[Value, ...]:
 
 
 def _range(start: float, width: float, item: Parameter) -> Value:
-    """Return a range about a number within the domain of its dimension; the number where nothing is left."""
+    """Return a range about a value within the domain of its dimension; the value if the range is empty."""
     lower, upper = max(start - width, item.lower), min(start + width, item.upper)
     return Free(lower, upper, min(max(start, lower), upper)) if lower < upper else start
 
 
 def _moved(position: Sequence[Value], offset: FloatArray) -> tuple[Value, ...]:
-    """Return a position in a frame whose origin is at an offset (3,)."""
+    """Return a position in a frame with its origin at an offset (3,)."""
     found: list[Value] = []
     for value, shift in zip(position, offset.tolist(), strict=True):
         if isinstance(value, Free):
@@ -282,7 +285,7 @@ def _moved(position: Sequence[Value], offset: FloatArray) -> tuple[Value, ...]:
 
 
 def _moved_pose(pose: Pose, offset: FloatArray) -> Pose:
-    """Return a stated pose in a frame whose origin is at an offset (3,)."""
+    """Return a stated pose in a frame with its origin at an offset (3,)."""
     moves = tuple(
         Displacement.by(each.rotation, each.translation + each.rotation @ offset - offset)
         for each in pose.displacements
@@ -291,7 +294,7 @@ def _moved_pose(pose: Pose, offset: FloatArray) -> Pose:
 
 
 def _moved_task(task: Task, offset: FloatArray) -> Task:
-    """Return a task in a frame whose origin is at an offset (3,): its velocity is that of this origin."""
+    """Return a task in a frame with its origin at an offset (3,), where its velocity is measured."""
     twist = np.asarray(task.twist, dtype=np.float64)
     point = None if task.point is None else frozen_array(np.asarray(task.point, dtype=np.float64) - offset, (3,))
     moved = np.concatenate([twist[:3], twist[3:] + np.cross(twist[:3], offset)])

@@ -186,7 +186,7 @@ def _with_first_joints(leg: LegInstance, first: LegInstance) -> LegInstance:
 
 
 def _inputs_of_row(row: Wrench, legs: Sequence[LegInstance]) -> tuple[Form, SX]:
-    """Return the form of a row's rates, and its inputs: base and span of its leg, or the wrench itself.
+    """Return the form of a row's rates, and the inputs of the row: base and span of its leg, or its wrench.
 
     The inputs of a wrench are force, moment and square.
     """
@@ -201,7 +201,7 @@ def _inputs_of_row(row: Wrench, legs: Sequence[LegInstance]) -> tuple[Form, SX]:
 
 
 def _calls_of_rows(robot: RobotInstance, rows: Sequence[tuple[Form, SX]]) -> list[InnerCall]:
-    """Return the calls for each row's rates, and those for F and its bound from the rates."""
+    """Return the calls for the rate, the term of F and the magnitude of each row, and for their sums."""
     tasks = robot.F.numel()
     at = robot.inputs.numel() - 6 * tasks
     length, calls = robot.inputs[at - 1], []
@@ -227,13 +227,13 @@ def _wrench(kind: WrenchKind, inputs: SX) -> Wrench:
 
 
 def _rate_of_row(inputs: SX, row: RowBuild) -> SX:
-    """Return a row's rate and its term of F, (2, 1), from characteristic length, twist and the row's inputs."""
+    """Return the rate of a row and its term of F, (2, 1), from characteristic length, twist and inputs of the row."""
     length, twist, rows = inputs[0], inputs[1:7], [row(inputs[7:])]
     return ca.vertcat(rates(rows, twist, length), objective(rows, twist, length))
 
 
 def _size_of_row(inputs: SX, row: RowBuild) -> SX:
-    """Return a row's term of the bound on F, (1, 1), from length, twist, position and the row's inputs."""
+    """Return the term of a row in the bound on F, (1, 1), from length, twist, position and inputs of the row."""
     return magnitude([row(inputs[10:])], inputs[1:7], inputs[7:10], inputs[0])
 
 

@@ -42,7 +42,7 @@ from .ctext import (
 from .loops import find_loops
 from .manifest import MANIFEST, NumberColumns, manifest_text, number_columns
 from .measure import NOT_MEASURED
-from .runtimelimits import held_by_fixed_numbers, held_texts, limit_texts, run_time_limits
+from .runtimelimits import fixed_condition_texts, fixed_conditions, limit_texts, run_time_limits
 from .stages import StagedFunctions, loop_texts, stage_functions
 from .subject import Subject, find_subject, magnitude_of, objective_words, turning_joints
 from .worstcase import worst_case_texts
@@ -97,12 +97,12 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
     """
     subject = find_subject(case)
     nlp, prefix = subject.nlp, identifier(case.name)
-    held = held_by_fixed_numbers(nlp)
+    held = fixed_conditions(nlp)
     staged = stage_functions(nlp.program, magnitude_of(nlp), f"{prefix}_CASADI", held)
     limits = run_time_limits(nlp, f"{prefix}_CASADI")
     columns = number_columns(nlp, limits.limits, prefix)
     names = _substitutions(subject, staged, columns)
-    names |= held_texts(held, limits)
+    names |= fixed_condition_texts(held, limits)
     names |= limit_texts(limits, prefix, columns.limits)
     core = {ending: _core_text(ending, prefix) for ending in _CORE}
     names |= _stated_texts(names, core)
@@ -124,7 +124,7 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
 
 
 def size_words(case: Case, files: Mapping[str, str]) -> str:
-    """Return the size of generated C in words, and for large C the limit that causes most of it.
+    """Return the size of generated C in words; for large C, also the limit that causes most of the code.
 
     Args:
         case: the case.
@@ -142,7 +142,7 @@ def size_words(case: Case, files: Mapping[str, str]) -> str:
         key = next((key.partition(".")[0] for key in constraint.keys if key), constraint.name)
         operations[key] = operations.get(key, 0) + slopes.n_instructions()
     key = max(operations, key=lambda name: operations[name], default="F")
-    return f"{words}, most of it for {key} and its derivatives: compiling it may take a minute"
+    return f"{words}, most of it for {key} and its derivatives; compilation may take a minute"
 
 
 def budget_files(prefix: str) -> dict[str, str]:

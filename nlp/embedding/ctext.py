@@ -37,7 +37,7 @@ def c_name(name: str) -> str:
 
 
 def c_names(names: Iterable[str]) -> list[str]:
-    """Return the suffixes of C names for names in a case; equal ones get their index at the end."""
+    """Return the suffixes of C names for names in a case; equal suffixes get an index at the end."""
     found: list[str] = []
     for index, name in enumerate(names):
         plain = c_name(name)
@@ -107,7 +107,7 @@ def index_macros(program: Program, prefix: str) -> str:
 class Macros:
     """Macros of C texts with whole-number values: sums, products and comparisons of macros and of parameters.
 
-    For two macros of one name, that of the later text counts.
+    For two macros with one name, the macro of the later text counts.
     """
 
     _DEFINITION = re.compile(r"^#define (\w+)(?:\(([\w, ]+)\))?[ \t]+(.+?)[ \t]*$", re.MULTILINE)

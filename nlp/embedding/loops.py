@@ -225,7 +225,7 @@ class _Tables:
         return list(self._constants).index(element.element_hash())
 
     def _loop(self, group: _Group, kinds: Sequence[float | bool | None], is_inner: bool) -> Loop:
-        """Return the loop of a group."""
+        """Return the loop statement of C that evaluates the calls of a group."""
         symbols = [SX(kind) if isinstance(kind, float) else SX.sym("u") for kind in kinds]
         varying = [i for i, kind in enumerate(kinds) if kind is None]
         constant = [i for i, kind in enumerate(kinds) if kind is True]

@@ -273,7 +273,7 @@ def _manifest(data: Mapping[str, object], folder: Path) -> Manifest:
         raise ValueError("a name in sources or headers is not a file name")
     prefix, seeds = value_of(str, data["prefix"], "prefix"), value_of(int, data["seeds"], "seeds")
     if not prefix.isidentifier() or seeds < 0:
-        raise ValueError("prefix must be a name in C, and seeds at least 0")
+        raise ValueError("prefix must be a C identifier, and seeds at least 0")
 
     def rows(where: str, /, **kinds: object) -> list[list[Any]]:
         """Return the values of the given keys of the objects in a list."""

@@ -39,7 +39,7 @@ class Target(NamedTuple):
 
     Attributes:
         name: name for people.
-        macro: suffix of the names of its macros.
+        macro: suffix of the macro names of the target.
         compilers: names of compilers; the first installed one is used.
         size: program that returns the sizes of an object file.
         flags: compiler flags that select the target.
@@ -55,15 +55,15 @@ class Target(NamedTuple):
 
 
 class Figures(NamedTuple):
-    """Figures of one target, or the reason why there are none.
+    """Measured sizes for one target, or the reason why nothing was measured.
 
     Attributes:
         target: measured target.
         compiler: first line of the compiler's version, and the flags.
         flash: bytes of code and constants of the library; None if not measured.
-        stack: bound of a solve's stack in bytes, without the mathematics library; None if there is none.
+        stack: bound on the stack of a solve in bytes, without the mathematics library; None without a bound.
         painted: measured bytes of stack of a solve from all starting points, with that library; None if not run.
-        fault: reason for missing figures; empty if all are measured.
+        fault: reason for missing sizes; empty if all sizes are measured.
     """
 
     target: Target
@@ -97,7 +97,7 @@ TARGETS = (X86_64, CORTEX_M7)
 
 
 def measure(files: Mapping[str, str], prefix: str) -> tuple[Figures, ...]:
-    """Compile generated C for all targets in parallel, and return the figures.
+    """Compile generated C for all targets in parallel, and return the measured sizes.
 
     The environment variable ``CC`` may name another compiler for x86-64.
 
@@ -118,7 +118,7 @@ def measure(files: Mapping[str, str], prefix: str) -> tuple[Figures, ...]:
 
 
 class _Running(NamedTuple):
-    """Running compiler in a folder; without a process, figures with the reason."""
+    """Running compiler in a folder; without a process, the reason why nothing is measured."""
 
     figures: Figures
     words: tuple[str, ...]
@@ -132,7 +132,7 @@ def _begin(target: Target, files: Mapping[str, str], sources: list[str], folder:
     names = (own,) if own and target is X86_64 else target.compilers
     found = first_program(names)
     if found is None:
-        fault = f"no compiler for it is installed: {' or '.join(names)}"
+        fault = f"no compiler for this target is installed: {' or '.join(names)}"
         return _Running(Figures(target, fault=fault), (), folder, None)
     words = (found, *target.flags, *_FLAGS)
     try:
@@ -154,7 +154,7 @@ def _begin(target: Target, files: Mapping[str, str], sources: list[str], folder:
 
 
 def _end(running: _Running, sources: list[str], prefix: str) -> Figures:
-    """Wait for a compiler, and return its figures."""
+    """Wait for a compiler, and return the measured sizes."""
     figures, words, folder, process = running
     if process is None:
         return figures
@@ -221,7 +221,7 @@ def stack_bound(graphs: Mapping[str, str], prefix: str) -> int | None:
 
 
 def _name(title: str, unit: str) -> str:
-    """Return the name of a function; that of a static one begins with its unit, as in the graph."""
+    """Return the name of a function in the call graph; names of static functions begin with the source file."""
     own = title.rpartition(":")[2]
     return f"{unit}:{own}" if ":" in title else own
 
@@ -258,12 +258,12 @@ def _deepest(function: str, frames: Mapping[str, int], calls: Mapping[str, set[s
     return depths[function]
 
 
-#: Text in place of the figures if no compiler was run.
+#: Text instead of measured sizes if no compiler was run.
 NOT_MEASURED = "Flash and stack were not measured when this folder was generated."
 
 
 def with_figures(files: Mapping[str, str], prefix: str, figures: Sequence[Figures]) -> dict[str, str]:
-    """Return the files of a folder with figures in the header, the README and the manifest."""
+    """Return the files of a folder with the measured sizes in the header, the README and the manifest."""
     manifest = json.loads(files[MANIFEST])
     manifest["measured"] = [
         {
@@ -287,7 +287,7 @@ def with_figures(files: Mapping[str, str], prefix: str, figures: Sequence[Figure
 
 
 def figure_words(figures: Figures) -> str:
-    """Return the figures of a target in one line."""
+    """Return the measured sizes for a target in one line."""
     parts = [
         "" if figures.flash is None else f"flash {figures.flash / 1000:.1f} kB",
         "" if figures.stack is None else f"stack at most {figures.stack} bytes",
@@ -297,7 +297,7 @@ def figure_words(figures: Figures) -> str:
 
 
 def _macros(prefix: str, figures: Sequence[Figures]) -> str:
-    """Return macros of the header, with a comment for missing figures."""
+    """Return macros of the header, with a comment for missing sizes."""
     lines = []
     for each in figures:
         name = each.target.macro
@@ -317,7 +317,7 @@ def _macros(prefix: str, figures: Sequence[Figures]) -> str:
 
 
 def _rows(figures: Sequence[Figures]) -> str:
-    """Return a table for the README, with a line for missing figures."""
+    """Return a table for the README, with a line for missing sizes."""
     heads = ("flash, bytes", "stack bound, bytes", "with margin, bytes", "stack measured, bytes")
     lines = [f"| target | {' | '.join(heads)} | compiler and flags |", "|---|---|---|---|---|---|"]
     for each in figures:

@@ -39,7 +39,7 @@ class RunTimeLimit:
     Attributes:
         key: dotted key below ``limits``; for the angle of a rotation with a free axis, the constraint's name with
             ``.min`` or ``.max``.
-        name: suffix of its name in C.
+        name: suffix of the limit's C identifier.
         dimension: dimension of the limit.
         default: value in the case, radians for an angle.
         above: exclusive lower bound of allowed values.
@@ -189,7 +189,7 @@ def _equal(expressions: Sequence[SX], wanted: SX) -> list[int]:
 
 
 def _limit(key: str, reading: Reading, value: float) -> RunTimeLimit:
-    """Return a limit with its range, which includes the value in the case, and without a name in C."""
+    """Return a limit with its range, which includes the value in the case, and without a C identifier."""
     above = reading.above if value > reading.above else float(np.nextafter(value, -math.inf))
     return RunTimeLimit(key, "", reading.dimension, value, above, max(reading.most, value))
 
@@ -237,7 +237,7 @@ def _description(limit: RunTimeLimit, unit: str) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
+class FixedConditions:
     """Constraints that the fixed parameters satisfy.
 
     Attributes:
@@ -254,7 +254,7 @@ class Held:
         return ca.vertcat(SX(0, 1), *[item.constraint.expression for item in self.items])
 
 
-def held_by_fixed_numbers(nlp: Nlp) -> Held:
+def fixed_conditions(nlp: Nlp) -> FixedConditions:
     """Return the constraints that the fixed parameters of the case satisfy."""
     pairs = [
         item
@@ -266,10 +266,10 @@ def held_by_fixed_numbers(nlp: Nlp) -> Held:
     x = nlp.program.x
     varies = [bool(nlp.n) and any(ca.which_depends(each.constraint.expression, x, 1, True)) for each in items]
     first = tuple(item for item, own in zip(items, varies, strict=True) if own)
-    return Held((*first, *(item for item, own in zip(items, varies, strict=True) if not own)), len(first))
+    return FixedConditions((*first, *(item for item, own in zip(items, varies, strict=True) if not own)), len(first))
 
 
-def held_texts(held: Held, limits: RunTimeLimits) -> dict[str, str]:
+def fixed_condition_texts(held: FixedConditions, limits: RunTimeLimits) -> dict[str, str]:
     """Return the texts of the placeholders for constraints that the fixed parameters satisfy.
 
     If a limit set at run time bounds several constraints, the tightest one counts.

@@ -19,7 +19,7 @@ from ..program.program import Program
 from .calls import RobotValues
 from .ctext import short_table
 from .loops import Loop, Loops, find_loops
-from .runtimelimits import Held
+from .runtimelimits import FixedConditions
 
 #: Number of operations of a Hessian, without loops, above which C has its product with a direction instead: a third of
 #: the code.
@@ -74,7 +74,7 @@ class StagedFunctions:
         return (self.prepare, *self.functions.values(), *self.of_robot.values(), *of_loops)
 
 
-def stage_functions(program: Program, size: SX, prefix: str, held: Held) -> StagedFunctions:
+def stage_functions(program: Program, size: SX, prefix: str, held: FixedConditions) -> StagedFunctions:
     """Return the functions that the generated C calls.
 
     * ``F``, ``F_gradient``: the objective, and the objective with its gradient; absent if a loop computes the objective

@@ -33,7 +33,7 @@ _DIGITS = 9
 
 
 class Subject(NamedTuple):
-    """Program, and its optimal value; None if the search did not end at an optimum in the home working mode."""
+    """Nonlinear program, and its optimal value; None without an optimum in the home working mode."""
 
     nlp: Nlp
     optimum: float | None
@@ -49,10 +49,10 @@ def find_subject(case: Case) -> Subject:
         InputError: the functions of the case have no finite value at any trial point.
     """
     if len(case.tasks) > 1 and case.method is Method.AVERAGE:
-        fault = "optimises nothing, so no C is generated: must be 'weighted-sum' or 'worst-case'"
+        fault = "has no objective to generate C for: must be 'weighted-sum' or 'worst-case'"
         raise CaseError("combine.method", fault, case.method.value, case.source)
     if case.tasks[0].measure:
-        fault = "is not supported in C: only F is, with limits on forces, speeds and powers"
+        fault = "is not supported in C: minimise F, and limit forces, speeds and powers instead"
         raise CaseError("objective.minimise", fault, case.tasks[0].measure, case.source)
     _refuse_nested_loops(case)
     _check_pairs(formulate(case))
@@ -80,7 +80,7 @@ def _refuse_nested_loops(case: Case) -> None:
 
 
 def magnitude_of(nlp: Nlp) -> SX:
-    """Return an upper bound (1, 1) on the absolute objective of a program without cancellation.
+    """Return the objective (1, 1) with the magnitudes of its terms: an upper bound on its absolute value.
 
     For several poses, the value is an estimate from the first one.
     """

@@ -35,19 +35,19 @@ from .workingmode import Posture, names_of, turned_limbs
 _FIRST = 1 / 16
 _SHORTEST = 1 / 2048
 _STEPS = 11
-#: Largest change of pose and unknowns, of order 1, in a step: a larger one that stays in the shortest step is a jump.
+#: Largest change of scaled pose and unknowns in a step. A larger change, even in the shortest step, is a jump.
 _LARGE = 0.05
 #: Weight of a pose step relative to a step of the unknowns: the pose moves only where the unknowns do not suffice.
 _HEAVY = 1e-3
-#: Largest residual of closed loops; equations are of order 1.
+#: Largest residual of closed loops; equations have magnitudes of about 1.
 _CLOSED = 1e-10
 #: Largest residual of the loops at home after scaling the robot: rounding of its dimensions.
 _SIMILAR = 1e-7
-#: Singular values below this part of the largest are zero: such a loop is mobile at home too.
+#: Singular values below this fraction of the largest are zero: such a loop is mobile at home too.
 _ZERO = 1e-9
-#: A path is near a singularity where a singular value falls below this part of that at home.
+#: A path is near a singularity where a singular value falls below this fraction of that at home.
 NEAR_SINGULAR = 0.1
-#: Largest difference of an unknown of order 1 within one assembly mode: in another mode it is of order 0.1.
+#: Largest difference of an unknown of magnitude about 1 within one assembly mode: in another mode it is about 0.1.
 _SAME = 1e-4
 
 
@@ -56,8 +56,8 @@ class Assembly:
     """Assembly mode of the joints at a point, compared with home.
 
     Attributes:
-        is_home: whether the path from home ends at the internal unknowns of the point.
-        nearness: smallest singular value of the loop equations on the path, as a part of its value at home; 0 where
+        is_home: If true, the path from home ends at the internal unknowns of the point.
+        nearness: smallest singular value of the loop equations on the path, as a fraction of its value at home; 0 if
             the path jumps or does not reach the pose.
         turned: names of the limbs in another working mode than at home: the path ends at other joint positions, and
             the actuators of the limb drive the platform in the opposite sense.
@@ -158,13 +158,13 @@ def _turned(model: Model, posture: Posture, differ: Sequence[bool]) -> tuple[str
 def unknowns_from_home(
     model: Model, parameters: FloatArray, pose: FloatArray, given: FloatArray | None = None
 ) -> FloatArray | None:
-    """Return the internal unknowns (u,) at the end of the path from home to a pose; None where the path ends early.
+    """Return the internal unknowns (u,) at the end of the path from home to a pose; None if the path ends early.
 
     Args:
         model: model of the robot.
         parameters: (k,) components of all parameters, radians for angles.
         pose: (6,) rotation vector, radians, and position of the platform.
-        given: (u,) values of the unknowns; only free actuator coordinates are read. 0, as at home, if left out.
+        given: (u,) values of the unknowns, of which only free actuator coordinates are read; 0 (home) if left out.
     """
     return _follow(model, parameters, pose, np.zeros(len(model.unknowns)) if given is None else given)[0]
 
@@ -179,7 +179,7 @@ def _follow(
 ) -> tuple[FloatArray | None, float]:
     """Return the unknowns (u,) at the end of the path from home, and the nearness to a singularity along it.
 
-    The unknowns are None where the path ends early. Free actuator coordinates move on the path to their given values.
+    The unknowns are None if the path ends early. Free actuator coordinates move on the path to their given values.
     """
     path = _path_of(model)
     dimensions = np.concatenate([np.zeros(0), *[item.typical for item in model.parameters]])
@@ -215,15 +215,16 @@ def _follow(
 
 @lru_cache(maxsize=4)
 def _path_of(model: Model) -> _Path:
-    """Return the loop equations of a robot; the last robots are cached, as a search evaluates many points."""
+    """Return the loop equations of a robot, from a cache of the last four robots."""
     return _Path(model)
 
 
 class _Path:
     """Loop equations of a robot and their derivatives, as functions of rotation vector, position and unknowns.
 
-    These are one vector; its unknowns are divided by their sizes. The unit of length of the case may differ from that
-    of the robot file. A scaled robot has the same assembly modes, so the path uses the scale of the robot file.
+    Rotation vector, position and unknowns form one vector, in which unknowns are divided by their sizes. The unit of
+    length of the case may differ from that of the robot file. A scaled robot has the same assembly modes, so the path
+    uses the scale of the robot file.
 
     Args:
         model: model of the robot.
@@ -245,7 +246,7 @@ class _Path:
         (residual,) = ca.Function("closure", own.all, [equations]).call(
             [own.parameters, z[6:] * sizes, rotation, z[3:6]]
         )
-        # With lengths of the robot's size, the singular values are those of equations of order 1.
+        # With lengths of the robot's size, the singular values are those of equations of magnitude about 1.
         outputs = [ca.densify(residual), ca.densify(ca.jacobian(residual, z))]
         self._kernel = Kernel(ca.Function("path", [z, own.parameters], outputs), tuple_of)
         self.scale = np.ones(z.numel())
@@ -271,7 +272,7 @@ class _Path:
         return factor if float(np.abs(self._kernel(home, typical)[0]).max(initial=0.0)) <= _SIMILAR else 1.0
 
     def singular_values(self, z: FloatArray, parameters: FloatArray) -> FloatArray:
-        """Return the smallest singular values of the derivatives by the determined unknowns, without and with the pose.
+        """Return the smallest singular values of the Jacobian of the determined unknowns, without and with the pose.
 
         The array is empty without equations, or without such unknowns.
         """
@@ -304,6 +305,6 @@ def _sizes_of_unknowns(model: Model, parameters: FloatArray) -> FloatArray:
 
 
 def _size(model: Model) -> float:
-    """Return a length of the order of the robot's size, from its lengths and its home position."""
+    """Return a length comparable to the robot's size, from its lengths and its home position."""
     lengths = [value for item in model.parameters if item.dimension is Dimension.LENGTH for value in item.typical]
     return float(np.linalg.norm([*lengths, *model.home])) or length_of(model, model.typical.tolist())

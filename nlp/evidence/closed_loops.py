@@ -11,13 +11,13 @@ from casadi import SX
 
 from ...models.arrays import FloatArray, values_at
 
-#: Largest residual of a closed loop; equations are of order 1, and Newton's method ends at rounding.
+#: Largest residual of a closed loop; equations have magnitudes of about 1, and Newton's method ends at rounding.
 _CLOSED = 1e-10
 #: Steps of Newton's method.
 _STEPS = 15
 #: Steps from the joints at home, where the equations have residuals at another pose, to closed loops.
 _WAY = 40
-#: Singular values below this part of the largest are zero in a step of more coordinates than equations.
+#: Singular values below this fraction of the largest are zero in a step of more coordinates than equations.
 DEPENDENT = 1e-9
 
 
@@ -26,10 +26,10 @@ class Loops:
 
     Args:
         z: (n, 1) symbols of the coordinates.
-        equations: (k, 1) expressions that are 0 where the loops are closed.
-        every: (e, 1) all equations, also those that follow from ``equations``.
+        equations: (k, 1) expressions that are 0 for closed loops.
+        every: (e, 1) all equations, including equations that follow from ``equations``.
         signs: (s, 1) expressions that are positive in the home assembly mode.
-        size: (n,) sizes that make coordinates comparable, of the order of their ranges.
+        size: (n,) divisors that make coordinates comparable, such as their typical ranges.
     """
 
     def __init__(self, z: SX, equations: SX, every: SX, signs: SX, size: FloatArray) -> None:
@@ -71,7 +71,7 @@ class Loops:
     def all_closed(
         self, z: FloatArray, moving: Sequence[int], *, steps: int = 1, zero: float | None = None
     ) -> FloatArray:
-        """Return closed points (n, B): along a path from each given point the left sides fall to 0.
+        """Return closed points (n, B): along a path from each given point, the residuals fall to 0.
 
         A point that cannot be closed is NaN.
 
@@ -104,8 +104,8 @@ class Loops:
 def inverses(matrices: FloatArray, zero: float | None = None) -> FloatArray:
     """Return the inverses of matrices (B, k, k); NaN for singular ones.
 
-    With ``zero`` the result is pseudo-inverses (B, n, k) of matrices (B, k, n); singular values below this part of the
-    largest count as zero.
+    With ``zero`` the result is pseudo-inverses (B, n, k) of matrices (B, k, n); singular values below this fraction of
+    the largest count as zero.
     """
     good = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
     if zero is None:
@@ -116,14 +116,14 @@ def inverses(matrices: FloatArray, zero: float | None = None) -> FloatArray:
 
 
 def closed_from_home(loops: Loops, z: FloatArray, pose: int) -> FloatArray | None:
-    """Return closed loops (n,) at a pose, or near it, in the home assembly mode; None where none are known.
+    """Return closed loops (n,) at or near a pose, in the home assembly mode; None if the loops cannot be closed.
 
     The unknowns are 0 at home. At another pose the equations then have residuals, which are reduced to 0 in steps.
 
     Args:
         loops: the loop equations.
         z: (n,) coordinates of the pose, followed by zeros.
-        pose: number of coordinates of the pose. They move only where the unknowns cannot close the loops.
+        pose: number of pose coordinates, which move only if the unknowns cannot close the loops.
     """
     if not loops.count:
         return z if loops.is_closed(z) else None

@@ -24,8 +24,8 @@ def closed_start(nlp: Nlp, others: Iterable[FloatArray] = ()) -> FloatArray:
 
     Args:
         nlp: the nonlinear program.
-        others: (n,) further points; where the loops cannot be closed at the program's start, the first of these at
-            which they can be closed replaces it.
+        others: (n,) further points. If the loops cannot be closed at the program's start, the first further point with
+            closed loops replaces it.
 
     Raises:
         EvaluationError: the loops cannot be closed at any of these points.
@@ -66,7 +66,7 @@ def closed_in_place(nlp: Nlp, x: FloatArray) -> FloatArray | None:
         x: (n,) given point; its internal unknowns are not read.
 
     Returns:
-        (n,) the point; None where a constraint of the program, such as the home working mode, is violated.
+        (n,) the point; None if a constraint of the program, such as the home working mode, is violated.
     """
     own, target = list(nlp.program.places.inner), x.copy()
     target[own] = nlp.start[own]
@@ -80,7 +80,7 @@ def closed_in_place(nlp: Nlp, x: FloatArray) -> FloatArray | None:
 
 
 def close_near(nlp: Nlp, first: FloatArray, x: FloatArray) -> FloatArray:
-    """Return a point near the given one at which the equations hold, with unknowns close to those of a first point.
+    """Return a point near ``x`` at which the equations hold, with unknowns close to those of ``first``.
 
     Args:
         nlp: the nonlinear program.
@@ -97,7 +97,7 @@ def close_near(nlp: Nlp, first: FloatArray, x: FloatArray) -> FloatArray:
 
 
 def _with_unknowns_from_home(nlp: Nlp, x: FloatArray) -> FloatArray:
-    """Return a point (n,) with the unknowns at the end of the path from home; unchanged where the path ends early."""
+    """Return a point (n,) with the unknowns at the end of the path from home; unchanged if the path ends early."""
     model, found = nlp.program.model, x.copy()
     if model.generic is None or not model.unknowns:
         return found

@@ -24,10 +24,10 @@ _NEGLIGIBLE = 1e-7
 
 @dataclass(frozen=True)
 class Dependence:
-    """Dependence of F on conventions, as parts of F.
+    """Dependence of F on conventions, relative to F.
 
     Attributes:
-        length: relative derivative ``(l / F) dF/dl`` with respect to the characteristic length; 0 where F does not
+        length: relative derivative ``(l / F) dF/dl`` with respect to the characteristic length; 0 if F does not
             depend on it.
         centre: largest relative change of F if all arbitrary centres move along their joint axes by the characteristic
             length, to either side; None if all centres are determined.
@@ -41,7 +41,7 @@ def dependence_of(nlp: Nlp, x: FloatArray) -> Dependence | None:
     """Return the dependence of F, summed over the poses, on conventions; None for a robot without couples, or F = 0.
 
     Args:
-        nlp: nonlinear program of one task; of several tasks, the first counts.
+        nlp: nonlinear program; for several tasks, the first task counts.
         x: (n,) the point.
     """
     model, program = nlp.program.model, nlp.program
@@ -68,7 +68,7 @@ def dependence_of(nlp: Nlp, x: FloatArray) -> Dependence | None:
 
 
 def _settled(value: float) -> float:
-    """Return a relative change of F, or 0 where it is only rounding."""
+    """Return a relative change of F, or 0 for a change within rounding error."""
     return 0.0 if abs(value) <= _NEGLIGIBLE else value
 
 

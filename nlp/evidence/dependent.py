@@ -31,9 +31,9 @@ from .closed_loops import Loops, closed_from_home
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Singular values below this part of the largest are zero; a relative change below the second number is rounding.
+#: Singular values below this fraction of the largest are zero; a relative change below the second number is rounding.
 _ZERO, _STILL = 1e-9, 1e-9
-#: Smallest component of a feasible direction, as a part of the largest, at which a coordinate counts as moving.
+#: Smallest component of a feasible direction, as a fraction of the largest, at which a coordinate counts as moving.
 _MOVES = 1e-6
 #: Number of random poses for dependent coordinates, largest number of corners, steps to each pose, and the seed.
 _POSES, _MOST_CORNERS, _WAY, _SEED = 12, 32, 8, 0
@@ -41,9 +41,9 @@ _POSES, _MOST_CORNERS, _WAY, _SEED = 12, 32, 8, 0
 #: the robot's size, or angle.
 _WIDER, _LEAST = 0.5, 1e-2
 #: Volumes with a smaller relative difference are equal: the first is taken. A fixed coordinate that comes first is
-#: taken if it has the second part of the largest volume.
+#: taken if its volume exceeds the second fraction of the largest volume.
 _TIE, _ENOUGH = 1e-9, 0.2
-#: Weight of a direction of the position, in parts of the robot's size, relative to a rotation in radians: most tasks
+#: Weight of a direction of the position, divided by the robot's size, relative to a rotation in radians: most tasks
 #: are positioning tasks.
 _POSITION = 3.0
 
@@ -85,7 +85,7 @@ def loop_system(model: Model, given: Substitution, values: Sequence[float]) -> L
 
 
 def with_dependent(case: Case, workspace: Workspace) -> Workspace:
-    """Return a workspace with its dependent coordinates, or refuse one whose ranges the robot cannot control.
+    """Return a workspace with its dependent coordinates; refuse ranges that the robot cannot control.
 
     Raises:
         CaseError: the robot controls no coordinate that has a range, or as :func:`dependent_of`.
@@ -94,7 +94,7 @@ def with_dependent(case: Case, workspace: Workspace) -> Workspace:
     if not found.independent and found.dependent:
         ranged = " and ".join(found.names[k] for k, _ in found.ranged)
         chosen = ", ".join(found.names[k] for k in independent_coordinates(case, found) or ())
-        fault = f"this robot cannot control {ranged}: give a range to at least one of {chosen}"
+        fault = f"this robot cannot control {ranged}: give a range to one or more of {chosen}"
         raise CaseError("workspace", fault, source=case.source)
     return found
 
@@ -102,8 +102,8 @@ def with_dependent(case: Case, workspace: Workspace) -> Workspace:
 def dependent_of(case: Case, workspace: Workspace) -> Workspace:
     """Return a workspace with its dependent coordinates and their working ranges.
 
-    Dependent coordinates that the workspace has already are kept, with new working ranges. Where the loops cannot be
-    closed in the middle of the workspace, the workspace is returned unchanged.
+    Existing dependent coordinates are kept, with new working ranges. If the loops cannot be closed at the centre of the
+    workspace, the workspace is returned unchanged.
 
     Args:
         case: case with fixed dimensions.
@@ -148,7 +148,7 @@ def dependent_of(case: Case, workspace: Workspace) -> Workspace:
 
 
 def robot_size(case: Case, position: Sequence[float] | None = None) -> float:
-    """Return the largest distance between points of a robot's drawing, unknown joints at home; 1 for one point.
+    """Return the largest distance between points of a robot's drawing, with unknown joints at home; 1 for one point.
 
     Args:
         case: case with fixed dimensions.
@@ -165,17 +165,19 @@ def robot_size(case: Case, position: Sequence[float] | None = None) -> float:
 
 
 def _misstated(case: Case, workspace: Workspace, k: int, stated: float, true: float) -> CaseError:
-    """Return the error for a stated coordinate that this robot keeps at another value."""
+    """Return the error for a stated coordinate that this robot cannot have."""
     dimension, units = (Dimension.LENGTH if k < 3 else Dimension.ANGLE), case.units
     one, other = (f"{units.shown(each, dimension):.6g} {units.label(dimension)}".rstrip() for each in (stated, true))
     key = f"workspace.position[{k}]" if k < 3 else "workspace.rotation"
-    return CaseError(key, f"{workspace.names[k]} = {one}: this robot keeps it at {other}", source=case.source)
+    return CaseError(
+        key, f"{workspace.names[k]} = {one}: this robot keeps this coordinate at {other}", source=case.source
+    )
 
 
 def independent_coordinates(case: Case, workspace: Workspace) -> list[int] | None:
     """Return the indices of the pose coordinates that the robot controls independently over a workspace.
 
-    These are all six for a robot with six degrees of freedom; None where the loops cannot be closed in the middle.
+    For a robot with six degrees of freedom, these are all six; None if the loops cannot be closed at the centre.
     """
     if not _may_depend(case.model):
         return list(range(6))
@@ -201,13 +203,13 @@ class CompletedPoses(NamedTuple):
 def completed(
     case: Case, positions: FloatArray, rotations: FloatArray, which: NDArray[np.bool_]
 ) -> CompletedPoses | None:
-    """Return poses with their dependent coordinates computed; None where all coordinates are independent.
+    """Return poses with their dependent coordinates computed; None if all coordinates are independent.
 
     Args:
         case: case with fixed dimensions.
         positions: (N, 3) origins of the platform frame, length.
         rotations: (N, 3, 3) platform to world coordinates.
-        which: (N,) poses whose dependent coordinates are computed; poses that cannot be closed stay unchanged.
+        which: (N,) True for poses whose dependent coordinates are computed; poses with open loops stay unchanged.
     """
     if not _may_depend(case.model) or not which.any():
         return None
@@ -249,14 +251,14 @@ def _may_depend(model: Model) -> bool:
 
 
 class _Chart:
-    """The loops of a robot in six coordinates of its pose, followed by its unknowns.
+    """Loop equations of a robot as functions of six pose coordinates, then the unknowns.
 
     Rotations are the tangents of half of roll, pitch and yaw, or the components of a Cayley vector: along the axis of
     a rotation about one axis, and across it.
 
     Attributes:
         middle: (6 + u,) middle of the workspace, with unknowns of 0.
-        half: (6,) half ranges; 0 for fixed coordinates.
+        half: (6,) half ranges of the coordinates; 0 for fixed coordinates.
         ranged: indices of the coordinates whose ranges are wider than rounding.
         size: (6 + u,) sizes that make coordinates comparable.
     """
@@ -329,7 +331,7 @@ class _Chart:
         Args:
             z: (6 + u,) the closed point.
             independent: indices of the independent coordinates.
-            to: (P, 6 or more) targets; only their independent coordinates are read.
+            to: (P, 6 or more) target poses, of which only the independent coordinates are read.
         """
         moving = [k for k in range(len(z)) if k not in independent]
         points, way = np.tile(z, (len(to), 1)), (to[:, independent] - z[independent])
@@ -347,7 +349,7 @@ class _Chart:
         return np.asarray((moves <= _MOVES) & (spread <= _STILL * self.size[:6]))
 
     def _moves(self, z: FloatArray) -> FloatArray:
-        """Return a basis (6, m) of the feasible pose directions at a closed point, in coordinates of size 1."""
+        """Return a basis (6, m) of the feasible pose directions at a closed point, in scaled coordinates."""
         _, values, right = np.linalg.svd(self.loops.slopes(z[:, None])[0] * self.size)
         rank = int(np.count_nonzero(values > _ZERO * values.max(initial=0.0)))
         return np.asarray(right[rank:, :6].T)
@@ -356,9 +358,9 @@ class _Chart:
 def _largest(
     moves: FloatArray, among: Sequence[int], chosen: list[int], count: int, enough: float = 1 - _TIE
 ) -> list[int]:
-    """Return the chosen rows of a matrix, with ``count`` more rows that span the largest volume together with them.
+    """Return the chosen rows of a matrix and ``count`` more rows, so that all rows span the largest volume.
 
-    Among several choices, the first one that has at least the part ``enough`` of the largest volume is taken.
+    Among several choices, the first with at least the fraction ``enough`` of the largest volume is taken.
     """
     every = [[*chosen, *more] for more in itertools.combinations(among, max(count, 0))]
     squares = [max(float(np.linalg.det(moves[rows] @ moves[rows].T)), 0.0) for rows in every]

@@ -19,7 +19,7 @@ class Equations(NamedTuple):
         x: (n,) the point, unscaled.
         residual: (k,) signed residuals.
         normals: (k, n) unit vectors along the gradients of the residuals.
-        is_defined: whether the program has a finite value at the point.
+        is_defined: If true, the program has a finite value at the point.
     """
 
     x: FloatArray
@@ -55,7 +55,7 @@ class ProgramEquations:
         return Equations(np.asarray(x, dtype=np.float64), residual, normals, is_defined)
 
     def linear(self, at: Equations) -> Linear | None:
-        """Return the equations to first order; None where they hold or are not defined."""
+        """Return the equations to first order; None if the equations hold or are undefined."""
         if np.max(np.abs(at.residual)) <= self._closed or not at.is_defined:
             return None
         return Linear(at.residual, at.normals[:, self._movable])
@@ -70,11 +70,11 @@ class ProgramEquations:
 def gradient_sizes(gradients: FloatArray, longest: FloatArray, no_gradient: float) -> FloatArray:
     """Return the lengths (k,) of the gradients of constraints, which turn residuals into distances.
 
-    Where the gradient of a constraint is zero its typical length is returned, as there is no distance.
+    For a zero gradient, the typical length is returned, because there is no distance.
 
     Args:
         gradients: (k, n) gradients in scaled variables.
-        longest: (k,) longest gradient of each constraint at a few points; 0 where there is none.
+        longest: (k,) longest gradient of each constraint at a few points; 0 without a finite gradient.
         no_gradient: relative size below which a gradient counts as zero.
     """
     sizes = np.sqrt(np.einsum("ij,ij->i", gradients, gradients))

@@ -30,7 +30,7 @@ def evaluate(case: Case | Nlp, x: FloatArray | None = None, pose: int = 0) -> Ro
         pose: index of the pose, in a case with several poses.
 
     Returns:
-        The state with the rates of the program's task; of several combined tasks, the first one counts.
+        The state with the rates of the program's task; for combined tasks, of the first task.
 
     Raises:
         CaseError: the fixed values of the case contradict each other.
@@ -41,7 +41,7 @@ def evaluate(case: Case | Nlp, x: FloatArray | None = None, pose: int = 0) -> Ro
 
 
 def starting_point(nlp: Nlp) -> FloatArray:
-    """Return the point (n,) at which a program is evaluated by default: its first starting point with closed loops.
+    """Return the default point (n,) for an evaluation: the first starting point, with closed loops.
 
     Raises:
         EvaluationError: the loops cannot be closed.
@@ -50,7 +50,7 @@ def starting_point(nlp: Nlp) -> FloatArray:
 
 
 def without_speeds(case: Case) -> Case:
-    """Return a case without the limits on speeds and powers of a path, whose motion the case does not state."""
+    """Return a case without limits on speeds and powers, if the case has no motion."""
     left_out = case.without_motion
     return replace(case, limits=Limits(*(each for each in case.limits if each not in left_out))) if left_out else case
 
@@ -64,7 +64,7 @@ def shown_parameters(case: Case, state: RobotState) -> Mapping[str, float | Vect
     return MappingProxyType(shown)
 
 
-def shown_numbers(nlp: Nlp, x: FloatArray, state: RobotState) -> Mapping[str, float | Vector]:
+def shown_values(nlp: Nlp, x: FloatArray, state: RobotState) -> Mapping[str, float | Vector]:
     """Return the parameters and pose coordinates of a case at a point in its units, by their names for ``--set``.
 
     Args:

@@ -41,10 +41,10 @@ if TYPE_CHECKING:
 _BLOCK = 256
 #: Components of a pose: the rotation column by column, then the position.
 _POSE = 12
-#: Attempts along a path: number of its steps, and largest correction of an extrapolated unknown of order 1 in a step.
+#: Attempts along a path: number of steps, and largest correction of a scaled, extrapolated unknown in a step.
 #: The last attempt has the step limit of :mod:`.assembly`, beyond which a step is a jump.
 _WAYS = ((4, 0.2), (16, 0.1), (64, 0.05))
-#: Between consecutive poses, one step is tried first.
+#: Attempts between consecutive poses, which begin with one step.
 _NEXT = ((1, 0.05), *_WAYS)
 #: Number of given poses at which the home assembly mode is sought, if it cannot be closed at the home pose.
 _REFERENCES = 8
@@ -63,17 +63,17 @@ class InversePoses:
         actuators: (a,) names of the actuators.
         held: labels of the driven joints that the pose does not determine; they stay at home, with rates of 0.
         measures: (a,) quantity of each coordinate: ``leg_length``, the distance between the joints of a leg, for robots
-            given by rows of ``J``; else ``actuator_angle`` or ``actuator_length``, measured from home.
+            given by rows of ``J``; otherwise ``actuator_angle`` or ``actuator_length``, measured from home.
         joints: (u,) names of the passive joint coordinates that are unknowns of the robot.
         coordinates: (N, a) actuator coordinates, radians or length.
-        unknowns: (N, u) coordinates of these passive joints, from home, radians or length.
+        unknowns: (N, u) coordinates of the ``joints``, from home, radians or length.
         jacobian: (N, m, 6) ``J``: unit wrenches, force, then moment about the world origin, couples times the
             characteristic length. For a limb whose wrenches follow from its joints, all rows of the projector onto
             them; results show a basis of these rows, with the same ``J'J``.
         rates: (N, a, 6) actuator rates for a unit of each component of the platform's motion: angular velocity, then
             velocity of its origin, in the world frame. They are valid for motions that the platform can make.
-        closed: (N,) whether all loops close at the pose, in the followed assembly mode. Limits do not count.
-        singular: (N,) whether J has a rank below 6 at a closed pose, or rates are not finite.
+        closed: (N,) True if all loops close at the pose, in the followed assembly mode. Limits do not count.
+        singular: (N,) True if J has a rank below 6 at a closed pose, or rates are not finite.
         positions: (N, 3) origins of the platform frame at the poses, length.
         rotations: (N, 3, 3) platform to world coordinates.
         dependent: names of the dependent coordinates whose values differ from the given values.
@@ -112,9 +112,9 @@ def inverse(
         case: case with fixed dimensions; its poses, limits and tasks are not read.
         positions: (N, 3) origins of the platform frame in the world frame, length.
         rotations: (N, 3, 3) platform to world coordinates, orthogonal to 1e-6; the identity if left out.
-        rpy: (N, 3) roll, pitch and yaw of each pose in place of ``rotations``, radians, about the world's axes x, y and
+        rpy: (N, 3) roll, pitch and yaw of each pose instead of ``rotations``, radians, about the world's axes x, y and
             z in this order, like the columns ``roll``, ``pitch`` and ``yaw`` of a CSV file.
-        follow: assembly mode where the loops have no closed form: ``"home"``, or ``"previous"`` to follow the joints
+        follow: assembly mode for loops without a closed form: ``"home"``, or ``"previous"`` to follow the joints
             from each closed pose to the next. With ``"previous"``, actuator angles have no jumps by a full turn.
 
     Raises:
@@ -162,7 +162,7 @@ def _rpy_rows(rpy: ArrayLike, count: int) -> FloatArray:
         k, column = large[0]
         angle = float(rows[k, column])
         words = f"{angle:.6g} rad = {math.degrees(angle):.1f} deg; angles are radians in Python"
-        raise InputError(f"rpy[{k}][{column}] = {angle:.6g}: must be at most 2 pi in size; {words}")
+        raise InputError(f"rpy[{k}][{column}] = {angle:.6g}: must be at most 2 pi in magnitude; {words}")
     return rows
 
 
@@ -196,7 +196,7 @@ def _inverse(case: Case, p: FloatArray, R: FloatArray, follow: str) -> InversePo
 
 
 class _Values(NamedTuple):
-    """Values at B poses: those of :class:`InversePoses`, and those that decide on ``closed`` and ``singular``."""
+    """Values at B poses: fields of :class:`InversePoses`, and values that decide ``closed`` and ``singular``."""
 
     coordinates: FloatArray
     unknowns: FloatArray
@@ -379,7 +379,7 @@ def _are_poses(R: FloatArray, p: FloatArray) -> NDArray[np.bool_]:
 
 
 def _margin(rows: SX) -> SX:
-    """Return a relative determinant (1, 1) of ``J'J``, which is small where rows (m, 6) are nearly dependent.
+    """Return a relative determinant (1, 1) of ``J'J``, which is small for nearly dependent rows (m, 6).
 
     Rows begin with moments, which are divided by the longest one. The determinant is divided by the largest possible
     one with the same squares.

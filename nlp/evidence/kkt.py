@@ -67,7 +67,7 @@ class Linearisation:
         residual: (k,) signed residual ``expression - limit``, positive outside, scaled to the same distance.
         normals: (k, n) outward unit normals in scaled variables; for an equation, the gradient's direction.
         per_unit: (k,) change of the slack per unit by which a side's limit is relaxed.
-        noise: (k,) rounding error of the slack where narrow ranges make it notable; else 0.
+        noise: (k,) rounding error of the slack if narrow ranges make it notable; otherwise 0.
         rounding: rounding error of the stationarity conditions.
     """
 
@@ -134,7 +134,7 @@ class Multipliers(NamedTuple):
     """Multipliers of the sides at a point.
 
     Attributes:
-        mu: (k,) multipliers: never negative on inequalities, zero on inactive sides.
+        mu: (k,) multipliers: nonnegative on inequalities, zero on inactive sides.
         residual: largest component of ``grad phi + sum mu a``; zero where ``-grad phi`` lies in the cone of the outward
             normals, ``inf`` where the gradient is not finite.
     """
@@ -231,7 +231,7 @@ class _Stationarity:
         self._mu, self._error = np.zeros(len(at.sides)), np.inf
 
     def linear(self, at: Linearisation) -> Linear | None:
-        """Return the conditions to first order; None where they hold to rounding, and after the last step."""
+        """Return the conditions to first order; None if the conditions hold to rounding, or after the last step."""
         n, k = self._nlp.n, len(self._active)
         if not self._left:
             return None
@@ -248,9 +248,9 @@ class _Stationarity:
         return Linear(residual, matrix) if np.isfinite(matrix).all() and np.isfinite(residual).all() else None
 
     def moved(self, at: Linearisation, step: FloatArray) -> Linearisation | None:
-        """Return the program after a step; None where the step is too long, or the residual grows.
+        """Return the program after a step; None if the step is too long, or the residual grows.
 
-        Where the step would cross a side, it ends on the side, which joins the active set.
+        A step that would cross a side ends on the side, which joins the active set.
         """
         nlp, active = self._nlp, self._active
         step = step[: nlp.n]
@@ -270,7 +270,7 @@ class _Stationarity:
         return after
 
     def drops_side(self, at: Linearisation) -> bool:
-        """Remove the side with the most negative multiplier from the active set; return whether there is one."""
+        """Remove the side with the most negative multiplier from the active set; return True if a side was removed."""
         wrong = np.where(self._nlp.sides.equal, 0.0, self._mu)
         converged = max(_CONVERGED, 4 * at.rounding)
         if not self._left or not self._error <= converged or wrong.min(initial=0.0) >= -converged:
@@ -312,11 +312,11 @@ def _move_onto_bounds(nlp: Nlp, x: FloatArray, active_set: Sequence[int]) -> Flo
 
 
 def close_equations(nlp: Nlp, x: FloatArray, *, in_place: bool = False) -> FloatArray:
-    """Return the point at which the program's equations hold, nearest to the given one to first order.
+    """Return the nearest point, to first order, at which the program's equations hold.
 
     Newton's method with least-norm steps solves only the equations: unit lengths of directions and closure of loops.
-    Where the robot has internal unknowns, first only those that the loops determine move; where that fails, free
-    actuator coordinates move too, then the pose, then all variables.
+    First only internal unknowns that the loops determine move. If this fails, free actuator coordinates move too, then
+    the pose, then all variables.
 
     Args:
         nlp: the nonlinear program.
@@ -324,7 +324,7 @@ def close_equations(nlp: Nlp, x: FloatArray, *, in_place: bool = False) -> Float
         in_place: If true, only internal unknowns may move.
 
     Returns:
-        (n,) the point inside the variables' bounds; the last iterate where Newton's method does not converge.
+        (n,) the point inside the variables' bounds; the last iterate if Newton's method does not converge.
     """
     if not nlp.sides.equal.any():
         return np.asarray(x, dtype=np.float64)
@@ -338,7 +338,7 @@ def close_equations(nlp: Nlp, x: FloatArray, *, in_place: bool = False) -> Float
 
 
 def _movable(nlp: Nlp) -> list[list[int]]:
-    """Return the sets of variables that may move, in the order in which they are tried."""
+    """Return the sets of variables that may move, in the order of the attempts."""
     places, every = nlp.program.places, list(range(nlp.n))
     unknowns = [sorted(places.determined), sorted({index for at_pose in places.unknowns for index in at_pose})]
     unknowns = unknowns if len(unknowns[0]) < len(unknowns[1]) else unknowns[:1]

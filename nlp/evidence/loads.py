@@ -33,7 +33,7 @@ from ..system.jsonvalues import (
 from .paths import velocities_at
 from .state import RobotState, evaluate
 
-#: Work rates of a limb's rows below this part of the largest count as zero.
+#: Work rates of a limb's rows below this fraction of the largest count as zero.
 _DRIVES = 1e-9
 
 
@@ -62,7 +62,7 @@ class ConstraintLoad(JsonObject):
 
     Attributes:
         limb: name of the limb.
-        wrench: wrench on the platform: force, then moment about the world origin; null where statics does not
+        wrench: wrench on the platform: force, then moment about the world origin; null if statics does not
             determine it, because limbs can load each other.
     """
 
@@ -89,11 +89,11 @@ class HeldLoad(JsonObject):
 
     Attributes:
         name: name of the load.
-        pose: number of the pose, from 1 on; absent where there is only one pose.
-        wrench: force, then moment about the world origin, without the part of any direction.
+        pose: number of the pose, from 1; absent for a single pose.
+        wrench: force, then moment about the world origin, without the part of unknown direction.
         actuators: forces or torques of the actuators.
         constraints: constraint wrenches of the limbs; absent for a robot without constraints.
-        deflection: displacement of the platform; absent where the stiffness of an actuator is not known.
+        deflection: displacement of the platform; absent if the stiffness of an actuator is unknown.
     """
 
     name: str
@@ -114,10 +114,10 @@ class TopSpeed(JsonObject):
 
     Attributes:
         actuator: name of the actuator.
-        pose: number of the pose, from 1 on; absent where there is only one pose.
+        pose: number of the pose, from 1; absent for a single pose.
         value: largest speed.
         unit: unit of the speed.
-        dimension: dimension of the speed, in radians for an actuator that turns.
+        dimension: dimension of the speed; rotary actuators have radians.
     """
 
     actuator: str
@@ -134,7 +134,7 @@ class ActuatorLoading(JsonObject):
         loads: balance of every load at every pose; absent without loads.
         speeds: largest speed of every actuator at every pose; absent without motions.
         compliance: compliance of the platform at the first pose: translation of its origin and rotation in radians, by
-            force and moment about the origin; absent at a singular pose, or where the stiffness of an actuator is not
+            force and moment about the origin; absent at a singular pose, or if the stiffness of an actuator is not
             known.
     """
 
@@ -144,13 +144,13 @@ class ActuatorLoading(JsonObject):
 
 
 class PoseLoads(NamedTuple):
-    """Forces of all load cases at a pose, with speeds and compliance, which do not depend on loads.
+    """Forces of all load cases at a pose; speeds and compliance, which do not depend on loads.
 
     Attributes:
         loads: load cases with their balance.
         speeds: largest speeds of the actuators; empty without a motion.
         compliance: (6, 6) displacement of the platform (rotation, then translation of its origin) by moment and force
-            about the origin; empty where the stiffness of an actuator is not known.
+            about the origin; empty if the stiffness of an actuator is not known.
     """
 
     loads: tuple[HeldLoad, ...]
@@ -283,12 +283,12 @@ def _numbers(expression: SX, state: RobotState) -> FloatArray:
 
 
 def _about_world(wrench: FloatArray, position: FloatArray) -> FloatArray:
-    """Return a wrench (6,) about the world origin, from one about the platform's origin."""
+    """Return a wrench (6,) with its moment about the world origin, from a moment about the platform's origin."""
     return np.concatenate([wrench[:3], wrench[3:] + np.cross(position, wrench[:3])])
 
 
 def _constraints(nlp: Nlp, statics: Statics) -> "dict[str, FloatArray | None]":
-    """Return the matrix (6, m) from row forces to each limb's constraint wrench; None where it is not determined."""
+    """Return the matrix (6, m) from row forces to each limb's constraint wrench; None for an undetermined wrench."""
     model = nlp.program.model
     rows, driven = (np.array(ca.DM(each), dtype=np.float64) for each in (statics.rows, statics.driven))
     limbs = np.array([row.limb for row in model.frame_rows])

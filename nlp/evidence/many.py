@@ -66,13 +66,13 @@ class Verdicts:
     """Evidence of optimality at N points of a program.
 
     Attributes:
-        is_strict: (N,) whether the point is clearly a strict local optimum.
+        is_strict: (N,) True if the point is clearly a strict local optimum.
         F: (N,) objective.
-        stationarity: (N,) largest scaled derivative of the Lagrangian; infinite where the active normals are dependent.
+        stationarity: (N,) largest scaled derivative of the Lagrangian; infinite if the active normals are dependent.
         feasibility: (N,) largest violation of a side, in half ranges.
-        curvature: (N,) smallest eigenvalue of the reduced Hessian; infinite where the active sides leave no direction,
+        curvature: (N,) smallest eigenvalue of the reduced Hessian; infinite if the active sides leave no direction,
             NaN where it is not computed.
-        active: (N, k) whether each side of the program is active.
+        active: (N, k) True for active sides of the program.
         multipliers: (N, k) scaled multipliers of the sides.
         weights: (N, k) factors from scaled multipliers to F per unit of the side's bound.
     """
@@ -110,7 +110,7 @@ def judge_many(nlp: Nlp, x: FloatArray, numbers: Numbers) -> Verdicts:
     """Return the evidence of optimality at points of a program.
 
     Args:
-        nlp: nonlinear program with every constraint of its limits on pairs.
+        nlp: nonlinear program in which limits on pairs (of legs or poses) have a constraint for every pair.
         x: (N, n) the points.
         numbers: data of the program at the points.
     """
@@ -150,7 +150,7 @@ def judge_many(nlp: Nlp, x: FloatArray, numbers: Numbers) -> Verdicts:
 def _scales(nlp: Nlp, numbers: Numbers) -> _Scales:
     """Return the scales of :class:`~..program.nlp.Nlp` at every point; NaN where the robot is not defined at the start.
 
-    For one point the objective's size would then be sought around the start: such points are left to ``examine``.
+    Such points are left to ``examine``, which evaluates the magnitude of the objective around the start.
     """
     scale, centre = (numbers.upper - numbers.lower) / 2, (numbers.upper + numbers.lower) / 2
     count = len(scale)
@@ -214,7 +214,7 @@ class _Multipliers(NamedTuple):
     Attributes:
         mu: (m, k) multipliers.
         stationarity: (m,) largest derivative of the Lagrangian.
-        is_independent: (m,) whether the normals are independent.
+        is_independent: (m,) True for independent normals.
         tangents: (m, n, n - k) orthonormal bases of the normals' null spaces.
     """
 

@@ -35,14 +35,14 @@ class Margin(JsonObject):
         name: name of the limit, with the leg, joint or pose.
         key: dotted key of the limit's value in the case, below limits.
         bound: side of the limit.
-        value: measured value; null where it is not finite.
+        value: measured value; null if it is not finite.
         limit: value of the limit in the case.
-        margin: distance from the limit, positive where the limit is satisfied.
+        margin: distance from the limit, positive for a satisfied limit.
         unit: unit of value, limit and margin.
-        active: whether the point lies on the limit.
-        violated: whether the point violates the limit by more than rounding error.
-        cost: derivative of the optimal F with respect to the limit; null where the point is no optimum.
-        dimension: dimension of value, limit and margin, which are in radians for angles.
+        active: If true, the point lies on the limit.
+        violated: If true, the point violates the limit by more than rounding error.
+        cost: derivative of the optimal F with respect to the limit; null if the point is not an optimum.
+        dimension: dimension of value, limit and margin; angles are in radians.
     """
 
     name: str
@@ -84,25 +84,25 @@ def measured_slack(nlp: Nlp, x: FloatArray, at: Linearisation, numbers: Sequence
         nlp: the nonlinear program.
         x: (n,) the point.
         at: linearised program at the point.
-        numbers: measured values of the constraints, from :func:`measured_numbers`; computed if left out.
+        numbers: measured values of the constraints, from :func:`measured_values`; computed if left out.
     """
     slack, constraints = at.slack.copy(), nlp.program.constraints
     sides = [(j, side.constraint) for j, side in enumerate(at.sides) if side.constraint is not None]
     for j, k in sides:
         if constraints[k].measure is not None:
-            numbers = measured_numbers(nlp, x) if numbers is None else numbers
+            numbers = measured_values(nlp, x) if numbers is None else numbers
             value = float(constraints[k].reading.to_value(SX(numbers[k])))
             slack[j] = -float(nlp.sides.sign[j] * (value - nlp.sides.limit[j]) * at.per_unit[j])
     return slack
 
 
 def measured_violation(nlp: Nlp, x: FloatArray) -> float:
-    """Return the largest violation of a side at a point (n,), from measured values; ``inf`` where it is not defined."""
+    """Return the largest violation of a side at a point (n,), from measured values; ``inf`` if undefined."""
     at = linearise(nlp, x)
     return replace(at, slack=measured_slack(nlp, x, at)).violation
 
 
-def measured_numbers(nlp: Nlp, x: FloatArray) -> list[float]:
+def measured_values(nlp: Nlp, x: FloatArray) -> list[float]:
     """Return the measured value of each constraint's limit at a point (n,), radians for angles; NaN without a limit."""
     return _measured(nlp, x, nlp.program.constraints, nlp.evaluate(x)[1])
 
@@ -113,7 +113,7 @@ def margins_of(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
     Args:
         nlp: the nonlinear program.
         x: (n,) the point.
-        optimal: whether the point is an optimum; costs are given only there.
+        optimal: If true, the point is an optimum, and the margins have costs.
     """
     if not nlp.case.limits:
         return []
@@ -122,7 +122,7 @@ def margins_of(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
     active = set(at.active())
     mu, _ = multipliers(at, sorted(active)) if optimal else (np.zeros(len(at.sides)), 0.0)
     gained = -mu * nlp.sides.sign * at.per_unit * nlp.objective_scale * nlp.sign
-    measured = measured_numbers(nlp, x)
+    measured = measured_values(nlp, x)
     slack = measured_slack(nlp, x, at, measured)
     rows = []
     for j, side in enumerate(nlp.sides.sides):
@@ -162,7 +162,7 @@ def _without_cost(nlp: Nlp, x: FloatArray, limits: Sequence[BoundedConstraint], 
 
 
 class _LimitSide(NamedTuple):
-    """A side of a constraint, with the key of its limit in the case and its bound in the program's terms."""
+    """A side of a constraint, with the key of its limit in the case and the bound in the nonlinear program."""
 
     bound: Bound
     key: str
@@ -207,12 +207,12 @@ def _sides(item: BoundedConstraint) -> list[_LimitSide]:
 
 
 def _measured(nlp: Nlp, x: FloatArray, constraints: Sequence[Constraint], values: FloatArray) -> list[float]:
-    """Return the measured value of each limit, radians for angles; NaN for a constraint that is no limit.
+    """Return the measured value of each limit, radians for angles; NaN for a constraint that is not a limit.
 
     Args:
         nlp: the nonlinear program.
         x: (n,) the point.
-        constraints: constraints of the program, or constant ones.
+        constraints: constraints of the program, or constant constraints.
         values: (c,) expressions of the constraints at the point.
     """
     exact = {k: each.exact for k, each in enumerate(constraints) if each.exact is not None}

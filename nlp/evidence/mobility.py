@@ -24,16 +24,16 @@ from .singularities import (
 )
 from .state import RobotState
 
-#: A twist is feasible where the constraint part of F is below this part of F's size: the rates are then below 1e-6.
+#: A twist is feasible where the constraint part of F is below this fraction of F's size: the rates are then below 1e-6.
 _FEASIBLE = 1e-12
 
 
 class LimbPart(JsonObject):
-    """Part of F from one limb.
+    """Contribution of one limb to F.
 
     Attributes:
         limb: name of the limb.
-        F: sum of the squared work rates of its wrenches: ``actuation`` plus ``constraints``.
+        F: sum of the squared work rates of the limb's wrenches: ``actuation`` plus ``constraints``.
         actuation: part of F from the motion that the limb's actuators can follow.
         constraints: part of F from the rest of the motion: 0 in every limb for a motion that the platform can make.
     """
@@ -51,9 +51,9 @@ class Mobility:
     Attributes:
         freedoms: degrees of freedom of the platform with free actuators.
         constraint_rank: rank of the constraint wrenches.
-        actuator_rates: rate of each actuator for the program's task: rad or length per unit of time; infinite where the
+        actuator_rates: rate of each actuator for the program's task: rad or length per unit of time; infinite if the
             actuator cannot drive the platform, NaN where the motion does not determine it.
-        constrained: part of F from constraint wrenches, 0 to 1; 0 where the platform can make the motion.
+        constrained: fraction of F from constraint wrenches, 0 to 1; 0 if the platform can make the motion.
         parts: actuation and constraint part of F for each limb.
         singularities: all singularities at the point.
     """
@@ -123,7 +123,7 @@ def mobility_of(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> Mo
 def _idle_limb(drives: Mapping[str, LimbDrive], generic: GenericRanks) -> list[Singularity]:
     """Return the serial singularity of a limb whose actuators have more idle rates than at almost all points.
 
-    The joints of each of its members may be independent all the same.
+    Nevertheless, the joints of each member of the limb may be independent.
     """
     idle = {limb: each.drive.idle.shape[1] for limb, each in drives.items() if each.drive.idle.shape[1]}
     if sum(idle.values()) <= generic.idle:

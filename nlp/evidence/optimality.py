@@ -31,7 +31,7 @@ from .singularities import is_passive_singular
 #: Scaled multiplier below which an active side is weakly active.
 STRONG = 1e-9
 #: Eigenvalue of the scaled reduced Hessian below which it counts as zero: over half a variable's range F then changes
-#: by less than this part of its size.
+#: by less than this fraction of its size.
 CURVED = 1e-8
 #: Length of the trial step along a flat direction, in half ranges: F must keep its value.
 _FLAT_STEP = 0.02
@@ -39,10 +39,10 @@ _FLAT_STEP = 0.02
 _DIRECTION_CHANGES = 4
 #: Cosine between two directions above which they count as equal.
 _SAME_DIRECTION = 0.999
-#: Flat directions from such steps are accurate to a few percent: singular values below this part of the largest do not
-#: belong to a separate direction.
+#: Flat directions from such steps are accurate to a few percent: singular values below this fraction of the largest
+#: one do not belong to a separate direction.
 _INDEPENDENT = 0.05
-#: For the same reason, components of a flat direction below this part of the largest are omitted.
+#: For the same reason, components of a flat direction below this fraction of the largest are omitted.
 _NEGLIGIBLE = 1e-2
 
 
@@ -74,7 +74,7 @@ class ActiveSide(JsonObject):
         value: value of the bound or limit.
         unit: unit of the value; left out for a plain number.
         multiplier: improvement of F per unit by which the limit is relaxed.
-        dimension: dimension of the value, in radians for an angle.
+        dimension: dimension of the value; angles are in radians.
     """
 
     name: str
@@ -92,13 +92,13 @@ class Evidence(JsonObject):
         kind: kind of the point, such as a strict local optimum or a saddle.
         stationarity: largest scaled derivative of the Lagrangian.
         feasibility: largest violation of a limit, in half ranges.
-        complementarity: largest product of a multiplier and its slack, scaled.
-        licq: whether the active normals are linearly independent.
+        complementarity: largest product of a scaled multiplier and the slack of its side.
+        licq: If true, the active normals are linearly independent.
         active: bounds and limits on which the point lies.
         eigenvalues: eigenvalues of the reduced Hessian, ascending: the scaled Hessian of the Lagrangian on the tangent
-            space of the strongly active sides. A positive one means that F gets worse along its direction.
+            space of the strongly active sides. For a positive eigenvalue, F gets worse along its eigenvector.
         flat: rates of the variables along directions in which F keeps its optimal value. In a result, the variable that
-            moves most in its range has rate 1; else rates are in the variables' units, for a step of half a range.
+            moves most relative to its range has rate 1; otherwise rates are in the variables' units per half range.
         violated: names of the variables and constraints of violated sides.
     """
 
@@ -254,10 +254,10 @@ def _reduced_eigenpairs(H: FloatArray, normals: FloatArray) -> tuple[FloatArray,
 
 
 def _follow_flat_direction(nlp: Nlp, at: Linearisation, direction: FloatArray) -> "FloatArray | None":
-    """Return a direction near the given one along which F keeps its value over a finite step; None if there is none.
+    """Return a nearby direction along which F keeps its value over a finite step, or None.
 
-    Newton's method corrects a step along the direction back onto the optimal set. Where the correction changes the
-    direction, the new direction is tried next.
+    Newton's method corrects a step along the direction back onto the optimal set. If the correction changes the
+    direction, the next attempt uses the new direction.
 
     Args:
         nlp: the nonlinear program.

@@ -85,6 +85,6 @@ def _right_singular_vectors(matrix: FloatArray) -> FloatArray:
 
 
 def _principal_motion(jacobian: FloatArray, twist: FloatArray) -> PrincipalMotion:
-    """Return a twist (6,) with its F for a Jacobian (m, 6)."""
+    """Return the motion of a twist (6,), with F for a Jacobian (m, 6)."""
     rates = jacobian[:, 3:] @ twist[:3] + jacobian[:, :3] @ twist[3:]
     return PrincipalMotion(F=float(rates @ rates), motion=motion_of(twist))

@@ -41,9 +41,9 @@ class Sensitivity(JsonObject):
         name: name of the parameter.
         value: value of the parameter.
         unit: unit of the value.
-        derivative: derivative of the optimal F with respect to the parameter; absent where it does not exist.
+        derivative: derivative of the optimal F with respect to the parameter; absent if it does not exist.
         hindrance: reason why the derivative does not exist, in words.
-        dimension: dimension of the parameter, in radians for an angle.
+        dimension: dimension of the parameter; angles are in radians.
     """
 
     name: str
@@ -92,7 +92,7 @@ def sensitivities(nlp: Nlp, x: FloatArray) -> list[Sensitivity]:
 
 
 def _can_follow(by_variable: FloatArray, by_argument: FloatArray) -> "NDArray[np.bool_]":
-    """Return whether the variables can follow each argument, (k,), so that the given functions keep their values.
+    """Return for each argument, (k,), whether the variables can follow it with unchanged values of the functions.
 
     Args:
         by_variable: (m, n) derivatives of the functions with respect to the variables.
@@ -106,7 +106,7 @@ def _can_follow(by_variable: FloatArray, by_argument: FloatArray) -> "NDArray[np
 
 
 def _loop_derivatives(nlp: Nlp, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the derivatives of all loop equations by scaled variables (m, n) and by the arguments (m, k).
+    """Return the derivatives of all loop equations with respect to variables, scaled (m, n), and arguments (m, k).
 
     The program itself has only the equations that are independent at the fixed parameters.
     """

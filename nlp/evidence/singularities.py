@@ -1,4 +1,4 @@
-"""Kinds of singularity of a robot with given joints, with the motions gained or the wrenches that lock them.
+"""Singularities of a robot defined by joints: kind, gained motions, and locking wrenches.
 
 Ranks at the point are compared with those at almost all dimensions and closed configurations:
 
@@ -31,11 +31,11 @@ from .paths import paths_at
 from .screwvalues import ScrewMotion, ScrewWrench, motion_of, wrench_of
 from .state import RobotState
 
-#: Screws of unit size are dependent if a singular value is below this part of the largest, as for the rank of J.
+#: Screws of unit size are dependent if a singular value is below this fraction of the largest, as for the rank of J.
 DEPENDENT = 1e-7
 #: Relative size below which motions that nested loops leave are rounding errors, and must not be scaled up.
 _NEGLIGIBLE = 1e-9
-#: Rates of dependent joints below this part of the largest are zero: such a joint is not among the dependent ones.
+#: Rates of dependent joints below this fraction of the largest are zero: such a joint is not among the dependent ones.
 _TAKES_PART = 1e-6
 
 
@@ -55,7 +55,7 @@ class SingularityKind(enum.Enum):
 
 
 _CLAUSES = {
-    SingularityKind.PASSIVE: "passive joints are dependent: F jumps here, and the point is no optimum to build",
+    SingularityKind.PASSIVE: "passive joints are dependent: F jumps here, and the point is not an optimum to build",
     SingularityKind.SERIAL: "joints are dependent: its actuator cannot drive the platform, "
     "which loses a degree of freedom",
     SingularityKind.CONSTRAINT: "the constraints are dependent: the platform gains a degree of freedom "
@@ -202,7 +202,7 @@ def _null_space(loops: FloatArray) -> FloatArray:
 
 
 def _without_rounding(screws: FloatArray, centre: FloatArray) -> FloatArray:
-    """Return motions (6, k) with zeros for those that are rounding errors relative to the others."""
+    """Return motions (6, k); motions within the rounding error of the largest motion are 0."""
     lengths = np.linalg.norm(_homogeneous(screws, centre, _reach(screws, centre)), axis=0)
     return np.asarray(np.where(lengths <= _NEGLIGIBLE * lengths.max(initial=0.0), 0.0, screws))
 
@@ -251,10 +251,10 @@ def _changes(
     reach: float,
     centre: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the changes (6, c) of dependent screw combinations by motions of joints, and their rates (n, k).
+    """Return changes (6, c) of dependent screw combinations as the joints ``before`` move, and the joint rates (n, k).
 
-    Rates whose combination has no change are left out where others have one: such a combination is zero nearby too, as
-    for the spin of a rod between two ball joints.
+    Rates whose combination has no change are left out if other combinations change. An example is the spin of a rod
+    between two ball joints, whose combination is also zero nearby.
     """
     rank = _rank(unit)
     kernel = np.linalg.svd(unit)[2][rank:].T
@@ -287,7 +287,7 @@ def _homogeneous(screws: FloatArray, centre: FloatArray, reach: float) -> FloatA
 
 
 def _unit_columns(screws: FloatArray, centre: FloatArray) -> tuple[FloatArray, float]:
-    """Return twists (6, n) of unit size, with velocities of a centre divided by the largest one, and the latter."""
+    """Return unit twists (6, n) about a centre, with velocities divided by the largest velocity, and this velocity."""
     reach = _reach(screws, centre)
     scaled = _homogeneous(screws, centre, reach)
     lengths = np.linalg.norm(scaled, axis=0)
@@ -302,7 +302,7 @@ def _reach(screws: FloatArray, centre: FloatArray) -> float:
 
 
 def _rank(columns: FloatArray) -> int:
-    """Return the rank of columns of size 1 at most."""
+    """Return the rank of columns with norms of at most 1."""
     if not columns.size:
         return 0
     values = np.linalg.svd(columns, compute_uv=False)
@@ -310,7 +310,7 @@ def _rank(columns: FloatArray) -> int:
 
 
 def _span_of(columns: FloatArray) -> FloatArray:
-    """Return an orthonormal basis (6, r) of the span of columns (6, n) of order 1."""
+    """Return an orthonormal basis (6, r) of the span of columns (6, n) of magnitude about 1."""
     left, values, _ = np.linalg.svd(columns)
     return np.asarray(left[:, : int(np.count_nonzero(values > _TAKES_PART * values.max(initial=1.0)))])
 
@@ -350,6 +350,6 @@ def _are_alike(one: Singularity | None, other: Singularity) -> bool:
 
 
 def _together(one: Singularity, other: Singularity) -> Singularity:
-    """Return one singularity of a limb from those of two paths."""
+    """Return one singularity of a limb from the singularities of two paths."""
     joints = tuple(dict.fromkeys([*(one.joints or ()), *(other.joints or ())]))
     return singularity(one.kind, one.limb, joints, locking=(*(one.locking or ()), *(other.locking or ())))

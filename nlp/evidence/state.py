@@ -21,7 +21,7 @@ from ...models.basis import settled_basis
 from ...models.linalg import echelon_basis
 from ...models.values import dataclass
 from ..case.case import Case
-from ..case.existence import fault_of_dimensions
+from ..case.existence import assembly_fault
 from ..errors import EvaluationError
 from ..program.nlp import Nlp
 from ..program.places import HeldRotation
@@ -31,10 +31,10 @@ from .paths import numbers_at
 
 #: Relative value, compared with F without cancellation, below which F is zero: the rates are then below 1e-6.
 ZERO_F = 1e-12
-#: Singular values below this part of the largest, with moments divided by their longest arm, count as zero. The part is
-#: the square root of the rounding unit of double precision: points are known to rounding error only.
+#: Singular values below this fraction of the largest, with moments divided by their longest arm, are zero: this is the
+#: square root of the rounding unit of double precision: points are known to rounding error only.
 ZERO_SINGULAR_VALUE = 1.5e-8
-#: Largest residual of a closed loop's equation, of order 1: in another assembly mode it is of order 0.1.
+#: Largest residual of a closed loop's equation, of magnitude about 1: in another assembly mode it is about 0.1.
 CLOSED = 1e-6
 
 
@@ -51,7 +51,7 @@ class RobotState:
         jacobian: (m, 6) unit wrenches, force, then moment about the world origin.
         rates: (m,) work rates ``L_i ^ chi``; for a leg driven along its axis, the rate of its length.
         F: ``sum(rates^2)``.
-        size: F without cancellation; F counts as zero when it is small compared with it.
+        size: sum of the magnitudes of the terms of F; an F that is small compared with ``size`` counts as zero.
         singular_values: (min(m, 6),) singular values of the Jacobian with moments about the platform's origin, divided
             by their longest arm, largest first: plain numbers, the same in every unit of length.
         rank: number of non-zero singular values.
@@ -76,12 +76,12 @@ class RobotState:
 
     @property
     def is_zero(self) -> bool:
-        """Whether F is zero: the platform can make the task's motion with every actuator locked."""
+        """True if F is zero: the platform can make the task's motion with every actuator locked."""
         return ZERO_F * self.size >= self.F
 
     @property
     def is_singular(self) -> bool:
-        """Whether there is a motion of the platform that no row of the Jacobian resists."""
+        """True if the platform has a motion that no row of the Jacobian resists."""
         return self.rank < 6
 
 
@@ -121,7 +121,7 @@ def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
         pose: index of the pose, in a case with several poses.
 
     Returns:
-        The state with the rates of the program's task; of several combined tasks, the first one counts.
+        The state with the rates of the program's task; for combined tasks, of the first task.
 
     Raises:
         EvaluationError: a value is not finite at this point, for example because a limb has zero length.
@@ -134,11 +134,11 @@ def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
     parts = np.split(numbers.parameters.ravel(), np.cumsum(sizes)[:-1]) if sizes else []
     if not all(np.isfinite(each).all() for each in (numbers.squares, numbers.jacobian, numbers.rates, rotation)):
         dimensions = {item.name: part for item, part in zip(model.parameters, parts, strict=True)}
-        if fault := fault_of_dimensions(model, dimensions, case.units):
+        if fault := assembly_fault(model, dimensions, case.units):
             raise EvaluationError(f"{where}{fault}")
     for row, square in zip(model.wrenches, numbers.squares.ravel(), strict=True):
         if square == 0:
-            raise EvaluationError(f"{where}{reason_for_zero_row(row)}, at this point")
+            raise EvaluationError(f"{where}{reason_for_zero_row(row)} at this point")
     if not all(np.isfinite(each).all() for each in (numbers.squares, numbers.jacobian, numbers.rates, rotation)):
         raise EvaluationError(f"{where}the robot's equations give no finite Jacobian at this point")
     reporting = reporting_matrix(model, numbers.velocities, position)
@@ -253,7 +253,7 @@ def _rank_and_free_twists(jacobian: FloatArray, centre: FloatArray) -> tuple[int
 
 
 def state_or_none(nlp: Nlp, x: FloatArray) -> RobotState | None:
-    """Return the state of the robot at a point (n,), or None where its equations have no finite value."""
+    """Return the state of the robot at a point (n,), or None if the equations of the robot have no finite value."""
     try:
         return evaluate(nlp, x)
     except EvaluationError:

@@ -19,7 +19,7 @@ from ..program.epigraph import total_over_poses, worst_value
 from ..program.nlp import Nlp
 from ..system.jsonvalues import JsonObject, Key, Vector3, vector
 
-#: All poses whose F differs from the worst one by at most this relative amount are worst poses.
+#: Largest relative difference from the worst F at which a pose also counts as worst.
 _SAME_VALUE = 1e-7
 
 
@@ -58,7 +58,7 @@ class ToleranceEvaluation(NamedTuple):
 
     Attributes:
         F: objective over the poses.
-        gradients: one or more (k, 3) derivatives with respect to the errors: one for each of the worst poses.
+        gradients: (k, 3) derivatives with respect to the errors at each of the worst poses.
     """
 
     F: float

@@ -88,7 +88,7 @@ class _Modes:
         model: model of the robot.
 
     Attributes:
-        limbs: names of the limbs that have a sense.
+        limbs: names of the limbs for which the sense is defined.
         home: matrices of these limbs at home.
     """
 
@@ -130,7 +130,7 @@ class _Modes:
         return found
 
     def sign(self, limb: str, now: FloatArray, home: FloatArray) -> int:
-        """Return 1 where a limb has the same sense as at home, -1 for the opposite one, 0 where it is not known."""
+        """Return 1 if a limb bends as at home, -1 if it bends the opposite way, 0 if unknown."""
         if not (np.isfinite(now).all() and np.isfinite(home).all()):
             return 0
         if self._passive[self.limbs.index(limb)] is None:
@@ -141,14 +141,14 @@ class _Modes:
 
 
 def _about(screws: FloatArray, centre: FloatArray) -> FloatArray:
-    """Return twists (6, n) of unit size, with velocities of a centre divided by the largest one."""
+    """Return unit twists (6, n) about a centre; velocities are divided by the largest velocity of the centre."""
     velocities = screws[3:] + np.cross(screws[:3].T, centre).T
     reach = float(np.linalg.norm(velocities, axis=0).max(initial=0.0)) or 1.0
     return _unit(np.vstack([screws[:3], velocities / reach]))
 
 
 def _unit(columns: FloatArray) -> FloatArray:
-    """Return columns of unit size; zero columns stay zero."""
+    """Return columns as unit vectors; zero columns stay zero."""
     lengths = np.linalg.norm(columns, axis=0)
     return np.asarray(columns / np.where(lengths > 0, lengths, 1.0))
 
@@ -159,7 +159,7 @@ def _oriented(columns: FloatArray) -> FloatArray:
 
 
 def _sign_of(matrix: FloatArray) -> int:
-    """Return the sign of a determinant, 0 where it is nearly zero."""
+    """Return the sign of a determinant; 0 for a nearly zero determinant."""
     value = float(np.linalg.det(matrix))
     return 0 if abs(value) < _SINGULAR else int(np.sign(value))
 

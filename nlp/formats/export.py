@@ -80,7 +80,7 @@ def files_at(nlp: Nlp, x: FloatArray, formats: Collection[str], pose: int) -> di
 
 
 def fixed_point(case: Case, joints: Mapping[str, float]) -> tuple[Nlp, FloatArray] | None:
-    """Return the program of the first task and its only point, for a case without free variables; else None.
+    """Return the program of the first task and its only point, for a case without free variables; otherwise None.
 
     Args:
         case: the case.

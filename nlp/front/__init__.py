@@ -1,4 +1,4 @@
-"""Fronts of several goals: the best of one for bounds of the others.
+"""Pareto fronts of several goals of a case.
 
 The modules import each other in this order: ``goals``, ``boxes``, ``front``, ``data``.
 """

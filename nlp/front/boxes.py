@@ -1,8 +1,8 @@
-"""The part of the space of goals in which points of a front can still be, as boxes below local upper bounds.
+"""Search region of a front: boxes of goal values that can contain further points.
 
-Goals are costs here: smaller is better. A local upper bound is a corner ``u`` such that no known point is below it in
-all goals, while any point that none of the known ones dominates is below one of these corners. Each new point splits
-the corners above it. The lower corner of a box is taken from the points that define its upper one.
+Goals are costs here: smaller is better. A local upper bound is a corner ``u`` with no known point below it in all
+goals; every point that no known point dominates is below one of these corners. Each new point splits the corners above
+it. The lower corner of a box follows from the points that define its upper corner.
 
 Source: K. Klamroth, R. Lacour and D. Vanderpooten, On the representation of the search region in multi-objective
 optimization, European J. Oper. Res. 245 (2015) 767-778.
@@ -17,34 +17,34 @@ import numpy as np
 
 from ...models import FloatArray
 
-#: Boxes that can hold less than this part of the front are left: the square root of it is about a thousandth of a goal.
+#: Size of a box, relative to the front, below which it is not searched: about the square of a thousandth of a goal.
 _SMALLEST = 1e-6
 
 
 class GoalBox(NamedTuple):
-    """A box between a lower and an upper corner, (k,) each."""
+    """Box between a lower and an upper corner, (k,) each."""
 
     lower: FloatArray
     upper: FloatArray
 
     @property
     def sides(self) -> FloatArray:
-        """(k,) sides, none negative."""
+        """Sides (k,) of the box, not negative."""
         return np.maximum(self.upper - self.lower, 0.0)
 
     @property
     def patch(self) -> float:
-        """Size of the largest piece of a surface that the box can hold: the product of all sides but the smallest."""
+        """Size of the largest piece of a front in the box: the product of all sides except the smallest."""
         return float(np.prod(np.sort(self.sides)[1:]))
 
 
 class Region:
-    """Boxes of the space of k goals that known points leave.
+    """Search region in the space of k goals, given the known points.
 
     Args:
-        best: (k,) the smallest cost of each goal.
-        worst: (k,) the largest cost of each goal that is searched.
-        points: (k,) each, none of which dominates another.
+        best: (k,) smallest cost of each goal.
+        worst: (k,) largest cost of each goal in the search region.
+        points: known points (k,) that do not dominate each other.
     """
 
     def __init__(self, best: FloatArray, worst: FloatArray, points: Iterable[FloatArray] = ()) -> None:
@@ -69,7 +69,7 @@ class Region:
         self._corners = corners[_largest(corners)]
 
     def widest(self, closed: set[tuple[float, ...]]) -> GoalBox | None:
-        """Return the box that can hold the largest piece of the front; None where all that is left is closed or small.
+        """Return the box that can contain the largest piece of the front; None if all boxes are closed or small.
 
         Args:
             closed: upper corners of boxes without a point.
@@ -79,7 +79,7 @@ class Region:
         return None if found is None or found.patch <= _SMALLEST else found
 
     def _lower(self, corner: FloatArray) -> FloatArray:
-        """Return the lower corner (k,) of a box: the largest that the points which define the upper one give."""
+        """Return the lower corner (k,) of a box: the largest corner from the points that define the upper one."""
         lower = self._best.copy()
         for i in range(len(corner)):
             others = np.arange(len(corner)) != i
@@ -90,7 +90,7 @@ class Region:
 
 
 def _largest(corners: FloatArray) -> list[int]:
-    """Return the indices of the corners (m, k) below none of the others, the first of those that are equal."""
+    """Return the indices of the corners (m, k) that are not below others, the first index of equal corners."""
     kept = []
     for j, corner in enumerate(corners):
         above = (corners >= corner).all(axis=1)

@@ -1,4 +1,4 @@
-"""A front as a result, and as a table of designs in the case's units."""
+"""Front as a result, and as a table of designs in the case's units."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from ..results.explorations import FrontGoalData, FrontPointData, FrontResult
 from ..results.objective import unit_of_objective
 from ..results.point import head_data, stated_pose_notice, versions
 from ..system.jsonvalues import finite_or_none
-from ..words.designs import SEPARATOR, Cell, Column, ColumnKind, Designs, DrawnDesign, Join, PageWords, free_numbers
+from ..words.designs import SEPARATOR, Cell, Column, ColumnKind, Designs, DrawnDesign, Join, PageWords, design_values
 from ..words.text import Line
 from .front import Front, FrontPoint
 from .goals import Goal
 
-#: Begins the name of the constraint that bounds F of a task.
+#: Prefix of the name of a constraint that bounds F of a task.
 _GOAL = "F of "
 
 
@@ -46,7 +46,7 @@ def goal_values(front: Front, point: FrontPoint) -> list[float]:
 
 
 def goal_units(front: Front) -> list[str]:
-    """Return the unit of each goal; an empty text for a plain number."""
+    """Return the unit of each goal; empty for a dimensionless goal."""
     readings = [each[0].dimension for each in front.points[0].program.readings]
     return [
         front.case.units.label(dimension) if goal.task is None else unit_of_objective(front.case, goal.task)
@@ -61,29 +61,31 @@ def shown_goal(front: Front, k: int, value: float) -> float:
 
 
 def design_places(front: Front) -> list[tuple[int, Scalar]]:
-    """Return place and name of each free number of the case, without joints and without a goal's own level."""
+    """Return place and name of each design variable, without joint coordinates and the level of a goal."""
     point = front.points[0]
     program = point.solution.nlp.program
-    # The program of a limit as the goal has the limit's number as a further variable, its last one.
+    # If a limit is the goal, the nonlinear program has its value as the last variable.
     last = len(program.variables) - (front.goals[point.program.optimised].task is None)
     return [(k, program.variables[k]) for k in design_indices(program) if k < last]
 
 
 def front_designs(front: Front, result: FrontResult) -> Designs[int]:
-    """Return a front as a table of designs, whose rows are the indices of its points.
+    """Return a front as a table of designs; the rows are the indices of its points.
 
     Args:
-        front: the front.
-        result: the same as a result.
+        front: front with its points.
+        result: front as a result.
     """
     several, lines = len(front.goals) > 2, _lines(front, result)
     rule = (
-        "Each point is an optimum with evidence: one goal is optimised while the others keep bounds. None of the "
-        "points is better than another in all goals."
+        "Each point is an optimum with evidence: one goal is optimised within bounds on the others. No point "
+        "is better than another in all goals."
     )
-    below = "One goal over the other; no line goes over a gap."
+    below = "Front of the two goals; gaps have no line."
     if several:
-        below = "A panel for each pair of goals" + ("; the third is the colour." if len(front.goals) == 3 else ".")
+        below = "One panel for each pair of goals" + (
+            "; the colour shows the third goal." if len(front.goals) == 3 else "."
+        )
     return Designs(
         "front",
         front.case,
@@ -94,13 +96,13 @@ def front_designs(front: Front, result: FrontResult) -> Designs[int]:
         PageWords(
             f"{front.case.name}, robot {front.case.model.name}",
             f"{lines[0]}.",
-            ("front", "The front"),
-            ("points", "Every point"),
+            ("front", "Pareto front"),
+            ("points", "All points"),
             rules=(rule, *(f"{line}." for line in lines[1:])),
             below=below,
-            designs="The designs",
+            designs="Designs",
             # Only a front of two goals has an order.
-            bends="" if several else "Where the front bends",
+            bends="" if several else "Changes of active limits",
         ),
         before=[Line(line) for line in lines],
         drawn=lambda: [_drawn(front, each) for each in front.points],
@@ -109,23 +111,25 @@ def front_designs(front: Front, result: FrontResult) -> Designs[int]:
 
 
 def _lines(front: Front, result: FrontResult) -> list[str]:
-    """Return a front in a few lines."""
+    """Return a summary of a front."""
     count, goals = len(result.points), [_words(goal) for goal in front.goals]
     lines = [f"{count} point{'s' * (count > 1)} on the front of {', '.join(goals[:-1])} and {goals[-1]}"]
     for goal in front.goals:
         values = [point.goals[goal.label] for point in result.points]
-        # A front of two goals runs from one end to the other.
+        # The ends of a front of two goals have the extreme values.
         low, high = (values[0], values[-1]) if len(goals) == 2 else (min(values), max(values))
         lines.append(f"{goal.label}: {low:.7g} to {high:.7g}")
     lines += [] if result.notice is None else [result.notice]
     if front.gaps:
-        lines.append(f"pairs of neighbours with a gap between them, in which no point was found: {len(front.gaps)}")
+        lines.append(f"gaps of the front, without points between two neighbours: {len(front.gaps)}")
     if front.failed:
-        lines.append(f"searches that found no optimum: {front.failed}")
+        lines.append(f"searches without an optimum: {front.failed}")
     proofs = [point.certificate for point in result.points if point.certificate is not None]
     if proofs:
         proved = sum(each.status is CertificateStatus.PROVED for each in proofs)
-        lines.append(f"{proved} of {len(proofs)} points are proved: no point of the box within its bound is better")
+        lines.append(
+            f"{proved} of {len(proofs)} points are proved global optima within their bounds on the other goals"
+        )
     return lines
 
 
@@ -187,7 +191,7 @@ def _columns(front: Front, result: FrontResult) -> Iterator[Column[int]]:
 
 
 def _drawn(front: Front, point: FrontPoint) -> DrawnDesign:
-    """Return the design of a point."""
+    """Return the design of a point for a drawing."""
     solution = point.solution
     units = (f" {unit}" if unit else "" for unit in goal_units(front))
     pairs = zip(front.goals, goal_values(front, point), units, strict=True)
@@ -196,7 +200,7 @@ def _drawn(front: Front, point: FrontPoint) -> DrawnDesign:
     return DrawnDesign(
         ", ".join(f"{goal.label} = {value:.6g}{unit}" for goal, value, unit in pairs),
         f"optimum of {front.goals[point.program.optimised].label}",
-        free_numbers(solution.nlp, solution.x),
+        design_values(solution.nlp, solution.x),
         tuple(f"{side.name} {side.bound}" for side in sides if side.name in names),
         solution.nlp,
         solution.x,
@@ -206,9 +210,9 @@ def _drawn(front: Front, point: FrontPoint) -> DrawnDesign:
 
 
 def _counted(point: FrontPoint) -> list[str]:
-    """Return the active sides without the limbs and joints that they are about, and how many each stands for.
+    """Return the active sides without the names of limbs and joints, with their counts.
 
-    Closed loops and joints of a robot say nothing about its design.
+    Loop equations and bounds of joint coordinates are ignored.
     """
     evidence, names = point.solution.evidence, design_names(point.solution.nlp.program)
     sides = [] if evidence is None else [side for side in evidence.active if side.name in names]

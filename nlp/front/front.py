@@ -1,15 +1,15 @@
-"""The front of two or more goals, spread evenly by an adaptive rule.
+"""Pareto front of two or more goals, with evenly spread points by an adaptive rule.
 
-The ends are the optima of each goal alone; where such an optimum is not one point, the other goals are optimised within
-it. Goals are measured in parts of the distance of the ends.
+The ends are the separate optima of the goals; if such an optimum is not unique, the other goals are optimised within
+it. Goals are scaled by the distance of the ends.
 
-Two goals: the widest gap between neighbours is divided: the goal that differs more in the gap gets a bound in the
-middle, and the other one is optimised. Where this leads back to an end of the gap with either goal as the bounded one,
-the front has no point in the gap.
+Two goals: the widest gap between neighbours is divided. The goal with the larger difference gets a bound in the middle
+of the gap, and the other goal is optimised. If this returns an end of the gap, for either goal as the bounded one, the
+front has no point in the gap.
 
-More goals: of the boxes that can still hold points (:mod:`.boxes`), the one that can hold the largest piece of the
-front is taken. The goal along its shortest side is optimised, and all others get bounds in the middle of their sides.
-Where this gives no new point, the other goals are optimised in turn; a box where none gives one is closed.
+More goals: the next box is that with room for the largest piece of the front (:mod:`.boxes`). The goal along its
+shortest side is optimised, and all others get bounds in the middle of their sides. If this gives no new point, the
+other goals are optimised in turn; if none gives a point, the box is closed.
 """
 
 from __future__ import annotations
@@ -35,24 +35,24 @@ from ..solver.status import Status
 from .boxes import GoalBox, Region
 from .goals import Goal, GoalProgram, loosest_numbers, program_of, read_goals
 
-#: Points of a front where no number is asked for.
+#: Default number of points of a front.
 POINTS = 16
-#: Points whose goals differ by less than this part of the distance of the ends are one point of the front.
+#: Difference of goals, relative to the distance of the ends, below which two points are one point of the front.
 _SAME = 1e-6
-#: A point is dominated where no goal is better than that of another by more than this part: rounding of a bound.
+#: Relative difference by which a goal must be better for a point not to be dominated: rounding error of a bound.
 _ROUNDING = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
 class FrontPoint:
-    """A point of a front: the optimum of one goal within bounds of the others.
+    """Point of a front: the optimum of one goal within bounds on the others.
 
     Attributes:
-        values: (k,) the goals, angles in radians.
-        program: whose optimum it is.
-        bounds: of each goal; None for the one that is optimised, and for all at an end.
-        solution: of the program, with its evidence.
-        certificate: proven bound of the optimised goal; None where none was asked for.
+        values: (k,) values of the goals, angles in radians.
+        program: program of the point.
+        bounds: bound on each goal; None for the optimised goal, and for all goals at an end.
+        solution: solution of the program, with its evidence.
+        certificate: certificate of the optimised goal; None if not requested.
     """
 
     values: FloatArray
@@ -64,14 +64,14 @@ class FrontPoint:
 
 @dataclass(frozen=True, eq=False)
 class Front:
-    """A front of two or more goals.
+    """Pareto front of two or more goals.
 
     Attributes:
-        case: the case.
-        goals: the k goals.
-        points: none of which dominates another, in the order of the first goal, its best value last.
-        gaps: of two goals, pairs of neighbours (index of the first) between which the front has no point.
-        failed: number of searches that found no optimum.
+        case: case of the front.
+        goals: k goals.
+        points: nondominated points, from the worst to the best value of the first goal.
+        gaps: for two goals, indices of the points after which the front has a gap.
+        failed: number of searches without an optimum.
         seconds: wall time.
     """
 
@@ -95,29 +95,30 @@ def pareto(
     certified: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Front:
-    """Find the front of two or more goals of a case.
+    """Return the Pareto front of two or more goals of a case.
 
     Args:
-        case: the case, all of whose limits hold at each point.
-        goals: as on the command line, such as ``["max F:drive", "min limits.leg_length.max"]``.
-        points: number of points, at least 2; fewer where the front has gaps or is one point.
-        starts: number of starting points instead of the case's.
-        seed: seed instead of the case's.
+        case: case of the front; every point satisfies all its limits.
+        goals: texts of the goals, such as ``["max F:drive", "min limits.leg_length.max"]``.
+        points: number of points, 2 or more; a front with gaps may have fewer points.
+        starts: number of starting points; by default the number of the case.
+        seed: seed that replaces the seed of the case.
         jobs: number of threads; the result does not depend on it.
-        certified: whether the optimum of each point is proved too.
-        progress: called after each solve with the numbers of points found and wanted.
+        certified: If true, also compute a certificate for each point.
+        progress: function called after each solve with the current and the requested number of points.
 
     Raises:
         CaseError: the case contradicts itself.
-        InputError: a goal is none of the case, is given twice, or is a limit that cannot move; or there is one only.
-        EvaluationError: a goal alone has no optimum.
-        UncoveredError: an optimum is to be proved, and an expression has an operation without a rule.
+        InputError: a goal is unknown in the case, occurs twice, or is a limit that cannot be a goal; or there is only
+                    one goal.
+        EvaluationError: a goal has no separate optimum.
+        UncoveredError: certificates are requested, and an expression has an operation without a rule.
     """
     if points < 2:
         raise InputError(f"pareto: points = {points}: must be at least 2")
     began, search, wanted = time.perf_counter(), case.search.but(starts, seed), read_goals(goals, case)
     if certified:
-        kernel()  # before any solve where it is missing
+        kernel()  # an error before any solve if it is missing
     loosest = loosest_numbers(case, wanted)
     builder = _Builder(case, wanted, search, jobs)
     nothing = (None,) * len(wanted)
@@ -125,9 +126,11 @@ def pareto(
     for k in (1, 0, *range(2, len(wanted))):
         end = builder.solve(k, nothing, [])
         if is_requested():
-            raise InputError(f"{case.source or case.name}: {why_stopped()} before the ends of the front are found")
+            raise InputError(
+                f"{case.source or case.name}: {why_stopped()} before the extreme points of the front are computed"
+            )
         if end is None:
-            fault = f"the goal {wanted[k].label} alone has no optimum within the limits"
+            fault = f"the goal {wanted[k].label} has no separate optimum within the limits"
             raise EvaluationError(f"{case.source or case.name}: {fault}")
         ends.append(end)
     size = np.ptp([end.values for end in ends], axis=0)
@@ -147,7 +150,7 @@ def pareto(
 def _spread_between(
     builder: _Builder, ends: list[FrontPoint], size: FloatArray, count: int, progress: Callable[[int, int], None]
 ) -> tuple[list[FrontPoint], list[int]]:
-    """Return the points of a front of two goals, and the pairs of neighbours without a point between them."""
+    """Return the points of a front of two goals, and the pairs of neighbours that enclose a gap."""
     found, closed = list(ends), set[tuple[int, int]]()
     while len(found) < count and not is_requested():
         progress(len(found), count)
@@ -156,7 +159,7 @@ def _spread_between(
             break
         middle = builder.between(found[pair], found[pair + 1], size)
         if middle is None:
-            if is_requested():  # an interrupted search shows no gap
+            if is_requested():  # an interrupted search does not prove a gap
                 break
             closed.add((id(found[pair]), id(found[pair + 1])))
             continue
@@ -175,8 +178,7 @@ def _spread_in_boxes(
 ) -> list[FrontPoint]:
     """Return the points of a front of more than two goals.
 
-    Boxes reach to the worst number of each goal that the ends have or the case allows, and farther where a point is
-    found beyond.
+    The boxes extend to the worst value of each goal at the ends or in the case, and farther if a point is beyond.
     """
     signs, found = builder.signs, _undominated(ends, builder.goals, size)
     closed = set[tuple[float, ...]]()
@@ -207,7 +209,7 @@ def _spread_in_boxes(
 
 
 def _point_in(builder: _Builder, box: GoalBox, known: list[FrontPoint], size: FloatArray) -> FrontPoint | None:
-    """Return a new point of a front from bounds in the middle of a box; None where no goal as the optimum gives one."""
+    """Return a new point of a front from bounds in the middle of a box; None if no optimised goal gives one."""
     middle = (box.lower + box.upper) / 2 * size * builder.signs
     for k in np.argsort(box.sides, kind="stable").tolist():
         bounds = tuple(None if j == k else float(value) for j, value in enumerate(middle))
@@ -220,17 +222,17 @@ def _point_in(builder: _Builder, box: GoalBox, known: list[FrontPoint], size: Fl
 
 
 def _nearest(points: list[FrontPoint], middle: FloatArray, size: FloatArray) -> list[FrontPoint]:
-    """Return the points of a front that are nearest to goals (k,), from which a search may begin."""
+    """Return the points of a front nearest to goals (k,), as starts of a search."""
     return sorted(points, key=lambda point: float(np.linalg.norm((point.values - middle) / size)))[:2]
 
 
 class _Builder:
-    """Solves of the programs of a front.
+    """Solver of the programs of a front.
 
     Args:
-        case: the case.
+        case: case of the front.
         goals: all goals.
-        search: number of starts, seed and the solver's settings.
+        search: number of starts, seed and settings of the solver.
         jobs: number of threads.
     """
 
@@ -240,28 +242,28 @@ class _Builder:
 
     @property
     def signs(self) -> FloatArray:
-        """(k,) factors that turn the goals into costs."""
+        """Factors (k,) that turn the goals into costs."""
         return np.array([goal.sign for goal in self.goals])
 
     def solve(self, optimised: int, bounds: tuple[float | None, ...], near: list[FrontPoint]) -> FrontPoint | None:
-        """Return the optimum of one goal within bounds of the others; None where none is found."""
+        """Return the optimum of one goal within bounds on the others; None without an optimum."""
         program = program_of(self.case, self.goals, optimised, bounds)
         nlp = program.nlp
         first = [_start(program, point) for point in near]
         solution = solve_program(nlp, self.search, first=first, jobs=self.jobs)
         if not solution.status.is_answer:
-            # An interrupted search has not failed.
+            # An interrupted search does not count as failed.
             self.failed += solution.status is not Status.INTERRUPTED
             return None
         return FrontPoint(program.measure(solution.x), replace(program, nlp=solution.nlp), bounds, solution)
 
     def polished(self, end: FrontPoint, size: FloatArray) -> FrontPoint:
-        """Return an end at which no other goal can be better, where the optimum of its goal alone is not one point."""
+        """Return an end whose other goals are optimised too, for a separate optimum that is not unique."""
         k = end.program.optimised
         for j in range(len(self.goals)):
             if j == k:
                 continue
-            # As tight as rounding allows: with the optimum itself as the bound, a program may have no inner point.
+            # As tight as rounding allows: with the optimum as the bound, a program may have no interior point.
             bounds = [
                 None if i == j else float(value) for i, value in enumerate(end.values + self.signs * _ROUNDING * size)
             ]
@@ -273,7 +275,7 @@ class _Builder:
         return end
 
     def between(self, one: FrontPoint, other: FrontPoint, size: FloatArray) -> FrontPoint | None:
-        """Return a point between two neighbours; None where the front has none."""
+        """Return a point between two neighbours; None if the front has no point between them."""
         apart = np.abs(one.values - other.values) / size
         for bounded in np.argsort(-apart, kind="stable").tolist():
             if apart[bounded] <= _SAME:
@@ -289,9 +291,9 @@ class _Builder:
 
 
 def _start(program: GoalProgram, point: FrontPoint) -> FloatArray:
-    """Return a point of the front as a start of another program, between its bounds.
+    """Return a point of the front as a start of another program, projected between its bounds.
 
-    A program whose optimised goal is a limit has that limit's number, in the case's unit, as its last variable.
+    A program with a limit as the optimised goal has the value of the limit, in the case's unit, as its last variable.
     """
     nlp = program.nlp
     dimension = program.readings[program.optimised][0].dimension
@@ -303,7 +305,7 @@ def _start(program: GoalProgram, point: FrontPoint) -> FloatArray:
 
 
 def _widest(points: list[FrontPoint], closed: set[tuple[int, int]], size: FloatArray) -> int | None:
-    """Return the index of the first of the two neighbours farthest apart; None where no gap can be divided."""
+    """Return the index of the first of the two most distant neighbours; None if no gap can be divided."""
     best, widest = None, _SAME
     for k in range(len(points) - 1):
         apart = float(np.linalg.norm((points[k].values - points[k + 1].values) / size))
@@ -313,12 +315,12 @@ def _widest(points: list[FrontPoint], closed: set[tuple[int, int]], size: FloatA
 
 
 def _undominated(points: list[FrontPoint], goals: tuple[Goal, ...], size: FloatArray) -> list[FrontPoint]:
-    """Return the points that no other one dominates, in the order of the first goal, its best value last."""
+    """Return the nondominated points, from the worst to the best value of the first goal."""
     signs = np.array([goal.sign for goal in goals])
     costs = [signs * point.values / size for point in points]
     kept = []
     for k, cost in enumerate(costs):
-        # Of points that are the same within rounding, the first one stays.
+        # Of points that are equal within rounding, keep the first.
         beaten = any(
             (other <= cost + _ROUNDING).all() and ((other < cost - _ROUNDING).any() or j < k)
             for j, other in enumerate(costs)
@@ -330,7 +332,7 @@ def _undominated(points: list[FrontPoint], goals: tuple[Goal, ...], size: FloatA
 
 
 def _certificate(point: FrontPoint, jobs: int | None, left: int) -> Certificate:
-    """Return the proven bound of a point's optimised goal, in an equal part of the time that so many points share."""
+    """Return the certificate of the optimised goal of a point; ``left`` points share the remaining time equally."""
     with within(seconds_left() / left):
         nlp, x = point.solution.nlp, point.solution.x
         return kept_certificate(nlp, x, partial(certify_program, nlp, x, claimed=point.solution.F, jobs=jobs))

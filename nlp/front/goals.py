@@ -1,6 +1,6 @@
-"""Goals of a front, such as ``max F:NAME`` and ``min limits.KEY``, and its programs (epsilon-constraint method).
+"""Goals of a front, such as ``max F:NAME`` and ``min limits.KEY``, and programs of the epsilon-constraint method.
 
-In each program one goal is optimised while the others keep bounds.
+Each program optimises one goal within bounds on the others.
 
 Source of the method: Y. Y. Haimes, L. S. Lasdon and D. A. Wismer, On a bicriterion formulation of the problems of
 integrated system identification and system optimization, IEEE Trans. Syst. Man Cybern. 1 (1971) 296-297.
@@ -28,17 +28,17 @@ from ..program.layout import Layout, assemble, lay_out
 from ..program.nlp import Nlp
 
 _TASK, _LIMIT = "F:", "limits."
-#: Largest number of goals: the boxes of the space of goals become too many, and nobody reads such a front.
+#: Largest number of goals: more goals have too many boxes, and a front that is hard to read.
 MOST = 6
 
 
 @dataclass(frozen=True)
 class Goal:
-    """A goal: F of a task, or the number of a limit.
+    """Goal of a front: F of a task, or the value of a limit.
 
     Attributes:
-        sense: whether it is maximised or minimised.
-        label: as it is written, without the sense.
+        sense: maximisation or minimisation.
+        label: text of the goal without the sense, such as ``F:drive``.
         task: index of the task; None for a limit.
         key: dotted key below ``limits``; empty for a task.
     """
@@ -50,15 +50,15 @@ class Goal:
 
     @property
     def sign(self) -> float:
-        """Factor that turns the goal into one to be minimised."""
+        """Factor that turns the goal into a cost to be minimised."""
         return -self.sense.sign
 
 
 def read_goals(texts: Sequence[str], case: Case) -> tuple[Goal, ...]:
-    """Return the goals of a case; F alone stands for that of the only task.
+    """Return the goals of a case; ``F`` without a name is F of the only task.
 
     Raises:
-        InputError: a text is no goal of the case, or there are fewer than two different ones or more than ``MOST``.
+        InputError: a text is not a goal of the case, or there are fewer than two different goals or more than ``MOST``.
     """
     goals = tuple(_read_goal(text, case) for text in texts)
     if not 2 <= len(goals) <= MOST:
@@ -72,7 +72,7 @@ def read_goals(texts: Sequence[str], case: Case) -> tuple[Goal, ...]:
 
 
 def _read_goal(text: str, case: Case) -> Goal:
-    """Return one goal; the errors are those of :func:`read_goals`."""
+    """Return one goal; errors as for :func:`read_goals`."""
     word, _, rest = text.strip().partition(" ")
     label = rest.strip()
     if word not in ("max", "min") or not (label == "F" or label.startswith((_TASK, _LIMIT))):
@@ -81,7 +81,7 @@ def _read_goal(text: str, case: Case) -> Goal:
     if label.startswith(_LIMIT):
         return Goal(sense, label, key=label.removeprefix(_LIMIT))
     if case.tasks[0].measure:
-        raise InputError(f"--goal {text!r}: the case optimises {case.tasks[0].measure} instead of F")
+        raise InputError(f"--goal {text!r}: F is not the objective; the case optimises {case.tasks[0].measure}")
     names = [task.name for task in case.tasks]
     name = label.removeprefix(_TASK) if label != "F" else (names[0] if len(names) == 1 else "")
     if name not in names:
@@ -93,13 +93,13 @@ def _read_goal(text: str, case: Case) -> Goal:
 
 @dataclass(frozen=True, eq=False)
 class GoalProgram:
-    """A program of a front.
+    """Program of a front.
 
     Attributes:
-        nlp: the program; a limit that is optimised is its last variable, in the case's unit.
-        optimised: index of the goal that is optimised.
-        values: ``(x, p)`` to the expressions of each goal, (k, 1); for a limit those of its constraints.
-        readings: how these expressions read, for each goal.
+        nlp: nonlinear program; the value of an optimised limit is its last variable, in the case's unit.
+        optimised: index of the optimised goal.
+        values: function from ``(x, p)`` to the expressions of each goal, (k, 1); for a limit, of its constraints.
+        readings: conversions of these expressions to readable values, for each goal.
         goals: all goals.
     """
 
@@ -115,21 +115,21 @@ class GoalProgram:
         values = []
         for goal, raw, readings in zip(self.goals, found, self.readings, strict=True):
             each = [r.from_value(float(v)) for r, v in zip(readings, raw.full().ravel(), strict=True)]
-            # The limit holds for all of its constraints: its number is the worst of them.
+            # The value of a limit is the worst value of its constraints.
             values.append(each[0] if goal.task is not None else max(each) if goal.sense is Sense.MIN else min(each))
         return np.array(values)
 
 
 def loosest_numbers(case: Case, goals: Sequence[Goal]) -> FloatArray:
-    """Return the worst number (k,) that the case allows of each goal: that of a limit; NaN for F.
+    """Return the worst value (k,) of each goal in the case: the value of a limit; NaN for F.
 
-    Goals that a front of the case cannot have are refused.
+    Limits that cannot be goals are refused.
 
     Raises:
-        InputError: a limit is not in the case or cannot move, or the case combines poses by their worst.
+        InputError: a limit is not in the case or cannot be a goal, or the case has the worst F of several poses.
     """
     if case.over_poses is OverPoses.WORST and case.pose_count > 1:
-        raise InputError("pareto: a case with the worst of several poses has no front here; use sum or mean")
+        raise InputError("pareto: the worst F of several poses is not supported; use sum or mean")
     layout = lay_out(case, [case.tasks[0]])
     found = []
     for goal in goals:
@@ -142,24 +142,24 @@ def program_of(case: Case, goals: tuple[Goal, ...], optimised: int, bounds: Sequ
     """Return the program that optimises one goal.
 
     Args:
-        case: the case, whose own limits hold too.
+        case: case of the front; its limits apply too.
         goals: all goals.
-        optimised: index of the goal to optimise.
-        bounds: number that each goal must reach; None for none, and for the goal that is optimised.
+        optimised: index of the optimised goal.
+        bounds: bound on each goal; None for no bound, and for the optimised goal.
 
     Raises:
         CaseError: the case contradicts itself.
-        InputError: a limit is not in the case or cannot move.
+        InputError: a limit is not in the case or cannot be a goal.
     """
     best = goals[optimised]
-    # A case without a goal of F still has a task: a layout has the rates of one.
+    # Without a goal F, one task remains, because a layout needs the rates of a task.
     tasks = [goal.task for goal in (best, *goals) if goal.task is not None] or [0]
     tasks = list(dict.fromkeys(tasks))
     layout = lay_out(case, [case.tasks[task] for task in tasks])
     added: list[BoundedConstraint] = []
     for goal, bound in zip(goals, bounds, strict=True):
         if bound is not None and goal.task is not None:
-            # Of order 1, as the solver takes what is no limit of the case.
+            # Scaled to order 1, like constraints that are not limits of the case.
             part = 1 / formulate(case, goal.task).objective_scale
             F = part * _total(layout, tasks.index(goal.task))
             sides = (part * bound, math.inf) if goal.sense is Sense.MAX else (-math.inf, part * bound)
@@ -171,7 +171,7 @@ def program_of(case: Case, goals: tuple[Goal, ...], optimised: int, bounds: Sequ
         objective, size = _total(layout, tasks.index(best.task)), formulate(case, best.task).objective_scale
     else:
         least, most = _range(layout, best)
-        # In the case's unit, as all that a program optimises: so are its bounds and multipliers.
+        # In the case's unit, like all objectives, and so are its bounds and multipliers.
         unit = case.units.to_internal(1.0, readings[optimised][0].dimension)
         level = layout.table.add(best.label, Dimension.NUMBER, Free(least / unit, most / unit)).symbols
         layout = replace(
@@ -192,7 +192,7 @@ def _total(layout: Layout, task: int) -> SX:
 
 
 def _raw(layout: Layout, goal: Goal, tasks: Sequence[int]) -> tuple[SX, tuple[Reading, ...]]:
-    """Return the expressions of a goal one below the other, and how each reads."""
+    """Return the stacked expressions of a goal, and their readings."""
     if goal.task is not None:
         return _total(layout, tasks.index(goal.task)), (Reading(Dimension.NUMBER),)
     found = [item.constraint for item in layout.constraints if _is_of(item, goal)]
@@ -200,25 +200,25 @@ def _raw(layout: Layout, goal: Goal, tasks: Sequence[int]) -> tuple[SX, tuple[Re
 
 
 def _is_of(item: BoundedConstraint, goal: Goal) -> bool:
-    """Return whether a constraint is one of a goal's limit: an upper one for a minimum, a lower one for a maximum."""
+    """Return whether a constraint belongs to a goal's limit: an upper one for a minimum, a lower one for a maximum."""
     return item.constraint.keys[int(goal.sense is Sense.MIN)] == goal.key
 
 
 def _range(layout: Layout, goal: Goal) -> tuple[float, float]:
-    """Return the smallest and the largest number that a limit can have; the case's own is the loosest.
+    """Return the smallest and the largest value of a limit; the value of the case is the loosest.
 
     Raises:
-        InputError: the case has no such limit, or it has no end in the goal's direction.
+        InputError: the case has no such limit, or its value is unbounded in the goal's direction.
     """
     found = [item for item in layout.constraints if _is_of(item, goal)]
     if not found:
         side = int(goal.sense is Sense.MIN)
         keys = sorted({item.constraint.keys[side] for item in layout.constraints} - {""})
-        fault = "is no limit of the case that can be a goal in this sense"
+        fault = f"the case has no such limit that can be {'minimised' if side else 'maximised'}"
         raise InputError(f"--goal {goal.sense.value} {goal.label}: {fault}; allowed: {listing(keys)}")
     reading = found[0].constraint.reading
     if any(item.constraint.exact is not None or item.constraint.measure is not None for item in found):
-        raise InputError(f"--goal {goal.label}: is kept by a smooth estimate, and so cannot be a goal")
+        raise InputError(f"--goal {goal.label}: is approximated by a smooth estimate, and cannot be a goal")
     if goal.sense is Sense.MIN:
         least, most = reading.above, min(reading.from_value(item.upper) for item in found)
     else:
@@ -226,12 +226,14 @@ def _range(layout: Layout, goal: Goal) -> tuple[float, float]:
         upper = [reading.from_value(item.upper) for item in found if math.isfinite(item.upper)]
         most = min([most, *upper])
     if not (math.isfinite(least) and math.isfinite(most) and least < most):
-        raise InputError(f"--goal {goal.label}: has no end in this direction; give the limit's other number too")
+        raise InputError(
+            f"--goal {goal.label}: the range of this goal is infinite; set both .min and .max of the limit"
+        )
     return least, most
 
 
 def _moved(item: BoundedConstraint, goal: Goal, bound: float) -> BoundedConstraint:
-    """Return a constraint with a goal's number as its bound, where it is one of the goal's limit."""
+    """Return a constraint; if it belongs to the limit of a goal, its bound is the value of the goal."""
     if not _is_of(item, goal):
         return item
     value = float(item.constraint.reading.to_value(SX(bound)))
@@ -239,12 +241,12 @@ def _moved(item: BoundedConstraint, goal: Goal, bound: float) -> BoundedConstrai
 
 
 def _below(item: BoundedConstraint, goal: Goal, level: SX, ends: tuple[float, float]) -> tuple[BoundedConstraint, ...]:
-    """Return a constraint of a goal's limit against a level that is a variable, and its other side."""
+    """Return a constraint of a goal's limit with a variable as its bound, and its other side."""
     if not _is_of(item, goal):
         return (item,)
     constraint, is_upper = item.constraint, goal.sense is Sense.MIN
     least, most = (float(constraint.reading.to_value(SX(end))) for end in ends)
-    # Of order 1, as a bound of 0 says nothing about the size of an expression such as a squared length.
+    # Scaled to order 1: a bound of 0 does not give the size of an expression such as a squared length.
     expression = (constraint.expression - constraint.reading.to_value(level)) / (most - least)
     plain = Constraint(constraint.name, expression, Reading(Dimension.NUMBER), pose=constraint.pose)
     moved = BoundedConstraint(plain, -math.inf, 0.0) if is_upper else BoundedConstraint(plain, 0.0, math.inf)

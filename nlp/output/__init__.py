@@ -1,1 +1,1 @@
-"""Output: terminal, files, pictures and reports."""
+"""Output of results: terminal, files, pictures, pages and notebooks."""

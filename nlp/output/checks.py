@@ -12,7 +12,7 @@ from .tables import markdown
 
 
 def checks_as_junit(checks: Sequence[CaseCheck]) -> str:
-    """Return the checks as JUnit XML: a suite for each case, a test for each number."""
+    """Return the checks as JUnit XML: a suite for each case, a test for each expected or published value."""
     root = ElementTree.Element("testsuites", name="screwsynth check")
     for check in checks:
         suite = ElementTree.SubElement(root, "testsuite", name=one_line(check.name), time=f"{check.seconds:.3f}")
@@ -21,7 +21,7 @@ def checks_as_junit(checks: Sequence[CaseCheck]) -> str:
             fault = "" if row.passed else f"computed {row.computed}, expected {row.expected} within {row.tolerance}"
             failures += _add_test(suite, check.name, f"expected {row.quantity}", fault)
         for published in check.published:
-            fault = "" if published.passed else f"newly changed: {published_words(published)}"
+            fault = "" if published.passed else f"changed since the last check: {published_words(published)}"
             failures += _add_test(suite, check.name, f"published {published.quantity}", fault)
         suite.set("tests", str(len(check.expected) + len(check.published)))
         suite.set("failures", str(failures))
@@ -30,7 +30,7 @@ def checks_as_junit(checks: Sequence[CaseCheck]) -> str:
 
 
 def _add_test(suite: ElementTree.Element, case: str, name: str, fault: str) -> int:
-    """Add a test to a suite, failed where there is a fault; return the number of failures, 0 or 1."""
+    """Add a test to a suite, failed if ``fault`` is not empty; return the number of failures, 0 or 1."""
     test = ElementTree.SubElement(suite, "testcase", classname=one_line(case), name=one_line(name))
     if fault:
         ElementTree.SubElement(test, "failure", message=one_line(fault))
@@ -38,5 +38,5 @@ def _add_test(suite: ElementTree.Element, case: str, name: str, fault: str) -> i
 
 
 def checks_as_markdown(checks: Sequence[CaseCheck]) -> str:
-    """Return the published numbers as a Markdown table: printed, computed, verdict and reason."""
+    """Return the published values as a Markdown table: published, computed, verdict and reason."""
     return markdown(reproduction_table(checks))

@@ -1,4 +1,7 @@
-"""Reading and writing of files: a file is written whole or not at all, and each fault is one sentence."""
+"""Reading and writing of files.
+
+A file is written completely or not at all, and an error is one sentence. Files of other programs are not overwritten.
+"""
 
 from __future__ import annotations
 
@@ -16,13 +19,13 @@ from ..interruption import WRITING, unfinished, wrote
 from ..system.locks import held_folder
 from ..system.reading import read_limited, text_of_bytes
 
-#: Name of the file that lists what was written into a folder; only a folder with it is written into again.
+#: Name of the manifest, which lists the written files of a folder; without it, a folder with files is refused.
 MANIFEST = "screwsynth-files.txt"
-#: Permission to write for anybody.
+#: Bits of the write permissions of owner, group and others.
 _WRITABLE = stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH
-#: Largest file that is read, bytes: above every proof that fits into memory as a tree; a device has no end.
+#: Largest file that is read, bytes: larger than any proof record that fits into memory; a device has no end.
 LARGEST_FILE = 256 * 2**20
-#: Beginning of names of files and folders that are not complete.
+#: Prefix of the names of incomplete files and folders.
 _WAITING = ".screwsynth."
 _MANIFEST_HEAD = "# Written by screwsynth, which may replace these files:"
 
@@ -42,9 +45,9 @@ def write_text(target: str, text: str) -> None:
 
 
 def write_bytes(target: str, content: bytes) -> None:
-    """Write bytes to a file; ``-`` is a file's name here.
+    """Write bytes to a file; the name ``-`` is not standard output here.
 
-    The file appears under its name only when it is complete; a pipe or device is written to, not replaced.
+    The file gets its name when it is complete; a pipe or device is written to, not replaced.
 
     Raises:
         InputError: the file cannot be written.
@@ -62,9 +65,9 @@ def write_bytes(target: str, content: bytes) -> None:
 
 @contextmanager
 def write_whole(target: str) -> Iterator[Path]:
-    """Give a new file to write in parts, which appears under the target's name when the block ends without an error.
+    """Yield the path of a temporary file, which is renamed to the target if the block ends without an error.
 
-    Until then its name is the same at each run: what a killed run leaves is replaced by the next one.
+    The temporary name is the same at each run, so the next run replaces the file of a killed run.
 
     Raises:
         InputError: the file cannot be written.
@@ -86,18 +89,18 @@ def write_whole(target: str) -> Iterator[Path]:
 
 
 def write_folder(target: str, files: Mapping[str, str], *, force: bool = False) -> None:
-    """Write texts by file name into a folder, which is made when missing.
+    """Write texts into the files of a folder; a missing folder is created.
 
-    All of them are complete before the first appears under its name; other files in the folder stay. A manifest in the
-    folder lists what was written. Of two runs at once, one writes after the other.
+    All files are complete before the first gets its name; other files in the folder stay. A manifest in the folder has
+    the names of the written files. Two runs at the same time write one after the other.
 
     Args:
-        target: the folder.
+        target: path of the folder.
         files: texts by file name.
-        force: write also over files that were not written here.
+        force: If true, also overwrite files that screwsynth did not write.
 
     Raises:
-        InputError: the folder cannot be made or written, or writing would replace files of another origin.
+        InputError: the folder cannot be made or written, or a file of another origin would be replaced.
     """
     if not force:
         check_folder(target, files)
@@ -120,14 +123,14 @@ def write_folder(target: str, files: Mapping[str, str], *, force: bool = False) 
 
 
 def check_folder(target: str, files: Iterable[str] = ()) -> None:
-    """Refuse a folder that holds files of another origin, before the work begins.
+    """Refuse a folder with files of another origin before the work begins.
 
     Args:
-        target: the folder; one that is missing or empty may be written.
-        files: names of the files to write, where they are known.
+        target: path of the folder, which may be missing or empty.
+        files: names of the files to write, if known.
 
     Raises:
-        InputError: the folder has no manifest, a file to write is not in it, or the target is no folder.
+        InputError: the folder has no manifest, its manifest lacks a file to write, or the target is not a folder.
     """
     folder = Path(target)
     try:
@@ -142,28 +145,28 @@ def check_folder(target: str, files: Iterable[str] = ()) -> None:
 
 
 def _refuse_foreign(folder: Path, target: str, files: Iterable[str]) -> None:
-    """Refuse a folder with files of another origin; the arguments and errors are those of :func:`check_folder`."""
+    """Refuse a folder with files of another origin; arguments and errors as for :func:`check_folder`."""
     written = _written_before(folder)
-    # What a killed run left is nobody's.
+    # Incomplete files of a killed run may be replaced.
     present = sorted(each.name for each in folder.iterdir() if not each.name.startswith(_WAITING))
     foreign = [name for name in present if written is None or (name in set(files) and name not in written)]
     if foreign:
         raise InputError(
-            f"{target}: holds {foreign[0]}, which screwsynth did not write: choose an empty or a new folder, or --force"
+            f"{target}: contains {foreign[0]}, not written by screwsynth: choose an empty or a new folder, or --force"
         )
 
 
 def check_outputs(inputs: Mapping[Path, str], outputs: Mapping[str, str | None]) -> None:
-    """Refuse outputs that cannot be written, that are an input, or that are each other, before the work begins.
+    """Refuse, before the work begins, outputs that are not writable, overwrite an input, or share a file.
 
     Links are resolved first. Pipes and devices take any number of outputs.
 
     Args:
-        inputs: files that are read, and the words for each in messages.
-        outputs: files to write by the option that names them; None and ``-`` are left out.
+        inputs: input files with their description for messages.
+        outputs: output files by option; None and ``-`` are ignored.
 
     Raises:
-        InputError: an output is refused.
+        InputError: an output cannot be written, is an input, or is the file of another output too.
     """
     chosen = {option: Path(target) for option, target in outputs.items() if target not in (None, "-") and target}
     for target in outputs.values():
@@ -175,19 +178,19 @@ def check_outputs(inputs: Mapping[Path, str], outputs: Mapping[str, str | None])
                 raise InputError(f"{option} {path}: is {words}, which would be lost; choose another name")
     for (option, path), (other, second) in combinations(chosen.items(), 2):
         if _is_same_file(path, second):
-            raise InputError(f"{option} {path}: is the file of {other} too; choose another name")
+            raise InputError(f"{option} {path}: is also the file of {other}; choose another name")
 
 
 def check_origin(target: str, beginning: str, *, force: bool = False) -> None:
-    """Refuse a file of another origin, which would be lost, before the work begins.
+    """Refuse to overwrite a file of another origin, before the work begins.
 
     Args:
-        target: file to write; one that is missing or empty may be written, and so may pipes and devices.
-        beginning: of each file that this program writes in its place.
-        force: write also over a file of another origin.
+        target: path of the output file; it may be missing, empty, a pipe or a device.
+        beginning: first characters of every such file that screwsynth writes.
+        force: If true, also overwrite a file of another origin.
 
     Raises:
-        InputError: the file begins with something else.
+        InputError: the file has another beginning.
     """
     path = Path(target)
     if force or target == "-" or not path.is_file():
@@ -202,10 +205,10 @@ def check_origin(target: str, beginning: str, *, force: bool = False) -> None:
 
 
 def check_target(target: str) -> None:
-    """Refuse a file that cannot be written, before the work begins.
+    """Refuse an output file that cannot be written, before the work begins.
 
     Raises:
-        InputError: the folder is missing or closed, or the target is a folder.
+        InputError: the folder is missing or has no write permission, or the target is a folder.
     """
     if target == "-":
         return
@@ -222,34 +225,34 @@ def read_text(source: str) -> str:
     """Read the text of a file.
 
     Raises:
-        InputError: it cannot be read, is too large, or is no UTF-8 text.
+        InputError: the file cannot be read, is too large, or is not UTF-8 text.
     """
     content = read_limited(source, LARGEST_FILE)
     try:
         return text_of_bytes(content)
     except UnicodeDecodeError:
-        raise InputError(f"{source}: is no text") from None
+        raise InputError(f"{source}: is not a UTF-8 text file") from None
 
 
 def _replace(path: Path, content: bytes) -> None:
-    """Put a complete file in the place of an older one, or of none."""
+    """Write a complete file, which replaces an older one."""
     with WRITING:
         _write_and_rename(path, content)
 
 
 def _write_and_rename(path: Path, content: bytes) -> None:
-    """Write a temporary file and give it the name of the result."""
+    """Write a temporary file and rename it to the target."""
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=_WAITING)
     with unfinished(Path(temporary)):
         _fill_and_rename(handle, temporary, path, content)
 
 
 def _fill_and_rename(handle: int, temporary: str, path: Path, content: bytes) -> None:
-    """Fill a temporary file and give it the name of the result."""
+    """Fill a temporary file and rename it to the target."""
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(content)
-        # Only its owner may read a temporary file; the result gets the permissions of any new file.
+        # Only its owner may read a temporary file; the renamed file gets the permissions of any new file.
         mask = os.umask(0)
         os.umask(mask)
         Path(temporary).chmod(0o666 & ~mask)
@@ -264,32 +267,32 @@ def _cannot_be_written(target: str, error: OSError) -> InputError:
 
 
 def _written_before(folder: Path) -> list[str] | None:
-    """Return the names in a folder's manifest; None where it has none."""
+    """Return the file names in the manifest of a folder; None without a manifest."""
     try:
         head, *names = (folder / MANIFEST).read_text(encoding="utf-8").splitlines()
-    except (FileNotFoundError, ValueError):  # a text that is no manifest, or an empty one
+    except (FileNotFoundError, ValueError):  # not a manifest, or an empty one
         return None
     return names if head == _MANIFEST_HEAD else None
 
 
 def _is_same_file(one: Path, other: Path) -> bool:
-    """Return whether two names are of one file or of one file to come; a pipe or device is never the same."""
+    """Return whether two paths are the same file, existing or new; false for pipes and devices."""
     try:
         first, second = one.resolve(), other.resolve()
         if first.exists() and second.exists():
             return first.is_file() and first.samefile(second)
-    except (OSError, RuntimeError, ValueError):  # such as a circle of links, or a name that no file can have
+    except (OSError, RuntimeError, ValueError):  # such as a loop of links, or an invalid name
         return False
     return first == second
 
 
 def _fault(path: Path) -> str:
-    """Return the reason why a file cannot be written; empty where it can."""
+    """Return the reason why a file cannot be written; empty if it can."""
     if path.is_dir():
         return "it is a folder"
     if not path.parent.is_dir():
-        return f"{path.parent} is no folder"
-    # The user root may write any file, and means a file without permission to write as little as others do.
+        return f"{path.parent} is not a folder"
+    # The user root may write any file, but a file without write permission is protected on purpose.
     if path.is_file() and not (os.access(path, os.W_OK) and path.stat().st_mode & _WRITABLE):
         return "it is read-only"
     folder = path.resolve().parent

@@ -1,4 +1,4 @@
-"""Values as notebooks show them: tables and a drawing as HTML; and a solution as text or as a picture."""
+"""Display of robots, cases, solutions and certificates in notebooks, as HTML, text and pictures."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from rich.console import Console
 
 from ...models import Dimension, FloatArray, Model, component_names
 from ..case.case import Case
-from ..case.choices import listed_numbers, within_ranges
+from ..case.choices import catalogue_dimensions, within_ranges
 from ..case.limits.limits import Limits
-from ..case.pose import HERE, Free, Value
+from ..case.pose import NO_DISPLACEMENT, Free, Value
 from ..errors import CaseError, EvaluationError, InputError
 from ..evidence.state import evaluate
 from ..program.formulation import formulate_each
@@ -36,16 +36,16 @@ from .pictures.solutions import drawings_of
 from .report.markup import html_table, image_source, join_markup, paragraphs, tag
 from .terminal import show
 
-#: Width of a text without a terminal, as the command line writes into a file.
+#: Width of a text in columns, as the command line writes it into a file.
 _WIDTH = 80
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture that a notebook shows.
+    """Picture for a notebook.
 
     Attributes:
-        svg: the picture as SVG.
+        svg: content of the picture as SVG.
     """
 
     svg: str
@@ -57,40 +57,40 @@ class Picture:
         return self.svg
 
 
-def text_of(found: Solution | Certified, width: int = _WIDTH) -> str:
+def text_of(solution: Solution | Certified, width: int = _WIDTH) -> str:
     """Return the tables of a solution as text, as ``solve --all`` prints them.
 
     Args:
-        found: a solution, or a solution with certificates.
-        width: number of columns.
+        solution: solution, or solution with certificates.
+        width: width of the text in columns.
     """
     out = io.StringIO()
-    case = (found if isinstance(found, Solution) else found.solution).case
-    # In a notebook rich would show its lines at once instead of writing them.
+    case = (solution if isinstance(solution, Solution) else solution.solution).case
+    # In a notebook, rich would show its lines at once instead of writing them to the file.
     plain = Console(
         file=out, width=width, color_system=None, force_jupyter=False, highlight=False, markup=False, emoji=False
     )
-    show(plain, case_summary(case, result_of(found)))
+    show(plain, case_summary(case, result_of(solution)))
     return "".join(f"{line.rstrip()}\n" for line in out.getvalue().splitlines())
 
 
-def picture_of(found: Solution | Model) -> Picture:
-    """Return the drawing of a solution's robot with its tasks, or of a robot at its typical values.
+def picture_of(subject: Solution | Model) -> Picture:
+    """Return the drawing of the robot of a solution with its tasks, or of a robot at its typical dimensions.
 
     Raises:
         InputError: Matplotlib is not installed.
-        EvaluationError: the robot does not exist at the point reached, or at its typical values.
+        EvaluationError: the robot does not exist at the final point of the solve, or at its typical dimensions.
     """
-    return _picture([drawing_of_model(found)] if isinstance(found, Model) else drawings_of(found))
+    return _picture([drawing_of_model(subject)] if isinstance(subject, Model) else drawings_of(subject))
 
 
 def html_of(value: object) -> str | None:
-    """Return a value as HTML for a notebook: its tables, and a drawing; None for a value that has neither.
+    """Return tables and a drawing of a value as HTML for a notebook; None for a value of any other type.
 
-    Without Matplotlib, or where the robot does not exist, a sentence stands in the drawing's place.
+    Without Matplotlib, or if the robot does not exist, a sentence replaces the drawing.
 
     Args:
-        value: a robot, a case, a solution, or a certificate.
+        value: robot, case, solution, or certificate.
     """
     if isinstance(value, Model):
         return _html(model_words(value.name, value, []), lambda: [drawing_of_model(value)])
@@ -101,9 +101,7 @@ def html_of(value: object) -> str | None:
         return _html(case_summary(solution.case, result_of(value)), lambda: drawings_of(solution))
     if isinstance(value, Certificate):
         words = [title_line(value.nlp.case), *certificate_lines(certificate_data(value))]
-        return _html(
-            words, lambda: [] if value.x is None else [_drawing_at(value.nlp, value.x, "the best point known")]
-        )
+        return _html(words, lambda: [] if value.x is None else [_drawing_at(value.nlp, value.x, "best known point")])
     return None
 
 
@@ -132,7 +130,7 @@ def _picture(drawings: Sequence[Drawing]) -> Picture:
 
 
 def _case_words(case: Case) -> Iterable[Line | TextTable]:
-    """Yield a case: its title, its tasks, its numbers, fixed or free, and its limits."""
+    """Yield lines and a table of a case: title, tasks, parameters, pose, and limits."""
     yield title_line(case)
     for index in range(len(case.tasks)):
         yield from task_lines(task_data(case, index), case.units)
@@ -147,7 +145,7 @@ def _case_words(case: Case) -> Iterable[Line | TextTable]:
         shown = "free" if axis is None else "  ".join(number(float(part)) for part in np.asarray(axis))
         rows.append((f"{prefix}axis", shown, ""))
         rows.append(_row(case, f"{prefix}angle", pose.rotation.angle, Dimension.ANGLE))
-    yield TextTable(("", "value, or free between", "unit"), tuple(rows))
+    yield TextTable(("", "value or bounds", "unit"), tuple(rows))
     if case.limits:
         yield Line(", ".join(limit.name for limit in case.limits), label="limits")
     if case.pose_count > 1:
@@ -162,29 +160,29 @@ def _row(case: Case, name: str, value: Value, dimension: Dimension) -> tuple[str
 
 
 def _drawings_at_start(case: Case) -> list[Drawing]:
-    """Return a case's robot with its tasks where the first search begins, at the first pose.
+    """Return the robot of a case with each of its tasks, at the first starting point and the first pose.
 
     Raises:
         EvaluationError: the robot does not exist there.
     """
-    # Limits and further poses change nothing in the drawing, and take time.
-    numbers = listed_numbers(case)
+    # Limits and further poses do not change the drawing, but take time.
+    numbers = catalogue_dimensions(case)
     case = within_ranges(case, numbers, tuple((0, 1) for _ in numbers))
-    plain = replace(case, limits=Limits(), displacements=(HERE,), further=(), joint_centre_tolerance=None)
+    plain = replace(case, limits=Limits(), displacements=(NO_DISPLACEMENT,), further=(), joint_centre_tolerance=None)
     try:
         nlps = formulate_each(plain)
     except CaseError as error:
         raise EvaluationError(str(error)) from None
-    return [_drawing_at(nlp, nlp.start, "where the first search begins", task) for task, nlp in enumerate(nlps)]
+    return [_drawing_at(nlp, nlp.start, "first starting point", task) for task, nlp in enumerate(nlps)]
 
 
 def _drawing_at(nlp: Nlp, x: FloatArray, where: str, task: int = 0) -> Drawing:
-    """Return the robot at a point (n,) of a program.
+    """Return the drawing of the robot at a point of a nonlinear program.
 
     Args:
-        nlp: the program.
-        x: the point.
-        where: the point in words.
+        nlp: nonlinear program of a case.
+        x: (n,) point.
+        where: name of the point for the heading.
         task: index of the task in the case.
 
     Raises:

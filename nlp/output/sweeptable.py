@@ -1,4 +1,4 @@
-"""The table of a sweep as a file, Parquet or CSV by its ending, and a sweep as a function of Python."""
+"""Table of a sweep as a Parquet or CSV file, and the public function ``sweep``."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from ..system.csvtext import csv_row, text_of_cell
 from ..words.designs import Column
 from .files import check_target, write_whole
 
-#: Endings of a table's file.
+#: Extensions of table files.
 _PARQUET, _CSV = ".parquet", ".csv"
-#: Rows that are in memory at once.
+#: Number of rows in memory at once.
 _GROUP = 20_000
 #: Key of the sweep's fingerprint in a Parquet file, and name of its column in a CSV file.
 _KEY = "screwsynth_sweep"
@@ -40,7 +40,7 @@ def check_table(target: str) -> None:
     """Refuse a table that cannot be written, before the work begins.
 
     Raises:
-        InputError: its ending is another one, pyarrow is not installed, or the file cannot be written.
+        InputError: the extension is unknown, pyarrow is not installed, or the file cannot be written.
     """
     ending = PurePath(target).suffix.lower()
     if ending not in (_PARQUET, _CSV):
@@ -52,16 +52,16 @@ def check_table(target: str) -> None:
 
 
 def is_written(target: str, sweep: Sweep) -> bool:
-    """Return whether a file is the whole table of a sweep already; false where there is no file.
+    """Return whether a file is the complete table of a sweep; false if the file is missing.
 
     Raises:
-        InputError: the file is there and is something else.
+        InputError: the file exists and is not the table of this sweep.
     """
     path = Path(target)
     if not path.exists():
         return False
     found = None
-    # Whatever cannot be read is no table of a sweep.
+    # A file that cannot be read is not the table of a sweep.
     with suppress(OSError, ValueError, IndexError, KeyError, TypeError, StopIteration):
         found = _fingerprint(path)
     if found != sweep.fingerprint:
@@ -72,12 +72,12 @@ def is_written(target: str, sweep: Sweep) -> bool:
 
 
 def write_table(target: str, sweep: Sweep, rows: Iterable[Row]) -> None:
-    """Write the rows of a whole sweep; the file appears under its name when it is complete.
+    """Write all rows of a sweep to a temporary file, which is renamed when complete.
 
     Args:
-        target: the file, whose ending is ``.parquet`` or ``.csv``.
-        sweep: the sweep.
-        rows: in the order of the points.
+        target: path of the file, with the extension ``.parquet`` or ``.csv``.
+        sweep: sweep of the rows.
+        rows: rows of all points, in their order.
 
     Raises:
         InputError: the file cannot be written.
@@ -94,12 +94,12 @@ def write_table(target: str, sweep: Sweep, rows: Iterable[Row]) -> None:
             _write_parquet(path, sweep, columns, cells)
 
 
-#: Fields of a row that a picture and a line about a sweep need.
+#: Fields of a row for the picture and the summary of a sweep.
 _SHOWN = ("status", "F", "active", "note", "certificate")
 
 
 class _ShownRows(Sequence[Row]):
-    """Rows without design and evidence, in a few bytes each: a picture may have millions."""
+    """Rows without design and evidence, a few bytes per row: a picture may have millions of rows."""
 
     def __init__(self, rows: Iterable[Row]) -> None:
         self._F, self._others = array("d"), list[Row]()
@@ -118,12 +118,12 @@ class _ShownRows(Sequence[Row]):
 
 
 def table_rows(target: str, sweep: Sweep, *, shown: bool = False) -> Sequence[Row]:
-    """Return the rows of the whole table of a sweep, in the order of its points.
+    """Return the rows of the complete table of a sweep, in the order of its points.
 
     Args:
-        target: the file.
-        sweep: the sweep.
-        shown: whether the rows are for a picture and a line alone, and need no design and no evidence.
+        target: path of the table.
+        sweep: sweep of the table.
+        shown: If true, read only the fields for the picture and the summary, without design and evidence.
     """
     read = row_reader(sweep, _SHOWN if shown else None)
     rows = map(read, _cells(target))
@@ -131,10 +131,10 @@ def table_rows(target: str, sweep: Sweep, *, shown: bool = False) -> Sequence[Ro
 
 
 def _cells(target: str) -> Iterator[Sequence[Any]]:
-    """Yield the cells of each row of a table by their place; None for an empty one."""
+    """Yield the cells of each row of a table, in the order of the columns; None for an empty cell."""
     if PurePath(target).suffix.lower() == _CSV:
         with Path(target).open(encoding="utf-8", newline="") as file:
-            # A number that changes and a free number may have one name.
+            # A varied value and a design variable may have the same name.
             for cells in islice(csv.reader(file), 1, None):
                 yield [text_of_cell(cell) or None for cell in cells]
         return
@@ -146,7 +146,7 @@ def _cells(target: str) -> Iterator[Sequence[Any]]:
 
 
 def _write_parquet(path: Path, sweep: Sweep, columns: Sequence[Column[Row]], cells: Iterator[list[Any]]) -> None:
-    """Write cells as a Parquet file, a group of rows at a time."""
+    """Write cells as a Parquet file in groups of rows."""
     import pyarrow as pa  # noqa: PLC0415 - only tables in this format need it
     import pyarrow.parquet as pq  # noqa: PLC0415
 
@@ -161,7 +161,7 @@ def _write_parquet(path: Path, sweep: Sweep, columns: Sequence[Column[Row]], cel
 
 
 def _fingerprint(path: Path) -> str | None:
-    """Return the fingerprint in a table's file, or raise any error of a file that is something else."""
+    """Return the fingerprint in a table; a file of another kind may raise any error."""
     if path.suffix.lower() == _CSV:
         with path.open(encoding="utf-8", newline="") as file:
             rows = csv.reader(file)
@@ -190,30 +190,31 @@ def sweep(
     progress: SweepProgress | None = None,
     notice: Callable[[str], None] | None = None,
 ) -> SweepColumns:
-    """Solve a case at many values of its fixed numbers, and return the answers as columns.
+    """Solve a case at many values of its fixed parameters, bounds or limits, and return the results as columns.
 
     Args:
-        case: the case, which a case file must be able to state.
-        over: values of each number by name, as ``--set`` names it; several numbers make a grid, whose last number
-            changes fastest.
-        points: the points instead: values of each number by name, all of one length.
-        out: file of the table, ``.parquet`` or ``.csv``; an interrupted run is taken up from the journal beside it, and
-            a table that is whole already is read. None for no file.
-        starts: number of starting points at each point, 8 if left out.
-        seed: seed instead of the case's.
-        jobs: threads of the compiled engine, or processes of Ipopt.
-        engine: ``"compiled"`` or ``"ipopt"``; left out, the compiled one where it covers the sweep.
-        certified: whether the optimum at each point is proved too, which Ipopt's engine alone does.
-        time_limit: seconds for the whole call; where they are over before all points are done, there is no table. The
-            proof of a point takes an equal part of the time left, and 60 s at most; it then has the bound reached.
-        dask: address of a Dask cluster that does the work.
-        progress: called after each block of points.
-        notice: called with the reason where Ipopt does the work of the compiled engine.
+        case: case to solve; a case file must be able to represent it.
+        over: values of each varied parameter, bound or limit by name, as for ``--set``; several names make a grid,
+            whose last name varies fastest.
+        points: list of points instead of a grid: values by name, all of the same length.
+        out: path of the table, ``.parquet`` or ``.csv``, or None for no file. An interrupted run continues from the
+            journal beside the table; a complete table is read instead of solving again.
+        starts: number of starts per point, 8 by default.
+        seed: seed that replaces the seed of the case.
+        jobs: number of threads of the compiled engine, or of processes of Ipopt.
+        engine: ``"compiled"`` or ``"ipopt"``; by default the compiled engine if it covers the sweep.
+        certified: If true, also compute a certificate for each point, which needs the engine ``"ipopt"``.
+        time_limit: seconds for the whole call; if they end before all points are solved, there is no table. The
+            certificate of a point takes an equal part of the remaining time, at most 60 s, and then has its best bound.
+        dask: address of a Dask cluster for the computation.
+        progress: function called after each block of points.
+        notice: function called with the reason if Ipopt replaces the compiled engine.
 
     Raises:
-        CaseError: the case has no number of a name, does not allow its smallest or largest value, or cannot be written.
-        InputError: there are no points, an option is not allowed, the file cannot be written or is something else, or
-            the time is over before all points are done.
+        CaseError: a name is unknown in the case, its smallest or largest value is not allowed, or no case file can
+            represent the case.
+        InputError: there are no points, an option is not allowed, the file cannot be written or has another origin, or
+            the time ends before all points are solved.
     """
     kind = EngineKind.of(engine)
     check_seconds(time_limit)
@@ -242,19 +243,19 @@ def sweep(
 
 
 def _points(over: Over | None, points: Mapping[str, Sequence[float]] | None) -> Points:
-    """Return the points that the arguments state.
+    """Return the points of the arguments ``over`` and ``points``.
 
     Raises:
-        InputError: there are none, both arguments are given, a value is not finite or given twice in a grid, or columns
-            have different lengths.
+        InputError: there are no points, both arguments are given, a value is not finite or occurs twice in a grid, or
+            the columns have different lengths.
     """
     if (not over) == (not points):
-        raise InputError("a sweep needs points: either over or points, a mapping from names to values")
+        raise InputError("a sweep needs exactly one of over and points: a mapping from names to values")
     axes = axes_of(over) if over else axes_of(points or {}, "points", repeated=True)
     if over:
         return grid_of(tuple(axes), list(axes.values()))
     lengths = {len(values) for values in axes.values()}
     if len(lengths) > 1:
         counts = ", ".join(f"{name} {len(values)}" for name, values in axes.items())
-        raise InputError(f"points: every number needs the same count of values, and the counts are {counts}")
+        raise InputError(f"points: all names need the same number of values, got {counts}")
     return Points(tuple(axes), np.stack(list(axes.values()), axis=1))

@@ -1,4 +1,4 @@
-"""Tables as comma-separated values, with every digit of their numbers, and in Markdown."""
+"""Tables as comma-separated values, with all digits, and in Markdown."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ def tables_as_csv(items: Iterable[Line | TextTable], name: str | None = None) ->
     """Return tables as comma-separated values.
 
     Args:
-        items: tables of a result; lines are left out.
-        name: of the one table to write; None for all, each below a line with its name, with an empty line between.
+        items: tables of a result; lines are ignored.
+        name: name of the table to write; None for all tables, each below its name, separated by empty lines.
 
     Raises:
         InputError: no table has this name.
@@ -31,7 +31,7 @@ def tables_as_csv(items: Iterable[Line | TextTable], name: str | None = None) ->
 
 
 def _as_csv(table: TextTable) -> str:
-    """Return one table, its headers in the first line."""
+    """Return one table, with its headers in the first line."""
     head = [header.replace("\n", ", ") or ("note" if k else "name") for k, header in enumerate(table.headers)]
     return csv_text(head, ([_cell(cell) for cell in row] for row in table.rows))
 
@@ -42,14 +42,14 @@ def _cell(cell: str | Line) -> str:
     return cell.words if isinstance(cell, Line) else cell
 
 
-def designs_markdown(found: Designs[Row]) -> str:
-    """Return a table of designs in Markdown, with its lines above and below it."""
-    lines = [f"{line.label}: {line.words}" if line.label else line.words for line in found.before]
-    return "\n".join([*(f"{markdown_text(line)}\n" for line in lines), markdown(designs_table(found))])
+def designs_markdown(designs: Designs[Row]) -> str:
+    """Return a table of designs in Markdown, with the lines above and below it."""
+    lines = [f"{line.label}: {line.words}" if line.label else line.words for line in designs.before]
+    return "\n".join([*(f"{markdown_text(line)}\n" for line in lines), markdown(designs_table(designs))])
 
 
 def markdown(table: TextTable) -> str:
-    """Return a table in Markdown; the words of a case are escaped in its cells."""
+    """Return a table in Markdown; texts of a case are escaped in its cells."""
     rows = ([_words(cell) for cell in row] for row in table.rows)
     lines = [
         _markdown_row([header.replace("\n", ", ") for header in table.headers]),
@@ -64,5 +64,5 @@ def _words(cell: str | Line) -> str:
 
 
 def _markdown_row(cells: Sequence[str]) -> str:
-    """Return a row of a Markdown table."""
+    """Return a row of a table in Markdown."""
     return "| " + " | ".join(markdown_text(text) for text in cells) + " |"

@@ -1,4 +1,4 @@
-"""Lines and tables of text on a terminal, and in a file or a pipe."""
+"""Lines and tables of text for a terminal, a file or a pipe."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from ..words.text import Line, TextTable, Tone
 if TYPE_CHECKING:
     from rich.console import Console
 
-#: A line as its parts, each with its style.
+#: Line as a list of texts with their styles.
 _Styled: TypeAlias = "list[tuple[str, str]]"
 
-#: Columns of a file or a pipe.
+#: Width of a file or a pipe, in columns.
 PLAIN_WIDTH = 80
-#: Lines of a short view.
+#: Number of lines of a short view.
 ROOM = 25
-#: Stands before the second and later lines of one that is broken.
+#: Indent of the continuation lines of a wrapped line.
 _INDENT = "  "
 
 _LABEL = "dim"
@@ -37,21 +37,21 @@ _STYLES = {
     Tone.FAULT: "red",
     Tone.CAUTION: "yellow",
 }
-#: Spaces between columns, where they fit; else the smaller number.
+#: Spaces between columns; the smaller number where a table would be too wide.
 _GAP, _NARROW_GAP = 3, 2
-#: Words in a column wrap at this width or a larger one, so that a column never becomes a word a line.
+#: Least width of a column with wrapped words: it never becomes one word per line.
 _WRAPPED = 14
-#: The same where a table goes on below itself, and has room for longer lines.
+#: The same for a table in several parts, which has room for longer lines.
 _COMFORTABLE = 28
 
 
 def show(console: Console | None, items: Iterable[Line | TextTable], *, whole: bool = True) -> None:
-    """Print lines and tables; no word or number of them is split unless it is wider than the terminal by itself.
+    """Print lines and tables; no word or number is split unless it is wider than the terminal.
 
     Args:
-        console: terminal; None for a standard output without styles.
-        items: lines and tables; those of the answer first, then those of parts.
-        whole: whether everything is printed; else the answer, then the parts that still fit, and the names of others.
+        console: terminal; None for standard output without styles.
+        items: lines and tables of the answer, then those of further parts.
+        whole: If true, print everything; otherwise the answer, the parts that fit, and the names of the other parts.
     """
     width = PLAIN_WIDTH if console is None else console.width
     lines = (each for item in items for each in _item_lines(item, width, whole=True)) if whole else _short(items, width)
@@ -59,7 +59,7 @@ def show(console: Console | None, items: Iterable[Line | TextTable], *, whole: b
         if console is None:
             sys.stdout.write("".join(text for text, _ in line) + "\n")
             continue
-        # Loading it takes as long as a tenth of a short command: a text without styles goes without it.
+        # Loading rich takes a tenth of the time of a short command: a text without styles does not need it.
         from rich.text import Text  # noqa: PLC0415
 
         styled = Text(line[0][0], style=line[0][1]) if len(line) == 1 else Text.assemble(*line)
@@ -67,7 +67,7 @@ def show(console: Console | None, items: Iterable[Line | TextTable], *, whole: b
 
 
 def _item_lines(item: Line | TextTable, width: int, *, whole: bool = False) -> Iterator[_Styled]:
-    """Yield a line or a table as lines in a width."""
+    """Yield a line or a table as lines of at most a width."""
     if isinstance(item, TextTable):
         yield from _table_lines(replace(item, folded=0) if whole else item, width)
     elif item.is_command:
@@ -77,7 +77,7 @@ def _item_lines(item: Line | TextTable, width: int, *, whole: bool = False) -> I
 
 
 def _short(items: Iterable[Line | TextTable], width: int) -> list[_Styled]:
-    """Return the answer in at most as many lines as there is room for, the parts that fit, and the names of others."""
+    """Return the shortened answer, the parts that fit in the short view, and the names of the other parts."""
     answer: list[Line | TextTable] = []
     parts: dict[str, list[_Styled]] = {}
     for item in items:
@@ -101,13 +101,13 @@ def _short(items: Iterable[Line | TextTable], width: int) -> list[_Styled]:
 
 
 def _more_lines(names: Iterable[str], width: int) -> list[_Styled]:
-    """Return the line that names what is not shown; nothing without a name."""
+    """Return the line with the names of the hidden parts; nothing without a name."""
     words = ", ".join(names)
     return list(_broken([("more  ", _LABEL), (f"{words}: --all", "")], width)) if words else []
 
 
 def _answer_lines(items: Sequence[Line | TextTable], width: int, room: int) -> list[_Styled]:
-    """Return the lines of an answer, whose tables are shortened where there is no room, the last ones first."""
+    """Return the lines of an answer; without room, tables are shortened, beginning with the last."""
     blocks = [list(_item_lines(item, width)) for item in items]
     over = sum(map(len, blocks)) - room
     for k in reversed(range(len(items))):
@@ -120,7 +120,7 @@ def _answer_lines(items: Sequence[Line | TextTable], width: int, room: int) -> l
 
 
 def _shortened(table: TextTable, width: int, room: int) -> list[_Styled]:
-    """Return the lines of a table without its extra columns, and with as few rows as there is room for, but one."""
+    """Return the lines of a table without its extra columns, with as many rows as fit, at least one."""
     lines: list[_Styled] = []
     note: list[_Styled] = []
     if table.extra:
@@ -136,7 +136,7 @@ def _shortened(table: TextTable, width: int, room: int) -> list[_Styled]:
     for count in range(min(every - table.folded, max(room, 2)), 0, -1):
         if table.is_curve:
             places = [round(k * (every - 1) / max(count - 1, 1)) for k in range(count)]
-            words = f"{count} of {every} rows: --all shows every one"
+            words = f"{count} of {every} rows shown: --all shows all"
             last: list[_Styled] = [[(words, _LABEL)]] if count < every else []
             lines = [*_table_lines(replace(table, rows=tuple(table.rows[k] for k in places)), width), *last, *note]
         else:
@@ -149,7 +149,7 @@ def _shortened(table: TextTable, width: int, room: int) -> list[_Styled]:
 
 
 def _command_lines(item: Line, width: int) -> Iterator[_Styled]:
-    """Yield a command, broken between its options so that a shell reads it as one."""
+    """Yield a command, wrapped between its options, so that a shell reads it as one command."""
     units: list[str] = []
     for word in map(shlex.quote, shlex.split(item.text)):
         if units and units[-1].startswith("--") and " " not in units[-1] and not word.startswith("--"):
@@ -160,7 +160,7 @@ def _command_lines(item: Line, width: int) -> Iterator[_Styled]:
     lines: list[str] = []
     for unit in units[1:]:
         beside = cell_len(label) if not lines else len(_INDENT)
-        # Two columns are for the backslash.
+        # Two columns for the backslash.
         if beside + cell_len(line) + 1 + cell_len(unit) + 2 <= width:
             line += f" {unit}"
         else:
@@ -172,7 +172,7 @@ def _command_lines(item: Line, width: int) -> Iterator[_Styled]:
 
 
 def _broken(line: _Styled, width: int) -> Iterator[_Styled]:
-    """Yield a line, broken between words where it is too wide; what follows is indented."""
+    """Yield a line; a line that is too wide is wrapped between words, with indented continuation lines."""
     text = "".join(part for part, _ in line)
     if cell_len(text) <= width:
         yield line
@@ -209,7 +209,7 @@ def _header(text: str) -> str:
 
 
 def _text(line: Line) -> _Styled:
-    """Return a line; the words of a case are escaped, so that they cannot control the terminal."""
+    """Return a line; texts of a case are escaped, so that they cannot control the terminal."""
     style = _STYLES[line.tone]
     if not (line.label or line.before or line.after):
         return [(one_line(line.text), style)]
@@ -218,9 +218,9 @@ def _text(line: Line) -> _Styled:
 
 
 def _table_lines(table: TextTable, width: int) -> Iterator[_Styled]:
-    """Yield the lines of a table in a width: in several tables below each other where one would be too wide.
+    """Yield the lines of a table; a table that is too wide is divided into several tables below each other.
 
-    Each of these begins with the first column, which names the rows.
+    Each part begins with the first column, which names the rows.
     """
     shown = table.rows[: len(table.rows) - table.folded]
     columns = [
@@ -236,24 +236,24 @@ def _table_lines(table: TextTable, width: int) -> Iterator[_Styled]:
 
 
 class _Column:
-    """A column of a table: header, cells, and the widths that it can have."""
+    """Column of a table: header, cells, and possible widths."""
 
     def __init__(self, header: str, cells: Sequence[str], styles: Sequence[str]) -> None:
         self.header, self.cells, self.styles = header, cells, styles
         inside = max(map(cell_len, cells), default=0)
         words = max((cell_len(word) for text in (header, *cells) for word in text.split()), default=0)
-        #: Width without a break.
+        #: Width without wrapping.
         self.natural = max(inside, *map(cell_len, header.split("\n")))
-        #: Width with breaks between the words of the header only.
+        #: Width with wrapping of the header only.
         self.narrow = max(inside, *(cell_len(word) for word in header.split()), 0)
         #: Least width.
         self.least = min(self.narrow, max(words, _WRAPPED))
-        #: Width in a table that goes on below itself.
+        #: Width in a table in several parts.
         self.comfortable = min(self.narrow, max(words, _COMFORTABLE))
 
 
 def _parts(columns: Sequence[_Column], width: int) -> Iterator[Sequence[_Column]]:
-    """Yield the columns of each of the tables that a table becomes, so that each fits a width."""
+    """Yield the columns of each part of a table, so that each part fits a width."""
     first, *others = columns
     if not others or _fits([column.least for column in columns], width):
         yield columns
@@ -286,7 +286,7 @@ def _part_lines(columns: Sequence[_Column], rows: int, width: int) -> Iterator[_
 
 
 def _widths(columns: Sequence[_Column], width: int) -> list[int]:
-    """Return a width for each column: headers wrap first, then the words of the widest columns."""
+    """Return the width of each column: headers wrap first, then the words of the widest columns."""
     widths = [column.natural for column in columns]
     for floors in ([column.narrow for column in columns], [column.least for column in columns]):
         while sum(widths) > width:
@@ -295,7 +295,7 @@ def _widths(columns: Sequence[_Column], width: int) -> list[int]:
                 break
             widths[max(wide, key=widths.__getitem__)] -= 1
     while sum(widths) > max(width, len(widths)):
-        # A word by itself is wider than the terminal.
+        # A single word is wider than the terminal.
         widths[widths.index(max(widths))] -= 1
     return widths
 
@@ -303,7 +303,7 @@ def _widths(columns: Sequence[_Column], width: int) -> list[int]:
 def _row_lines(
     cells: Sequence[Sequence[str]], styles: Sequence[str], widths: Sequence[int], between: int
 ) -> Iterator[_Styled]:
-    """Yield the lines of one row, each cell as its lines."""
+    """Yield the lines of one row from the lines of its cells."""
     for k in range(max(map(len, cells))):
         line: _Styled = []
         for lines, style, size in zip(cells, styles, widths, strict=True):
@@ -315,7 +315,7 @@ def _row_lines(
 
 
 def _wrapped(text: str, width: int) -> list[str]:
-    """Return the lines of a text in a width, broken between words."""
+    """Return the lines of a text, wrapped between words to a width."""
     lines: list[str] = []
     for paragraph in text.split("\n"):
         if cell_len(paragraph) <= width:
@@ -335,7 +335,7 @@ def _wrapped(text: str, width: int) -> list[str]:
 
 
 def _pieces(word: str, width: int) -> Iterator[str]:
-    """Yield the pieces of a word, one where it fits a width."""
+    """Yield the pieces of a word, one piece if it fits a width."""
     piece = ""
     for sign in word:
         if piece and cell_len(piece + sign) > width:

@@ -31,12 +31,12 @@ class ArcError(Exception):
 
 
 class Tolerances(NamedTuple):
-    """Tolerances on the ends of arcs, length.
+    """Tolerances on the end points of arcs, length.
 
     Attributes:
-        radius: smallest radius, and excess of half a chord over it.
-        spiral: difference of the distances of both ends from the centre, allowed for large radii too.
-        closed: distance of the ends of a full circle.
+        radius: smallest radius, and largest excess of half a chord over the radius.
+        spiral: largest difference of the distances of both end points from the centre, for any radius.
+        closed: largest distance between start and end of a full circle.
     """
 
     radius: float
@@ -84,7 +84,7 @@ def arc_about(centre: Point, start: Point, end: Point, turns: int, tolerances: T
         centre: coordinates in the plane.
         start: first point.
         end: last point; equal to the first for a full circle.
-        turns: 1 for at most one turn, 2 for one more, and so on; negative for clockwise.
+        turns: number of turns, with the last turn complete or partial; negative for clockwise.
         tolerances: tolerances in the unit of the coordinates.
 
     Raises:
@@ -93,11 +93,11 @@ def arc_about(centre: Point, start: Point, end: Point, turns: int, tolerances: T
     from_start, from_end = (start[0] - centre[0], start[1] - centre[1]), (end[0] - centre[0], end[1] - centre[1])
     radius, last = math.hypot(*from_start), math.hypot(*from_end)
     if min(radius, last) < tolerances.radius:
-        raise ArcError("the centre of the arc is at one of its ends")
+        raise ArcError("the centre of the arc coincides with its start or end")
     gap = abs(last - radius)
     if gap > 100 * tolerances.spiral or (gap > tolerances.spiral and gap > _SPIRAL * max(radius, last)):
         raise ArcError(
-            f"the ends of the arc are {radius:.7g} and {last:.7g} from its centre; they may differ by"
+            f"start and end of the arc are {radius:.7g} and {last:.7g} from its centre; these may differ by"
             f" {max(tolerances.spiral, min(100 * tolerances.spiral, _SPIRAL * max(radius, last))):.3g}"
         )
     angle = math.atan2(from_start[1], from_start[0])
@@ -130,7 +130,7 @@ def centre_of_radius(radius: float, start: Point, end: Point, is_clockwise: bool
             "an arc with R must not end at its start, because its centre is undetermined; give I, J, K instead"
         )
     if length / 2 - size > tolerances.radius:
-        raise ArcError(f"the ends of the arc are {length:.7g} apart, more than two radii of {size:.7g}")
+        raise ArcError(f"start and end of the arc are {length:.7g} apart, more than two radii of {size:.7g}")
     height = 0.0 if length / 2 > size * (1 - _TINY) else math.sqrt((size - length / 2) * (size + length / 2))
     # The centre is to the right of the chord of a clockwise arc of less than half a turn.
     height = (-height if is_clockwise == (radius > 0) else height) / length

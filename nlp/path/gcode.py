@@ -100,7 +100,7 @@ class _Machine:
         knots = np.array(self.knots).reshape(-1, 6)
         if not (np.abs(knots) <= LARGEST).all():
             line = self.lines[max(int(np.argmin((np.abs(knots) <= LARGEST).all(axis=1))) - 1, 0)]
-            raise InputError(f"{self.source}: line {line}: must be finite and at most {LARGEST:g} in size")
+            raise InputError(f"{self.source}: line {line}: must be finite and at most {LARGEST:g} in magnitude")
         knots[:, 3:] = np.radians(knots[:, 3:])
         path = ProgrammedPath(
             self.source,
@@ -194,7 +194,7 @@ class _Machine:
         if "unit" in codes:
             unit = int(codes["unit"])
             if "F" in words and not self.is_inverse_time and self.unit not in (None, unit):
-                raise WordError(f"G{unit}", "changes the unit of F on the same line; put them on two lines")
+                raise WordError(f"G{unit}", "changes the unit of F on the same line; write F on another line")
             self._set_unit(unit)
 
     def _set_unit(self, code: int) -> None:
@@ -243,12 +243,12 @@ class _Machine:
     def _dwell(self, words: dict[str, float]) -> None:
         """Wait."""
         if not words.get("P", -1) >= 0:
-            raise WordError("G4", "needs a time of at least 0 seconds, P")
+            raise WordError("G4", "needs P, a time of 0 seconds or more")
         if words["P"]:
             self._add(Kind.DWELL, self.now, words["P"])
 
     def _axis_words(self, words: dict[str, float], code: str) -> dict[int, float]:
-        """Return the axis words of a line by axis, for a code that needs at least one."""
+        """Return the axis words of a line by axis; refuse a line without axis words."""
         found = {AXES[a]: self._length(v) if AXES[a] < 3 else v for a, v in words.items() if a in AXES}
         if not found:
             raise WordError(code, "needs axis words")
@@ -276,13 +276,13 @@ class _Machine:
             self.axis_offsets[axis] = self._stated(axis, "G92") - self.origins[self.system][axis] - value
 
     def _stated(self, axis: int, code: str) -> float:
-        """Return a coordinate of the point; refuse a code that needs it if it is unknown."""
+        """Return a coordinate of the point; refuse a code that needs an unknown coordinate."""
         if math.isnan(self.now[axis]):
-            raise WordError(code, f"depends on {'XYZABC'[axis]} of the point, which is not known yet; give the start")
+            raise WordError(code, f"depends on {'XYZABC'[axis]} of the point, which is unknown here; give the start")
         return self.now[axis]
 
     def _move(self, motion: float, words: dict[str, float], is_machine: bool) -> None:
-        """Make a motion if the line has axis words, and keep its code for the following lines."""
+        """Make a motion if the line has axis words, and keep the motion mode for the following lines."""
         self.motion = motion
         if motion == 80:
             return
@@ -334,7 +334,7 @@ class _Machine:
             raise WordError(f"P{turns:g}", f"must be a number of turns: 1, 2, ..., {_MOST_TURNS}")
         given = [letter for letter in _CENTRE if letter in words]
         if ("R" in words) == bool(given):
-            raise WordError(f"G{motion:g}", "needs either the offsets of its centre, I, J, K, or its radius, R")
+            raise WordError(f"G{motion:g}", "needs the offsets I, J, K of the centre, or the radius R, not both")
         if given:
             centre = self._centre(words, given, first, second)
         else:
@@ -387,4 +387,4 @@ def _check_letters(codes: dict[str, float], words: dict[str, float], motion: flo
     used = {**dict.fromkeys("IJKR", is_arc), "P": times == 1, "L": once == 10, "Q": is_blending}
     for letter, value in words.items():
         if not used.get(letter, True):
-            raise WordError(f"{letter}{value:g}", "no code of the line uses it")
+            raise WordError(f"{letter}{value:g}", "is not used by any code of the line")

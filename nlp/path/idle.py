@@ -6,12 +6,12 @@ from ..system.jsonvalues import JsonObject
 
 
 class Idle(JsonObject):
-    """A word of a program that moves nothing, or a line that is no part of the path.
+    """Word of a G-code program without motion, or line that does not belong to the path.
 
     Attributes:
-        word: the word, or what is left out.
-        line: the first line that has it.
-        lines: number of lines that have it.
+        word: the word, or the reason why a line is left out.
+        line: first line with the word.
+        lines: number of lines with the word.
     """
 
     word: str

@@ -214,7 +214,7 @@ class ProgrammedPath:
         return Arc(*self.arcs[row].tolist()), int(self.planes[row])
 
     def shapes(self) -> dict[Shape, NDArray[np.intp]]:
-        """Return the indices of the segments of each shape; the path needs as many expressions as it has shapes."""
+        """Return the indices of the segments of each shape; the path needs one expression for each shape."""
         order = None if self.between is Between.SLERP else self.order
         found = {Shape(None, order): np.flatnonzero(self.kinds != Kind.ARC)}
         found |= {Shape(plane, order): self.arc_segments[self.planes == plane] for plane in PLANES}
@@ -260,7 +260,7 @@ class Segment:
 
     @property
     def duration(self) -> float | None:
-        """Duration, seconds; None if the file does not state it."""
+        """Duration, seconds; None if the file does not state a time or feed rate."""
         seconds = float(self.path.durations[self.index])
         return None if np.isnan(seconds) else seconds
 

@@ -15,7 +15,7 @@ from ..units import Units
 from .options import Between, PathOptions
 from .orientation import ORDERS, order_named, roll_pitch_yaw
 from .path import Kind, ProgrammedPath
-from .standing import duration_at, still_way, turns_between, without_rests
+from .standing import duration_at, rest_length, turns_between, without_rests
 
 #: Columns of poses and of times.
 _ROWS = POSE_ROWS._replace(others={**POSE_ROWS.others, "t": ("t",), "feed": ("feed",)})
@@ -81,7 +81,7 @@ def _read_table(text: str, source: str) -> NumberTable:
     left_out = [{header.index(name): _LEFT_OUT.get(name, "0") for name in names} for names in turns]
     table = number_table(records, header, source, left_out)
     for name, column in table.columns.items():
-        table.refuse(~(np.abs(column) <= LARGEST), name, f"must be finite and at most {LARGEST:g} in size")
+        table.refuse(~(np.abs(column) <= LARGEST), name, f"must be finite and at most {LARGEST:g} in magnitude")
     return table
 
 
@@ -116,5 +116,5 @@ def _durations(table: NumberTable, knots: FloatArray, between: Between, units: U
         ways = np.linalg.norm(np.diff(knots[:, :3], axis=0), axis=1)
         turns = turns_between(knots[:, 3:], ORDERS["rpy"], between)
         both = feeds[1:], feeds[1:] * units.to_internal(1, Dimension.ANGLE)
-        durations = duration_at(ways, turns, both, still_way(knots[:, :3]))
+        durations = duration_at(ways, turns, both, rest_length(knots[:, :3]))
     return durations

@@ -58,7 +58,7 @@ def text_of_path(file: str | Path) -> str:
 
 
 def is_table(file: str) -> bool:
-    """Return True if a file is a table of poses, by its name; otherwise it is G-code."""
+    """Return True if the name of a file is that of a table of poses, False for G-code."""
     return file.lower().endswith(".csv")
 
 

@@ -27,7 +27,7 @@ class Points(NamedTuple):
     parameters: FloatArray
 
 
-class WayKind(enum.Enum):
+class ProgressKind(enum.Enum):
     """Quantity that measures the progress along a path."""
 
     TIME = "time"
@@ -35,10 +35,10 @@ class WayKind(enum.Enum):
     SEGMENTS = "segments"
 
 
-class Way(NamedTuple):
+class Progress(NamedTuple):
     """Progress along a path at the knots (n + 1,): seconds, length, or number of segments."""
 
-    kind: WayKind
+    kind: ProgressKind
     knots: FloatArray
 
     def at(self, points: Points) -> FloatArray:
@@ -76,14 +76,14 @@ def spread_points(path: ProgrammedPath, most: int, also: Sequence[tuple[int, flo
     return Points(every[:, 0].astype(np.intp), every[:, 1])
 
 
-def way_of(path: ProgrammedPath) -> Way:
+def progress_of(path: ProgrammedPath) -> Progress:
     """Return the progress along a path: time if known throughout, else length if each motion has one, else segments."""
-    kinds = ((WayKind.TIME, path.durations), (WayKind.LENGTH, path.lengths))
+    kinds = ((ProgressKind.TIME, path.durations), (ProgressKind.LENGTH, path.lengths))
     for kind, sizes in kinds:
-        moves = (path.kinds != Kind.DWELL) if kind is WayKind.LENGTH else np.ones(len(path), dtype=bool)
+        moves = (path.kinds != Kind.DWELL) if kind is ProgressKind.LENGTH else np.ones(len(path), dtype=bool)
         if np.isfinite(sizes).all() and (sizes[moves] > 0).all() and sizes.any():
-            return Way(kind, np.concatenate([[0.0], np.cumsum(sizes)]))
-    return Way(WayKind.SEGMENTS, np.arange(len(path) + 1.0))
+            return Progress(kind, np.concatenate([[0.0], np.cumsum(sizes)]))
+    return Progress(ProgressKind.SEGMENTS, np.arange(len(path) + 1.0))
 
 
 def twists_at(path: ProgrammedPath, points: Points) -> FloatArray:

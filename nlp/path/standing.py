@@ -39,7 +39,7 @@ def turns_between(angles: FloatArray, order: Order, between: Between) -> FloatAr
     return shortest_turns(quaternions[:-1], quaternions[1:])[1]
 
 
-def still_way(positions: FloatArray) -> float:
+def rest_length(positions: FloatArray) -> float:
     """Return the length of a translation between positions (n, 3) up to which the platform is at rest."""
     return STILL * float(np.abs(positions).max(initial=0.0))
 
@@ -52,7 +52,7 @@ def standing(knots: FloatArray, order: Order, between: Between) -> NDArray[np.in
         order: convention of the angles.
         between: interpolation between two knots.
     """
-    most, at = still_way(knots[:, :3]), np.arange(len(knots))
+    most, at = rest_length(knots[:, :3]), np.arange(len(knots))
 
     def stands(one: FloatArray) -> NDArray[np.bool_]:
         ways = np.linalg.norm(np.diff(one[:, :3], axis=0), axis=1)
@@ -84,7 +84,7 @@ def _times_of_steps(path: ProgrammedPath, at: NDArray[np.intp]) -> FloatArray:
     """Return the times of segments; successive short steps share the time of their motion."""
     found = path.durations.copy()
     ways, turns = path.lengths, turns_between(path.knots[:, 3:], path.order, path.between)
-    most = still_way(path.knots[:, :3])
+    most = rest_length(path.knots[:, :3])
     for k in np.flatnonzero((ways <= most) & (turns <= STILL) & (at[1:] == np.arange(1, len(path.knots)))).tolist():
         ends = path.knots[[at[k], k + 1]]
         way = float(np.linalg.norm(ends[1, :3] - ends[0, :3]))

@@ -54,7 +54,7 @@ _REFUSED: Mapping[str, str] = {
     **dict.fromkeys(("G52", "G92.2", "G92.3"), "only G92 and G92.1 are supported for axis offsets"),
     **dict.fromkeys(("G70", "G71", "G71.1", "G71.2", "G72", "G72.1", "G72.2", "G73", "G74"), _CYCLES),
     **dict.fromkeys([f"G{code}" for code in range(81, 90)], _CYCLES),
-    "G95": "a feed per turn needs the spindle's speed, which is not known; use G94 or G93",
+    "G95": "a feed per turn needs the spindle speed, which is unknown; use G94 or G93",
     "G96": "constant cutting speed needs a lathe; use G97",
     **dict.fromkeys(("G17.1", "G18.1", "G19.1"), "axes U, V and W are not supported"),
     **dict.fromkeys(("M98", "M99"), _SUBROUTINE),
@@ -145,7 +145,7 @@ def block_of(line: str) -> Block:
 
 
 def _put(letter: str, number: str, codes: dict[str, float], groups: Mapping[float, str]) -> None:
-    """Add a code to those of a line.
+    """Add a code to the codes of a line.
 
     Raises:
         WordError: the code is not supported, or excluded by another one.

@@ -1,7 +1,7 @@
 """Largest force, speed or power of the actuators as the objective, over loads, actuators and poses.
 
 The objective is a minimised epigraph variable (:mod:`.epigraph`). Its square bounds the squares of the forces, speeds
-or powers, which are smooth where a force changes its sign, and which a search over boxes bounds best.
+or powers. The squares are smooth at a change of sign of a force, and a search over boxes bounds squares best.
 
 The objective is in the unit of the case, such as degrees per second, and so are its bounds, slopes and multipliers.
 """
@@ -111,7 +111,7 @@ def level_constraints(nlp: Nlp, forces: PosedForces, names: Collection[str], whe
 
 
 def _size(nlp: Nlp, values: list[SX]) -> float:
-    """Return the size of the objective from squares: the median at a few points; 1 if unknown."""
+    """Return the magnitude of the objective from squares: the median at a few points; 1 if unknown."""
     program = nlp.program
     function = ca.Function("largest", [program.x, program.p], [ca.sqrt(ca.mmax(ca.vertcat(*values)))])
     found = np.array([float(function(x, nlp.arguments)) for x in starting_points(nlp, _SIZE_POINTS, 0)])

@@ -99,7 +99,7 @@ class Blocks:
         )
 
     def orders(self, points: FloatArray) -> Iterator[NDArray[np.intp]]:
-        """Yield the order (k,) of points (k, n) for each block: the best feasible one first, the most violated last."""
+        """Yield the order (k,) of points (k, n) for each block, from the best feasible to the most violated point."""
         nlp = self._nlp
         epigraph = nlp.program.places.epigraph
         values = slack_levels(nlp, points.T) if epigraph else self._function(points.T, nlp.arguments).full()

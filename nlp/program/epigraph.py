@@ -49,7 +49,7 @@ def total_over_poses(values: Sequence[Number], how: OverPoses) -> Number:
     """Return the sum or the mean of values at several poses; the sum for a worst pose.
 
     Args:
-        values: value at each pose, at least one; all of one shape.
+        values: value at each of one or more poses; all of one shape.
         how: combination of F over the poses of a case.
     """
     total = values[0]
@@ -64,10 +64,10 @@ def worst_value(values: Sequence[float] | FloatArray, sense: Sense) -> float:
 
 
 def formulate_worst_pose(layout: Layout, sense: Sense) -> Nlp:
-    """Return the program of the best level of F that all poses keep.
+    """Return the program of the best level of F that all poses reach.
 
-    The bounds of the level come from the size of F without cancellation at a few points. If F has other values, a
-    search widens them: :func:`with_wider_level`.
+    The bounds of the level follow from the magnitude of the terms of F at a few points. A search widens these bounds if
+    F leaves them: :func:`with_wider_level`.
 
     Args:
         layout: layout of a case with one task.
@@ -157,7 +157,7 @@ def level_of_tasks(case: Case, values: Sequence[float], weights: Sequence[float]
 
 
 def with_exact_level(nlp: Nlp, x: FloatArray) -> FloatArray:
-    """Return a point with the level of a worst case of one task set to its best value; another point unchanged.
+    """Return a point with the level of a one-task worst case set to its best value; other points unchanged.
 
     Args:
         nlp: the program.
@@ -172,7 +172,7 @@ def with_exact_level(nlp: Nlp, x: FloatArray) -> FloatArray:
 
 
 def with_wider_level(nlp: Nlp, x: FloatArray) -> Nlp | None:
-    """Return a program with wider bounds of its level if they may be active at a point (n,); else None.
+    """Return a program with wider bounds of its level; None if these bounds are not active at a point (n,).
 
     The bounds are estimates, not limits of the case: a level on its bound is not an answer.
     """
@@ -286,7 +286,7 @@ class EpigraphBuilder:
         self._constraints: list[BoundedConstraint] = []
 
     def add(self, name: str, slack: Form, *inputs: SX) -> None:
-        """Add the constraint ``slack >= 0``, divided by the ceiling, so that its gradient is of order 1.
+        """Add the constraint ``slack >= 0``, divided by the ceiling to scale its gradient.
 
         Args:
             name: name of the constraint.

@@ -49,7 +49,7 @@ def formulate(case: Case, task: int = 0) -> Nlp:
 
 
 def formulate_everywhere(case: Case) -> Nlp:
-    """Return the program of the worst F of the stated poses, to which an exchange adds further ones.
+    """Return the program of the worst F of the stated poses, to which an exchange adds further poses.
 
     Args:
         case: a case with one task.
@@ -130,14 +130,14 @@ def proximity_program(program: Program) -> Program:
 
 
 def with_proximity_term(nlp: Nlp, extended: Program, target: FloatArray, strength: float) -> Nlp:
-    """Return a program with a cost on the squared distance from a point added to its objective.
+    """Return a program whose objective also has a cost on the squared distance from a point.
 
     If the optima of the original program form a set, the optimum of the new program tends to the point of that set
     nearest to the target as the strength tends to zero. Distances are in half ranges of the variables.
 
     Args:
         nlp: the original program.
-        extended: :func:`proximity_program` of the original's program, built once for all points and strengths.
+        extended: result of :func:`proximity_program`, built once for all points and strengths.
         target: (n,) target point.
         strength: cost of a distance of 1, as a multiple of the objective's scale.
     """

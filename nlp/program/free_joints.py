@@ -38,12 +38,12 @@ class FreeJoint(JsonObject):
         joint: limb and place of the joint.
         kind: kind of the coordinate: ``angle`` or ``length``.
         value: coordinate, 0 at home.
-        lower: smallest coordinate: by its limits, or by the search range if it has none.
-        upper: largest coordinate: by its limits, or by the search range if it has none.
-        limits: names of the limits on the coordinate; empty for none.
+        lower: smallest coordinate: its lower limit, or the end of the search range without a limit.
+        upper: largest coordinate: its upper limit, or the end of the search range without a limit.
+        limits: names of the limits on the coordinate; empty without limits.
         lower_is_limit: True if ``lower`` is a limit of the case.
         upper_is_limit: True if ``upper`` is a limit of the case.
-        dimension: dimension of the coordinate; radians for an angle.
+        dimension: dimension of the coordinate; angles are in radians.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Case as symbols: free variables, fixed arguments, and the robot's expressions; and the program assembled from them.
+"""Case as symbols (variables, arguments, expressions of the robot), and its nonlinear program.
 
 The variables are the free components of the parameters, of the position ``p``, and of the rotation:
 
@@ -42,7 +42,7 @@ from ...models import (
 from ...models.instance import length_of, sizes_at
 from ...models.values import dataclass
 from ..case.case import Case
-from ..case.choices import check_no_choice
+from ..case.choices import check_no_catalogue
 from ..case.limits.constraint import BoundedConstraint, Call, Constraint, PairFamily, Reading, squared
 from ..case.pose import Free, Pose, Value, sizes_of_turn
 from ..case.task import Sense, Task
@@ -88,8 +88,8 @@ class Layout:
         constraints: constraints that depend on a variable, and violated limits.
         constant_limits: satisfied limits that depend on no variable.
         families: limits on many pairs, not yet constraints.
-        implied: equations that the fixed parameters satisfy, so that they are not constraints: dependent loop
-            equations, and lengths of fixed directions.
+        implied: equations that the fixed parameters already satisfy: dependent loop equations, and lengths of fixed
+            directions. These equations are not constraints.
         fixed_families: limits on many pairs of fixed values, each represented by its tightest pair.
     """
 
@@ -131,17 +131,17 @@ AddPose: TypeAlias = Callable[[Pose, str, SymbolTable], StatedPoseSymbols]
 
 
 def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) -> Layout:
-    """Return symbols of all parameters that a case fixes or frees, and the robot's expressions in them.
+    """Return symbols of all fixed and free parameters of a case, and the robot as expressions of these symbols.
 
     Args:
         case: the case.
         tasks: one or more tasks, with twists as arguments.
-        add_pose: function that adds a stated pose in other coordinates than those above.
+        add_pose: function that adds a stated pose in other coordinates than those of this module.
 
     Raises:
         CaseError: an equation of fixed parameters is violated, or a dimension has a list of values to choose from.
     """
-    check_no_choice(case)
+    check_no_catalogue(case)
     table, model = SymbolTable(), case.model
     parameters = [
         table.add_each(case.component_names(item), item.dimension, _component_values(case, item))
@@ -293,7 +293,7 @@ def _component_values(case: Case, parameter: Parameter) -> tuple[Value, ...]:
 def _divided(
     case: Case, constraints: Sequence[BoundedConstraint], table: SymbolTable
 ) -> tuple[list[BoundedConstraint], list[BoundedConstraint]]:
-    """Return the constraints that depend on a variable, and the others; refuse a violated one of the others.
+    """Return the constraints with and without variables; refuse a violated constraint without variables.
 
     Raises:
         CaseError: a constraint of fixed parameters only is violated.
@@ -308,7 +308,7 @@ def _divided(
             continue
         value = float(ca.Function("constant", [x, p], [expression])(0, table.values))
         if not item.lower - _ROUNDING <= value <= item.upper + _ROUNDING:
-            fault = f"is {value:.6g} with these parameters, which are all fixed, and must be {item.lower:g}"
+            fault = f"is {value:.6g} with these fixed parameters, but must be {item.lower:g}"
             raise CaseError(f"robot.parameters: {item.constraint.name}", fault, source=case.source)
         fixed.append(item)
     return variable, fixed

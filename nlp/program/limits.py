@@ -36,9 +36,9 @@ class LimitConstraints(NamedTuple):
     """Limits of a case as constraints.
 
     Attributes:
-        varying: limits that depend on the variables, and violated ones.
+        varying: limits that depend on the variables, and violated limits of fixed parameters.
         constant: satisfied limits of fixed parameters only.
-        families: limits on many pairs, none of which is in ``varying``.
+        families: limits on many pairs; these pairs are not in ``varying``.
         fixed_families: families of fixed values; the tightest pair of each is in ``varying`` or ``constant``.
     """
 
@@ -51,7 +51,7 @@ class LimitConstraints(NamedTuple):
 def limit_constraints(
     case: Case, robots: Sequence[RobotInstance], named: Mapping[str, SX], table: SymbolTable
 ) -> LimitConstraints:
-    """Return the limits of a case as constraints, each once.
+    """Return the limits of a case as constraints, without repetitions.
 
     Args:
         case: the case.
@@ -94,7 +94,7 @@ def limit_constraints(
 
 
 def _size_of(item: BoundedConstraint, length: float) -> float:
-    """Return the typical size of a limited quantity; 0 if unknown.
+    """Return the typical magnitude of a limited quantity; 0 if unknown.
 
     Args:
         item: the limit.
@@ -111,7 +111,7 @@ def _sorted_families(
 ) -> tuple[list[tuple[BoundedConstraint, ...]], tuple[PairFamily, ...], tuple[PairFamily, ...]]:
     """Return pairs that are constraints from the start, families with pairs added on demand, and fixed families.
 
-    The first are all pairs of small families, and the tightest pair of each fixed family.
+    Constraints from the start are all pairs of small families, and the tightest pair of each fixed family.
     """
     x, p = table.variables_vector, table.arguments_vector
     pairs: list[tuple[BoundedConstraint, ...]] = []

@@ -1,4 +1,4 @@
-"""Loop equations that a program needs, without those that become dependent when a case fixes parameters.
+"""Independent loop equations of a nonlinear program: fixed parameters may make equations dependent.
 
 The equations of a model are independent if all dimensions and the pose are free. With fewer free parameters some may
 follow from others: the platform of a Delta with fixed rotation satisfies its rotation equations by itself. A local
@@ -26,7 +26,7 @@ _SPREAD = 0.6
 #: Largest number of Newton steps to a closed point, with only the unknowns and with all variables. From home six are
 #: enough.
 _STEPS = (11, 39)
-#: Largest residual of a closed point; equations are of order 1.
+#: Largest residual of a closed point; equations have magnitudes of about 1.
 _CLOSED = 1e-10
 #: Relative size below which singular values are zero in a step, so that rounding moves nothing.
 _DEPENDENT = 1e-9

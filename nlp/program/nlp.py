@@ -72,7 +72,7 @@ class Side:
 
 @dataclass(frozen=True, eq=False)
 class Sides:
-    """All sides of a program as arrays: those of the variables' bounds, then those of the constraints.
+    """All sides of a program as arrays: bounds of the variables, then constraints.
 
     Attributes:
         sides: sides, k of them.
@@ -101,16 +101,16 @@ class Nlp(Whole):
         lower: (n,) lower bounds of the variables.
         upper: (n,) upper bounds, ``lower < upper``.
         start: (n,) first starting point.
-        g_lower: (c,) lower sides of the constraints, infinite where there is none.
+        g_lower: (c,) lower sides of the constraints; minus infinity without a lower side.
         g_upper: (c,) upper sides of the constraints; equal to the lower ones for an equation.
-        constant_limits: satisfied limits that depend on no variable, so that they are not constraints.
+        constant_limits: satisfied limits that depend on no variable, and so are not constraints.
         families: limits on many pairs of values. Only the pairs in ``pairs`` are constraints; see :mod:`.pairs`.
         implied: equations that the fixed parameters satisfy, as in :class:`~.layout.Layout`.
         fixed_families: families of fixed values.
         pairs: family, first and second index of the pairs that are the program's last constraints.
         pair_count: number of constraints of these pairs.
         in_home_mode: True if a search of the whole box keeps to the home working mode of a robot given joint by joint.
-        size: positive size of the objective, if the objective does not consist of the robot's F; else None.
+        size: magnitude of an objective that does not consist of the robot's F; otherwise None.
     """
 
     program: Program
@@ -213,7 +213,7 @@ class Nlp(Whole):
 
     @cached_property
     def objective_scale(self) -> float:
-        """Scale of the objective: its size or, for narrow ranges, its change between the bounds.
+        """Scale of the objective: its magnitude or, for narrow ranges, its change between the bounds.
 
         The change is the largest sum of scaled derivatives at a few points.
         """
@@ -226,7 +226,7 @@ class Nlp(Whole):
 
     @cached_property
     def rounding(self) -> float:
-        """Rounding error of the scaled objective and its derivatives: of order 1e-15, and larger for narrow ranges."""
+        """Rounding error of the scaled objective and its derivatives: about 1e-15, and larger for narrow ranges."""
         return _ROUNDINGS * float(np.finfo(float).eps) * self.objective_size / self.objective_scale
 
     @cached_property
@@ -268,10 +268,10 @@ class Nlp(Whole):
 
     @cached_property
     def objective_size(self) -> float:
-        """Size of the objective without cancellation at the first starting point: positive even if F is 0.
+        """Sum of the magnitudes of the terms of the objective at the first starting point: positive even if F is 0.
 
-        If the robot is undefined at that point, as with limbs of zero length, the size is that at the first of a few
-        points around the middle of the box with a defined robot; 1 if there is none.
+        If the robot is undefined there, for example with limbs of zero length, the first of a few points around the
+        middle of the box with a defined robot is used; without such a point, the value is 1.
         """
         if self.size is not None:
             return self.size

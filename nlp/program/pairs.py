@@ -1,8 +1,8 @@
 """Limits on many pairs of values, with only violated pairs as constraints.
 
 A stroke over N poses limits ``N (N - 1)`` pairs of lengths for each leg. An optimum of a program without some pairs is
-an optimum of the whole program if it satisfies every pair. A solver therefore starts with few pairs, adds the violated
-ones, and searches again until there are none.
+an optimum of the whole program if it satisfies every pair. A solver therefore starts with few pairs, adds violated
+pairs, and searches again until no pair is violated.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _ROUNDING = 1e-13
 
 
 def with_pairs_at(nlp: Nlp, points: Iterable[FloatArray]) -> Nlp:
-    """Return a program with the tightest violated pair of each family at given points; unchanged if it has them.
+    """Return a program with the tightest violated pair of each family at given points as constraints.
 
     Args:
         nlp: the program.
@@ -34,7 +34,7 @@ def with_pairs_at(nlp: Nlp, points: Iterable[FloatArray]) -> Nlp:
 
 
 def with_pairs(nlp: Nlp, places: Iterable[PairPlace]) -> Nlp:
-    """Return a program with further pairs as its last constraints; unchanged if it has them all.
+    """Return a program with further pairs as its last constraints; unchanged if it already has all pairs.
 
     Pairs of a symmetric robot that are the same function become one constraint.
     """

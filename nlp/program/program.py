@@ -2,7 +2,7 @@
 
 A program belongs to a *structure*: a robot with a set of free parameters. All fixed values of a case (dimensions, pose,
 twist) are arguments, so one program serves every start, task and point of a sweep. Variables are in the units of the
-case (radians for angles); division by :attr:`~.nlp.Nlp.scale` makes them of order 1.
+case (radians for angles); division by :attr:`~.nlp.Nlp.scale` makes them of magnitude about 1.
 
 CasADi's functions are evaluated on NumPy arrays in place, by kernels that keep the memory of arguments and results: the
 conversions of CasADi's general interface take twenty times as long as the functions of a parallel robot.
@@ -113,7 +113,7 @@ class RobotNumbers(NamedTuple):
         magnitude: (tasks, 1) upper bound on F without cancellation.
         loops: (k, 1) left sides of all loop equations of the model.
         driven: (m, a) work rate of each row for a unit rate of each actuator.
-        relations: (r, a) coefficients of the equations of the actuator rates only, which loops impose.
+        relations: (r, a) coefficients of the loop equations that involve only actuator rates.
         quantities: (n, 1) values of each quantity of the model, radians for angles.
     """
 
@@ -156,7 +156,7 @@ class Program(Whole):
         robots: the robot's expressions at each pose.
         model: symbolic model of the robot.
         places: places of the case's parameters, rotations, unknowns, twists, directions and epigraph.
-        objective_call: call that returns the objective, if it combines F of several poses; else None.
+        objective_call: call that returns the objective, if it combines F of several poses; otherwise None.
     """
 
     variables: tuple[Scalar, ...]
@@ -281,7 +281,7 @@ def design_indices(program: Program) -> tuple[int, ...]:
 
 
 def design_names(program: Program) -> frozenset[str]:
-    """Return the names of a design's variables and limits: all but those of joints and closed loops."""
+    """Return the names of a design's variables and limits, without names of joints and closed loops."""
     model = program.model
     inner = {program.variables[index].name for index in program.places.inner}
     names = {each.name for each in program.variables} | {each.name for each in program.constraints}

@@ -35,15 +35,15 @@ _LARGEST_RELAXATION = 1e3
 
 
 class RelaxedLimit(JsonObject):
-    """Limit of an infeasible case that must be relaxed, together with all others of its list.
+    """Limit of an infeasible case that must be relaxed, together with all other limits of the list.
 
     Attributes:
         key: dotted key of the limit's value, below ``limits``.
         limit: value in the case.
-        needed: value with which the case would be feasible; for limits over a workspace or along a path, at least so
-            far from ``limit``.
+        needed: value with which the case would be feasible; over a workspace or along a path, a necessary value,
+            perhaps not sufficient.
         unit: unit of both values.
-        dimension: dimension of both values; radians for angles.
+        dimension: dimension of both values; angles are in radians.
     """
 
     key: str
@@ -78,7 +78,7 @@ class _RelaxableSide:
 
     @property
     def unit(self) -> float:
-        """Change of the limit's value by a relaxation of 1: its size, or one unit if it is 0."""
+        """Change of the limit's value for a relaxation of 1: magnitude of the value, or one unit for a value of 0."""
         return abs(self.number) or 1.0
 
     def necessary_relaxation(self, value: float) -> float:
@@ -147,7 +147,7 @@ def formulate_relaxation(nlp: Nlp) -> Nlp:
 
 
 def relaxation_point(nlp: Nlp, x: FloatArray) -> FloatArray:
-    """Return a point of the relaxation's program: a point of the original one with the required t.
+    """Return a point of the relaxation's program: a point of the original program with the required t.
 
     Args:
         nlp: the original program.

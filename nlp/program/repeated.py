@@ -137,7 +137,7 @@ class _NormalForms:
         return {(atom,): _Coefficient(1.0, 1.0)}
 
     def _wave(self, op: int, angle: _Polynomial) -> _Polynomial:
-        """Return the sine or cosine of an angle by those of the angle without constant and with a positive sign."""
+        """Return the sine or cosine of an angle, reduced to the angle without a constant and with a positive sign."""
         constant = angle.get((), _Coefficient(0.0, 0.0)).value
         rest = {monomial: each for monomial, each in angle.items() if monomial}
         if not rest:

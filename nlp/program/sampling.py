@@ -1,4 +1,4 @@
-"""Starting points: that of the case, then a Latin hypercube, uniform on unit spheres and in balls of rotations."""
+"""Starting points: the start of the case, then a Latin hypercube, uniform on spheres and in balls of rotations."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def starting_points(nlp: Nlp, count: int, seed: int) -> FloatArray:
 
     Args:
         nlp: the program.
-        count: number of points, at least 1.
+        count: number of points, 1 or more.
         seed: seed of the generator; the same seed gives the same points.
 
     Returns:

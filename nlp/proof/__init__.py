@@ -1,6 +1,6 @@
 """Proofs for every point of a box, and the checker of proof files. Nothing here imports a solver.
 
-The rooms import each other in this order:
+The packages import each other in this order:
 
 * ``statement``: claims, shared by searches and checker;
 * ``enclosure``: ranges of expressions over boxes, in C and in NumPy;

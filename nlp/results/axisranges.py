@@ -23,7 +23,7 @@ class AxisRangesResult(JsonObject):
         faults: claims that are not proved at the pose itself.
         axes: ranges of the independent coordinates, with the others held.
         pairs: ranges of the pairs of independent coordinates.
-        not_alone: dependent coordinates, which move with the independent ones.
+        not_alone: names of the dependent coordinates, which move with the independent coordinates.
         reason: reason for the end of the search before all axes and pairs were examined; absent otherwise.
         versions: versions of the software.
     """

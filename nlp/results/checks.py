@@ -45,7 +45,7 @@ class ExpectedCheck(JsonObject):
     Attributes:
         quantity: dotted path in the case's result.
         expected: expected value.
-        computed: value in the result; null where the result has none.
+        computed: value in the result; null if the result has none.
         tolerance: allowed difference.
         passed: If true, the values agree.
     """
@@ -65,12 +65,12 @@ class PublishedCheck(JsonObject):
         value: printed value.
         source: place in the literature.
         reproduced: If true, the case states that the value is reproduced.
-        because: reason, where the value is not reproduced.
-        decimals: number of printed decimals, where the value does not show them.
+        because: reason why the value is not reproduced; empty if it is reproduced.
+        decimals: number of printed decimals, if the value has trailing zeros.
         over: name of the reference case of a gain.
-        computed: computed value; empty where there is none.
+        computed: computed value; empty if there is none.
         verdict: verdict of the check.
-        rule: rule that decided, with its figures.
+        rule: rule of the verdict, with its computed difference.
         passed: If true, the check confirms the statement of the case.
     """
 
@@ -186,7 +186,7 @@ def _result_for(name: str, solved: dict[str, CaseResult], case: Case | None = No
     Args:
         name: name of the case.
         solved: results by name; a new result is added.
-        case: the case; None where it is not read yet.
+        case: the case; None to read it first.
     """
     if name not in solved:
         case = case or load_case(name)
@@ -219,7 +219,7 @@ def _check_expected(case: Case, result: CaseResult, data: JsonData) -> list[Expe
 
 
 def _lookup(data: JsonValue, path: str) -> JsonValue:
-    """Return the value at a dotted path of JSON data, where a number is an index in a list; None without one."""
+    """Return the value at a dotted path of JSON data, or None; a number in the path is an index in a list."""
     found = data
     for part in path.split("."):
         if isinstance(found, dict):
@@ -232,13 +232,13 @@ def _lookup(data: JsonValue, path: str) -> JsonValue:
 
 
 def _number(data: JsonValue, path: str) -> float | None:
-    """Return the number at a dotted path of JSON data, or None where there is none."""
+    """Return the number at a dotted path of JSON data, or None if there is none."""
     found = _lookup(data, path)
     return float(found) if isinstance(found, float | int) else None
 
 
 def _numbers(data: JsonValue, path: str) -> tuple[float, ...]:
-    """Return the number, or the list of numbers, at a dotted path of JSON data; empty where there is neither."""
+    """Return the number, or the list of numbers, at a dotted path of JSON data; empty if there is neither."""
     found = _lookup(data, path)
     parts = found if isinstance(found, list) else [found]
     numbers = tuple(float(part) for part in parts if isinstance(part, float | int))
@@ -262,7 +262,7 @@ def _check_published(
         return _published(row, (), f"the case has no answer: it is {result.status.value}", found=False)
     if len(computed) != len(row.value):
         source = case.source or name
-        fault = f"is no number of this result with {len(row.value)} components"
+        fault = f"must name a number of the result, with {len(row.value)} component{'s' * (len(row.value) != 1)}"
         raise CaseError(f"published: {row.quantity}", fault, source=source)
     halves = [0.5 * 10.0 ** -(decimals_of(value) if row.decimals is None else row.decimals) for value in row.value]
     off = max(abs(c - v) / h for c, v, h in zip(computed, row.value, halves, strict=True))
@@ -271,7 +271,9 @@ def _check_published(
     flat = _flat_difference(name, case, row, result)
     if flat is None:
         return _published(row, computed, "digits", found=False)
-    return _published(row, computed, f"flat: F is off its best by {flat:.1e}", found=flat <= FLAT)
+    return _published(
+        row, computed, f"flat: F at the printed value is off the best F by {flat:.1e}", found=flat <= FLAT
+    )
 
 
 def _published(row: Published, computed: tuple[float, ...], rule: str, *, found: bool) -> PublishedCheck:
@@ -290,9 +292,9 @@ def decimals_of(value: float) -> int:
 
 
 def _flat_difference(name: str, case: Case, row: Published, result: CaseResult) -> float | None:
-    """Return the relative difference of F between the printed point and the optimum with this argument free.
+    """Return the relative difference of F between the printed value of a variable and its optimal value.
 
-    None where the value is no argument of F, or the robot has no value at the printed point.
+    None if the printed value is not a variable of F, or the robot cannot be assembled at the printed point.
     """
     printed: dict[str, float | list[float]] = {}
     for each in case.published:
@@ -339,7 +341,7 @@ def _computed_settings(case: Case, robot: RobotData) -> Settings:
 
 
 def _best_objectives(case: Case) -> list[tuple[float, float]]:
-    """Return the best F of each task over the remaining variables, and its size without cancellation."""
+    """Return the best F of each task over the remaining variables, and the sum of the magnitudes of its terms."""
     values = []
     for nlp in formulate_each(case):
         solution = solve_program(nlp, Search(starts=_STARTS))

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from ...models import Dimension
-from ..case.choices import ChosenNumber, chosen_settings, listed_numbers
+from ..case.choices import ChosenDimension, catalogue_dimensions, chosen_settings
 from ..solver.status import Status
 from ..system.jsonvalues import JsonObject
 
@@ -26,7 +26,7 @@ class ChoiceData(JsonObject):
         statement: outcome in words.
     """
 
-    numbers: tuple[ChosenNumber, ...]
+    numbers: tuple[ChosenDimension, ...]
     combinations: int
     solved: int
     complete: bool
@@ -41,7 +41,7 @@ class RoundingData(JsonObject):
         numbers: rounded dimensions.
         before: objective before the rounding.
         loss: loss of the objective by the rounding; null without an answer.
-        relative_loss: loss as a part of the objective before the rounding; null where that is 0, and without an answer.
+        relative_loss: loss divided by the objective before rounding; null without an answer, or if the divisor is 0.
         combinations: number of searched combinations of multiples.
         solved: number of solved combinations.
         complete: If true, all combinations are solved, or excluded: no better design was found within their ranges.
@@ -49,7 +49,7 @@ class RoundingData(JsonObject):
     """
 
     step: float
-    numbers: tuple[ChosenNumber, ...]
+    numbers: tuple[ChosenDimension, ...]
     before: float
     loss: float | None
     relative_loss: float | None
@@ -66,8 +66,10 @@ def choice_data(solution: "Solution") -> ChoiceData | None:
         return None
     chosen = chosen_settings(case, solution.outcomes[0].own.nlp.case)
     numbers = tuple(
-        ChosenNumber.of(each, case.units, value=chosen[each.name], unit=case.units.label(each.dimension), before=None)
-        for each in listed_numbers(case)
+        ChosenDimension.of(
+            each, case.units, value=chosen[each.name], unit=case.units.label(each.dimension), before=None
+        )
+        for each in catalogue_dimensions(case)
     )
     return ChoiceData.of(
         choice,
@@ -78,7 +80,7 @@ def choice_data(solution: "Solution") -> ChoiceData | None:
 
 
 def _starts(solution: "Solution") -> int:
-    """Return the number of starts of each solve; 0 where a case has no other variables."""
+    """Return the number of starts of each solve; 0 for a case without other variables."""
     return len(solution.outcomes[0].own.starts)
 
 
@@ -103,7 +105,7 @@ def _statement(choice: "Choice", starts: int, status: Status) -> str:
 
 
 def rounding_data(solution: "Solution") -> RoundingData | None:
-    """Return the rounding of a solution's dimensions; None where they are not rounded."""
+    """Return the rounding of a solution's dimensions; None if they are not rounded."""
     case, rounding = solution.case, solution.rounding
     if rounding is None:
         return None
@@ -115,7 +117,7 @@ def rounding_data(solution: "Solution") -> RoundingData | None:
     choice = rounding.choice
     return RoundingData(
         step=rounding.step,
-        numbers=ChosenNumber.of_each(rounding.numbers, case.units),
+        numbers=ChosenDimension.of_each(rounding.numbers, case.units),
         before=before,
         loss=loss,
         relative_loss=None if loss is None or not before else loss / abs(before),
@@ -141,5 +143,5 @@ def _rounding_statement(solution: "Solution", rounding: "Rounding") -> str:
     if all(abs(each.value - (each.before or 0.0)) <= _SAME * abs(each.value) for each in rounding.numbers):
         return f"{what}: the dimensions were round already"
     if rounding.choice is None:
-        return f"{what}: every dimension has only one multiple near it within its bounds"
+        return f"{what}: every dimension has only one multiple within its bounds"
     return f"{what}: {_statement(rounding.choice, starts, status)}"

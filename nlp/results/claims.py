@@ -29,7 +29,7 @@ class PosedClaim(NamedTuple):
         outcome: outcome of the claim over the workspace.
         pose: the pose.
         verdict: verdict on the claim; None for a rank.
-        length: verdict on the leg length that is extreme at the pose, for a claim with two poses; else None.
+        length: for a claim with two poses, verdict on the leg length that is extreme at the pose; otherwise None.
     """
 
     name: str
@@ -45,7 +45,7 @@ class PosedClaim(NamedTuple):
 
     @property
     def beyond(self) -> float:
-        """Excess over the limit, as a part of the limit; negative where the limit is satisfied."""
+        """Excess over the limit, divided by the limit; negative for a satisfied limit."""
         return 0.0 if self.verdict is None else _beyond(self.verdict)
 
 
@@ -62,7 +62,7 @@ def refuted_claims(result: WorkspaceResult) -> Iterator[PosedClaim]:
 def worst_claim(result: WorkspaceResult, sense: Sense) -> PosedClaim | None:
     """Return the claim with the largest excess over its limit, or with the smallest margin, and its pose.
 
-    A singular pose is worse than any limit. Without limits it is the worst F. None where no pose is known.
+    A singular pose is worse than any limit. Without limits it is the worst F. None if no pose is known.
 
     Args:
         result: verdicts over the workspace.
@@ -84,7 +84,7 @@ def worst_claim(result: WorkspaceResult, sense: Sense) -> PosedClaim | None:
 
 
 def _at_poses(result: WorkspaceResult, each: VerdictData) -> Iterator[PosedClaim]:
-    """Yield an extreme value with the poses that have it."""
+    """Yield an extreme value with each of its poses."""
     name = each.name.partition(":")[0]
     if each.key is not None and each.key.startswith(_OVER_POSES):
         for length in _lengths(result.extremes, each.name.partition(" limb ")[2]):
@@ -100,7 +100,7 @@ def _lengths(extremes: Sequence[VerdictData], limb: str) -> list[VerdictData]:
 
 
 def _beyond(each: VerdictData) -> float:
-    """Return the excess of a value over its limit, as a part of the limit; negative where the limit is satisfied."""
+    """Return the excess of a value over its limit, divided by the limit; negative for a satisfied limit."""
     if each.limit is None or each.reached is None or each.sense is None:
         return float("-inf")
     sign = each.sense.sign

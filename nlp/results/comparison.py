@@ -18,7 +18,7 @@ class ComparedRateData(JsonObject):
     Attributes:
         actuator: name of the actuator.
         unit: unit of the rate, per unit of the task's motion.
-        rate: rate for the task's motion; null where the motion does not determine the rate, because the actuator can
+        rate: rate for the task's motion; null if the motion does not determine the rate, because the actuator can
             move while the platform stands still.
     """
 
@@ -34,8 +34,8 @@ class ComparedTaskData(JsonObject):
         name: name of the task.
         F: objective; null without an answer.
         unit: unit of F.
-        can_move: If true, the platform can make the motion at the first pose; null where this is not known.
-        constraint: part of F from constraint wrenches, 0 to 1; null where it is not known.
+        can_move: If true, the platform can make the motion at the first pose; null if unknown.
+        constraint: fraction of F from constraint wrenches, 0 to 1; null if unknown.
         rates: rates of the actuators.
     """
 
@@ -94,13 +94,13 @@ class ComparedRobotData(JsonObject):
         name: name in tables.
         model: name of the robot.
         description: description of the robot.
-        part: part of the table: ``ranked``, ``limits not kept`` where the robot violates a limit of the case,
+        part: section of the table: ``ranked``, ``limits not kept`` if the robot violates a limit of the case,
             ``no freedom`` where the platform cannot make a task's motion, or ``no answer``.
         factor: scale factor of the typical lengths.
-        size: largest distance between two points at home, with typical dimensions times the factor.
+        size: largest distance between two points of the robot at home, with typical dimensions times ``factor``.
         final_size: largest distance between two points of the design; null without an answer.
-        freedoms: degrees of freedom of the platform; null where they are not known.
-        status: status of the solve; null where the case contradicts itself with this robot.
+        freedoms: degrees of freedom of the platform; null if unknown.
+        status: status of the solve; null if the case contradicts itself with this robot.
         value: F of one task, or value of the combination of several tasks; null without an answer.
         sense: sense of the optimisation: the value is maximised or minimised.
         tasks: tasks at the design; empty without an answer.
@@ -110,11 +110,11 @@ class ComparedRobotData(JsonObject):
         limits_kept: number of the case's limits that the robot satisfies.
         limits_left_out: limits that do not apply to the robot.
         certificate: proved bound; null without a proof.
-        certificate_fault: reason why there is no certificate; absent with a certificate, or where none was requested.
+        certificate_fault: reason why there is no certificate; absent with a certificate, or if none was requested.
         workspace: verdict on the design over the workspace; null without a verdict.
-        strokes: largest strokes by quantity: over the workspace, else over the poses of a case with several poses.
+        strokes: largest stroke of each quantity over the workspace; without a workspace, over the poses of the case.
         sentences: sentences about missing or incomparable values.
-        case: case with this robot, as the text of a case file; null where no file can state it.
+        case: case with this robot, as the text of a case file; null if a case file cannot represent it.
         seconds: wall time.
     """
 
@@ -153,7 +153,7 @@ class ComparisonResult(JsonObject):
         title: title of the case.
         units: units of all values.
         limits: number of limits of the case.
-        size: common size of the robots; null where they are not scaled.
+        size: common size of the robots; null if they are not scaled.
         range: largest relative difference between a dimension of a design and its typical value.
         characteristic_length: factor between couples and forces.
         robots: robots, ranked robots first, best first.

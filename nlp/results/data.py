@@ -29,7 +29,7 @@ class ReachedData(JsonObject):
     """Best point of a failed solve.
 
     Attributes:
-        F: objective at the point; null where it has no value.
+        F: objective at the point; null if it has no value.
         violated: violated bounds and constraints.
     """
 
@@ -43,7 +43,7 @@ class OptimumData(JsonObject):
     Attributes:
         F: objective.
         count: number of starts that ended at the optimum.
-        spread: largest distance of these points along a variable, as a part of its range; 0 for an isolated optimum.
+        spread: largest distance of these points along a variable, divided by its range; 0 for an isolated optimum.
         assembly: assembly mode in a few words, if it is not, or may not be, that of home; empty for the home mode,
             absent for a robot without loops.
     """
@@ -62,7 +62,7 @@ class StartsData(JsonObject):
         converged: number of converged starts.
         failed: number of failed starts, by reason.
         optima: distinct optima, best first.
-        better: F of a feasible point of an unconverged search that is better than every optimum; else absent.
+        better: F of a feasible point of an unconverged search that is better than every optimum; otherwise absent.
     """
 
     run: int
@@ -77,10 +77,10 @@ class CertificateData(JsonObject):
 
     Attributes:
         status: status of the proof.
-        bound: proved bound: no feasible point has a better objective; null where nothing is proved.
-        incumbent: objective of the best known feasible point; null where no such point is known.
+        bound: proved bound: no feasible point has a better objective; null if nothing is proved.
+        incumbent: objective of the best known feasible point; null if no such point is known.
         gap: distance of the bound from the incumbent.
-        relative_gap: gap as a part of the incumbent; null near 0.
+        relative_gap: gap divided by the incumbent; null if the incumbent is near 0.
         engine: engine of the search.
         boxes: number of boxes examined.
         open: number of undecided boxes.
@@ -110,21 +110,21 @@ class SolveResult(JsonObject):
         sense: sense of the optimisation: F is maximised or minimised.
         status: status of the solve.
         F: objective; null without an answer.
-        objective: objective, where it is not F at the stated poses; else absent.
-        reached: best point of a failed solve; else absent.
-        relaxation: for an infeasible case, the limits that would have to change; else absent.
-        robot: robot at the point; absent where its equations have no value.
+        objective: objective, if it is not F at the stated poses; otherwise absent.
+        reached: best point of a failed solve; otherwise absent.
+        relaxation: for an infeasible case, the limits that would have to change; otherwise absent.
+        robot: robot at the point; absent if its loop equations have no solution.
         optimality: evidence of optimality; null for a case without variables.
         margins: margin of every limit at every leg, joint and pose.
-        limits: limits of the case, a row for each.
-        sensitivity: derivatives of the optimal F by every fixed value; absent without an answer.
+        limits: limits of the case, one row for each limit.
+        sensitivity: derivatives of the optimal F with respect to each fixed value; absent without an answer.
         tolerance: loss by joint-centre errors; absent without an answer or a tolerance.
         starts: outcomes of the starts.
-        certificate: proved bound; null where no proof was requested.
-        workspace: proof over the workspace; absent where no limit covers the workspace.
-        path: proof along the path; absent where no limit covers the path.
+        certificate: proved bound; null if no proof was requested.
+        workspace: proof over the workspace; absent if no limit covers the workspace.
+        path: proof along the path; absent if no limit covers the path.
         choice: choice among listed values; absent without listed values.
-        rounding: rounding of the dimensions; absent where they are not rounded.
+        rounding: rounding of the dimensions; absent if they are not rounded.
         seed: random seed of the starting points.
         versions: versions of the software.
         seconds: wall time.
@@ -162,9 +162,9 @@ class OutcomeData(JsonObject):
         sense: sense of the optimisation: F is maximised or minimised.
         weight: weight of the task in the combination.
         F: objective at the combined point; null without an answer.
-        best: separate optimum of the task; null where there is none.
+        best: separate optimum of the task; null without a separate optimum.
         loss: loss of F against the separate optimum.
-        relative_loss: loss as a part of the separate optimum.
+        relative_loss: loss divided by the separate optimum.
         unique: If true, the separate optimum is unique.
         verdict: kind of the combined point as a point of this task; null for a case without variables.
         rates: work rate of each row in the task's motion; null without an answer.
@@ -186,9 +186,9 @@ class CombinedPointData(JsonObject):
     """Combined point of several tasks.
 
     Attributes:
-        robot: robot at the point; absent where its equations have no value.
+        robot: robot at the point; absent if its loop equations have no solution.
         margins: margin of every limit at every leg, joint and pose.
-        limits: limits of the case, a row for each.
+        limits: limits of the case, one row for each limit.
     """
 
     robot: Inline[RobotData | None]
@@ -203,13 +203,13 @@ class CombinedData(JsonObject):
         method: method of combination.
         value: value of the combined objective; null for an average, and without an answer.
         method_point: point of the method; absent without an answer.
-        reached: last point of a method without an answer; else absent.
+        reached: last point of a method without an answer; otherwise absent.
         tasks: each task at the combined point.
         violated: names of the violated bounds and constraints.
         notices: notices for the reader.
         optimality: evidence of optimality for the combined program; null without such a program.
         starts: outcomes of the starts of the combined program; null without such a program.
-        certificate: proved bound of the combined program; null where no proof was requested.
+        certificate: proved bound of the combined program; null if no proof was requested.
     """
 
     method: Method
@@ -225,7 +225,7 @@ class CombinedData(JsonObject):
 
     @property
     def point(self) -> CombinedPointData | None:
-        """Combined point, whether it is an answer or not."""
+        """Combined point, even if it is not an answer."""
         return self.reached if self.method_point is None else self.method_point
 
 
@@ -238,9 +238,9 @@ class CombinedResult(JsonObject):
         tasks: results of the separate solves.
         combined: combination of the tasks.
         choice: choice among listed values; absent without listed values.
-        rounding: rounding of the dimensions; absent where they are not rounded.
-        workspace: proof of the combined design over the workspace; absent where no limit covers the workspace.
-        path: proof of the combined design along the path; absent where no limit covers the path.
+        rounding: rounding of the dimensions; absent if they are not rounded.
+        workspace: proof of the combined design over the workspace; absent if no limit covers the workspace.
+        path: proof of the combined design along the path; absent if no limit covers the path.
         versions: versions of the software.
         seconds: wall time.
     """
@@ -263,7 +263,7 @@ class CombinedResult(JsonObject):
 
     @property
     def robot(self) -> RobotData | None:
-        """Robot at the combined point, whether it is an answer or not; None where its equations have no value."""
+        """Robot at the combined point, even without an answer; None if the loop equations have no solution."""
         return None if self.combined.point is None else self.combined.point.robot
 
     @property
@@ -273,7 +273,7 @@ class CombinedResult(JsonObject):
 
     @property
     def limits(self) -> tuple[LimitData, ...]:
-        """Limits of the case at the combined point, a row for each."""
+        """Limits of the case at the combined point, one row for each limit."""
         return () if self.combined.point is None else self.combined.point.limits or ()
 
 

@@ -1,4 +1,4 @@
-"""Margins of a design's limits with derivatives of F, in the case's units, and its loss by joint-centre errors."""
+"""Margins of a design, derivatives of F, and the loss of F by joint-centre errors, in the units of the case."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from .rounding import NOISE
 
 
 def margins_data(nlp: Nlp, x: FloatArray, *, optimal: bool) -> tuple[Margin, ...]:
-    """Return the margins of a point (n,) in the case's units, with derivatives of F where the point is an optimum."""
+    """Return the margins of a point (n,) in the case's units; at an optimum, with derivatives of F."""
     return Margin.of_each(margins_of(nlp, x, optimal=optimal), nlp.case.units)
 
 
 def limits_data(margins: Sequence[Margin]) -> tuple[LimitData, ...]:
-    """Return a row for each limit: its smallest margin, the places where it is active, and the derivative of F."""
+    """Return a row for each limit: smallest margin, places at which the limit is active, and derivative of F."""
     keys = dict.fromkeys(row.key for row in margins)
     return tuple(_limit([row for row in margins if row.key == key]) for key in keys)
 
@@ -42,7 +42,7 @@ def _limit(margins: Sequence[Margin]) -> LimitData:
 
 
 def tolerance_loss_of(nlp: Nlp, x: FloatArray) -> ToleranceLoss | None:
-    """Return the loss at an optimum (n,) by joint-centre errors; None without a tolerance, or where it has no rule."""
+    """Return the loss of F by joint-centre errors at an optimum (n,); None without a tolerance or a rule for it."""
     tolerance = nlp.case.joint_centre_tolerance
     if tolerance is None or not nlp.case.model.built or nlp.case.tasks[0].measure or nlp.case.worst_everywhere:
         return None

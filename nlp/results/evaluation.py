@@ -36,12 +36,12 @@ class EvaluationResult(JsonObject):
     Attributes:
         head: the case.
         F: objective of the first task.
-        objective: objective of a solve, where it is not F at the stated poses; else absent.
+        objective: objective of a solve, if it is not F at the stated poses; otherwise absent.
         robot: robot at the point, with the first task.
         tasks: every task at the point.
         violated: violated bounds and constraints.
         margins: margin of every limit at every leg, joint and pose.
-        limits: limits of the case, a row for each.
+        limits: limits of the case, one row for each limit.
         principal_motions: motions that the robot resists least and most.
         versions: versions of the software.
     """

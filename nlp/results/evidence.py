@@ -44,7 +44,7 @@ def certificate_data(certificate: Certificate | None) -> CertificateData | None:
 
 
 def incumbent_data(certificate: Certificate | None) -> Mapping[str, float] | None:
-    """Return the incumbent by the names of the program's variables, in the case's units."""
+    """Return the value of each variable at the incumbent, by name, in the case's units."""
     if certificate is None or certificate.x is None:
         return None
     nlp = certificate.nlp
@@ -61,7 +61,7 @@ class CertifiedTaskData(JsonObject):
         name: name of the task.
         sense: sense of the optimisation: F is maximised or minimised.
         certificate: proved bound of the task's F.
-        point: incumbent, by the names of the program's variables; null where no feasible point is known.
+        point: incumbent, by the names of the program's variables; null if no feasible point is known.
     """
 
     name: str
@@ -76,11 +76,11 @@ class CertifiedResult(JsonObject):
     Attributes:
         head: the case.
         certificate: proved bound of the task, or of the program that combines tasks; null without such a program.
-        objective: objective, where it is not F at the stated poses; else absent.
-        point: incumbent, by the names of the program's variables; null where no feasible point is known.
+        objective: objective, if it is not F at the stated poses; otherwise absent.
+        point: incumbent, by the names of the program's variables; null if no feasible point is known.
         tasks: certificates of the separate tasks.
         choice: choice among listed values, at the best known combination; absent without listed values.
-        notice: notice that limits over a workspace or path are taken at the stated pose only; else absent.
+        notice: notice that limits over a workspace or path are taken at the stated pose only; otherwise absent.
         versions: versions of the software.
     """
 
@@ -95,7 +95,7 @@ class CertifiedResult(JsonObject):
 
 
 def certified_of(certified: "Certified") -> CertifiedResult:
-    """Return the proved bounds of a case: of every task, and of the combined program where there is one."""
+    """Return the proved bounds of every task and, if tasks are combined, of the combined program."""
     case = certified.tasks[0].nlp.case
     return CertifiedResult(
         head=head_data(case),

@@ -39,8 +39,9 @@ class ExchangeData(JsonObject):
 
     Attributes:
         proved: If true, all ranks and limits are proved at every pose.
-        joint_centre: tolerance of joint centres: the proof covers every robot within it; absent for the exact robot.
-        tighter: safety margin of the added constraints, as a part of the limits; absent in results of earlier versions.
+        joint_centre: joint-centre tolerance: the proof covers every robot within this tolerance; absent for the exact
+            robot.
+        tighter: relative safety margin of the added constraints; absent in results of earlier versions.
         designs: designs of the iterations; the last one is the answer.
         poses: poses of the added constraints.
     """

@@ -36,10 +36,10 @@ class FrontPointData(JsonObject):
         design: variables of the case, by name.
         active: active bounds and limits.
         multipliers: multipliers of the active bounds and limits, in the optimised goal per unit.
-        kind: kind of the point, by its evidence; null for a case without variables.
+        kind: kind of the point, such as strict local maximum; null for a case without variables.
         stationarity: largest scaled derivative of the Lagrangian; null without evidence.
         feasibility: largest distance outside a limit, in half ranges; null without evidence.
-        certificate: proved bound; null where no proof was requested.
+        certificate: proved bound; null if no proof was requested.
     """
 
     goals: Mapping[str, float]
@@ -60,10 +60,10 @@ class FrontResult(JsonObject):
 
     Attributes:
         head: the case.
-        notice: notice that limits over a workspace or path are taken at the stated pose only; else absent.
+        notice: notice that limits over a workspace or path are taken at the stated pose only; otherwise absent.
         front: the goals.
-        points: nondominated points, in the order of the first goal, its best value last.
-        gaps: for two goals, indices of points with a gap in the front between them and the next point.
+        points: nondominated points, from the worst to the best value of the first goal.
+        gaps: for two goals, indices of points after which the front has a gap.
         failed: number of searches without an optimum.
         versions: versions of the software.
         seconds: wall time.
@@ -79,7 +79,7 @@ class FrontResult(JsonObject):
     seconds: float
 
 
-#: Values of the points; null where a point has no value.
+#: Values of the points; null if a point has no value.
 Numbers: TypeAlias = tuple[float | None, ...]
 
 
@@ -89,10 +89,10 @@ class SweepResult(JsonObject):
     Attributes:
         head: case at the first point.
         notice: notice that limits over a workspace are taken at the stated pose only, for points of the compiled
-            engine; else absent.
-        unit: unit of F; empty where tasks have different units.
+            engine; otherwise absent.
+        unit: unit of F; empty if tasks have different units.
         numbers: values of each varied parameter, by name.
-        statuses: status of each solve; "refused" where the case contradicts itself.
+        statuses: status of each solve; "refused" if the case contradicts itself.
         F: objective, or value of the combination of several tasks.
         design: values of each variable, by name.
         actives: active bounds and limits of each design.
@@ -106,9 +106,9 @@ class SweepResult(JsonObject):
         engines: engine that solved the point.
         times: wall time, seconds.
         notes: reasons for refusals.
-        certificates: status of each proof; absent where no proof was requested.
-        bounds: proved bounds of F; absent where no proof was requested.
-        gaps: distances of the bounds from F; absent where no proof was requested.
+        certificates: status of each proof; absent if no proof was requested.
+        bounds: proved bounds of F; absent if no proof was requested.
+        gaps: distances of the bounds from F; absent if no proof was requested.
         versions: versions of the software.
     """
 

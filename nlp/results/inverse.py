@@ -18,7 +18,7 @@ _WRENCH = ("f_x", "f_y", "f_z", "m_x", "m_y", "m_z")
 
 
 def inverse_csv(case: Case, found: InversePoses, rows: Sequence[int], *, derivatives: bool) -> str:
-    """Return a row for each pose: closed or not, singular or not, and coordinates, which are empty where not closed.
+    """Return a row for each pose: closed, singular, and coordinates, which are empty if the loops are not closed.
 
     Args:
         case: the case.

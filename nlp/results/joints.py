@@ -17,9 +17,9 @@ class ActuatorData(JsonObject):
     """Actuated joint of a robot defined by joints.
 
     Attributes:
-        name: name of the actuator: its limb, with a number where the limb has several actuators.
+        name: name of the actuator: the limb, with a number if the limb has several actuators.
         kind: ``angle`` or ``length``.
-        rate: rate for the task's motion, radians or length per unit of time; null where the motion does not determine
+        rate: rate for the task's motion, radians or length per unit of time; null if the motion does not determine
             the rate, because the actuator can move while the platform stands still.
     """
 
@@ -35,8 +35,8 @@ class JointsData(JsonObject):
         freedoms: degrees of freedom of the platform with free actuators.
         feasible: If true, the platform can make the task's motion with free actuators; absent with several tasks.
         actuators: actuators with their rates for the task's motion; absent with several tasks.
-        constrained: part of F from constraint wrenches, which no actuator motion can follow; 0 for a possible motion.
-        limb_parts: parts of actuation and constraints in F, by limb; absent with several tasks.
+        constrained: fraction of F from constraint wrenches, 0 to 1; 0 for a motion that the platform can make.
+        limb_parts: F by limb, split into actuation and constraint wrenches; absent with several tasks.
         centre_dependence: largest relative change of F where the centre of a limb's wrenches moves by the
             characteristic length along the axis of its last passive joint; absent with several tasks, and without such
             a centre.
@@ -63,7 +63,7 @@ def joints_data(
         nlp: nonlinear program.
         x: (n,) point.
         state: robot at the point and the first pose.
-        dependence: dependence of F on conventions; None where it is not known.
+        dependence: dependence of F on conventions; None if unknown.
         with_task: If true, the rates of the state belong to a task.
     """
     found = mobility_of(nlp, x, state)

@@ -25,9 +25,9 @@ class ObjectiveData(JsonObject):
         minimise: name of the actuator quantity; absent for F.
         over: domain of the worst F, ``workspace`` or ``path``; absent for an actuator quantity.
         value: largest value over loads, actuators and poses, or worst F; a proved bound where limits cover a workspace
-            or path. Null without an answer, or where nothing is proved.
+            or path. Null without an answer, or if nothing is proved.
         unit: unit of value and bound.
-        bound: proved bound of the value for all designs within the limits; absent where no proof was requested.
+        bound: proved bound of the value for all designs within the limits; absent if no proof was requested.
         gap: distance of the bound from the value.
     """
 
@@ -40,7 +40,7 @@ class ObjectiveData(JsonObject):
 
 
 def objective_data(case: Case, value: float | None, certificate: Certificate | None = None) -> ObjectiveData | None:
-    """Return the objective of a case, where it is not F at the stated poses; else None.
+    """Return the objective of a case, if it is not F at the stated poses; otherwise None.
 
     Args:
         case: the case.
@@ -63,7 +63,7 @@ def objective_data(case: Case, value: float | None, certificate: Certificate | N
 
 
 def certified_objective(certified: "Certified") -> ObjectiveData | None:
-    """Return the objective that a certificate bounds, with its proved value over the workspace where there is one."""
+    """Return the objective that a certificate bounds, with the proved value over the workspace, if any."""
     certificate, solution = certified.certificate, certified.solution
     if certificate is None:
         return None
@@ -103,7 +103,7 @@ def unit_of_objective(case: Case, task: int | None = None) -> str:
 
     Args:
         case: the case.
-        task: index of the task; None for all tasks, which have a unit only where it is the same for all.
+        task: index of the task; None for the common unit of all tasks, which may not exist.
     """
     tasks = case.tasks if task is None else [case.tasks[task]]
     if tasks[0].measure:
@@ -117,7 +117,7 @@ def unit_of_claim(case: Case, name: str, dimension: Dimension) -> str:
     Args:
         case: the case.
         name: name of the claim.
-        dimension: dimension of its quantity.
+        dimension: dimension of the quantity.
     """
     tasks = [k for k, task in enumerate(case.tasks) if name in ("F", f"F of {task.name}")]
     is_of_F = dimension is Dimension.NUMBER and tasks and not case.tasks[0].measure

@@ -30,7 +30,7 @@ Jacobian: TypeAlias = tuple[Vector6, ...]
 
 
 def settings_data(settings: Settings) -> SettingsData | None:
-    """Return the values that replace those of a case file, in the form of JSON; None without any."""
+    """Return the values that replace values of a case file, as JSON; None without such values."""
     return {name: _setting_data(value) for name, value in settings.items()} or None
 
 
@@ -64,7 +64,7 @@ class HeadData(JsonObject):
 
     Attributes:
         schema: version of the result's keys.
-        case: name of the case, which is that of its file.
+        case: name of the case: name of its file without suffix.
         title: title of the case.
         model: name of the robot.
         units: units of all values.
@@ -93,7 +93,7 @@ class TaskData(JsonObject):
         name: name of the task.
         sense: sense of the optimisation: F is maximised or minimised.
         motion: motion of the platform.
-        stated_point: point of the axis as the case states it; absent where the case states none.
+        stated_point: point of the axis in the case; absent if the case has no such point.
     """
 
     name: str
@@ -152,7 +152,7 @@ class RobotData(JsonObject):
         pose: pose of the platform; with several poses, the first stated pose.
         task: task to which the rates belong; absent with several tasks.
         limbs: limb of each row of the Jacobian.
-        members: member of each row of the Jacobian: the limb, with a number where the limb has several members.
+        members: name of the member of each row of J: the limb, with a number if the limb has several members.
         jacobian: unit wrenches as rows, force then moment about the world origin.
         rates: work rate of each row in the task's motion.
         rank: rank of the Jacobian.
@@ -165,12 +165,12 @@ class RobotData(JsonObject):
         limited_quantities: further quantities that the case limits, by name and limb: joint angles from stated mounting
             axes, and leg lengths of a robot defined by joints; absent without any.
         characteristic_length: factor between couples and forces; absent for robots without constraint couples.
-        length_dependence: relative derivative of F by the characteristic length, ``(l / F) dF/dl``, over all poses;
+        length_dependence: relative derivative of F with respect to the characteristic length, ``(l / F) dF/dl``;
             absent without that length, where F is 0, and with several tasks.
         joints: degrees of freedom, actuator rates and singularities of a robot defined by joints; absent for others.
-        free_joints: free actuator coordinates, which the pose does not determine, at every pose; absent without any.
+        free_joints: actuator coordinates that the pose does not determine, at every pose; absent if there are none.
         loading: forces and speeds of the actuators; absent without loads and motions.
-        several: robot at every pose; absent where there is one pose.
+        several: robot at every pose; absent for a single pose.
     """
 
     parameters: Mapping[str, float | Vector]
@@ -225,7 +225,7 @@ class LimitData(JsonObject):
         margin: smallest margin, positive inside the limit.
         active: places at which the limit is active.
         violated: places at which the limit is violated.
-        cost: derivative of the optimal F by the allowed value; null where the point is no optimum.
+        cost: derivative of the optimal F with respect to the allowed value; null if the point is not an optimum.
     """
 
     key: str

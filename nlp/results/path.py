@@ -51,7 +51,7 @@ class PathVerdictData(VerdictData):
     """Verdict on a claim about every point of a path.
 
     Attributes:
-        line: line of the file, or row of a table, of the segment with the pose; null where no pose is known.
+        line: line of the file, or row of a table, of the segment with the pose; null if no pose is known.
         segment: index of this segment, from 0; null likewise.
         parameter: parameter along this segment, from 0 to 1; null likewise.
         fault: first known point of the path that refutes the claim; absent for another outcome.
@@ -69,8 +69,8 @@ class PathActuatorData(JsonObject):
     Attributes:
         actuator: name of the actuator.
         unit: unit of its coordinate.
-        smallest: proved smallest coordinate; null where nothing is proved.
-        largest: proved largest coordinate; null where nothing is proved.
+        smallest: proved smallest coordinate; null if nothing is proved.
+        largest: proved largest coordinate; null if nothing is proved.
         speed: proved largest speed in the motion of the path, unit per second; absent without times.
         acceleration: largest acceleration between knots, unit per second squared; absent without knots or times.
     """
@@ -90,8 +90,8 @@ class PathKnotsData(JsonObject):
         number: number of knots.
         closed: number of knots that the robot reaches.
         within: requested largest deviation of the platform's origin from the path, with linear actuator motion from
-            knot to knot; absent where a step was requested.
-        deviation: proved largest deviation; null where nothing is proved, or where a step was requested.
+            knot to knot; absent if a step was requested.
+        deviation: proved largest deviation; null if nothing is proved, or if a step was requested.
         reason: reason why no deviation is proved; absent otherwise.
     """
 
@@ -108,13 +108,13 @@ class PathData(JsonObject):
     Attributes:
         file: name of the path's file.
         segments: number of segments.
-        time: total time of the segments with a stated time, seconds; absent where no time is stated.
-        untimed: number of segments without a time, along which speeds are not known; absent where no time is stated.
+        time: total time of the segments with a stated time, seconds; absent if no segment has a time.
+        untimed: number of segments without a time, whose speeds are unknown; absent if no segment has a time.
         idle: words of the G-code without a motion, in the order of the lines.
         dependent: names of the dependent coordinates of the pose; absent without any.
         claims: verdicts, ranks first.
         actuators: ranges of the actuators.
-        knots: knots of the table of actuators; absent where no table is requested.
+        knots: knots of the table of actuators; absent if no table is requested.
     """
 
     file: str
@@ -168,7 +168,7 @@ class PlaceData(JsonObject):
 
 
 class PathProofData(ExchangeData):
-    """Proof of a design along its path, by exchange of poses.
+    """Proof of a solved design along its path.
 
     Attributes:
         file: name of the path's file.
@@ -188,7 +188,7 @@ def path_result(judged: "Judgement", settings: "Settings | None" = None) -> Path
 
     Args:
         judged: the verdicts.
-        settings: values that replaced those of the case file; None without any.
+        settings: values that replaced values of the case file; None without such values.
     """
     return PathResult(
         head=head_data(judged.case),
@@ -228,7 +228,7 @@ def _claims(judged: "Judgement") -> tuple[PathVerdictData, ...]:
 
 
 def _verdict(each: "Verdict", judged: "Judgement") -> PathVerdictData:
-    """Return a verdict with its place."""
+    """Return a verdict with its line and path parameter."""
     place, fault = each.place if each.pose is not None else None, each.first_fault
     return PathVerdictData.of(
         each,

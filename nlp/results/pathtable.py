@@ -35,7 +35,7 @@ class KnotMotion(NamedTuple):
     Attributes:
         times: (K,) seconds from the start; a segment without a time counts 0.
         speeds: (K, a) speeds of the motion that ends at each knot.
-        accelerations: (K, a) accelerations: change of the speed at each knot by the mean time of both motions there.
+        accelerations: (K, a) change of the speed at each knot, divided by the mean time of both adjacent motions.
     """
 
     times: FloatArray
@@ -58,7 +58,7 @@ def knot_motion(path: ProgrammedPath, knots: Knots) -> KnotMotion:
 
 
 def _angles(path: ProgrammedPath, k: NDArray[np.intp], s: FloatArray, rotations: FloatArray) -> FloatArray:
-    """Return roll, pitch and yaw (K, 3) at places of a path: its own angles where the path states these."""
+    """Return roll, pitch and yaw (K, 3) at places of a path; if the file has these angles, the angles of the file."""
     if path.between is Between.ANGLES and path.order == ORDERS["rpy"] and path.frame is None:
         start = path.knots[k, 3:]
         return np.asarray(start + s[:, None] * (path.knots[k + 1, 3:] - start))
@@ -71,7 +71,7 @@ def _angles(path: ProgrammedPath, k: NDArray[np.intp], s: FloatArray, rotations:
 def knots_csv(case: Case, path: ProgrammedPath, knots: Knots) -> str:
     """Return a row for each knot: line, segment and parameter, time, pose, coordinates, speeds and accelerations.
 
-    Values are in the units of the case. Cells are empty where the robot does not reach the pose, or without a time.
+    Values are in the units of the case. Cells are empty if the robot does not reach the pose, or without a time.
     """
     units = case.units
     head = ["line", "segment", "parameter", *(["t"] * path.is_timed), *_POSE]

@@ -19,7 +19,7 @@ from ..evidence.conventions import dependence_of
 from ..evidence.evaluation import shown_parameters
 from ..evidence.kkt import FEASIBLE, linearise
 from ..evidence.loads import loading_of, loads_at
-from ..evidence.margins import measured_numbers, measured_slack, unit_of_side
+from ..evidence.margins import measured_slack, measured_values, unit_of_side
 from ..evidence.screwvalues import motion_of
 from ..evidence.state import PlatformPose, RobotState, evaluate, stated_poses
 from ..program.free_joints import FreeJoint, free_joints
@@ -42,7 +42,7 @@ from .parts import (
 )
 from .rounding import TURNED
 
-#: Size of violations, as a part of the worst one, below which they are left out: a failed solve leaves small ones.
+#: Size of violations, as a fraction of the worst one, below which they are left out: a failed solve leaves small ones.
 _SMALL = 1e-3
 
 
@@ -52,7 +52,7 @@ def head_data(case: Case) -> HeadData:
 
 
 def stated_pose_notice(case: Case) -> str | None:
-    """Return the notice that limits over a workspace or path are taken at the stated pose only; else None."""
+    """Return the notice that limits over a workspace or path are taken at the stated pose only; otherwise None."""
     if case.tasks[0].measure:  # its bound covers poses of the workspace or path
         return None
     return case.stated_pose_notice or None
@@ -211,7 +211,7 @@ def violations(nlp: Nlp, x: FloatArray) -> tuple[ViolationData, ...]:
     worst = -float(np.min(slack, initial=0.0)) if np.isfinite(slack).all() else math.inf
     least = -max(FEASIBLE, _SMALL * worst)
     outside = [j for j in range(len(slack)) if not slack[j] >= least]
-    measured = measured_numbers(nlp, x) if outside else []
+    measured = measured_values(nlp, x) if outside else []
     rows: list[ViolationData] = []
     for j in outside:
         side, limit = nlp.sides.sides[j], float(nlp.sides.limit[j])

@@ -1,4 +1,4 @@
-"""Rotations as numbers, in the form of their case."""
+"""Rotations as numbers, in the rotation form of the case."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def rotation_form(case: Case) -> RotationForm:
-    """Return the form of rotations for the poses of a case: that of its workspace or path, else that of its pose."""
+    """Return the rotation form for poses of a case: that of the workspace, the path, or the stated pose."""
     if case.workspace is not None:
         is_rpy = case.workspace.turns.kind is TurnKind.ROLL_PITCH_YAW
         return RotationForm.RPY if is_rpy else RotationForm.AXIS_ANGLE

@@ -57,7 +57,7 @@ def task_result(
         workspace: proof over the workspace; None without a proof.
         path: proof along the path; None without a proof.
         choice: choice among listed values; None without listed values.
-        rounding: rounding of the dimensions; None where they are not rounded.
+        rounding: rounding of the dimensions; None if they are not rounded.
     """
     nlp, x, state = solution.nlp, solution.x, solution.state
     answer = solution.status.is_answer
@@ -165,11 +165,11 @@ def combined_result(
 
 
 def _point(solution: Solution, combination: Combination) -> CombinedPointData:
-    """Return the combined point; without the robot where its equations have no value."""
+    """Return the combined point; without the robot if the loop equations have no solution."""
     own, combined = solution.outcomes[0], combination.combined
     if own.state is None:
         return CombinedPointData(robot=None, margins=None, limits=None)
-    # Only a combined program has derivatives of its value by the limits.
+    # Only a combined program has derivatives of its value with respect to the limits.
     nlp, x = (own.own.nlp, solution.x) if combined is None else (combined.nlp, combined.x)
     margins = margins_data(nlp, x, optimal=combined is not None and solution.all_solved)
     robot = robot_data(own.own.nlp, solution.x, own.state, None)
@@ -194,7 +194,7 @@ def _outcome(outcome: TaskOutcome, *, is_answer: bool) -> OutcomeData:
 
 
 def result_of(found: Solution | Certified) -> CaseResult:
-    """Return the result of a solve, with its certificates where a proof was requested."""
+    """Return the result of a solve; with certificates if a proof was requested."""
     solution = found if isinstance(found, Solution) else found.solution
     certificates = () if isinstance(found, Solution) else found.tasks
     if solution.combination is None:

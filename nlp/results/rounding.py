@@ -16,9 +16,9 @@ from ..units import Units
 if TYPE_CHECKING:
     from .parts import Jacobian, RobotData, TaskData
 
-#: Error bound of a number, as a part of its terms, its neighbours or its range: a thousand times a search's error.
+#: Error bound of a number, as a fraction of its terms, its neighbours or its range: a thousand times a search's error.
 NOISE = 1e-9
-#: Error bound of a stated number, as a part of the largest stated with it: a few times the rounding of a sine.
+#: Error bound of a stated number, as a fraction of the largest stated with it: a few times the rounding of a sine.
 STATED = 1e-14
 #: Significant digits by which numbers are sorted, so that rounding errors do not decide on the order.
 _ORDERED = 6
@@ -27,22 +27,22 @@ TURNED = 1e-9
 
 
 def settled(value: float, size: float, part: float = NOISE) -> float:
-    """Return a number, or 0 where it is below a part of a size."""
+    """Return a number, or 0 if it is below a fraction of ``size``."""
     return 0.0 if abs(value) <= part * size else value + 0.0
 
 
 def ordered(value: float) -> float:
-    """Return the sorting key of a number: numbers that differ by rounding errors have the same key."""
+    """Return the sorting key of a number; numbers within rounding error have the same key."""
     return float(f"{value:.{_ORDERED}g}")
 
 
 def size_of(dimension: Dimension, values: Iterable[float], units: Units) -> float:
-    """Return the size to which rounding errors of values are relative: half a turn for angles."""
+    """Return the magnitude to which rounding errors of values are relative; for angles, half a turn."""
     return units.shown(math.pi, dimension) if dimension is Dimension.ANGLE else max(map(abs, values), default=0.0)
 
 
 def rate_sizes(jacobian: Jacobian, twist: Sequence[float], position: Sequence[float]) -> list[float]:
-    """Return the size of the terms of each row's rate, ``|m| |omega| + |f| |v|``, with moments about a point.
+    """Return the magnitude of the terms of each row's rate, ``|m| |omega| + |f| |v|``, with moments about a point.
 
     Args:
         jacobian: the rows, force, then moment about the world origin.
@@ -60,7 +60,7 @@ def rate_sizes(jacobian: Jacobian, twist: Sequence[float], position: Sequence[fl
 
 
 def settled_rates(rates: Sequence[float], sizes: Sequence[float], *, is_free: bool = False) -> list[float]:
-    """Return rates, 0 where they are rounding errors of their terms.
+    """Return rates; a rate within the rounding error of its terms is 0.
 
     Args:
         rates: work rates of the rows.
@@ -71,7 +71,7 @@ def settled_rates(rates: Sequence[float], sizes: Sequence[float], *, is_free: bo
 
 
 def settled_F(F: float, sizes: Sequence[float]) -> float:  # noqa: N802 - the objective's name
-    """Return F, or 0 where it is rounding error of the terms of its rates."""
+    """Return F, or 0 if F is within the rounding error of its rates."""
     return settled(F, math.fsum(size**2 for size in sizes), ZERO_F)
 
 
@@ -80,7 +80,7 @@ def _cross(a: Sequence[float], b: Sequence[float]) -> tuple[float, float, float]
 
 
 def size_of_F(robot: RobotData, F: float = 0.0, task: TaskData | None = None) -> float:  # noqa: N802 - the objective's name
-    """Return the size of the terms of F, over all poses; F itself where the task is not known.
+    """Return the magnitude of the terms of F over all poses; F itself if the task is unknown.
 
     Args:
         robot: robot at the point.
@@ -97,11 +97,11 @@ def size_of_F(robot: RobotData, F: float = 0.0, task: TaskData | None = None) ->
 
 
 def task_F(robot: RobotData | None, F: float) -> float:  # noqa: N802 - the objective's name
-    """Return a value of F of a robot's task over its poses, or 0 where it is rounding error."""
+    """Return F of a robot's task over its poses, or 0 if F is within the rounding error."""
     return F + 0.0 if robot is None or robot.task is None else settled(F, size_of_F(robot), ZERO_F)
 
 
 def robot_size(robot: RobotData) -> float:
-    """Return the length to which rounding errors of a robot's positions are relative: its longest arm of a moment."""
+    """Return the length to which rounding errors of a robot's positions are relative: the longest moment arm."""
     lengths = [abs(part) for row in robot.jacobian for part in row[3:] if any(row[:3])]
     return max([*lengths, *map(abs, robot.pose.position)]) or 1.0

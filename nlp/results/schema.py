@@ -221,7 +221,7 @@ def result_from_json(tables: object, source: str) -> Result:
     try:
         return _result(tables)
     except WrongValueError as error:
-        raise InputError(f"{source}: is no result of screwsynth: {error}") from None
+        raise InputError(f"{source}: is not a result of screwsynth: {error}") from None
 
 
 def _result(tables: object) -> Result:
@@ -231,7 +231,7 @@ def _result(tables: object) -> Result:
         WrongValueError: the document is no result.
     """
     if not isinstance(tables, dict):
-        raise WrongValueError("", "must be an object")
+        raise WrongValueError("", "the file must contain one JSON object, { ... }")
     if VERSION_KEY not in tables:
         raise WrongValueError(VERSION_KEY, "is missing")
     required = {kind: set(keys_of(kind, required=True)) for kind in RESULTS}

@@ -34,7 +34,7 @@ def load_answer(file: str) -> Answer:
     """
     result = load_result(file)
     if not isinstance(result, Answer):
-        raise InputError(f"--of {file}: is no result of solve or evaluate")
+        raise InputError(f"--of {file}: is not a result of solve or evaluate")
     return result
 
 
@@ -60,7 +60,7 @@ def robot_of(result: Answer, source: str, case: Case, *, of_any_case: bool = Fal
         raise InputError(f"{source}: has the units {units.length!r} and {units.angle!r}, but the case has {own}")
     robot = result.robot
     if robot is None or (not isinstance(result, EvaluationResult) and not result.status.is_answer):
-        raise InputError(f"{source}: holds no answer: its solve gave none")
+        raise InputError(f"{source}: contains no answer: the solve has failed")
     return robot
 
 
@@ -77,7 +77,7 @@ def claim_settings(given: str, case: Case) -> Settings:
     """
     file, _, text = given.rpartition("#")
     if not file or not text.isdecimal():
-        raise InputError(f"--set-from {given}: must be RESULT#N: a file, and the number of a refuted claim in it")
+        raise InputError(f"--set-from {given}: must be RESULT#N: a result file, and the number of a violated claim")
     result = load_result(file)
     form, numbers = rotation_form(case), dict[str, float | list[float]]()
     if isinstance(result, WorkspaceResult | PathResult):
@@ -92,7 +92,7 @@ def claim_settings(given: str, case: Case) -> Settings:
         poses = [claim.fault.pose for claim in result.path.claims if claim.fault is not None]
         form = RotationForm.RPY
     else:
-        raise InputError(f"--set-from {given}: {file} is no result of workspace or path")
+        raise InputError(f"--set-from {given}: {file} is not a result of workspace or path")
     if (result.head.case, result.head.model) != (case.name, case.model.name):
         fault = f"is a result of the case {result.head.case!r} with the robot {result.head.model!r}"
         raise InputError(f"--set-from {given}: {fault}, not of {case.name!r} with {case.model.name!r}")
@@ -119,7 +119,7 @@ def dimensions_of(robot: RobotData, case: Case) -> Settings:
 
 
 def _without_end(name: str) -> str:
-    """Return the name of a value without the name of an end of its range."""
+    """Return the name of a value without ``.min``, ``.max`` or another suffix of a range."""
     whole, _, end = name.rpartition(".")
     return whole if end in ENDS else name
 
@@ -134,7 +134,7 @@ def joints_of(robot: RobotData, case: Case) -> Mapping[str, float]:
 
 
 def place_of(result: Answer, case: Case) -> Settings:
-    """Return the free values of a path's placement in a result, by their names in the case; empty without any."""
+    """Return the free values of the path placement in a result, by their names in the case."""
     path = result.path if isinstance(result, SolveResult) else None
     if path is None or case.path is None:
         return {}
@@ -142,7 +142,7 @@ def place_of(result: Answer, case: Case) -> Settings:
 
 
 def _pose_settings(prefix: str, pose: Pose, data: PlatformPose) -> Settings:
-    """Return the values of a pose; those of its rotation only where it is free."""
+    """Return the values of a pose; values of the rotation only if the rotation is free."""
     found: dict[str, float | list[float]] = {
         f"{prefix}p_{axis}": value for axis, value in zip("xyz", data.position, strict=True)
     }

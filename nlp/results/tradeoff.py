@@ -32,12 +32,12 @@ class TradeoffPointData(JsonObject):
         value: value of the limit or parameter.
         status: status of the solve.
         F: objective, or value of the combination of several tasks; null for an average, and without an answer.
-        slope: derivative of F by the value; null where it is not known.
+        slope: derivative of F with respect to the varied value; null if unknown.
         tasks: F of each task at the point; null without an answer.
         active: active bounds and limits.
         parameters: dimensions by name; null without an answer.
         pose: first stated pose of the platform; null without an answer.
-        certificate: proved bound; absent where no proof was requested.
+        certificate: proved bound; absent if no proof was requested.
     """
 
     value: float
@@ -60,11 +60,11 @@ class TradeoffResult(JsonObject):
         unit: unit of its values; empty for a plain number.
         senses: sense of each task.
         tasks: name of each task.
-        points: optima, one for each value; the status is "interrupted" for values that an interrupted command left.
+        points: optima, one for each value; the status of values after an interruption is "interrupted".
         seed: random seed of the starting points.
         versions: versions of the software.
         seconds: wall time.
-        notice: notice that limits over a workspace or path are taken at the stated pose only; else absent.
+        notice: notice that limits over a workspace or path are taken at the stated pose only; otherwise absent.
     """
 
     head: Inline[HeadData]
@@ -101,7 +101,7 @@ def tradeoff_result(found: Tradeoff) -> TradeoffResult:
 
 
 def unit_of_number(name: str, case: Case, limits: Sequence[LimitData] = ()) -> str:
-    """Return the unit of a value of a case by its name; empty for a plain number, or where it is not known.
+    """Return the unit of a value of a case by its name; empty for a plain number or an unknown unit.
 
     Args:
         name: name of the value, as in ``--set``.
@@ -151,13 +151,13 @@ def _unsolved(value: float, tasks: int) -> TradeoffPointData:
 
 
 def _is_key(name: str, key: str) -> bool:
-    """Return whether a setting names a limit, which may leave out ``max``."""
+    """Return whether a setting names a limit; the suffix ``.max`` may be left out."""
     dotted = name.removeprefix(LIMITS)
     return dotted in (key, f"{key}.max") or f"{dotted}.max" == key
 
 
 def _slope(name: str, result: CaseResult) -> float | None:
-    """Return the derivative of F by the varied value: a limit, a bound, or a fixed parameter."""
+    """Return the derivative of F with respect to the varied value: a limit, a bound, or a fixed parameter."""
     if name.startswith(LIMITS):
         return next((row.cost for row in result.limits if _is_key(name, row.key)), None)
     if not isinstance(result, SolveResult):
@@ -182,7 +182,7 @@ def _active(solution: Solution, result: CaseResult) -> tuple[str, ...]:
     return (*(f"{name}.{bound}" if bound in ("min", "max") else name for name, bound in sides), *keys)
 
 
-#: Range of a curve to each side of the limit, as a part of it; number of values, odd to include the limit itself.
+#: Range of a curve to each side of the limit, as a fraction of it; number of values, odd to include the limit itself.
 _REACH, _VALUES = 0.1, 7
 #: Largest number of curves of a solution; number of starting points of each solve, besides the neighbouring optima.
 _CURVES, _STARTS = 3, 4

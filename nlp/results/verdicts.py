@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from ..case.task import Sense
 from ..evidence.state import WorkspacePose
 from ..proof.enclosure.engine import ENGINE
-from ..proof.statement.machine import has_straight_legs
+from ..proof.statement.fixed_robot import has_straight_legs
 from ..proof.workspace.robot.pose_box import pose_box
 from ..proof.workspace.verdict import Outcome
 from ..system.jsonvalues import Absent, JsonObject, Mark, Measure, Vector3, vector
@@ -14,7 +14,7 @@ from .objective import unit_of_claim
 
 if TYPE_CHECKING:
     from ..case.case import Case
-    from ..proof.statement.machine import JointErrors
+    from ..proof.statement.fixed_robot import JointErrors
     from ..proof.workspace.judgement import Judgement
     from ..proof.workspace.robot.pose_box import PoseNumbers
     from ..proof.workspace.verdict import Verdict
@@ -32,7 +32,7 @@ class CentreData(JsonObject):
     error: Vector3
 
 
-class MachineData(JsonObject):
+class JointErrorsData(JsonObject):
     """Joint-centre errors of a robot within the tolerance.
 
     Attributes:
@@ -52,16 +52,16 @@ class RegularData(JsonObject):
     Attributes:
         outcome: ``proved``; ``refuted``, with a singular pose; ``open`` (undecided), with the centre of the widest
             undecided box.
-        pose: singular pose, or centre of the widest undecided box; absent where the claim is proved.
-        between: two poses at which the determinant of the rows is proved to have opposite signs; absent where the
+        pose: singular pose, or centre of the widest undecided box; absent if the claim is proved.
+        between: two poses at which the determinant of the rows is proved to have opposite signs; absent if the
             claim is not refuted in this way.
         boxes: number of boxes examined.
         open: number of undecided boxes.
-        share: volume of the undecided boxes, as a part of the box of poses.
+        share: volume of the undecided boxes, as a fraction of the box of poses.
         seconds: wall time.
         engine: ``c``, or ``none`` where no search was made.
         reason: reason for an early end, or method of a singular pose that is not between two poses; absent without one.
-        machine: joint-centre errors of the singular robot; absent where the claim is not refuted, or the exact robot is
+        machine: joint-centre errors of the singular robot; absent if the claim is not refuted, or the exact robot is
             singular.
     """
 
@@ -74,7 +74,7 @@ class RegularData(JsonObject):
     seconds: float
     engine: str
     reason: Absent[str]
-    machine: Absent[MachineData]
+    machine: Absent[JointErrorsData]
 
 
 class VerdictData(JsonObject):
@@ -84,7 +84,7 @@ class VerdictData(JsonObject):
         name: name of the claim.
         unit: unit of the values; empty for a plain number, absent for a rank.
         sense: smallest or largest value; absent for a rank.
-        bound: proved bound: no pose has a smaller, or larger, value; null where nothing is proved, and for a rank.
+        bound: proved bound: no pose has a smaller, or larger, value; null if nothing is proved, or for a rank.
         reached: smallest or largest known value; null without one, and for a rank.
         key: dotted key, below ``limits``, of the limit in the case; absent without one.
         limit: the limit; absent without one.
@@ -108,7 +108,7 @@ class VerdictData(JsonObject):
     boxes: Absent[int]
     seconds: Absent[float]
     reason: Absent[str]
-    machine: Absent[MachineData]
+    machine: Absent[JointErrorsData]
 
 
 def pose_data(pose: "PoseNumbers", units: Units) -> WorkspacePose:
@@ -127,19 +127,19 @@ def rank_data(found: "Verdict", judged: "Judgement") -> RegularData:
         pose=None if found.pose is None else pose_data(found.pose, case.units),
         between=sides,
         engine=ENGINE if found.boxes else "none",
-        machine=machine_data(found.errors, case),
+        machine=joint_errors_data(found.errors, case),
     )
 
 
-def machine_data(errors: "JointErrors | None", case: "Case") -> MachineData | None:
+def joint_errors_data(errors: "JointErrors | None", case: "Case") -> JointErrorsData | None:
     """Return the joint-centre errors of a robot; None for the exact robot. Lengths are in the case's unit already."""
     if errors is None:
         return None
     each = tuple(map(vector, errors.vectors))
     if has_straight_legs(case.model):
-        return MachineData(base=each[::2], platform=each[1::2], centres=None)
+        return JointErrorsData(base=each[::2], platform=each[1::2], centres=None)
     centres = tuple(CentreData(joint=name, error=error) for name, error in zip(errors.names, each, strict=True))
-    return MachineData(base=None, platform=None, centres=centres)
+    return JointErrorsData(base=None, platform=None, centres=centres)
 
 
 def verdict_data(each: "Verdict", case: "Case") -> VerdictData:
@@ -148,10 +148,10 @@ def verdict_data(each: "Verdict", case: "Case") -> VerdictData:
 
 
 def posed_fields(each: "Verdict", case: "Case") -> dict[str, Any]:
-    """Return the fields of a verdict that depend on its kind and its robot, in a case's units, by name."""
+    """Return the fields of a verdict that depend on its kind and robot, by name, in the units of the case."""
     return {
         "unit": None if each.is_rank else unit_of_claim(case, each.name, each.dimension),
         "sense": None if each.is_rank else each.sense,
         "pose": None if each.pose is None else pose_data(each.pose, case.units),
-        "machine": machine_data(each.errors, case),
+        "machine": joint_errors_data(each.errors, case),
     }

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from ...models import Dimension
 from ...models.statics import driven_joints
 from ..case.loads import NO_LOADING
-from ..case.motors import MotorNumber
+from ..case.motors import ActuatorQuantity
 from ..case.task import Sense
 from ..evidence.state import WorkspacePose
 from ..proof.statement.claims import ACTUATED
@@ -34,11 +34,11 @@ class MotorEndData(JsonObject):
     """Smallest or largest value of an actuator quantity.
 
     Attributes:
-        bound: proved bound: no pose has a smaller, or larger, value; null where nothing is proved.
-        reached: smallest or largest known value; null where no value is known.
+        bound: proved bound: no pose has a smaller, or larger, value; null if nothing is proved.
+        reached: smallest or largest known value; null if unknown.
         outcome: outcome of the limit; without a limit, ``proved`` if the requested gap was reached.
         limit: the limit; absent without one.
-        pose: pose with the known value; null where no value is known.
+        pose: pose with the known value; null if unknown.
     """
 
     bound: float | None
@@ -62,7 +62,7 @@ class MotorData(JsonObject):
     """
 
     actuator: str
-    number: MotorNumber
+    number: ActuatorQuantity
     unit: str
     load: Absent[str]
     smallest: Absent[MotorEndData]
@@ -70,14 +70,14 @@ class MotorData(JsonObject):
 
 
 class ScaleData(JsonObject):
-    """Largest factor by which the box of poses can grow about its centre with everything proved.
+    """Largest factor by which the box of poses can grow about its centre so that all claims stay proved.
 
     The radius alone grows where the positions are a disc, ring, cylinder, ball or cone.
 
     Attributes:
-        factor: factor of the largest proved box; null where no box is proved.
+        factor: largest factor with a proof; null if no box is proved.
         diameter: diameter of the largest proved set of positions, of the base for a cone; absent without a diameter.
-        refuted: smallest known factor at which a claim is refuted; null where none is known.
+        refuted: smallest known factor with a violated claim; null if unknown.
         claim: claim that is refuted or undecided for the next larger box; empty without one.
         pose: pose at which the claim is refuted; null without one.
         reason: reason for the end of the search before the factor was known to its accuracy; absent otherwise.
@@ -99,7 +99,8 @@ class WorkspaceResult(JsonObject):
         parameters: dimensions by name; three numbers for a point or direction.
         settings: values that replaced those of the case file, such as a limit, by the names of ``--set``; absent
             without any, and in results of earlier versions.
-        joint_centre: tolerance of joint centres: every claim covers all robots within it; absent for the exact robot.
+        joint_centre: joint-centre tolerance: every claim covers all robots within this tolerance; absent for the exact
+            robot.
         proved: If true, J has full rank at every pose, and every limit is satisfied. Quantities without a limit do not
             count.
         poses: set of poses that the verdicts cover, in words; absent for a box without dependent coordinates.
@@ -108,7 +109,7 @@ class WorkspaceResult(JsonObject):
         constraints: verdict on the rank of the constraint wrenches at every pose; absent without constraint wrenches.
         extremes: smallest and largest values; of actuators under loads, only values with a limit.
         motors: actuator quantities; absent for a case without loads and motions.
-        scale: largest proved box; absent where it was not requested.
+        scale: largest proved box; absent if it was not requested.
         versions: versions of the software.
     """
 
@@ -128,7 +129,7 @@ class WorkspaceResult(JsonObject):
 
 
 class WorkspaceProofData(ExchangeData):
-    """Proof of a design over its workspace, by exchange of poses.
+    """Proof of a solved design over its workspace.
 
     Attributes:
         regular: verdict on the full rank of J at every pose.
@@ -158,8 +159,8 @@ def workspace_of(
 
     Args:
         judged: the verdicts.
-        scale: the largest proved box; None where no search for it was made.
-        settings: values that replaced those of the case file; None without any.
+        scale: the largest proved box; None if no search for it was made.
+        settings: values that replaced values of the case file; None without such values.
     """
     case = judged.case
     parameters: dict[str, float | Vector] = {}
@@ -195,7 +196,7 @@ def _motors(judged: "Judgement") -> Iterator[MotorData]:
     case = judged.case
     if case.loading == NO_LOADING:
         return
-    found: dict[tuple[MotorNumber, str, str], list[Verdict]] = {}
+    found: dict[tuple[ActuatorQuantity, str, str], list[Verdict]] = {}
     for each in judged.extremes:
         if each.motor is not None:
             found.setdefault((each.motor.number, each.motor.actuator, each.motor.load), []).append(each)
@@ -203,8 +204,8 @@ def _motors(judged: "Judgement") -> Iterator[MotorData]:
         names = [f"{measure} limb {joint.name}" for measure in ("leg_length", *ACTUATED)]
         own = {each.sense: each for each in judged.extremes if each.name in names}
         if len(own) == len(Sense):
-            found[MotorNumber.COORDINATE, joint.name, ""] = list(own.values())
-    order, names = list(MotorNumber), [joint.name for joint in driven_joints(case.model)]
+            found[ActuatorQuantity.COORDINATE, joint.name, ""] = list(own.values())
+    order, names = list(ActuatorQuantity), [joint.name for joint in driven_joints(case.model)]
     for key in sorted(found, key=lambda key: (names.index(key[1]), order.index(key[0]))):
         (what, actuator, load), every = key, found[key]
         ends = {sense: [each for each in every if each.sense is sense] for sense in Sense}
@@ -219,7 +220,7 @@ def _motors(judged: "Judgement") -> Iterator[MotorData]:
 
 
 def _motor_end(parts: "Sequence[Verdict]", case: "Case") -> MotorEndData:
-    """Return an extreme value of an actuator quantity: the most extreme of its parts, with their worst outcome."""
+    """Return an extreme value of an actuator quantity over all load cases, with the worst outcome."""
     every = [verdict_data(each, case) for each in parts]
     farthest = max(parts, key=lambda each: each.sense.sign * each.reached if math.isfinite(each.reached) else -math.inf)
     shown = every[list(parts).index(farthest)]

@@ -27,11 +27,11 @@ from .starts import Start, StartStatus, judge
 
 
 class SearchedStarts(NamedTuple):
-    """Starts of a program that is searched block by block.
+    """Starts of a nonlinear program that is searched block by block.
 
     Attributes:
         points: (k, n) starting points of the whole program.
-        starts: converged starts by their index; these need no further search.
+        starts: converged starts by index, which need no further search.
     """
 
     points: FloatArray
@@ -82,7 +82,7 @@ class _BlockResults:
         self._is_whole = False
 
     def take(self, block: Block, found: Screened) -> None:
-        """Store the results of the searches of a block; where a search did not converge, its starting point stays."""
+        """Store the results of the searches of a block; a search that did not converge keeps its starting point."""
         count, kept, of_block = len(block.variables), found.converged[:, None], list(block.variables)
         x = np.clip(found.x[:, :count], self._nlp.lower[of_block], self._nlp.upper[of_block])
         self.x[:, of_block] = np.where(kept, x, self.x[:, of_block])
@@ -111,7 +111,7 @@ class _BlockResults:
         self.x = np.array([with_exact_level(self._nlp, x) for x in self.x])
 
     def judged(self) -> dict[int, Start]:
-        """Return the converged starts by their index; none where a block has no good result."""
+        """Return the converged starts by index; no starts if a block has no converged result."""
         starts: dict[int, Start] = {}
         for k in range(len(self.x)) if self._is_whole else ():
             if is_requested():
@@ -132,13 +132,13 @@ class _BlockResults:
 def from_best_blocks(
     nlp: Nlp, blocks: Blocks, ends: Sequence[FloatArray], best: float | None, better: float
 ) -> FloatArray | None:
-    """Return the point (n,) of the best blocks over all results, if it is better than the best optimum; else None.
+    """Return the point (n,) of the best blocks over all results, if it is better than the best optimum; otherwise None.
 
     Args:
         nlp: the nonlinear program.
         blocks: blocks of the program.
         ends: points (n,) at which searches ended.
-        best: objective of the best optimum; None for none.
+        best: objective of the best optimum; None without an optimum.
         better: smallest difference of the scaled objective that is more than rounding.
     """
     if not blocks.blocks or not ends:

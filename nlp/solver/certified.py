@@ -12,7 +12,7 @@ from ...models import FloatArray
 from ...models.shown import Shown
 from ...models.whole import Whole
 from ..case.case import Case
-from ..case.choices import listed_numbers
+from ..case.choices import catalogue_dimensions
 from ..case.task import Method, Sense
 from ..errors import InputError, check_seconds
 from ..interruption import is_requested, one_call, reason_of, seconds_left, within
@@ -43,7 +43,7 @@ _Solved = TypeVar("_Solved")
 
 
 class OptionError(InputError):
-    """Invalid option of a certificate: out of range, or without meaning for the case."""
+    """Invalid option of a certificate: value out of range, or not applicable to the case."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class CertifyOptions:
 
     Attributes:
         gap: allowed relative difference between bound and incumbent.
-        above: value of F to prove as a lower bound, in place of a gap.
+        above: value of F to prove as a lower bound, instead of a gap.
         time_limit: seconds for the whole call.
         jobs: number of threads.
 
@@ -79,10 +79,10 @@ class Certified(Whole, Shown, Answer):
 
     Attributes:
         solution: the solution.
-        tasks: certificate of each task by itself.
-        combined: certificate of the combined program of several tasks; None where the method has none.
-        statement: description of the program that ``tree`` proves.
-        tree: nodes of the proof; None without ``with_proof``, and where nothing is proved.
+        tasks: certificate of the separate optimum of each task.
+        combined: certificate of the combined program of several tasks; None if the method has none.
+        statement: premises of the proof ``tree``: nonlinear program and options.
+        tree: nodes of the proof; None without ``with_proof``, or without a proved bound.
     """
 
     solution: Solution
@@ -137,7 +137,7 @@ def certify(
         starts: number of starting points; the case's number if left out.
         seed: seed of the starting points; the case's seed if left out.
         all_assemblies: If true, cover all working modes of a robot with given joints; otherwise only the home working
-            mode, in which a solve begins. All are also covered if the solution is in another mode.
+            mode, in which a solve begins. All modes are also covered if the solution is in another mode.
         with_proof: If true, keep the proof of the only task, or of the combined program, for :func:`proof_of`.
         progress: function that returns, for the name of a program, a function to call repeatedly during its search.
 
@@ -162,20 +162,20 @@ def certify(
             tasks = tuple(replace(each, scope=_ROUNDED) for each in own.tasks)
             combined = None if own.combined is None else replace(own.combined, scope=_ROUNDED)
             return replace(own, solution=solution, tasks=tasks, combined=combined)
-        if listed_numbers(case):
+        if catalogue_dimensions(case):
             return _certify_choices(found, options, starts, seed, prove)
         return prove(found, options)
 
 
 def _check_writable(case: Case, *, is_rounded: bool) -> None:
-    """Refuse a proof record of a program that no case file states.
+    """Refuse a proof record of a nonlinear program that a case file cannot represent.
 
     Raises:
-        OptionError: the program is not stated by a case file.
+        OptionError: a case file cannot represent the program.
     """
     if is_rounded:
         raise OptionError("proof: no case file contains the rounded dimensions; give them with --set")
-    if listed_numbers(case):
+    if catalogue_dimensions(case):
         raise OptionError("proof: each combination of listed values is a separate program; give the values with --set")
     if case.is_optimised_everywhere:
         raise OptionError(
@@ -184,7 +184,7 @@ def _check_writable(case: Case, *, is_rounded: bool) -> None:
 
 
 def _in_half(solve: Callable[[], _Solved]) -> _Solved:
-    """Return the result of a solve that may use half of the remaining time; the other half is for the proof."""
+    """Return the result of a solve with half of the remaining time; the proof has the other half."""
     left = seconds_left()
     with within(None if math.isinf(left) else _SHARE * left):
         return solve()
@@ -284,7 +284,7 @@ def _incumbent(own: ProgramSolution) -> tuple[FloatArray | None, float | None]:
 
 
 def _after_solve(certificate: Certificate, own: ProgramSolution, starts: int) -> Certificate:
-    """Return a certificate with a reason that the solve before it was cut short, unless it is proved."""
+    """Return an unproved certificate with the reason that its solve was cut short; a proved one unchanged."""
     if own.status is not Status.INTERRUPTED or certificate.status is CertificateStatus.PROVED:
         return certificate
     done = f"the time for the solve was used up after {len(own.starts)} of {starts} starts"
@@ -356,7 +356,7 @@ def _certify_from_poses(
             status=CertificateStatus.INCOMPLETE,
             x=None,
             incumbent=math.nan,
-            reason=f"no design that keeps the limits over the {solution.case.limits_over} is known",
+            reason=f"no design is known that satisfies the limits over the {solution.case.limits_over}",
         )
     return Certified(solution, (certificate,), None, Statement(), None)
 
@@ -383,7 +383,7 @@ def proof_of(certified: Certified, text: str) -> Proof:
 
 
 def _complete_tree(writer: TreeRecord | None, certificate: Certificate) -> bytes | None:
-    """Return the nodes of a complete proof; None where nothing is proved or recorded."""
+    """Return the nodes of a complete proof; None if nothing is proved or recorded."""
     complete = certificate.status in (CertificateStatus.PROVED, CertificateStatus.INFEASIBLE)
     # A program with a single point needs no search, and has no tree.
     return writer.tree() if writer is not None and complete and certificate.engine == ENGINE else None

@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
 from ..case.case import Case
-from ..case.choices import Ranges, listed_numbers, within_ranges
+from ..case.choices import Ranges, catalogue_dimensions, within_ranges
 from ..interruption import is_requested, seconds_left, why_stopped, within
 from ..proof.certificate.certificate import Certificate, CertificateStatus
 from .choices import combinations_of, exists
@@ -45,7 +45,7 @@ class ChoiceProof(NamedTuple, Generic[Proved]):
     Attributes:
         best: certificates of the best combination.
         chosen: ranges of this combination.
-        certificate: certificate over all combinations; None where no program combines the tasks of the best one.
+        certificate: certificate over all combinations; None if its tasks have no common nonlinear program.
     """
 
     best: Proved
@@ -66,7 +66,7 @@ def prove_choices(
         is_each: If true, certify every combination separately, as for a lower bound on F.
     """
     began = time.perf_counter()
-    numbers, chosen = listed_numbers(case), choice.chosen
+    numbers, chosen = catalogue_dimensions(case), choice.chosen
     parts = [part for part in choice.parts if part.ranges != choice.chosen]
     if is_each:
         parts = [each for part in parts for each in _combinations_in(part, choice.chosen)]
@@ -124,8 +124,8 @@ def _together(
         first: certificate of the best combination of the solve.
         found: certificates of the parts that cover all combinations.
         count: number of combinations.
-        boxes: number of boxes examined in addition to those of these certificates.
-        unknown: reason why these certificates do not cover some combinations; empty where they cover all.
+        boxes: number of examined boxes that these certificates do not count.
+        unknown: reason why some combinations are not covered; empty if all are covered.
     """
     possible = [each for each in found if each.status is not CertificateStatus.INFEASIBLE]
     bounds = [known.nlp.sign * each.bound for each in possible]
@@ -170,7 +170,7 @@ def _is_met(bound: float, certificate: Certificate, known: Certificate) -> bool:
 
 
 def _combinations_in(part: ChoicePart, chosen: Ranges) -> list[ChoicePart]:
-    """Return the combinations of a part without the chosen one, which is certified already."""
+    """Return the combinations of a part, except the chosen combination, which is already certified."""
     return [ChoicePart(each, None) for each in combinations_of(part.ranges) if each != chosen]
 
 
@@ -186,7 +186,7 @@ def _cost(certificate: Certificate, value: float) -> float:
 
 
 def _gap_of(part: ChoicePart, known: Certificate, gap: float) -> float:
-    """Return the gap to which a part must be proved to show that it has no better combination."""
+    """Return the gap of a proof that a part has no better combination."""
     best = _cost(known, known.incumbent)
     if not part.cost or math.isinf(best):
         return gap

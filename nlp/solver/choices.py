@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..case.case import Case
-from ..case.choices import ListedNumber, Ranges, all_values, listed_numbers, within_ranges
+from ..case.choices import CatalogueDimension, Ranges, all_values, catalogue_dimensions, within_ranges
 from ..errors import EvaluationError, NoRobotError
 from ..interruption import is_requested, one_call
 from .solution import Choice, ChoicePart, Solution, interrupted
@@ -34,7 +34,7 @@ def solve_choices(case: Case, solve_fixed: Callable[[Case], Solution], most: flo
     Args:
         case: the case.
         solve_fixed: function that solves a case without listed values.
-        most: largest number of solves; the search then ends with the best known combination.
+        most: largest number of solves, after which the search ends with the best known combination.
 
     Returns:
         The solution of the best combination, with the given case; without an answer where no combination has one.
@@ -52,9 +52,9 @@ def cost_of(solution: Solution) -> float:
 
 
 class _Part:
-    """An open part of the combinations: index ranges of values, and the solve with parameters free between their ends.
+    """An open group of combinations: index ranges of values, and the solution with parameters free between them.
 
-    The solve is None where the robot's loops cannot be closed at any of its starting points.
+    The solution is None if the robot's loops cannot be closed at any starting point.
     """
 
     def __init__(self, ranges: Ranges, relaxed: Solution | None) -> None:
@@ -75,7 +75,7 @@ class _Search:
 
     def __init__(self, case: Case, solve_fixed: Callable[[Case], Solution], most: float) -> None:
         self._case, self._solve, self._most = case, solve_fixed, most
-        self._numbers = listed_numbers(case)
+        self._numbers = catalogue_dimensions(case)
         self._solved: dict[Ranges, Solution] = {}
         self._cut: dict[Ranges, Solution] = {}
         self._relaxed = 0
@@ -145,7 +145,7 @@ class _Search:
         return exists(self._case, self._numbers, ranges)
 
     def _is_no_better(self, part: _Part) -> bool:
-        """Return whether no combination of a part is known to be better than the best one."""
+        """Return whether the bound of a group excludes a combination better than the best one."""
         best = math.inf if self._best is None else cost_of(self._best)
         return math.isfinite(best) and part.bound >= best - _BETTER * abs(best)
 
@@ -181,7 +181,7 @@ class _Search:
         return found
 
     def _nearest(self, part: _Part) -> Ranges:
-        """Return the combination nearest to the solved values of a part."""
+        """Return the combination nearest to the solved values of a group."""
         ranges = []
         for number, (first, behind) in zip(self._numbers, part.ranges, strict=True):
             at = _value_of(part.relaxed, number)
@@ -191,7 +191,10 @@ class _Search:
         return tuple(ranges)
 
     def _divided(self, part: _Part) -> tuple[Ranges, Ranges]:
-        """Return two halves of a part, split where a solved value is relatively farthest from any listed one."""
+        """Return two halves of a group of combinations.
+
+        The split is in the dimension whose solved value is relatively farthest from every value of the catalogue.
+        """
         farthest, cut = -1.0, (0, 1)
         for k, (number, (first, behind)) in enumerate(zip(self._numbers, part.ranges, strict=True)):
             if behind - first > 1:
@@ -206,7 +209,7 @@ class _Search:
         return low, high
 
 
-def exists(case: Case, numbers: Sequence[ListedNumber], ranges: Ranges) -> bool:
+def exists(case: Case, numbers: Sequence[CatalogueDimension], ranges: Ranges) -> bool:
     """Return whether the robot's loops can be closed with the values of a combination."""
     try:
         within_ranges(case, numbers, ranges)
@@ -222,8 +225,8 @@ def combinations_of(ranges: Ranges) -> Iterator[Ranges]:
         yield tuple((first + k, first + k + 1) for (first, _), k in zip(ranges, index, strict=True))
 
 
-def _value_of(solution: Solution | None, number: ListedNumber) -> float:
-    """Return the value of a listed parameter at a solution; the middle of its values where the robot has none."""
+def _value_of(solution: Solution | None, number: CatalogueDimension) -> float:
+    """Return the value of a listed parameter at a solution; without a robot, the middle of the listed values."""
     state = None if solution is None else solution.outcomes[0].state
     if state is None:
         return (number.values[0] + number.values[-1]) / 2

@@ -42,8 +42,8 @@ from .solution import Combination, Solution, TaskOutcome
 from .starts import StartStatus, same_value
 from .status import Status
 
-#: Weights of the distance to the other tasks' points, in parts of F's scale, in descending order, for the search of the
-#: nearest optimum of a set: smaller weights approach it, and a final correction removes the rest.
+#: Weights of the distance to the other tasks' points, relative to the scale of F, for the search of the nearest optimum
+#: of a set: descending weights approach this optimum, and a final correction removes the rest.
 _DISTANCE_WEIGHTS = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
 #: Largest number of rounds of this choice, and the movement in half ranges below which the rounds end.
 _ROUNDS = 20

@@ -42,7 +42,7 @@ class Frame:
 
     Attributes:
         place: pose of the frame in the world, as expressions of a program.
-        is_path: whether this is the frame of a path; else it is the pose about which a workspace lies.
+        is_path: If true, this is the frame of a path; otherwise, the reference pose of a workspace.
     """
 
     place: SymbolicPose
@@ -63,7 +63,7 @@ class Frame:
         """Return an expression of a world pose that is fixed in this frame, from its value at a point of a program.
 
         Args:
-            at: pose in the world; none of its expressions is a variable of the frame.
+            at: pose in the world, whose expressions are no variables of the frame.
             nlp: the nonlinear program.
             x: (n,) the point at which the pose has its value.
         """
@@ -71,7 +71,7 @@ class Frame:
         return self.in_world(at.position - SX(position.tolist()), at.rotation @ SX(rotation.T.tolist()))
 
     def returned(self, at: SymbolicPose, nlp: Nlp, x: FloatArray) -> SymbolicPose:
-        """Return the world pose as if this frame had stayed at its place at a point (n,) of a program."""
+        """Return a world pose for the fixed place that this frame has at a point (n,) of a program."""
         position, rotation = self.at(self.place, nlp, x)
         turned = at.rotation @ self.place.rotation.T @ SX(rotation.tolist())
         return SymbolicPose(at.position - self.place.position + SX(position.tolist()), turned)

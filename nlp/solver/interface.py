@@ -1,7 +1,7 @@
 """Interface of local solvers: any function of the type :class:`Solver` can search a program.
 
 A solver reports its last point, the multipliers, the stop reason, and the number of iterations. The report is never
-trusted: :mod:`screwsynth.nlp.solver.starts` corrects the point and judges it by the conditions of the program.
+trusted: :mod:`screwsynth.nlp.solver.starts` corrects the point and checks its optimality conditions.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class Solver(Protocol):
         Args:
             nlp: nonlinear program with at least one variable.
             search: limit of iterations, and whether functions are compiled.
-            points: (k, n) later starting points, for a solver that scales the problem by them.
+            points: (k, n) starting points of the searches, by which a solver may scale the problem.
             count: number of searches.
 
         Raises:

@@ -57,10 +57,10 @@ def ipopt(nlp: Nlp, search: Search, points: FloatArray, count: int) -> list[Loca
 
 
 class Confirmation:
-    """Ipopt from points that are optimal already, with their multipliers: if it confirms a point, it stays there.
+    """Ipopt from points that are already optimal, with multipliers: a confirmed point does not move.
 
-    Its derivatives are existing functions of the program; another differentiation would take longer than a search.
-    Like every search it must be built and used in the same thread.
+    Derivatives are existing functions of the program, because another differentiation would take longer than a search.
+    Like every search, the object must be built and used in the same thread.
 
     Args:
         nlp: the nonlinear program.
@@ -165,9 +165,9 @@ def _given_derivatives(nlp: Nlp) -> tuple[dict[str, MX], dict[str, Any]]:
 
 
 def constraint_sizes(nlp: Nlp, points: FloatArray) -> FloatArray:
-    """Return typical gradient lengths (c,) of the limits in scaled variables; divided by them, rows are of order 1.
+    """Return typical gradient lengths (c,) of the limits in scaled variables, by which Ipopt's rows are divided.
 
-    The other constraints of the program are of order 1 already and have 1, unless narrow ranges make them small.
+    Other constraints have gradients of length about 1 and the divisor 1, unless narrow ranges make gradients small.
     """
     jacobians = [nlp.program.kernels.derivatives(x, nlp.arguments).jacobian for x in points[:_SAMPLED]]
     rows = np.array(jacobians) * nlp.scale
@@ -197,7 +197,7 @@ def _compiled_problem(problem: dict[str, SX]) -> str:
 
 
 def _options(max_iterations: int) -> dict[str, Any]:
-    """Return the options of CasADi and Ipopt, by their names there."""
+    """Return the options of CasADi and Ipopt, by the names in CasADi and Ipopt."""
     return {
         "print_time": False,
         "show_eval_warnings": False,

@@ -1,4 +1,4 @@
-"""Active journal, from which kept searches are read and to which new ones are added; most commands have none."""
+"""Active journal of searches: kept searches are read from it, new searches are added."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _journal: ContextVar[Keeper | None] = ContextVar("journal", default=None)
 
 @contextmanager
 def kept_in(journal: Keeper | None) -> Iterator[None]:
-    """Use a journal inside a block: read kept searches from it, and add new ones to it; None for no journal."""
+    """Use a journal inside a block: read kept searches, and add new searches; None for no journal."""
     token = _journal.set(journal)
     try:
         yield

@@ -44,7 +44,7 @@ from .screened import search_each
 from .starts import Optimum, Start, StartStatus, distinct_optima
 from .status import Phase, PhaseProgress, Status, no_phase
 
-#: Smallest improvement over the best optimum, in parts of F's scale, that is more than rounding.
+#: Smallest improvement over the best optimum, relative to the scale of F, that is more than rounding.
 _BETTER = 1e-6
 #: Number of starting points of the search for the smallest relaxation.
 _ELASTIC_STARTS = 8
@@ -57,14 +57,14 @@ class ProgramSolution(Whole):
     Attributes:
         status: outcome of the search; only :attr:`Status.OPTIMAL` stands for the best known point.
         nlp: the nonlinear program.
-        x: (n,) the best point: optimal, or only reached, as the status says.
-        state: state of the robot at ``x``; None where its equations have no value.
-        evidence: evidence of optimality at ``x``; None when nothing is free.
+        x: (n,) the best point; the status says whether the point is optimal.
+        state: state of the robot at ``x``; None if its loop equations have no solution.
+        evidence: evidence of optimality at ``x``; None without free variables.
         starts: every start, in order.
         optima: distinct optima of converged starts, best first.
         seed: seed of the starting points.
         seconds: wall time.
-        relaxation: smallest known relaxation of the limits that makes an infeasible program feasible; empty where none
+        relaxation: smallest known relaxation of the limits that makes an infeasible program feasible; empty if none
             is known.
         better: objective of a feasible point that is better than every optimum, but at which no search converged; None
             for none.
@@ -112,7 +112,7 @@ def solve_program(
     solver: Solver = ipopt,
     phase: PhaseProgress = no_phase,
 ) -> ProgramSolution:
-    """Solve a program; where its limits seem to contradict each other, search for the smallest relaxation.
+    """Solve a nonlinear program; if its limits seem to conflict, search for the smallest relaxation.
 
     Args:
         nlp: the nonlinear program.
@@ -188,7 +188,7 @@ def _search(
     solver: Solver,
     phase: PhaseProgress,
 ) -> ProgramSolution:
-    """Search a program from the first points and from sampled ones; repeat while the bounds of its level are active."""
+    """Search a program from first and sampled points; repeat while bounds of the epigraph variable are active."""
     solution = _search_within(nlp, search, first, jobs, progress, solver, phase)
     while (wider := with_wider_level(solution.nlp, solution.x)) is not None and not is_requested():
         solution = _search_within(wider, search, [*first, solution.x], jobs, progress, solver, phase)
@@ -205,7 +205,7 @@ def _search_within(
     solver: Solver,
     phase: PhaseProgress,
 ) -> ProgramSolution:
-    """Search a program from the first points and from sampled ones.
+    """Search a program from the first points and from sampled points.
 
     Of limits on many pairs, the program has those that the starting points violate. Limits that the results violate
     are added, and the affected starts are repeated until no limit is violated.
@@ -257,7 +257,7 @@ def _searched(
     solver: Solver,
     phase: PhaseProgress,
 ) -> tuple[Nlp, dict[int, Start]]:
-    """Return a program with the pairs that bind, and the searches from points (k, n) whose results are not yet known.
+    """Return a program with its active pairs, and the pending searches from points (k, n).
 
     If interrupted, the searches end before the last point.
     """
@@ -295,7 +295,7 @@ def _best_value(nlp: Nlp, starts: Iterable[Start]) -> float | None:
 
 
 def _evaluate_fixed(nlp: Nlp, search: Search, began: float) -> ProgramSolution:
-    """Evaluate a program without free variables: only the robot's loops are closed."""
+    """Evaluate a program without free variables, after closing the loops of the robot."""
     x = closed_point(nlp, search)
     status = Status.EVALUATED if measured_violation(nlp, x) <= FEASIBLE else Status.INFEASIBLE
     evidence = None if status is Status.EVALUATED else examine(nlp, x)

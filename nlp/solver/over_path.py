@@ -19,7 +19,7 @@ from .semi_infinite import ExchangeProof, JudgedDesign, SemiInfinite, design_of,
 
 
 def over_path(case: Case, nlp: Nlp) -> SemiInfinite:
-    """Return a program of a case whose limits hold along its path.
+    """Return a nonlinear program of a case, with limits along the path.
 
     Args:
         case: the case.

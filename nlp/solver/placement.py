@@ -25,8 +25,8 @@ class Placement(NamedTuple):
 
     Attributes:
         nlp: the nonlinear program.
-        numbers: function that returns the pose (6,) of the frame at a point of the program, or of an extended one.
-        frame: frame as expressions; None where the frame is fixed.
+        numbers: function that returns the pose (6,) of the frame at a point of the program or of an extended program.
+        frame: frame as expressions; None if the frame is fixed.
     """
 
     nlp: Nlp

@@ -45,7 +45,7 @@ from ..program.epigraph import level_constraint
 from ..program.nlp import Nlp
 from ..program.places import Scalar
 from ..proof.statement.claims import Claim, dependent_claims
-from ..proof.statement.machine import workspace_of_case
+from ..proof.statement.fixed_robot import workspace_of_case
 from ..proof.statement.tolerance import BuiltModel, built_model
 from ..proof.workspace.robot.pose_box import PoseNumbers, pose_box, rotation_of
 from ..proof.workspace.robot.posed_robot import NotJudgedError, Problem, build_problem
@@ -56,10 +56,10 @@ TIGHTER = 1e-3
 #: First words of the name of a claim about the reach of a limb; and smallest squared sine or cosine of the limb's reach
 #: in a constraint: for a quantity between 0 and 1, the limit 0 is tighter by this amount.
 REACH, _REACH = "reach limb ", TIGHTER
-#: Smallest determinant of J at a singular pose, as a part of that in the middle of the workspace.
+#: Smallest determinant of J at a singular pose, as a fraction of that in the middle of the workspace.
 _DETERMINANT = 1e-2
-#: Smallest determinant of J'J, as a part of that at the stated pose; the factor for each further singular pose; and the
-#: largest part. J'J has no sign, so the singular pose moves only a little: each further one must be farther away.
+#: Smallest determinant of J'J, as a fraction of that at the stated pose; factor for each further singular pose; largest
+#: fraction. J'J has no sign, so a singular pose moves only a little: each further singular pose must be farther away.
 _SQUARED, _MORE, _MOST = 1e-4, 4.0, 1e-2
 #: Bounds of reaches and determinants that hold for every proved design.
 _ABOVE = (0.0, math.inf)
@@ -82,7 +82,7 @@ class BindingPose(NamedTuple):
     Attributes:
         name: name of the claim.
         pose: pose in question; for a stroke, the pose of the shortest length.
-        longest: pose of the longest length, for a stroke; else None.
+        longest: pose of the longest length, for a stroke; otherwise None.
         errors: (m, 3) joint-centre errors of the robot within the tolerance; None for the exact robot.
     """
 
@@ -138,7 +138,7 @@ class _ClosedPose:
 
 
 class _PosedClaim(NamedTuple):
-    """A claim as constraints of a program, and of its level if that is minimised, with the robot at its poses."""
+    """A claim as constraints of a program, and of a minimised epigraph variable, with the robot at its poses."""
 
     poses: tuple[_ClosedPose, ...]
     constraints: tuple[BoundedConstraint, ...]
@@ -151,14 +151,14 @@ class PoseConstraints:
     Args:
         nlp: nonlinear program without these constraints.
         case: the case.
-        middle: pose whose determinant of J is the reference; the middle of the workspace if left out.
+        middle: reference pose for the determinant of J; the middle of the workspace if left out.
         frame: frame in which poses are given; the world if left out.
     """
 
     def __init__(self, nlp: Nlp, case: Case, middle: PoseNumbers | None = None, frame: Frame | None = None) -> None:
         if middle is None:
             if case.workspace is None:
-                raise TypeError("case.workspace: expected a workspace where limits hold over it, got None")
+                raise TypeError("case.workspace: limits over a workspace need a workspace, got None")
             box = pose_box(case.workspace)
             middle = box.pose(box.middle)
         self._nlp, self._case, self._middle, self._frame = nlp, case, middle, frame
@@ -264,7 +264,7 @@ class PoseConstraints:
         return np.array([at_design(x) for x in points])
 
     def _claim(self, binding: BindingPose, problem: Problem, x: FloatArray) -> _PosedClaim | None:
-        """Return a claim as constraints; None without any, or where the loops of the design (n,) cannot be closed."""
+        """Return a claim as constraints; None without constraints, or if the design (n,) cannot be assembled."""
         where = f" workspace pose {len(self._claims) + 1}"
         poses = []
         for pose in binding.poses:
@@ -286,7 +286,7 @@ class PoseConstraints:
     def _closed_pose(
         self, pose: PoseNumbers, errors: FloatArray | None, problem: Problem, x: FloatArray, where: str
     ) -> _ClosedPose | None:
-        """Return a robot at a pose; None where the loops of the design (n,) cannot be closed."""
+        """Return a robot at a pose; None if the loops of the design (n,) cannot be closed."""
         nlp, count, box = self._nlp, len(problem.free), problem.box
         y = box.coordinates(self._numbers(pose, x))
         start = _closed_at(problem, y)
@@ -438,9 +438,9 @@ class PoseConstraints:
 
 
 def with_margin(nlp: Nlp, part: float) -> Nlp:
-    """Return a program with limits at poses that are tighter than in the case by a part of their present margin.
+    """Return a program with limits at poses that are tighter than in the case by a fraction of the present margin.
 
-    With ``part`` 0 they are the limits of the case, and any poses give constraints that a valid design satisfies.
+    With ``part`` 0, the limits are those of the case, so that a valid design satisfies the constraints at any pose.
     """
     stated = [each.stated for each in nlp.program.constraints]
 
@@ -460,13 +460,13 @@ def _rows(robot: RobotInstance, length: float) -> SX:
 
 
 def _are_alike(one: FloatArray, other: FloatArray, part: float) -> bool:
-    """Return whether values (designs, constraints) are equal up to a small part of their size."""
+    """Return whether values (designs, constraints) are equal up to a small relative error."""
     most = part * _ALIKE * np.abs(other).max(initial=0.0)
     return one.shape == other.shape and bool(np.abs(one - other).max() <= most)
 
 
 def _problem(design: Case, workspace: Workspace) -> Problem | None:
-    """Return the problem of a design over its workspace; None where its loops cannot be closed in the middle."""
+    """Return the problem of a design over its workspace; None if the loops cannot be closed at its centre."""
     try:
         return build_problem(design, closed_form(design.model).model, pose_box(workspace))
     except NotJudgedError:

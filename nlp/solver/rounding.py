@@ -19,7 +19,7 @@ import numpy as np
 
 from ...models import Dimension
 from ..case.case import Case
-from ..case.choices import ChosenNumber, listed_numbers, within_ranges
+from ..case.choices import ChosenDimension, catalogue_dimensions, within_ranges
 from ..case.pose import Free, Value
 from ..case.task import Method
 from ..errors import InputError
@@ -28,7 +28,7 @@ from .solution import Rounding, Solution
 from .solve import solve
 from .status import Status
 
-#: Numbers of additional multiples on each side of the nearest ones, in the order in which they are tried.
+#: Numbers of additional multiples on each side of the nearest multiples, in the order of the attempts.
 _FARTHEST = 3
 #: Largest number of solves for each of these: with many dimensions not every combination can be searched.
 _MOST = 200
@@ -58,7 +58,7 @@ def round_design(
     jobs: int | None = None,
     compiled: bool = False,
 ) -> Solution:
-    """Return a solution with rounded lengths and angles of its robot; everything else is solved again.
+    """Return a solution with rounded lengths and angles of the robot; all other variables are solved again.
 
     Args:
         solution: answer to a case; a solution without an answer is returned unchanged.
@@ -80,7 +80,9 @@ def round_design(
     check_rounding(case, step)
     if not solution.status.is_answer:
         return solution
-    chosen = case if solution.choice is None else within_ranges(case, listed_numbers(case), solution.choice.chosen)
+    chosen = (
+        case if solution.choice is None else within_ranges(case, catalogue_dimensions(case), solution.choice.chosen)
+    )
     places = list(_places(chosen, solution))
     solve_fixed = partial(solve, starts=starts, seed=seed, jobs=jobs, compiled=compiled)
     found, farther = solution, 0
@@ -91,12 +93,12 @@ def round_design(
             for item in case.model.parameters
         }
         near = replace(chosen, parameters=parameters)
-        found = solve_choices(near, solve_fixed, _MOST) if listed_numbers(near) else solve_fixed(near)
+        found = solve_choices(near, solve_fixed, _MOST) if catalogue_dimensions(near) else solve_fixed(near)
         if found.status.is_answer or found.status is Status.INTERRUPTED:
             break
     state = found.outcomes[0].state
     numbers = tuple(
-        ChosenNumber(
+        ChosenDimension(
             name=each.name,
             value=math.nan if state is None else float(np.ravel(state.parameters[each.parameter])[each.component]),
             unit=case.units.label(each.dimension),
@@ -145,7 +147,7 @@ def _places(case: Case, solution: Solution) -> Iterator[_Place]:
 
 
 def _multiples(place: _Place, step: float, farther: int, case: Case, option: str) -> Value:
-    """Return the multiples of a step near a value: the nearest ones, and ``farther`` more on each side.
+    """Return the nearest multiples of a step to a value, and ``farther`` more multiples on each side.
 
     Raises:
         InputError: there is no multiple within the bounds of the value.

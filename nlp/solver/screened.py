@@ -39,7 +39,7 @@ def search_each(
         solver: local solver.
 
     Yields:
-        One start for each point, in order; if a stop is requested, only those that are done.
+        One start for each point, in order; after a stop request, only the complete starts.
 
     Raises:
         InputError: the objective cannot be compiled, although the search asks for it.
@@ -57,7 +57,7 @@ def search_each(
 def _search_block(
     nlp: Nlp, points: FloatArray, search: Search, jobs: int | None, confirmed: _Confirmed
 ) -> Iterator[Start]:
-    """Screen points, and yield their starts in order; if a stop is requested, only those that are done."""
+    """Screen points, and yield their starts in order; after a stop request, only the complete starts."""
     found = screen(nlp, points, confirmed.sizes, search.max_iterations, jobs)
     starts: list[Start | None] = []
     for k in range(len(points)):
@@ -81,8 +81,8 @@ def _search_block(
 class _Confirmed:
     """Confirmation by Ipopt of optima from the search in C.
 
-    Of points with equal F, as on a connected set of optima, Ipopt confirms the first, and each that is better even by
-    rounding, so that the best point always comes from Ipopt.
+    Among points with equal F, Ipopt confirms the first point, and each point that is better even within rounding
+    error. So the best point always comes from Ipopt.
 
     Args:
         nlp: the nonlinear program.
@@ -96,7 +96,7 @@ class _Confirmed:
         self._known: list[Start] = []
 
     def start(self, found: Screened, k: int) -> Start | None:
-        """Return the k-th start, or None where Ipopt must search from its starting point."""
+        """Return the k-th start, or None if Ipopt must search from its starting point."""
         if not found.converged[k]:
             return None
         n, iterations = self._nlp.n, int(found.iterations[k])
@@ -116,7 +116,7 @@ class _Confirmed:
         return start
 
     def _confirm(self, screened: SolverResult) -> Start | None:
-        """Return the start for an optimum of the search in C; None where it violates the program's conditions.
+        """Return the start for an optimum of the search in C; None if it violates the program's conditions.
 
         Ipopt's point counts unless Ipopt fails from there, or moves to a worse point.
         """
@@ -138,7 +138,7 @@ class _Confirmed:
         return own if is_good and loss > SAME_F * nlp.objective_scale else confirmed
 
     def _is_of_known_value(self, start: Start) -> bool:
-        """Return whether Ipopt has confirmed a point with the same F that is at least as good."""
+        """Return whether Ipopt has confirmed a point that has the same F and is not worse."""
         tolerance, sign = same_value(self._nlp), self._nlp.sign
         known = (sign * (start.F - each.F) for each in self._known if each.solver != SCREEN)
         return any(0 <= worse <= tolerance for worse in known)

@@ -39,14 +39,14 @@ _DIGITS, _ROUNDING = 12, 1e-14
 
 
 class KeptSearch(NamedTuple):
-    """Outcome of a search of a program. Numbers are texts, which keep every digit and also values that are not finite.
+    """Outcome of a search of a program. Numbers are texts, to keep every digit and infinite values.
 
     Attributes:
         key: text that identifies the search.
         status: value of the status.
         x, lower, upper: best point, and bounds of the last searched program.
         pairs: constraints of limits on pairs that were added to the program.
-        has_evidence: whether there is evidence at ``x``.
+        has_evidence: If true, evidence of optimality exists at ``x``.
         starts: status, objective, stationarity, violation, iterations, solver and point of each start.
         optima: objective, count, spread and point of each distinct optimum.
         relaxation: key, unit, dimension, limit and needed value of each limit to relax.
@@ -108,7 +108,7 @@ class SearchJournal(JournalFile):
             path, {"screwsynth": "searches", "version": __version__}, "command", "choose another --resume, or remove it"
         )
 
-    def found(self, place: int, line: bytes) -> None:
+    def load_entry(self, place: int, line: bytes) -> None:
         """Store an entry that is in the file."""
         del place
         with suppress(ValueError):
@@ -150,8 +150,8 @@ class SearchJournal(JournalFile):
 
     @property
     def words(self) -> str:
-        """Number of entries, and how to resume from them."""
-        return f"{self.count}: the same command goes on from there" if self._kept else "no search is done"
+        """Number of entries, and the way to resume, in words."""
+        return f"{self.count}: the same command continues from there" if self._kept else "no search is complete"
 
     @property
     def count(self) -> str:
@@ -188,11 +188,11 @@ def _vector(text: str, count: int) -> FloatArray:
     """Return an array (n,) from a text.
 
     Raises:
-        ValueError: the text has another number of values.
+        ValueError: the text does not have ``count`` values.
     """
     values = [float(part) for part in text.split()]
     if len(values) != count:
-        raise ValueError(f"the entry belongs to another program: expected {count} values")
+        raise ValueError(f"the entry belongs to another nonlinear program: expected {count} values, got {len(values)}")
     return frozen_array(values, (count,))
 
 
@@ -273,7 +273,7 @@ def kept_certificate(
     Args:
         nlp: the nonlinear program.
         x: (n,) incumbent; None without one.
-        certified: function that certifies the program from this point.
+        certified: function that certifies the program, beginning with the incumbent.
         gap: requested gap, as for :func:`.certify_program`.
         above: value of F to prove as a lower bound, as for :func:`.certify_program`.
     """

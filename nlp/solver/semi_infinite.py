@@ -1,4 +1,4 @@
-"""Semi-infinite programming by exchange of poses: a design that is regular and satisfies its limits over a workspace.
+"""Semi-infinite programming by exchange of poses: regular designs that satisfy limits over a workspace.
 
 A limit over a workspace is one constraint at each of its poses. A program with a few of them is solved, and its design
 is judged over the whole workspace (:mod:`screwsynth.nlp.proof.workspace`). Poses that refute a claim become constraints
@@ -38,7 +38,7 @@ from ..path.path import SymbolicPose
 from ..program.nlp import Nlp
 from ..proof.enclosure.engine import kernel
 from ..proof.statement.claims import REGULAR
-from ..proof.statement.machine import JointErrors, workspace_of_case
+from ..proof.statement.fixed_robot import JointErrors, workspace_of_case
 from ..proof.statement.posed_layout import reach_claims
 from ..proof.workspace.judge import judge_workspace
 from ..proof.workspace.judgement import Judgement
@@ -56,7 +56,7 @@ _PARTS = (1.0, 1e-1, 1e-2, 1e-3, 0.0)
 #: Relative amount by which a minimised level may be larger over the workspace.
 LEVEL_ROOM = 1e-3
 #: Reason why ranks are not judged.
-_UNREACHED = "a limb does not reach every pose, so that J is not judged"
+_UNREACHED = "a limb does not reach every pose, so the rank of J is not checked"
 #: Largest number of exchanges.
 MOST_EXCHANGES = 40
 
@@ -71,7 +71,7 @@ class ExchangeProof:
     Attributes:
         judgement: verdicts on the design.
         poses: poses of the constraints, in the order in which they were added.
-        history: F, and the number of claims that were not proved, of each design in turn.
+        history: F and the number of unproved claims of each design, in order.
         first: verdicts on the first design, with limits at the stated poses only.
         tighter: relative amount by which the constraints are tighter than the limits of the case.
         place: (6,) pose of a path's frame: position, then roll, pitch and yaw, radians; empty for a workspace.
@@ -96,7 +96,7 @@ class JudgedDesign(NamedTuple):
     Attributes:
         design: design, with the set of poses as its workspace.
         judgement: verdicts on the design.
-        faults: pose for each claim that is not proved; None for a claim that is undecided and has no pose.
+        faults: pose for each unproved claim; None for an undecided claim without a pose.
     """
 
     design: Case
@@ -111,7 +111,7 @@ class SemiInfinite(NamedTuple):
         nlp: nonlinear program without constraints at poses.
         constraints: constraints at poses, none yet.
         judge: function that judges the design of a solution, with a gap.
-        in_world: function that returns a proof at a point (n,) of the program with its poses in the world frame.
+        in_world: function that converts the poses of a proof to the world frame, for a point (n,) of the program.
     """
 
     nlp: Nlp
@@ -121,7 +121,7 @@ class SemiInfinite(NamedTuple):
 
 
 def over_workspace(case: Case, nlp: Nlp) -> SemiInfinite:
-    """Return a program of a case whose limits hold over its workspace.
+    """Return a nonlinear program of a case, with limits over the workspace.
 
     Args:
         case: the case.
@@ -160,10 +160,10 @@ def check_exchange(case: Case) -> None:
         InputError: the C kernel was not built.
     """
     if len(case.tasks) > 1 and case.method is Method.AVERAGE:
-        fault = f"must be 'weighted-sum' or 'worst-case' where limits hold {case.limits_where}: an average keeps none"
+        fault = f"must be 'weighted-sum' or 'worst-case' with limits {case.limits_where}: an average ignores limits"
         raise CaseError("combine.method", fault, case.method.value, case.source)
     if len(case.tasks) > 1 and case.path is not None and any(isinstance(each, Free) for each in case.path.place):
-        raise CaseError("path.place", "must be fixed where several tasks are combined", source=case.source)
+        raise CaseError("path.place", "must be fixed if several tasks are combined", source=case.source)
     kernel()  # a missing kernel is reported before any solve
 
 
@@ -171,9 +171,9 @@ def check_exchange(case: Case) -> None:
 def exchanged(
     problem: SemiInfinite, solve_one: SolveOne, first: Sequence[FloatArray] = ()
 ) -> tuple[ProgramSolution, ExchangeProof | None]:
-    """Return the solution of a program whose limits hold at every pose of a set, and the proof; None without an answer.
+    """Return the solution with limits at every pose of a set, and the proof; the proof is None without an answer.
 
-    A design that is not proved at the end of the exchange is no answer. If a stop is requested, the result is the last
+    An unproved design at the end of the exchange is not an answer. If a stop is requested, the result is the last
     judged design.
 
     Args:
@@ -209,7 +209,7 @@ def exchanged(
 def _solve_within(
     nlp: Nlp, solve_one: SolveOne, start: FloatArray, parts: Sequence[float]
 ) -> tuple[ProgramSolution, list[float]]:
-    """Return the solution of a program with the largest margin that a design satisfies, and the remaining margins.
+    """Return the solution with the largest safety margin that a design satisfies, and the remaining margins.
 
     Args:
         nlp: nonlinear program with the whole margin.
@@ -253,7 +253,7 @@ def with_objective(design: Case, level: float) -> Case:
 
 
 def _judged(case: Case, gap: float) -> Judgement:
-    """Return the verdicts on a design over its workspace; if a limb does not reach every pose, on the reaches only."""
+    """Return the verdicts on a design over its workspace; only on the reaches if a limb does not reach every pose."""
     closed, workspace = closed_form(case.model), workspace_of_case(case)
     # Poses that the robot cannot take are no evidence about the reach of its limbs.
     if workspace.position_set is not None:
@@ -289,7 +289,7 @@ def design_of(case: Case, nlp: Nlp, x: FloatArray) -> Case:
 
 
 def faults_of(judged: Judgement) -> Iterator[BindingPose | None]:
-    """Yield a pose for each claim that is not proved; None for a claim that is undecided and has no pose.
+    """Yield a pose for each unproved claim; None for an undecided claim without a pose.
 
     There is no constraint for the rank of the constraint wrenches.
     """
@@ -300,7 +300,7 @@ def faults_of(judged: Judgement) -> Iterator[BindingPose | None]:
 
 
 def _faults_of_numbers(extremes: Sequence[Verdict]) -> Iterator[BindingPose | None]:
-    """Yield a pose for each limited quantity that is not proved; None where it is undecided and has no pose."""
+    """Yield a pose for each unproved limited quantity; None for an undecided quantity without a pose."""
     by_name = {(each.name, each.sense): each for each in extremes}
     for each in extremes:
         if not each.fails:

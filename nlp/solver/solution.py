@@ -12,10 +12,10 @@ from ...models.shown import Shown
 from ...models.values import dataclass
 from ...models.whole import Whole
 from ..case.case import Case
-from ..case.choices import ChosenNumber, Ranges
+from ..case.choices import ChosenDimension, Ranges
 from ..case.task import Method, Task
 from ..errors import EvaluationError, InputError, nearest
-from ..evidence.evaluation import shown_numbers, shown_parameters
+from ..evidence.evaluation import shown_parameters, shown_values
 from ..evidence.optimality import Evidence
 from ..evidence.state import RobotState
 from ..program.nlp import Nlp
@@ -64,7 +64,7 @@ class Answer:
         return picture_of(solution)
 
     def report(self, file: str | Path | None = None) -> str:
-        """Return a page about the answer as HTML, which needs no network.
+        """Return an HTML page about the answer, which opens without a network.
 
         Args:
             file: file for the page; None for none.
@@ -94,16 +94,16 @@ class TaskOutcome:
     Attributes:
         task: task with its scaled weight.
         own: solution of the separate program of the task.
-        unique: whether the separate optimum of the task is the only one.
+        unique: If true, the task has only one separate optimum.
         x: (n,) point of the task's optimal set that is combined with those of other tasks.
-        state: state of the robot at the solution's point, with this task's rates, at the first pose; None where the
+        state: state of the robot at the solution's point, with this task's rates, at the first pose; None if the
             loops cannot be closed.
         F: objective of the task at the solution's point; NaN where the loops cannot be closed.
-        evidence: evidence at the solution's point for this task by itself; None when nothing is free.
-        loss: difference by which F is worse than the task's separate optimum; negative where the combined search
-            reached a better optimum, and 0 for a case with one task.
+        evidence: evidence of optimality at the solution for this task only; None without free variables.
+        loss: loss of F compared with the task's separate optimum; negative if the combined search reached a better
+            optimum; 0 for a case with one task.
         exchanged: solution of the task's separate program with the poses of the exchange as constraints, for several
-            tasks with limits over a workspace or along a path; ``own`` is without these poses. Else None.
+            tasks with limits over a workspace or along a path; otherwise None. ``own`` is without these poses.
     """
 
     task: Task
@@ -127,7 +127,7 @@ class Combination:
         weights: weight of each task, scaled to sum to the number of tasks.
         violated: names of the bounds and constraints that the combined point violates.
         notices: sentences about scaled weights and optima that are not unique.
-        combined: solution of the combined program; None for an average, or where a task has no separate optimum.
+        combined: solution of the combined program; None for an average, or if a task has no separate optimum.
     """
 
     method: Method
@@ -159,7 +159,7 @@ class Choice:
         combinations: number of all combinations.
         solved: number of solved combinations.
         relaxed: number of parts that were solved with the parameters free between their smallest and largest values.
-        is_complete: whether every combination was solved, or skipped in a part that is no better.
+        is_complete: If true, every combination was solved, or belongs to a part without a better combination.
         parts: parts that together cover all combinations.
         chosen: combination of the solution.
     """
@@ -182,14 +182,14 @@ class Rounding:
         after: objective of the rounded design, as a cost to be minimised; infinite without an answer.
         farther: number of additional multiples on each side of the nearest ones that were searched.
         numbers: rounded dimensions; their values are NaN without an answer.
-        choice: search over the multiples; None where each dimension has only one.
+        choice: search over the multiples; None if each dimension has only one multiple.
     """
 
     step: float
     before: float
     after: float
     farther: int
-    numbers: tuple[ChosenNumber, ...]
+    numbers: tuple[ChosenDimension, ...]
     choice: Choice | None
 
 
@@ -212,12 +212,12 @@ class Solution(Whole, Shown, Answer):
         outcomes: outcome of each task.
         combination: combination of several tasks; None for one task.
         seconds: wall time.
-        workspace: proof that the design satisfies its limits over the workspace; None where no limit holds there, or
+        workspace: proof that the design satisfies its limits over the workspace; None if no limit holds there, or
             the program has no answer.
-        path: proof that the design satisfies its limits along the path; None where no limit holds there, or the program
+        path: proof that the design satisfies its limits along the path; None if no limit holds there, or the program
             has no answer.
-        choice: search over listed parameter values, which the programs have fixed; None without such values.
-        rounding: rounding of dimensions, which the programs have fixed; None without rounding.
+        choice: search over listed parameter values; None without listed values.
+        rounding: rounding of dimensions; None without rounding.
     """
 
     case: Case
@@ -253,9 +253,9 @@ class Solution(Whole, Shown, Answer):
             InputError: the case has no value of this name.
             EvaluationError: the robot's loops cannot be closed at the point.
         """
-        numbers = shown_numbers(self.outcomes[0].own.nlp, self.x, self._state())
+        numbers = shown_values(self.outcomes[0].own.nlp, self.x, self._state())
         if name not in numbers:
-            raise InputError(f"{name}: no such number; {nearest(str(name), numbers)}")
+            raise InputError(f"{name}: no such value; {nearest(str(name), numbers)}")
         return numbers[name]
 
     @property
@@ -280,7 +280,7 @@ class Solution(Whole, Shown, Answer):
 
     @property
     def keeps_limits(self) -> bool:
-        """Whether all limits over a workspace or along a path are proved."""
+        """True if all limits over a workspace or along a path are proved."""
         return all(proof is None or proof.is_proved for proof in (self.workspace, self.path))
 
     @property
@@ -290,9 +290,9 @@ class Solution(Whole, Shown, Answer):
 
     @property
     def all_solved(self) -> bool:
-        """Whether every program of the method is solved, so that the point is an answer of the method.
+        """True if all nonlinear programs of the method are solved, so that the point is an answer.
 
-        An interrupted search, for example over listed values, is no answer, even if its best program is solved.
+        An interrupted search, for example over listed values, is not an answer, even if its best program is solved.
         """
         has_answers = all(outcome.own.status.is_answer for outcome in self.outcomes)
         decisive = self.decided_by
@@ -307,12 +307,12 @@ class Solution(Whole, Shown, Answer):
             EvaluationError: the solve failed, or the case has several tasks.
         """
         if self.combination is not None:
-            raise EvaluationError("F: a case with several tasks has one F for each: see outcomes and combination.value")
+            raise EvaluationError("F: a case with several tasks has no single F: see outcomes and combination.value")
         return self.outcomes[0].own.F
 
     @property
     def state(self) -> RobotState | None:
-        """State of the robot at the point, with the rates of the first task; None where loops cannot be closed."""
+        """State of the robot at the point, with the rates of the first task; None if loops cannot be closed."""
         return self.outcomes[0].state
 
     @property
@@ -367,7 +367,7 @@ class Solution(Whole, Shown, Answer):
 
 
 def interrupted(solution: Solution) -> Solution:
-    """Return the best solution so far of an interrupted search; it is no answer."""
+    """Return the best solution so far of an interrupted search, which is not an answer."""
     if not solution.status.is_answer:
         return solution
     outcomes = solution.outcomes

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from ...models import FloatArray
 from ..case.case import Case
-from ..case.choices import listed_numbers
+from ..case.choices import catalogue_dimensions
 from ..case.settings import Search
 from ..errors import CaseError
 from ..program.formulation import formulate_each, formulate_everywhere
@@ -46,7 +46,7 @@ def solve(
 ) -> Solution:
     """Solve a case: its task, or each of several tasks and then their combination by the method of the case.
 
-    Of listed parameter values, the best combination is chosen: see :mod:`.choices`.
+    For listed parameter values, the solve chooses the best combination: see :mod:`.choices`.
 
     Args:
         case: the case.
@@ -64,7 +64,7 @@ def solve(
             workspace or along a path, and the C kernel for their proof was not built; or the path cannot be read.
     """
     began = time.perf_counter()
-    if listed_numbers(case):
+    if catalogue_dimensions(case):
         from .choices import solve_choices  # noqa: PLC0415 - few cases have listed values
 
         solve_fixed = partial(
@@ -115,8 +115,8 @@ def solve_programs(
         progress: function to call after each start.
         solver: local solver that searches from each starting point.
         phase: function to call with the phase of the solve and its progress.
-        everywhere: function that returns a program with limits over a workspace or along a path, from one with limits
-            at the stated poses; None for none.
+        everywhere: function that adds limits over a workspace or along a path to a program with limits at the stated
+            poses; None without such limits.
 
     Raises:
         CaseError: the case has several tasks and nothing free.
@@ -139,7 +139,7 @@ def solve_programs(
         return found
 
     if len(nlps) > 1 and nlps[0].is_fixed:
-        raise CaseError("robot", "has nothing free, so that several tasks cannot be combined", source=case.source)
+        raise CaseError("robot", "has no free variable, so several tasks cannot be combined", source=case.source)
     if len(nlps) == 1:
         found = solve_everywhere(case, case.tasks[0].name, nlps[0])
         return replace(solution_of_one_task(case, found), **proof)

@@ -1,4 +1,4 @@
-"""Searches from many starting points, each corrected and judged by the program's conditions, and their distinct optima.
+"""Searches from many starting points: Newton corrections, optimality conditions, and distinct optima.
 
 The sides that the solver reports as active are fixed, and a few Newton steps bring the solver's point to rounding
 error. The first-order conditions of the program then decide on convergence, never the report of the solver.
@@ -36,8 +36,8 @@ if TYPE_CHECKING:
 
 #: A side farther than this from the solver's point, in half ranges, does not belong to the active set.
 _NEAR = 1e-2
-#: A side is taken as active if its multiplier exceeds this part of its slack. The smallest part, with the most sides,
-#: is tried first; larger parts follow unless the corrected point is as stationary as ``_POLISHED``.
+#: A side is taken as active if its multiplier exceeds this fraction of its slack. The smallest fraction, with the most
+#: sides, is tried first; larger fractions follow unless the corrected point is as stationary as ``_POLISHED``.
 _SHARES = (1e-4, 1.0, 1e2)
 _POLISHED = 1e-10
 #: Distance of a unit normal from the span of others below which it depends on them.
@@ -48,8 +48,8 @@ _EXACT = 1e-13
 _WORSE = 1e-8
 #: Distance between points, in half ranges, below which two optima are the same.
 SAME_POINT = 1e-4
-#: Largest difference of F between the solver's point and the nearby optimum, in parts of F's scale: the remainder of an
-#: interior-point method's barrier.
+#: Largest difference of F between the solver's point and the nearby optimum, relative to the scale of F: the remainder
+#: of an interior-point method's barrier.
 SAME_F = 1e-6
 #: Smallest number of starts for each thread: with fewer, building another solver takes longer than the thread saves.
 _STARTS_PER_JOB = 12
@@ -115,7 +115,7 @@ def search_from(
         solver: local solver.
 
     Yields:
-        One start for each point, in order; if a stop is requested, only those that are done.
+        One start for each point, in order; after a stop request, only the complete starts.
 
     Raises:
         InputError: the objective cannot be compiled, although the search asks for it.
@@ -152,7 +152,7 @@ def search_from(
 
 
 def _wait_for(future: Future[SolverResult]) -> SolverResult | None:
-    """Return the result of a search, or None if a stop is requested before."""
+    """Return the result of a search, or None if a stop is requested first."""
     while not is_requested():
         try:
             return future.result(timeout=_LOOK)
@@ -177,7 +177,7 @@ def known_optimum(nlp: Nlp, stopped: FloatArray, known: list[Start]) -> Start | 
 
 
 def judge(nlp: Nlp, found: SolverResult) -> Start:
-    """Return the corrected last point of a solver, judged by the conditions of the program."""
+    """Return the last point of a local solver after Newton corrections, with its status by the conditions."""
     stopped = np.clip(found.x, nlp.lower, nlp.upper)
     raw = at = linearise(nlp, stopped)
     active = at.active()
@@ -238,7 +238,7 @@ def _independent(normals: FloatArray, order: NDArray[np.intp]) -> list[int]:
     return kept
 
 
-#: Difference of F, in parts of its scale, below which two optima have the same F.
+#: Difference of F, relative to its scale, below which two optima have the same F.
 SAME_VALUE = 1e-9
 
 
@@ -250,7 +250,7 @@ class Optimum:
         F: objective.
         count: number of starts that converged to the optimum.
         x: (n,) one of its points.
-        spread: largest distance between its points along one variable, as a part of that variable's range: 0 for an
+        spread: largest distance between its points along one variable, divided by the range of the variable: 0 for an
             isolated optimum, up to 1 for a set of optima, which may have several pieces.
         evidence: evidence of optimality at ``x``.
         nlp: nonlinear program of the optimum.

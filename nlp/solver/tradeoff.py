@@ -29,7 +29,7 @@ from .multistart import ProgramSolution, solve_program
 from .solution import Solution
 from .solve import solve_programs
 
-#: Smallest improvement by a neighbour's optimum, in parts of the objective's scale, that is more than rounding.
+#: Smallest improvement by a neighbour's optimum, relative to the scale of the objective, that is more than rounding.
 _BETTER = 1e-9
 
 Given = ParamSpec("Given")
@@ -42,7 +42,7 @@ class TradeoffPoint:
     Attributes:
         value: value, in the case's unit.
         solution: solution of the case with this value; its status says whether it is an answer.
-        certified: certificates of an answer; None where they were not requested.
+        certified: certificates of an answer; None if not requested.
     """
 
     value: float
@@ -58,7 +58,7 @@ class Tradeoff:
         name: name of the varied parameter, bound or limit, such as ``limits.leg_length.max``.
         points: optimum at each solved value, in order.
         seconds: wall time.
-        unsolved: remaining values that an interrupted command did not solve; empty otherwise.
+        unsolved: values that an interrupted command did not solve; empty otherwise.
     """
 
     name: str
@@ -117,8 +117,8 @@ def tradeoff(
     """
     axes = axes_of(over)
     if len(axes) != 1:
-        fault = f"over: must have one number for a trade-off curve, got {listing(axes)}"
-        raise InputError(f"{fault}; sweep takes several" if axes else fault)
+        fault = f"over: must name exactly one parameter, bound or limit, got {listing(axes)}"
+        raise InputError(f"{fault}; use sweep for several" if axes else fault)
     ((name, values),) = axes.items()
     case_at = case if not isinstance(case, Case) else lambda value: with_settings(case, {name: value})
     return solve_along(
@@ -168,7 +168,7 @@ def solve_along(
     if certified:
         kernel()  # a missing kernel is reported before any solve
     if not values:
-        raise InputError(f"{name}: a trade-off needs at least one value")
+        raise InputError(f"{name}: a trade-off needs one value or more, got none")
     cases = [case_at(value) for value in values]
     solutions: list[Solution] = []
     for done, case in enumerate(cases, 1):
@@ -195,7 +195,7 @@ def solve_along(
 
 
 def _certified(point: TradeoffPoint, left: int, jobs: int | None) -> TradeoffPoint:
-    """Return an answer with its certificates, in an equal share of the remaining time, for ``left`` values."""
+    """Return an answer with its certificates, in an equal share of the remaining time of ``left`` values."""
     if not point.solution.status.is_answer:
         return point
     with within(seconds_left() / left):

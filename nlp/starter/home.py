@@ -23,7 +23,7 @@ from ...models import (
     homogenised,
     screw_from_axis,
 )
-from ...models.mechanism.freedoms import null_space
+from ...models.mechanism.mobility import null_space
 from ...models.rows import rank_of
 from ..case.case import Case
 from ..case.pose import Free, Rotation, Value
@@ -130,7 +130,7 @@ def read_home(model: Model, size: float) -> Home:
 
     Args:
         model: the robot.
-        size: length of the order of the robot's size.
+        size: length comparable to the robot's size.
     """
     reach = round_number(_REACH * size)
     every, any_axis = (True, True, True), Turning(3)

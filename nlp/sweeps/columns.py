@@ -1,4 +1,4 @@
-"""The rows of a sweep as a table of designs, as typed columns, and as a result."""
+"""Rows of a sweep as a table of designs, as typed columns, and as a result."""
 
 from __future__ import annotations
 
@@ -34,27 +34,27 @@ from .sweep import Sweep
 
 @dataclass(frozen=True, eq=False)
 class SweepColumns:
-    """The answers of a sweep, column by column, in the order of its N points; NaN where there is no number.
+    """Results of a sweep as columns, in the order of its N points; NaN for missing numbers.
 
     Attributes:
-        numbers: (N,) values of each number that changes, by name.
-        status: that of a solve; ``refused`` where the case contradicts itself.
+        numbers: (N,) values of each varied parameter, bound or limit, by name.
+        status: status of each solve; ``refused`` if the case contradicts itself.
         F: (N,) objective; for several tasks the value of their combination.
-        design: (N,) each free number of the case by name, in the case's units.
-        active: sides of bounds and limits that each design lies on.
-        multipliers: of the active sides.
-        verdict: on each point.
-        stationarity: (N,) evidence, as the two that follow.
-        feasibility: (N,) largest distance outside a side.
+        design: (N,) values of each design variable by name, in the case's units.
+        active: active sides of bounds and limits of each design.
+        multipliers: multipliers of the active sides.
+        verdict: kind of each point, such as a strict local maximum.
+        stationarity: (N,) largest scaled derivative of the Lagrangian.
+        feasibility: (N,) largest scaled violation of a bound or limit.
         curvature: (N,) smallest eigenvalue of the reduced Hessian.
         starts: (N,) number of searches.
-        converged: (N,) number of those that converged.
-        engine: whose point it is.
+        converged: (N,) number of converged searches.
+        engine: engine that found each point, ``compiled`` or ``ipopt``.
         seconds: (N,) wall time.
-        note: reason of a refusal; that limits over a workspace are taken at the stated pose alone, or not proved.
-        certificate: status of each proof; empty texts without ``certified``.
-        bound: (N,) proven bound of F.
-        gap: (N,) its distance from F.
+        note: reason of a refusal, or note on limits over a workspace that are only checked at the stated pose.
+        certificate: status of each certificate; empty texts without ``certified``.
+        bound: (N,) proved bound of F.
+        gap: (N,) absolute difference of F and the bound.
     """
 
     numbers: Mapping[str, FloatArray]
@@ -81,11 +81,11 @@ class SweepColumns:
 
     def __repr__(self) -> str:
         answers = int(np.isfinite(self.F).sum())
-        return f"<SweepColumns of {len(self):,} points over {', '.join(self.numbers)}: {answers:,} have an answer>"
+        return f"<SweepColumns of {len(self):,} points over {', '.join(self.numbers)}: {answers:,} with an optimum>"
 
 
 def columns_of(sweep: Sweep, rows: Sequence[Row]) -> SweepColumns:
-    """Return the rows of a whole sweep, in the order of its points, as columns."""
+    """Return the rows of a complete sweep as columns, in the order of its points."""
 
     def numbers(values: Sequence[float | None]) -> FloatArray:
         return frozen_array(np.array(values, dtype=np.float64), (len(rows),))
@@ -110,7 +110,7 @@ def sweep_designs(sweep: Sweep, rows: Sequence[Row]) -> Designs[Row]:
     """Return rows of a sweep as a table of designs."""
     case = sweep.case
     values = [row.F for row in rows if row.F is not None]
-    words = f"{len(values):,} of {len(rows):,} points have an answer"
+    words = f"{len(values):,} of {len(rows):,} points have an optimum"
     proved = sum(row.certificate == "proved" for row in rows)
     notice = stated_pose_note(case, (row.note for row in rows)) if case.limits_over else None
     line = words
@@ -126,11 +126,11 @@ def sweep_designs(sweep: Sweep, rows: Sequence[Row]) -> Designs[Row]:
         Join.GRID if is_drawn(sweep.points) else Join.CLOUD,
         PageWords(
             f"{case.name}, robot {case.model.name}, over {', '.join(sweep.points.names)}",
-            f"{words}, {proved:,} of them with a proof." if any(row.certificate for row in rows) else f"{words}.",
+            f"{words}, {proved:,} of them with a certificate." if any(row.certificate for row in rows) else f"{words}.",
             ("curve", "F over the points"),
-            ("values", "Every point"),
+            ("values", "All points"),
             rules=() if notice is None else (f"Note: {notice}.",),
-            below="F at each point. Numbers: the limits that are active in a region.",
+            below="F at each point. Numbers: regions of equal active limits.",
             is_answer=bool(values),
         ),
         before=[Line(line + f", {proved:,} are proved" if sweep.certified else line)],
@@ -139,28 +139,28 @@ def sweep_designs(sweep: Sweep, rows: Sequence[Row]) -> Designs[Row]:
 
 
 def is_drawn(points: Points) -> bool:
-    """Return whether points are a grid over one or two numbers, over which F is drawn."""
+    """Return whether points are a grid over one or two varied names, over which F can be drawn."""
     return 1 <= sum(len(axis) > 1 for axis in points.axes) <= 2
 
 
 def check_drawn(points: Points) -> None:
-    """Refuse a picture of a sweep that is no grid over one or two numbers.
+    """Refuse a picture of a sweep that is not a grid over one or two varied names.
 
     Raises:
-        InputError: it is none.
+        InputError: the points are not such a grid.
     """
     if not is_drawn(points):
         count = sum(len(axis) > 1 for axis in points.axes)
-        fault = f"{count} numbers change on a grid" if points.axes else "the points are rows of a file"
-        raise InputError(f"--plot: draws F over one or two numbers of --over, and {fault}")
+        fault = f"a grid over {count} names" if points.axes else "the rows of a file"
+        raise InputError(f"--plot: needs a grid of --over over one or two names, got {fault}")
 
 
 def sweep_columns(sweep: Sweep, case: Case | None = None) -> Iterator[Column[Row]]:
-    """Yield the columns of a sweep's table: the numbers that change, the answer, its evidence.
+    """Yield the columns of the table of a sweep: varied values, result, evidence.
 
     Args:
-        sweep: the sweep.
-        case: the case at one of its points, for labels and units; None for a table without them.
+        sweep: sweep of the table.
+        case: case at one of the points, for labels and units; None for a table without labels and units.
     """
     nlp = None if case is None else formulate_each(case)[0]
     yield Column("index", lambda row: row.point, holds=int, label="point", text=lambda row: str(row.point))
@@ -213,15 +213,15 @@ def _variable(k: int, name: str, size: float, unit: str) -> Column[Row]:
 
 
 def _unit_of(nlp: Nlp, name: str) -> str:
-    """Return the unit of a number of the case of a program by its name."""
+    """Return the unit of a parameter, bound or limit of the case by its name."""
     limits = limits_data(margins_data(nlp, nlp.start, optimal=False)) if name.startswith("limits.") else ()
     return unit_of_number(name, nlp.case, limits)
 
 
-#: Fields of a row that its last columns have, and those of its proof.
+#: Fields of a row for the last columns, and fields of its certificate.
 _PROOF = ("certificate", "bound", "gap")
 _LAST = {name for name, _ in fields_of(Row)} - {"point", "status", "F", "x"}
-#: Texts of fields that a page shows; ``None`` in the place of a number that is missing.
+#: Texts of fields on a page; ``None`` for a missing number.
 _SHOWN: Mapping[str, Callable[[Row], str]] = {
     "active": lambda row: ", ".join(row.active) or row.note,
     "certificate": lambda row: row.certificate,
@@ -247,13 +247,13 @@ def _column_of(name: str, kind: object) -> Column[Row]:
 
 
 def row_reader(sweep: Sweep, names: Sequence[str] | None = None) -> Callable[[Sequence[Any]], Row]:
-    """Return the function that makes a row of the cells of its table as they are read from a file; None for empty ones.
+    """Return the function that converts the cells of a table file to a row; an empty cell is None.
 
-    Equal texts become one object: a million rows have a few dozen sets of active sides.
+    Equal texts share one object: a million rows have a few dozen sets of active sides.
 
     Args:
-        sweep: the sweep.
-        names: fields of a row that are needed; all where they are left out. The others have their defaults.
+        sweep: sweep of the table.
+        names: names of the needed fields, by default all; other fields get their defaults.
     """
     first = 1 + len(sweep.points.names)
     design = slice(first + 2, first + 2 + len(sweep.variables))
@@ -286,50 +286,50 @@ def row_reader(sweep: Sweep, names: Sequence[str] | None = None) -> Callable[[Se
 
 
 def stated_pose_note(case: Case, notes: Iterable[str]) -> str | None:
-    """Return the notice that limits over the workspace are taken at the stated pose alone, where a row has it.
+    """Return the note that limits over the workspace are only checked at the stated pose, if a row has it.
 
     Args:
-        case: the case at one of the points.
-        notes: of the rows.
+        case: case at one of the points.
+        notes: notes of the rows.
     """
     notice = stated_pose_notice(case)
     return notice if notice is not None and notice in notes else None
 
 
-def sweep_result(case: Case, found: SweepColumns) -> SweepResult:
-    """Return the answers of a sweep as a result.
+def sweep_result(case: Case, columns: SweepColumns) -> SweepResult:
+    """Return the columns of a sweep as a result.
 
     Args:
-        case: the case at one of the points.
-        found: the answers.
+        case: case at one of the points.
+        columns: columns of the sweep.
     """
-    is_proved = any(found.certificate)
+    is_proved = any(columns.certificate)
     return SweepResult.of(
-        found,
+        columns,
         head=head_data(case),
-        notice=stated_pose_note(case, found.note),
+        notice=stated_pose_note(case, columns.note),
         unit=unit_of_objective(case),
-        numbers=MappingProxyType({name: vector(values) for name, values in found.numbers.items()}),
-        statuses=found.status,
-        F=_numbers(found.F),
-        design=MappingProxyType({name: _numbers(values) for name, values in found.design.items()}),
-        actives=found.active,
-        verdicts=found.verdict,
-        stationarity=_numbers(found.stationarity),
-        feasibility=_numbers(found.feasibility),
-        curvature=_numbers(found.curvature),
-        starts=tuple(found.starts.tolist()),
-        converged=tuple(found.converged.tolist()),
-        engines=found.engine,
-        times=_numbers(found.seconds),
-        notes=found.note,
-        certificates=found.certificate if is_proved else None,
-        bounds=_numbers(found.bound) if is_proved else None,
-        gaps=_numbers(found.gap) if is_proved else None,
+        numbers=MappingProxyType({name: vector(values) for name, values in columns.numbers.items()}),
+        statuses=columns.status,
+        F=_numbers(columns.F),
+        design=MappingProxyType({name: _numbers(values) for name, values in columns.design.items()}),
+        actives=columns.active,
+        verdicts=columns.verdict,
+        stationarity=_numbers(columns.stationarity),
+        feasibility=_numbers(columns.feasibility),
+        curvature=_numbers(columns.curvature),
+        starts=tuple(columns.starts.tolist()),
+        converged=tuple(columns.converged.tolist()),
+        engines=columns.engine,
+        times=_numbers(columns.seconds),
+        notes=columns.note,
+        certificates=columns.certificate if is_proved else None,
+        bounds=_numbers(columns.bound) if is_proved else None,
+        gaps=_numbers(columns.gap) if is_proved else None,
         versions=versions(),
     )
 
 
 def _numbers(values: FloatArray) -> Numbers:
-    """Return numbers (N,) with None for those that are not finite."""
+    """Return numbers (N,); infinite and undefined numbers become None."""
     return tuple(finite_or_none(value) for value in values.tolist())

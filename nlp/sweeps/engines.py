@@ -1,8 +1,8 @@
-"""Engines of a sweep, made from a job that other processes and machines can read.
+"""Engines of a sweep, made from a job that other processes and computers can read.
 
-Ipopt solves points one at a time from many starts, as the command ``solve`` does. The compiled program solves many at a
-time, each winner judged by the program's own evidence. A point whose search did not converge, or whose winner the
-evidence does not call an optimum, is given to Ipopt.
+Ipopt solves points one at a time from many starts, like the command ``solve``. Compiled C solves many points at a time;
+the evidence of the nonlinear program then judges each best point. Ipopt solves the points without convergence or
+without evidence of an optimum again.
 """
 
 from __future__ import annotations
@@ -50,13 +50,13 @@ def solve_point(
     """Return the row of one point.
 
     Args:
-        source: the case.
-        settings: the point's numbers by name.
-        index: of the point.
+        source: case as text.
+        settings: values of the varied names at the point.
+        index: index of the point.
         starts: number of starting points.
-        seed: seed instead of the case's.
+        seed: seed that replaces the seed of the case.
         proof_seconds: seconds for the certificate of the point; None for no certificate.
-        at_stated_pose: whether limits over a workspace or along a path are taken at the stated pose alone.
+        at_stated_pose: If true, check limits over a workspace or along a path only at the stated pose.
     """
     began = time.perf_counter()
     try:
@@ -64,7 +64,7 @@ def solve_point(
         if at_stated_pose:
             case = case.at_stated_poses()
         solution = solve(case, starts=starts, seed=seed, jobs=1)
-    except (CaseError, EvaluationError) as error:  # also a robot that does not exist there
+    except (CaseError, EvaluationError) as error:  # includes a robot that does not exist at the point
         return Row(index, REFUSED, None, seconds=time.perf_counter() - began, note=str(error))
     if proof_seconds is None:
         return row_of_solution(solution, index, time.perf_counter() - began)
@@ -76,11 +76,11 @@ def solve_point(
     return _with_certificate(row, found)
 
 
-def _with_certificate(row: Row, found: Certified) -> Row:
-    """Return a row with the certificate of the program that decides."""
-    certificate = found.certificate
+def _with_certificate(row: Row, certified: Certified) -> Row:
+    """Return a row with the certificate of the final nonlinear program."""
+    certificate = certified.certificate
     if certificate is None:
-        note = "tasks that are averaged have no one program: no one bound"
+        note = "no certificate: averaged tasks are not one nonlinear program"
         return row._replace(note=note)
     return row._replace(
         certificate=certificate.status.value,
@@ -114,14 +114,14 @@ MOST_STARTS = 16
 
 
 class Solved(NamedTuple):
-    """Points as the compiled solver left them.
+    """Points after their solve in compiled C.
 
     Attributes:
-        indices: of the points.
-        values: (N, m) numbers of the sweep there.
-        block: numbers of the program there.
-        found: answers of the solver in C.
-        seconds: wall time.
+        indices: indices of the points.
+        values: (N, m) varied values at the points.
+        block: data of the nonlinear program at the points.
+        found: results of the solver in C.
+        seconds: wall time of the block.
     """
 
     indices: Sequence[int]
@@ -132,18 +132,18 @@ class Solved(NamedTuple):
 
 
 class CompiledEngine:
-    """Engine that solves a block of points by compiled C, and gives Ipopt what the evidence does not accept.
+    """Engine that solves blocks of points by compiled C; points without evidence of optimality are solved by Ipopt.
 
     Args:
-        source: the case.
-        chosen: points of the sweep at which its program is compared with those of cases read anew.
-        starts: number of searches at each point, at most ``MOST_STARTS``.
-        seed: of Ipopt's starting points instead of the case's.
-        threads: number of threads; as many as there are processors where None.
+        source: case as text.
+        chosen: points at which the nonlinear program is compared with newly formulated ones.
+        starts: number of searches per point, at most ``MOST_STARTS``.
+        seed: seed of Ipopt's starting points that replaces the seed of the case.
+        threads: number of threads; None for the number of processors.
 
     Raises:
-        NotPlacedError: one program does not serve all points, or no compiler does.
-        CaseError: the case has no number of a name, or does not allow a value.
+        NotPlacedError: a single nonlinear program does not cover all points, or C cannot be generated.
+        CaseError: a name is unknown in the case, or a value is not allowed.
         InputError: there is no C compiler, or it fails.
     """
 
@@ -151,13 +151,13 @@ class CompiledEngine:
         self, source: CaseSource, chosen: Points, starts: int, seed: int | None, threads: int | None = None
     ) -> None:
         if starts > MOST_STARTS:
-            raise NotPlacedError(f"compiled C has {MOST_STARTS} starting points, and {starts} are wanted")
+            raise NotPlacedError(f"compiled C has at most {MOST_STARTS} starting points, and {starts} are requested")
         self.source, self.names, self.starts, self.seed, self.threads = source, chosen.names, starts, seed, threads
         self.places: Places = place(source, chosen)
         self.library = _compile(self.places)
         sides = self.places.nlp.sides.sides
         self._side_names = [f"{side.name} {side.bound}" for side in sides]
-        # All points are solved in one way, those that Ipopt solves too.
+        # Ipopt treats its points in the same way.
         self._note = self.places.nlp.case.stated_pose_notice
         self._slopes: dict[tuple[int, float], float] = {}
 
@@ -166,7 +166,7 @@ class CompiledEngine:
         began = time.perf_counter()
         block = self.places.block(values)
         numbers = block.numbers
-        bounded = bool(self.places.bounds)  # whether bounds of variables change
+        bounded = bool(self.places.bounds)  # true if bounds of variables vary
         found = self.library.solve(
             p=numbers.arguments,
             lower=numbers.lower if bounded else None,
@@ -229,7 +229,7 @@ class CompiledEngine:
         )
 
     def _with_evidence(self, row: Row, block: Block, x: FloatArray, k: int) -> Row | None:
-        """Return a row with evidence that is computed for its point alone; None where that is no optimum."""
+        """Return a row with evidence that is computed for a single point; None if the point is not an optimum."""
         evidence = examine(block.numbers.put_into(self.places.nlp, k), x)
         return with_evidence(row, evidence, self.places.nlp.case.units) if evidence.kind.is_optimum else None
 
@@ -250,24 +250,24 @@ class CompiledEngine:
 
 
 def _compile(places: Places) -> CompiledCase:
-    """Return the solver in C of the places' program.
+    """Return the compiled solver of the nonlinear program of the places.
 
     Raises:
-        NotPlacedError: C is not generated for the case, or has other variables or numbers than the program.
+        NotPlacedError: C cannot be generated for the case, or differs from the program in variables or parameters.
         InputError: there is no C compiler, or it fails.
     """
     with tempfile.TemporaryDirectory(prefix="screwsynth.") as folder:
         try:
             files = generate_c(places.nlp.case)
         except CaseError as error:
-            raise NotPlacedError(f"C is not generated for this case: {error}") from None
+            raise NotPlacedError(f"C cannot be generated for this case: {error}") from None
         for name, text in files.items():
             (Path(folder) / name).write_text(text, encoding="utf-8")
         library = load_compiled(folder)
     program = places.nlp.program
     wanted = [each.name for each in program.variables], [each.name for each in program.arguments]
     if wanted != ([each.name for each in library.variables], [each.name for each in library.parameters]):
-        raise NotPlacedError("the generated C has other numbers than the program")
+        raise NotPlacedError("the generated C has other parameters than the nonlinear program")
     return library
 
 
@@ -279,7 +279,7 @@ class EngineKind(enum.Enum):
 
     @classmethod
     def of(cls, word: str | None) -> EngineKind | None:
-        """Return the kind of a word; None where none is given.
+        """Return the kind of a word; None for None.
 
         Raises:
             InputError: there is no such kind.
@@ -290,16 +290,17 @@ class EngineKind(enum.Enum):
 
 
 class Job(NamedTuple):
-    """A sweep without its points.
+    """Sweep without points: case, names and settings.
 
     Attributes:
         source: the case.
-        names: numbers that change.
-        chosen: their values at the points at which programs are compared.
-        starts: number of searches at each point.
-        seed: seed instead of the case's.
-        kind: of the engine.
-        certified: whether the optimum at each point is proved too.
+        source: case as text.
+        names: varied parameters, bounds and limits.
+        chosen: values at the points at which nonlinear programs are compared.
+        starts: number of searches per point.
+        seed: seed that replaces the seed of the case.
+        kind: kind of the engine.
+        certified: If true, also compute a certificate for each point.
     """
 
     source: CaseSource
@@ -312,36 +313,36 @@ class Job(NamedTuple):
 
     @property
     def points(self) -> Points:
-        """The points at which programs are compared."""
+        """Points at which nonlinear programs are compared."""
         return Points(self.names, np.array(self.chosen))
 
 
 class Choice(NamedTuple):
-    """A kind of engine, and the reason why it is not the compiled one; empty where it is, or was asked for."""
+    """Kind of engine, and the reason for Ipopt; empty for the compiled engine or a requested one."""
 
     kind: EngineKind
     reason: str
 
 
 def choose_engine(job: Job, wanted: EngineKind | None, threads: int | None) -> Choice:
-    """Return the kind of engine for a job: the compiled one where it covers the job.
+    """Return the kind of engine for a job: the compiled engine if it covers the job.
 
     Args:
-        job: the job.
-        wanted: the kind that is asked for; None for none.
-        threads: as for :func:`compiled_engine`.
+        job: job of the sweep.
+        wanted: requested kind; None for none.
+        threads: number of threads, as for :func:`compiled_engine`.
 
     Raises:
-        CaseError: the case has no number of a name, or does not allow a value.
-        InputError: the compiled engine is asked for and cannot be had, or something is to be proved and cannot be.
+        CaseError: a name is unknown in the case, or a value is not allowed.
+        InputError: the requested compiled engine is not available, or certificates are requested and not available.
     """
     if job.certified and wanted is EngineKind.COMPILED:
-        raise InputError("--engine compiled: has no certificates; leave it out, or leave out --certify")
+        raise InputError("--engine compiled: conflicts with --certify; leave out one of them")
     if wanted is EngineKind.IPOPT or job.certified:
         cases = [case for _, case in existing_cases(job.source, job.points)]
         if job.certified or any(each.limits_over for each in cases):
-            kernel()  # before any solve where it is missing
-        return Choice(EngineKind.IPOPT, "" if wanted else "a certificate is of one solve by Ipopt")
+            kernel()  # an error before any solve if it is missing
+        return Choice(EngineKind.IPOPT, "" if wanted else "certificates need solves by Ipopt")
     try:
         compiled_engine(job, threads)
     except CaseError:
@@ -356,7 +357,7 @@ def choose_engine(job: Job, wanted: EngineKind | None, threads: int | None) -> C
 
 
 def answer(job: Job, block: PointBlock) -> list[Row]:
-    """Return the rows of a block of points by one thread."""
+    """Return the rows of a block of points, solved by one thread."""
     if job.kind is EngineKind.COMPILED:
         engine = compiled_engine(job, 1)
         return engine.rows(engine.solve(block.indices, block.values))
@@ -374,15 +375,15 @@ def _engine(job: Job, threads: int | None) -> CompiledEngine:
 
 
 def compiled_engine(job: Job, threads: int | None) -> CompiledEngine:
-    """Return the compiled engine of a job, made once in each process.
+    """Return the compiled engine of a job, made once per process.
 
     Args:
-        job: the job; its kind does not matter.
-        threads: number of threads; as many as there are processors where None.
+        job: job of any kind.
+        threads: number of threads; None for the number of processors.
 
     Raises:
-        NotPlacedError: one program does not serve all points.
-        CaseError: the case has no number of a name, or does not allow a value.
+        NotPlacedError: a single nonlinear program does not cover all points.
+        CaseError: a name is unknown in the case, or a value is not allowed.
         InputError: there is no C compiler, or it fails.
     """
     return _engine(job._replace(kind=EngineKind.COMPILED), threads)

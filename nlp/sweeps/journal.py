@@ -1,4 +1,4 @@
-"""Journal of a sweep, to which the answer at each point is appended as it is found."""
+"""Journal of a sweep: a file to which the result of each solved point is appended."""
 
 from __future__ import annotations
 
@@ -17,33 +17,33 @@ from ..units import Units
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Status of a point at which the case contradicts itself; the other statuses are those of a solve.
+#: Status of a point at which the case contradicts itself; other statuses are those of a solve.
 REFUSED = "refused"
 
 
 class Row(NamedTuple):
-    """The answer at one point.
+    """Result at one point of a sweep.
 
     Attributes:
         point: index of the point.
-        status: that of the solve, or ``refused`` where the case is none at this point.
-        F: objective; for several tasks the value of their combination. None where there is no answer.
-        x: the free numbers of the design in the case's units; empty for a point that is refused.
-        active: sides of bounds and limits on which the point lies, such as ``p_z max``.
-        multipliers: of the active sides, in F per unit of the limit.
-        verdict: on the point, in words.
+        status: status of the solve, or ``refused`` if the case contradicts itself at the point.
+        F: objective; for several tasks the value of their combination. None without an optimum.
+        x: design variables in the case's units; empty for a refused point.
+        active: active sides of bounds and limits, such as ``p_z max``.
+        multipliers: multipliers of the active sides, in F per unit of the limit.
+        verdict: kind of the point, such as a strict local maximum.
         stationarity: largest scaled derivative of the Lagrangian.
-        feasibility: largest distance outside a side, in half ranges.
-        curvature: smallest eigenvalue of the reduced Hessian; None where no direction is left, or it is not computed.
+        feasibility: largest violation of a bound or limit, in half ranges.
+        curvature: smallest eigenvalue of the reduced Hessian; None without a free direction, or if it is not computed.
         starts: number of searches.
-        converged: number of searches that ended at an optimum.
-        engine: ``compiled`` or ``ipopt``: whose point it is.
-        seconds: wall time; of points solved together, an equal share.
-        note: a sentence where the point is refused, or where its certificate is, and about limits over a workspace that
-            are taken at the stated pose alone, or are not proved; empty otherwise.
-        certificate: status of the proof; empty where none was asked for, or it is refused.
-        bound: no feasible design has a better F; None where nothing is proved.
-        gap: distance of the bound from F; None likewise.
+        converged: number of searches that converged to an optimum.
+        engine: engine that found the point, ``compiled`` or ``ipopt``.
+        seconds: wall time; for points of a block, an equal share.
+        note: reason of a refused point or certificate, or note that limits over a workspace are only checked at the
+            stated pose, or not proved; empty otherwise.
+        certificate: status of the certificate; empty without a certificate.
+        bound: proved bound of F, which no feasible design exceeds; None without a certificate.
+        gap: absolute difference of F and the bound; None without a certificate.
     """
 
     point: int
@@ -78,20 +78,20 @@ def with_evidence(row: Row, evidence: Evidence, units: Units) -> Row:
     )
 
 
-#: Ending of a journal's name behind that of the table.
+#: Suffix of a journal's name after the name of the table.
 ENDING = ".journal"
 
 
 class Journal(JournalFile):
-    """Rows of a sweep that are solved, in a file.
+    """File with the solved rows of a sweep.
 
     Args:
-        path: of the file, which is made when missing.
-        fingerprint: of the sweep.
-        count: number of its points.
+        path: path of the file; a missing file is created.
+        fingerprint: fingerprint of the sweep.
+        count: number of points of the sweep.
 
     Raises:
-        InputError: the file cannot be written, belongs to another sweep, or is held by another process.
+        InputError: the file cannot be written, belongs to another sweep, or is locked by another process.
     """
 
     def __init__(self, path: Path, fingerprint: str, count: int) -> None:
@@ -99,8 +99,8 @@ class Journal(JournalFile):
         head = {"screwsynth": "sweep", "fingerprint": fingerprint, "points": count}
         super().__init__(path, head, "sweep", "choose another --out, or remove it")
 
-    def found(self, place: int, line: bytes) -> None:
-        """Take note of a row that is in the file, at a place."""
+    def load_entry(self, place: int, line: bytes) -> None:
+        """Register a row of the file at its position."""
         with suppress(ValueError):
             index = row_of(Row, line).point
             if 0 <= index < len(self._places) and self._places[index] < 0:
@@ -108,10 +108,10 @@ class Journal(JournalFile):
 
     @property
     def words(self) -> str:
-        """How many points it has, and what goes on from there."""
+        """Number of solved points, and how to continue."""
         count = len(self._places)
         done = f"{count - len(self.missing):,} of {count:,} points are in {self.path}"
-        return f"{done}: the same command goes on from there"
+        return f"{done}: the same command continues from there"
 
     @property
     def missing(self) -> NDArray[np.intp]:
@@ -119,7 +119,7 @@ class Journal(JournalFile):
         return np.flatnonzero(self._places < 0)
 
     def add(self, rows: Iterable[Row]) -> None:
-        """Append rows; those of points that have one already are left out.
+        """Append rows; rows of points that already have one are ignored.
 
         Raises:
             InputError: the file cannot be written.

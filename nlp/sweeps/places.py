@@ -1,7 +1,7 @@
-"""Numbers of a sweep placed in the arrays of one program, so that one program serves every point.
+"""Places of the varied values of a sweep in the arrays of one nonlinear program, which then covers all points.
 
-A number that changes is an argument, a bound of a free variable, a limit, or a number of the task, from which the twist
-follows. The places are held to cases that are read and formulated anew at a few points: where anything differs, the
+A varied value is a parameter, a bound of a variable, a limit, or a number of the task, from which the twist follows.
+The places are checked against cases that are read and formulated again at a few points; if anything differs, the
 sweep does not use them.
 """
 
@@ -28,27 +28,27 @@ from ..program.nlp import Nlp
 from ..program.pairs import with_all_pairs
 from .points import CaseSource, Points
 
-#: Largest relative difference of a placed number from one that is read: rounding of a conversion.
+#: Largest relative difference of a placed value and a read value: rounding of a unit conversion.
 _SAME = 1e-12
-#: Largest relative difference of values of the two programs at one point: rounding of a thousand operations.
+#: Largest relative difference of function values of two programs: rounding of a thousand operations.
 _SAME_VALUE = 1e-9
-#: Number of points of the box at which values of the two programs are compared.
+#: Number of points of the box at which function values of two programs are compared.
 _SHARES = 3
 _LIMITS = "limits."
 _ENDS = ("min", "max")
 
 
 class NotPlacedError(Exception):
-    """Reason why one program does not serve every point of a sweep, in words."""
+    """Error of a sweep whose points a single nonlinear program does not cover, with the reason."""
 
 
 class Block(NamedTuple):
-    """Numbers of the program at N points of a sweep.
+    """Data of the nonlinear program at N points of a sweep.
 
     Attributes:
-        numbers: of the program.
-        limits: (N,) values of the limits that change, by key, as C takes them.
-        is_placed: (N,) whether the case may have the point's numbers; the others have those of the case.
+        numbers: parameters and bounds of the nonlinear program.
+        limits: (N,) values of the varied limits by key, for the compiled C.
+        is_placed: (N,) True if the case allows the values of the point; other points have the values of the case.
     """
 
     numbers: Numbers
@@ -58,16 +58,16 @@ class Block(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Places of the numbers of a sweep.
+    """Places of the varied values of a sweep.
 
     Attributes:
-        nlp: the program at the case's own numbers, with every constraint of its limits on pairs.
-        limits: the limits that C sets.
-        arguments: index of an argument, and by what the value is multiplied, by column of the points.
-        bounds: index of a variable, whether the bound is the upper one, and the factor, by column.
-        limited: index among the limits that C sets, and by what the value is multiplied, by column.
-        task: part of the task by column: its key, and the index in it, None for a single number.
-        written: the task's table in the case.
+        nlp: nonlinear program at the values of the case, with all constraints of limits on pairs.
+        limits: limits that the compiled C can change.
+        arguments: index of a parameter, and factor of its value, by column of the points.
+        bounds: index of a variable, True for its upper bound, and factor of the value, by column.
+        limited: index in ``limits``, and factor of the value, by column.
+        task: for each column, key of a task entry and index in the entry; None for a scalar.
+        written: table of the task in the case.
     """
 
     nlp: Nlp
@@ -79,7 +79,7 @@ class Places:
     written: Mapping[str, Any]
 
     def block(self, values: FloatArray) -> Block:
-        """Return the program's numbers at points with values (N, m)."""
+        """Return the data of the nonlinear program at points with values (N, m)."""
         nlp, count = self.nlp, len(values)
         arguments, lower, upper, g_lower, g_upper = (
             np.repeat(each[None], count, axis=0)
@@ -116,7 +116,7 @@ class Places:
         """Return the task's twist (6,) at one point.
 
         Raises:
-            CaseError: the task may not have these numbers.
+            CaseError: the task does not allow these values.
         """
         written = {key: list(each) if isinstance(each, list) else each for key, each in self.written.items()}
         for column, (key, index) in self.task.items():
@@ -130,7 +130,7 @@ class Places:
         return unit_twist(written.get("axis"), written.get("point"), pitch, "task")
 
     def _set_limits(self, limits: Mapping[str, FloatArray], count: int, numbers: Numbers) -> None:
-        """Write the bounds that follow from limits into a program's numbers, as the C does."""
+        """Write the bounds that follow from limits into the data of a program, like the compiled C."""
         function = self.limits.function
         if function is None:
             return
@@ -147,10 +147,10 @@ class Places:
 
 
 def existing_cases(source: CaseSource, points: Points) -> Iterator[tuple[int, Case]]:
-    """Yield indices and cases of points; where the robot does not exist there is none, and only that row is refused.
+    """Yield indices and cases of points, without points at which the robot does not exist.
 
     Raises:
-        CaseError: the case has no number of a name, or does not allow a value.
+        CaseError: a name is unknown in the case, or a value is not allowed.
     """
     for k in range(len(points)):
         with suppress(NoRobotError):
@@ -158,20 +158,20 @@ def existing_cases(source: CaseSource, points: Points) -> Iterator[tuple[int, Ca
 
 
 def place(source: CaseSource, chosen: Points) -> Places:
-    """Return the places of a sweep's numbers, after they have been compared with cases read anew.
+    """Return the places of the varied values of a sweep, checked against newly read cases.
 
     Args:
-        source: the case.
-        chosen: points of the sweep at which the programs are compared, at least one; see :meth:`.Points.chosen`.
+        source: case as text.
+        chosen: points at which nonlinear programs are compared, at least one; see :meth:`.Points.chosen`.
 
     Raises:
-        NotPlacedError: one program does not serve all points, or is not covered here.
-        CaseError: the case has no number of a name, or does not allow a value.
+        NotPlacedError: a single nonlinear program does not cover all points, or the case is not supported.
+        CaseError: a name is unknown in the case, or a value is not allowed.
     """
     tables = tomllib.loads(source.text)
     programs = {k: _program(case) for k, case in existing_cases(source, chosen)}
     if not programs:
-        raise NotPlacedError("the robot does not exist at the points at which programs are compared")
+        raise NotPlacedError("the robot does not exist at the points for the comparison of programs")
     nlp = next(iter(programs.values()))
     program = nlp.program
     limits = run_time_limits(nlp, "sweep")
@@ -204,7 +204,7 @@ def place(source: CaseSource, chosen: Points) -> Places:
             k = keys.index(key) if key in keys else keys.index(f"{key}.max")
             limited[column] = (k, nlp.case.units.to_internal(1.0, limits.limits[k].dimension))
         else:
-            raise NotPlacedError(f"{name} changes the program itself")
+            raise NotPlacedError(f"{name} changes the structure of the nonlinear program")
     found = Places(nlp, limits, arguments, bounds, limited, task, written)
     for k, other in programs.items():
         _compare(found, other, chosen.values[[k]])
@@ -212,36 +212,36 @@ def place(source: CaseSource, chosen: Points) -> Places:
 
 
 def _program(case: Case) -> Nlp:
-    """Return the program of a case.
+    """Return the nonlinear program of a case.
 
     Raises:
-        NotPlacedError: it is not covered.
+        NotPlacedError: the case is not supported by the compiled engine.
         CaseError: the case contradicts itself.
     """
     if len(case.tasks) > 1:
         raise NotPlacedError("the case has several tasks")
     nlp = formulate(case)
     if not nlp.n:
-        raise NotPlacedError("the case has no free number")
+        raise NotPlacedError("the case has no variables")
     if nlp.program.places.epigraph is not None:
-        raise NotPlacedError("the case is a worst case over poses")
+        raise NotPlacedError("F is the worst case over several poses")
     if nlp.program.model.closure or nlp.program.model.loops:
-        raise NotPlacedError("the robot has loops to close")
+        raise NotPlacedError("the robot has loop equations")
     if nlp.program.model.unknowns:
-        raise NotPlacedError("the pose does not determine all joints of the robot")
+        raise NotPlacedError("the robot has free actuator coordinates")
     if nlp.constant_limits:
-        raise NotPlacedError("the case has limits that depend on fixed numbers alone")
+        raise NotPlacedError("the case has limits that involve only fixed parameters")
     return with_all_pairs(nlp)
 
 
-def _compare(found: Places, other: Nlp, values: FloatArray) -> None:
-    """Compare placed numbers and values with those of a program that was formulated at one point with values (1, m).
+def _compare(places: Places, other: Nlp, values: FloatArray) -> None:
+    """Compare data and function values with a program that is formulated at one point with values (1, m).
 
     Raises:
-        NotPlacedError: they differ.
+        NotPlacedError: data or function values differ.
     """
-    block = found.block(values)
-    placed = block.numbers.put_into(found.nlp, 0)
+    block = places.block(values)
+    placed = block.numbers.put_into(places.nlp, 0)
     names = [
         [*(each.name for each in nlp.program.variables), *(each.name for each in nlp.program.constraints)]
         + [each.name for each in nlp.program.arguments]
@@ -258,4 +258,4 @@ def _compare(found: Places, other: Nlp, values: FloatArray) -> None:
         close = np.allclose([one.F, *one.g], [two.F, *two.g], rtol=_SAME_VALUE, atol=_SAME_VALUE, equal_nan=True)
         is_same = is_same and bool(close)
     if not is_same:
-        raise NotPlacedError("its program differs from point to point in more than numbers")
+        raise NotPlacedError("the structure of the nonlinear program differs between points")

@@ -1,4 +1,4 @@
-"""A sweep from its points to the rows of its journal."""
+"""Run of a sweep, from its points to the rows of its journal."""
 
 from __future__ import annotations
 
@@ -24,28 +24,29 @@ from .journal import ENDING, Journal, Row
 from .points import CaseSource, PointBlock, Points
 from .workers import answer_in_processes, answer_on_cluster
 
-#: Points that are solved and judged together: enough for arrays to pay, and about a third of a second of work.
+#: Number of points in a block: enough for efficient arrays, and about a third of a second of work.
 _BLOCK = 512
-#: Seconds that the proof of a point takes at most.
+#: Largest time for the certificate of a point, seconds.
 PROOF_SECONDS = 60.0
-#: Searches at each point without ``--starts``.
+#: Number of searches per point without ``--starts``.
 STARTS = 8
 
-#: Called after each block with the numbers of points done before this run, done now and to be done, and seconds.
+#: Function called after each block with the number of points solved before this run, the number solved in this run, the
+#: number missing at its beginning, and its seconds.
 SweepProgress = Callable[[int, int, int, float], None]
 
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """A sweep before its run.
+    """Sweep before its run.
 
     Attributes:
-        source: the case.
-        points: its points.
-        variables: names of the free numbers of a design.
-        starts: number of searches at each point.
-        seed: seed instead of the case's.
-        certified: whether the optimum at each point is proved too.
+        source: case as text.
+        points: points of the sweep.
+        variables: names of the design variables.
+        starts: number of searches per point.
+        seed: seed that replaces the seed of the case.
+        certified: If true, also compute a certificate for each point.
     """
 
     source: CaseSource
@@ -68,7 +69,7 @@ class Sweep:
         """Return the sweep of a case.
 
         Raises:
-            CaseError: the case has no number of a name, or does not allow the first point's.
+            CaseError: a name is unknown in the case, or the values of the first point are not allowed.
         """
         program = formulate(source.case_at(points.settings(0))).program
         names = tuple(program.variables[k].name for k in design_indices(program))
@@ -76,7 +77,7 @@ class Sweep:
 
     @property
     def fingerprint(self) -> str:
-        """Hash of what the rows depend on: case, points, starts, seed, certificates and version."""
+        """Hash of everything that determines the rows: case, points, starts, seed, certificates and version."""
         parts = (__version__, *self.source, self.points.names, self.starts, self.seed, self.certified)
         hashed = hashlib.sha256(repr(parts).encode())
         hashed.update(np.ascontiguousarray(self.points.values).tobytes())
@@ -84,14 +85,14 @@ class Sweep:
 
     @property
     def case(self) -> Case:
-        """The case at the first point."""
+        """Case at the first point."""
         return self.source.case_at(self.points.settings(0))
 
     def journal_of(self, out: str, file: str | None = None) -> Journal:
-        """Return the journal beside a table's file, or in a file of its own.
+        """Return the journal beside the file of a table, or in the given file.
 
         Raises:
-            InputError: it belongs to another sweep, is held by another process, or cannot be written.
+            InputError: the journal belongs to another sweep, is locked by another process, or cannot be written.
         """
         return Journal(Path(file or f"{out}{ENDING}"), self.fingerprint, len(self.points))
 
@@ -107,20 +108,20 @@ def run_sweep(
     progress: SweepProgress | None = None,
     notice: Callable[[str], None] | None = None,
 ) -> None:
-    """Solve the points that a journal lacks, and append their rows as they finish, until the time is over.
+    """Solve the missing points of a journal, and append their rows, until the time ends.
 
     Args:
-        sweep: the sweep.
-        journal: its journal.
-        engine: the engine; None for the compiled one where it covers the sweep.
-        jobs: number of threads, or of processes for Ipopt; as many as there are processors where None.
-        dask: address of a Dask cluster that does the work; None for this machine.
-        progress: called after each block.
-        notice: called with the reason where Ipopt does the work of the compiled engine.
+        sweep: sweep to run.
+        journal: journal of the sweep.
+        engine: requested engine; None for the compiled engine if it covers the sweep.
+        jobs: number of threads, or of processes for Ipopt; None for the number of processors.
+        dask: address of a Dask cluster for the computation; None for this computer.
+        progress: function called after each block.
+        notice: function called with the reason if Ipopt replaces the compiled engine.
 
     Raises:
-        CaseError: the case has no number of a name, or does not allow one's smallest or largest value.
-        InputError: the engine, the cluster or the journal's file is not to be had.
+        CaseError: a name is unknown in the case, or its smallest or largest value is not allowed.
+        InputError: the engine or the cluster is not available, or the journal cannot be written.
     """
     missing = journal.missing
     if not len(missing):
@@ -129,7 +130,7 @@ def run_sweep(
     job = Job(sweep.source, sweep.points.names, chosen, sweep.starts, sweep.seed, EngineKind.COMPILED, sweep.certified)
     choice = choose_engine(job, engine, jobs)
     if choice.reason and notice is not None:
-        notice(f"Ipopt solves each point by itself: {choice.reason}")
+        notice(f"Ipopt solves the points one by one: {choice.reason}")
     job = job._replace(kind=choice.kind)
     count = jobs or os.cpu_count() or 1
     blocks = _blocks(sweep.points, missing, _BLOCK if choice.kind is EngineKind.COMPILED else 1, count)
@@ -143,7 +144,7 @@ def run_sweep(
         answers = (answer(job, block) for block in blocks)
     began, before, done = time.perf_counter(), len(sweep.points) - len(missing), 0
     for rows in answers:
-        if is_requested():  # a search that was stopped is no answer
+        if is_requested():  # a stopped search gives no result
             if is_interrupted():
                 raise KeyboardInterrupt
             return
@@ -156,22 +157,22 @@ def run_sweep(
 def _blocks(
     points: Points, missing: np.ndarray[tuple[int, ...], np.dtype[np.intp]], size: int, count: int
 ) -> Iterator[PointBlock]:
-    """Yield blocks of the missing points until the time is over: those with the same quotient of index by size.
+    """Yield blocks of the missing points until the time ends: points with the same quotient of index and block size.
 
-    So many points are answered at a time: each has an equal part of the time left for its proof.
+    Each of the points that are solved at a time has an equal part of the remaining time for its certificate.
     """
     left = len(missing)
     for _, group in groupby(missing.tolist(), key=lambda index: index // size):
         if is_requested():
             return
-        # One more than needed: the last proof ends before the time does, after which no answer is taken.
+        # One more than needed, so that the last proof ends before the time, after which no result is accepted.
         indices, seconds, rounds = list(group), seconds_left(), 1 + math.ceil(left / count)
         yield PointBlock(indices, points.values[indices], seconds, min(PROOF_SECONDS, seconds / rounds))
         left -= len(indices)
 
 
 def _answer_in_threads(job: Job, blocks: Iterator[PointBlock], threads: int | None) -> Iterator[list[Row]]:
-    """Answer blocks by the compiled engine: the next one is solved while the evidence judges one."""
+    """Solve blocks by the compiled engine, while the evidence for the previous block is computed."""
     engine = compiled_engine(job, threads)
     with ThreadPoolExecutor(1) as ahead:
         following = next(blocks, None)

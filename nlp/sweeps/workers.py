@@ -1,7 +1,7 @@
-"""Blocks of a sweep answered in several processes, or on a Dask cluster by its address.
+"""Blocks of a sweep solved in several processes, or on a Dask cluster.
 
-A worker process reads its blocks from a pipe of its own, and ends when the other end is closed: none is left behind by
-a killed run. The block of a worker that dies is given to a new one.
+A worker process reads its blocks from a pipe, and ends when the other end is closed, so a killed run leaves no process
+behind. If a worker dies, a new worker gets its block.
 """
 
 from __future__ import annotations
@@ -22,30 +22,30 @@ from .engines import Job, answer
 from .journal import Row
 from .points import PointBlock
 
-#: Number of workers that may die with one block: the block itself is then the cause.
+#: Number of workers that may die with one block; then the block is the cause.
 _DEATHS = 3
 
 
 class _Worker(NamedTuple):
-    """A process, and this end of its pipe."""
+    """Worker process with this end of its pipe."""
 
     process: BaseProcess
     pipe: Connection
 
 
 def answer_in_processes(job: Job, blocks: Iterable[PointBlock], count: int) -> Iterator[list[Row]]:
-    """Answer blocks in several processes.
+    """Solve blocks in several processes.
 
     Args:
-        job: the job.
-        blocks: the blocks.
+        job: job of the sweep.
+        blocks: blocks of points.
         count: number of processes.
 
     Yields:
-        The rows of each block, in the order in which they finish.
+        Rows of each block, in the order of completion.
 
     Raises:
-        InputError: a block kills every process that tries it.
+        InputError: a block ends every process that tries to solve it.
     """
     waiting, source = deque[PointBlock](), iter(blocks)
     busy: dict[Connection, tuple[_Worker, PointBlock]] = {}
@@ -71,7 +71,7 @@ def answer_in_processes(job: Job, blocks: Iterable[PointBlock], count: int) -> I
                     first = block.indices[0]
                     deaths[first] = deaths.get(first, 0) + 1
                     if deaths[first] >= _DEATHS:
-                        fault = f"ended {_DEATHS} processes without an answer; the points before it are kept"
+                        fault = f"ended {_DEATHS} processes without a result; the results of earlier points are kept"
                         raise InputError(f"point {first}: {fault}") from None
                     workers.discard(worker)
                     waiting.append(block)
@@ -88,11 +88,11 @@ def answer_in_processes(job: Job, blocks: Iterable[PointBlock], count: int) -> I
 
 
 def _start(job: Job) -> _Worker:
-    """Start a worker. It begins anew instead of as a copy of this process, whose threads would be lost in a copy."""
+    """Start a worker as a new process, because a copy of this process would lose its threads."""
     context = get_context("spawn")
     mine, its = context.Pipe()
     process = context.Process(target=_serve, args=(its, job), daemon=True)
-    # This process does not end between the worker's start and the job, without which the worker would show an error.
+    # Without the job, the worker would show an error: this process must not end before it sends the job.
     with WRITING, _without_interrupts():
         process.start()
     its.close()
@@ -101,11 +101,11 @@ def _start(job: Job) -> _Worker:
 
 @contextmanager
 def _without_interrupts() -> Iterator[None]:
-    """Let a process that is started here have no interrupts: Ctrl-C goes to every process, also while it starts."""
+    """Block interrupts in processes that start in this block: Ctrl-C goes to every process, also during its start."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    # It is started with the first worker otherwise, and lets interrupts through again.
+    # Otherwise it starts with the first worker, and unblocks interrupts.
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -115,8 +115,8 @@ def _without_interrupts() -> Iterator[None]:
 
 
 def _serve(pipe: Connection, job: Job) -> None:
-    """Answer blocks until the other end of the pipe is closed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it could not be blocked; the first process closes the pipe
+    """Solve blocks until the other end of the pipe is closed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # if it could not be blocked; the main process closes the pipe
     while True:
         try:
             block = pipe.recv()
@@ -127,36 +127,38 @@ def _serve(pipe: Connection, job: Job) -> None:
 
 #: Seconds to wait for an answer of the cluster's scheduler.
 _WAIT = 5
-#: Blocks at the cluster for each of its threads: enough to keep it busy, few enough to fit into this memory.
+#: Blocks at the cluster per thread: enough to keep it busy, few enough for the memory of this computer.
 _AHEAD = 3
-#: Number of times that a block is given to the cluster again after its worker was lost.
+#: Number of repetitions of a block after the loss of its worker.
 _RETRIES = 5
 
 
 def answer_on_cluster(job: Job, blocks: Iterable[PointBlock], address: str) -> Iterator[list[Row]]:
-    """Answer blocks on a cluster, whose workers need this package and, for the compiled engine, a C compiler.
+    """Solve blocks on a cluster, whose workers need this package and, for the compiled engine, a C compiler.
 
     Args:
-        job: the job.
-        blocks: the blocks.
-        address: of the scheduler, such as ``tcp://10.0.0.1:8786``.
+        job: job of the sweep.
+        blocks: blocks of points.
+        address: address of the scheduler, such as ``tcp://10.0.0.1:8786``.
 
     Yields:
-        The rows of each block, in the order in which they finish.
+        Rows of each block, in the order of completion.
 
     Raises:
-        InputError: Dask is not installed, no cluster answers, or a block is lost again and again.
+        InputError: Dask is not installed, no cluster answers, or a block is lost repeatedly.
     """
     if find_spec("distributed") is None:
         raise InputError("--dask needs distributed, which is not installed: pip install 'screwsynth[dask]'")
     import distributed  # noqa: PLC0415 - few sweeps need a cluster
 
-    dask: Any = distributed  # its functions have no types
+    dask: Any = distributed  # its functions have no type annotations
 
     try:
         client = dask.Client(address, timeout=_WAIT, set_as_default=False)
     except (OSError, ValueError, TypeError):
-        raise InputError(f"--dask {address}: no Dask scheduler answers there within {_WAIT} seconds") from None
+        raise InputError(
+            f"--dask {address}: no Dask scheduler answers at this address within {_WAIT} seconds"
+        ) from None
     source = iter(blocks)
     with client:
         given: dict[str, tuple[PointBlock, int]] = {}
@@ -175,7 +177,7 @@ def answer_on_cluster(job: Job, blocks: Iterable[PointBlock], address: str) -> I
             if error is not None:
                 if tries >= _RETRIES:
                     fault = f"point {block.indices[0]} was lost {tries + 1} times: {type(error).__name__}: {error}"
-                    raise InputError(f"--dask {address}: {fault}; the points before it are kept")
+                    raise InputError(f"--dask {address}: {fault}; the results of earlier points are kept")
                 running.add(submit(block, tries + 1))
                 continue
             yield future.result()

@@ -39,5 +39,5 @@ def text_of_cell(cell: str) -> str:
 
 
 def _is_formula(cell: str) -> bool:
-    """Return True if a spreadsheet may take a text for a formula, unlike a single sign or numbers with a unit."""
+    """Return True if a spreadsheet may read a text as a formula; single signs and numbers with a unit are safe."""
     return len(cell) > 1 and cell.startswith(_FORMULA) and not _NUMBERS.fullmatch(cell)

@@ -12,7 +12,7 @@ Answer = TypeVar("Answer")
 
 
 def renamed_argument(earlier: str, now: str) -> Callable[[Callable[Given, Answer]], Callable[Given, Answer]]:
-    """Return a decorator by which a function takes an argument by its earlier name too.
+    """Return a decorator with which a function also takes an argument by its earlier name.
 
     Args:
         earlier: earlier name of the argument.
@@ -34,10 +34,10 @@ def renamed_argument(earlier: str, now: str) -> Callable[[Callable[Given, Answer
 
 
 def warn_deprecated(earlier: str, now: str) -> None:
-    """Warn the caller of a public function of a form that is deprecated, and say its successor.
+    """Warn the caller of a public function that its form is deprecated, and name the new form.
 
     Args:
-        earlier: the form, as Python writes it.
-        now: its successor, likewise.
+        earlier: deprecated form, as Python code.
+        now: new form, as Python code.
     """
     warnings.warn(f"{earlier}: deprecated; use {now}", DeprecationWarning, stacklevel=3)

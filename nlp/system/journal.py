@@ -48,7 +48,7 @@ def row_of(kind: type[Kind], line: str | bytes) -> Kind:
     """
     data, fields = json_tree(line), fields_of(kind)
     if not isinstance(data, list) or len(data) != len(fields):
-        raise ValueError("the line is not a row of this journal")
+        raise ValueError(f"expected a row of {len(fields)} values")
     return kind(*(value_of(of, value, name) for (name, of), value in zip(fields, data, strict=True)))
 
 
@@ -80,7 +80,7 @@ class JournalFile:
             self._file.close()
             raise
 
-    def found(self, place: int, line: bytes) -> None:
+    def load_entry(self, place: int, line: bytes) -> None:
         """Process an existing line of the file at a byte position."""
         raise NotImplementedError
 
@@ -131,7 +131,7 @@ class JournalFile:
         self._file.close()
 
     def remove(self) -> None:
-        """Remove the file, after its rows are in a result."""
+        """Remove the file, when a result contains its rows."""
         self.path.unlink(missing_ok=True)
         self._file.close()
 
@@ -153,7 +153,7 @@ class JournalFile:
         for line in self._file:
             if not line.endswith(b"\n"):
                 break
-            self.found(place, line)
+            self.load_entry(place, line)
             place += len(line)
         self._file.truncate(place)
         return place

@@ -42,7 +42,7 @@ JsonValue: TypeAlias = "bool | int | float | str | list[JsonValue] | dict[str, J
 
 
 class Mark(enum.Enum):
-    """Treatment of a field that is not always written, or not under its own key."""
+    """Treatment of a field that is written only sometimes, or under another key."""
 
     ABSENT = "left out if it is None"
     INLINE = "replaced by its fields, or left out if it is None"
@@ -56,7 +56,7 @@ class Key(NamedTuple):
 
 
 class Measure(enum.Enum):
-    """Relation of a value to the ``dimension`` of its object, which is a hidden field."""
+    """Relation of a value to ``dimension``, a hidden field of the same object."""
 
     NUMBER = "a value of that dimension"
     SLOPE = "a derivative with respect to such a value"
@@ -135,7 +135,7 @@ class JsonObject:
         Args:
             row: other value, or object of this class; its arrays become tuples for fields that are tuples, and its
                 numbers that are not finite None.
-            units: units of the case for values with a dimension; None if the values have these units.
+            units: units of the case, to convert values with a dimension; None for values already in these units.
             given: fields that are missing in the other value, or replace its attributes.
         """
         measured = None if units is None else getattr(row, "dimension", Dimension.NUMBER)
@@ -202,7 +202,7 @@ def _entry(name: str, field: Field, kind: object) -> Entry:
     if field.mark is Mark.ABSENT:
         return Entry(name, field.key, kind, None)
     if not (isinstance(inner, type) and issubclass(inner, JsonObject)):
-        raise TypeError(f"only an object can stand inline, which {inner!r} is not")
+        raise TypeError(f"field {name}: an inline field must be a JsonObject, got {inner!r}")
     return Entry(name, field.key, kind, MISSING if inner is get_args(kind)[0] else None, inner)
 
 

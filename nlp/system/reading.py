@@ -1,4 +1,4 @@
-"""Reading of files up to a size, with each fault as one sentence."""
+"""Reading of files up to a size; each fault is one sentence."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def read_limited(source: str | Path, largest: int, *, is_regular: bool = False) 
 
     Args:
         source: name of the file, as written in messages.
-        largest: largest size that is read, bytes, also for devices without an end.
+        largest: largest number of bytes to read, also for devices without an end.
         is_regular: If true, pipes and devices are refused.
 
     Raises:

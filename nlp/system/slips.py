@@ -44,7 +44,9 @@ def toml_slips(text: str) -> Iterator[tuple[int, str]]:
 
 
 def toml_fault(text: str, error: Exception) -> str:
-    """Return the fault of invalid TOML as a clause: the slips in it, else the message of the parser.
+    """Return the fault of invalid TOML as a clause.
+
+    The fault lists the known slips if one of them is on the parser's line. Otherwise it is the parser's message.
 
     Args:
         text: text of the document.

@@ -56,8 +56,8 @@ class Entry(NamedTuple):
         name: name of the attribute.
         key: key in JSON.
         kind: annotation of the value.
-        default: value where the key is missing; ``dataclasses.MISSING`` for a key that must be there.
-        inline: class of the value, where its own fields stand in its place; else None.
+        default: value for a missing key; ``dataclasses.MISSING`` for a required key.
+        inline: class of a value whose fields are written in its place; otherwise None.
     """
 
     name: str
@@ -68,12 +68,12 @@ class Entry(NamedTuple):
 
     @property
     def is_required(self) -> bool:
-        """Whether the key must be there."""
+        """True if the key is required."""
         return self.default is dataclasses.MISSING
 
 
 class WrongValueError(ValueError):
-    """Error of a value that its type does not allow.
+    """Error for a value that its declared type does not allow.
 
     Attributes:
         key: dotted key of the value.
@@ -218,7 +218,7 @@ def _one_of(kinds: tuple[object, ...], value: object, key: str) -> object:
     """Return a value of the first of several annotations that allows it.
 
     Raises:
-        WrongValueError: no annotation allows the value; the deepest fault is that of the intended annotation.
+        WrongValueError: no annotation allows the value; the error names the deepest fault.
     """
     faults = []
     # An exact type comes before a number type to which an integer could be converted.
@@ -246,11 +246,11 @@ def _entries_of(kind: Any) -> tuple[Entry, ...]:  # noqa: ANN401 - as above
 
 
 def keys_of(kind: Any, *, required: bool = False) -> tuple[str, ...]:  # noqa: ANN401 - as above
-    """Return the keys of the objects of a class, those of its inline parts among them.
+    """Return the keys of the objects of a class, including keys of inline parts.
 
     Args:
         kind: the class.
-        required: whether only keys that must be there are returned.
+        required: If true, only required keys are returned.
     """
     keys: list[str] = []
     for each in entries_of(kind):

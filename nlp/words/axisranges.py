@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def axis_ranges_tables(result: AxisRangesResult) -> Iterator[TextTable]:
-    """Yield the ranges, a row for each coordinate, and the factors, a row for each pair of coordinates."""
+    """Yield two tables: a range for each coordinate, then a factor for each pair of coordinates."""
     rows = [
         (
             each.axis,
@@ -33,7 +33,12 @@ def axis_ranges_tables(result: AxisRangesResult) -> Iterator[TextTable]:
         for each in result.axes
     ]
     headers = ("axis", "unit", "at pose", "from", "to", "lower end limited by", "upper end limited by")
-    yield TextTable(headers, tuple(rows), name="axes", title="free travel along each axis, the others held (proved)")
+    yield TextTable(
+        headers,
+        tuple(rows),
+        name="axes",
+        title="free travel along each axis, with the other coordinates fixed (proved)",
+    )
     pairs = [(*each.axes, number(each.factor), _pair_words(each)) for each in result.pairs]
     yield TextTable(("axis", "and", "factor", "limited by"), tuple(pairs), name="pairs")
 
@@ -51,7 +56,7 @@ def axis_ranges_summary(case: Case, result: AxisRangesResult) -> Iterator[Line |
     if result.not_alone:
         yield Line(f"{', '.join(result.not_alone)}, moving with these coordinates", label="dependent coordinates")
     if result.reason:
-        yield Line(f"{result.reason}: some axes or pairs are not examined", label="stopped", tone=Tone.CAUTION)
+        yield Line(f"{result.reason}: some axes or pairs were not examined", label="stopped", tone=Tone.CAUTION)
     if not result.axes:
         return
     length, angle = (number(each, digits=4) for each in result.largest)
@@ -69,18 +74,18 @@ def _matrix(result: AxisRangesResult) -> TextTable:
     rows = [
         (one, *(_factor_words(factors.get((one, other))) for k, other in enumerate(names) if k)) for one in names[:-1]
     ]
-    title = "pairs of axes moved together: proved fraction of both ranges about the pose"
+    title = "two axes moved together: proved fraction of both ranges about the pose"
     return TextTable(("axis", *names[1:]), tuple(rows), name="pairs", title=title)
 
 
 def _factor_words(factor: float | None) -> str:
-    """Return a factor; empty where there is none."""
+    """Return the text of a factor; empty for None."""
     return "" if factor is None else number(factor, digits=3) if factor else OUTCOME_WORDS[Outcome.OPEN]
 
 
 def _pair_words(pair: PairRange) -> str:
     """Return the claim that limits two coordinates."""
-    return "nothing more" if pair.stop is None else _stop_words(pair.stop)
+    return "single-axis ranges only" if pair.stop is None else _stop_words(pair.stop)
 
 
 def _end_words(end: RangeEnd) -> str:

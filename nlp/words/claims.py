@@ -1,4 +1,4 @@
-"""Violated claims over a workspace in words, and the commands that show them; words about ranks."""
+"""Violated claims over a workspace, the commands that show violations, and verdicts on ranks, in words."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..evidence.state import WorkspacePose
     from ..results.workspace import WorkspaceResult
 
-#: Claims about ranks in words; a singularity of each; its label; and the sentence that is proved.
+#: Claims about ranks: name, singularity, label and proved sentence, each by the key of the claim.
 CLAIM_WORDS = {REGULAR: "full rank of J", CONSTRAINTS: "rank of the constraint wrenches"}
 SINGULAR = {REGULAR: "J is singular", CONSTRAINTS: "the constraint wrenches lose rank"}
 _LABELS = {REGULAR: "singularities", CONSTRAINTS: "constraint singularities"}
@@ -58,12 +58,12 @@ def claim_words(claim: PosedClaim) -> str:
     where = ""
     if length is not None:
         end = "shortest" if length.sense is Sense.MIN else "longest"
-        where = f"; limb {each.name.partition(' limb ')[2]} at its {end}"
+        where = f"; limb {each.name.partition(' limb ')[2]} at its {end} length"
     return f"{each.name}:{value}{limit}{where}"
 
 
-def seeing_lines(result: WorkspaceResult, command: Callable[[WorkspacePose], str]) -> Iterator[Line]:
-    """Yield the commands that show violations: for each limit, the claim that is farthest beyond it.
+def violation_lines(result: WorkspaceResult, command: Callable[[WorkspacePose], str]) -> Iterator[Line]:
+    """Yield the commands that show violations: for each limit, its most violated claim.
 
     Args:
         result: verdicts over the workspace.

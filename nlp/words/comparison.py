@@ -20,7 +20,7 @@ _DIGITS, _FEW = 7, 4
 
 
 def comparison_lines(result: ComparisonResult) -> Iterator[Line]:
-    """Yield the lines below the table: sentences and dimensions of each robot, then the rules."""
+    """Yield the lines below the table: notes and dimensions of each robot, then the rules of the comparison."""
     for robot in result.robots:
         for sentence in robot.sentences:
             yield Line(sentence, label=robot.name, tone=Tone.CAUTION)
@@ -32,14 +32,14 @@ def comparison_lines(result: ComparisonResult) -> Iterator[Line]:
 
 
 def comparison_columns(result: ComparisonResult) -> Iterator[Column[ComparedRobotData]]:
-    """Yield the columns: robot, rank, F, rates, sizes, limits, workspace, strokes, and certificate."""
+    """Yield the columns: robot, place, F, rates, sizes, limits, workspace, strokes, and certificate."""
     robots, proofs = result.robots, ColumnKind.PROOF
     tasks = next((each.tasks for each in robots if each.tasks), ())
     several, unit = len(tasks) > 1, result.units.length
-    ranks = {robot.name: str(k) if robot.part == "ranked" else robot.part for k, robot in enumerate(robots, start=1)}
+    places = {robot.name: str(k) if robot.part == "ranked" else robot.part for k, robot in enumerate(robots, start=1)}
     yield Column("robot", lambda robot: robot.name, holds=str, label="robot", text=lambda robot: robot.name)
     yield Column("model", lambda robot: robot.model, holds=str)
-    yield Column("part", lambda robot: robot.part, holds=str, label="rank", text=lambda robot: ranks[robot.name])
+    yield Column("part", lambda robot: robot.part, holds=str, label="place", text=lambda robot: places[robot.name])
     yield Column(
         "freedoms",
         lambda robot: robot.freedoms,
@@ -58,7 +58,7 @@ def comparison_columns(result: ComparisonResult) -> Iterator[Column[ComparedRobo
     )
     for k, task in enumerate(tasks):
         yield from _task_columns(k, task, is_shown=several)
-    yield Column("", _constraints, label="constraints", unit="% of F", text=_constraints)
+    yield Column("", _constraints, label="constraint wrenches", unit="% of F", text=_constraints)
     yield Column("", _largest_rate, label="largest rate", text=_largest_rate)
     yield Column("factor", lambda robot: robot.factor)
     yield Column("size", lambda robot: robot.size)
@@ -122,7 +122,7 @@ def _joined(name: str, texts: Callable[[ComparedRobotData], Iterable[str]]) -> C
 
 
 def dimension_words(robot: ComparedRobotData) -> str:
-    """Return the free dimensions of a design in one line, or all where none is free; values at a bound are marked."""
+    """Return the free dimensions of a design, or all dimensions if none is free, with marks at bounds."""
     parts = []
     free = [each for each in robot.dimensions if each.range is not None]
     for each in free or robot.dimensions:
@@ -166,7 +166,7 @@ def _strokes(robot: ComparedRobotData) -> str:
 
 
 def _proof(robot: ComparedRobotData) -> str:
-    """Return the status of a certificate with its gap; ``none`` where there is no certificate."""
+    """Return the status and the gap of a certificate; ``none`` without a certificate."""
     proof = robot.certificate
     if proof is None:
         return "none" if robot.certificate_fault else ""

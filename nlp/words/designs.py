@@ -17,7 +17,7 @@ from ..system.csvtext import csv_text
 from .numbers import number
 from .text import Line, TextTable
 
-#: Between several values in a cell of CSV.
+#: Separator of several values in a cell of CSV.
 SEPARATOR = "; "
 Row = TypeVar("Row")
 Cell: TypeAlias = "float | str | bool | None"
@@ -79,13 +79,13 @@ class DrawnDesign(NamedTuple):
 
     Attributes:
         name: name of the robot, or the varied value or the goals of the design.
-        words: result of the design.
-        numbers: variables of the design, with name, value and unit.
+        words: result of the design, as a sentence.
+        numbers: variables of the design, each as a text with name, value and unit.
         active: active bounds and limits.
-        nlp: nonlinear program of the design.
-        x: (n,) point of the program.
-        state: robot at the point and the first pose; None where its equations have no value.
-        task: index of the task of the drawing.
+        nlp: nonlinear program whose solution is the design.
+        x: (n,) variables of the nonlinear program at the design.
+        state: robot of the design at the first pose; None if the loop equations have no solution.
+        task: index of the task that is drawn.
     """
 
     name: str
@@ -99,7 +99,7 @@ class DrawnDesign(NamedTuple):
 
 
 class DesignDetails(NamedTuple):
-    """Part of a page about one design: name, sentences, and a table of dimensions, which may be None."""
+    """Part of a page about one design: name, sentences, and a table of dimensions or None."""
 
     name: str
     sentences: Sequence[str]
@@ -147,10 +147,10 @@ class Designs(Generic[Row]):
         join: relation of the rows: a curve, a grid, a cloud or a list.
         page: words of the page.
         before, after: lines above and below the table on a terminal.
-        drawn: returns the designs for drawings.
-        gaps: indices of rows that a curve does not join with the next one.
+        drawn: function that returns the designs for drawings.
+        gaps: indices of rows after which the curve is interrupted.
         missing: sentences about rows without an answer.
-        throughout: bounds and limits that are active in every row with an answer, in words.
+        throughout: names of the bounds and limits that are active in every row with an answer.
         details: texts of a page about the designs.
     """
 
@@ -219,8 +219,8 @@ def certificate_columns(certificate_of: Callable[[Row], CertificateData | None])
     yield Column("gap", number_of("gap"), ColumnKind.PROOF)
 
 
-def free_numbers(nlp: Nlp, x: FloatArray) -> tuple[str, ...]:
-    """Return the free dimensions and pose coordinates of a program, with name, value and unit."""
+def design_values(nlp: Nlp, x: FloatArray) -> tuple[str, ...]:
+    """Return the free dimensions and pose coordinates of a design, each as a text with name, value and unit."""
     units, variables = nlp.case.units, nlp.program.variables
     found = []
     for k in design_indices(nlp.program):

@@ -41,7 +41,11 @@ def inverse_summary(case: Case, found: InversePoses, file: str, rows: Sequence[i
         words = f"no solution at {total - closed} of {counted(total, 'pose')}"
         yield Line(words, label="inverse kinematics", tone=Tone.FAULT, after=_first(~found.closed, file, rows))
     if found.dependent:
-        yield Line(", ".join(found.dependent), label="dependent coordinates", after=", set by the others of each pose")
+        yield Line(
+            ", ".join(found.dependent),
+            label="dependent coordinates",
+            after=", determined by the other coordinates of each pose",
+        )
     if found.singular.any():
         words = f"{int(found.singular.sum())} of {counted(total, 'pose')}"
         yield Line(words, label="singular", tone=Tone.CAUTION, after=_first(found.singular, file, rows))

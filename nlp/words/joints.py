@@ -27,7 +27,7 @@ def motion_words(motion: ScrewMotion, units: Units, size: float = 0.0, part: flo
         motion: motion of the platform.
         units: units of the case.
         size: length to which the rounding errors of the motion's point and pitch are relative.
-        part: error bound of its pitch, as a part of this length.
+        part: error bound of the pitch, as a fraction of ``size``.
     """
     if motion.point is None or motion.pitch == "inf":
         return f"translation along {triple(motion.axis, 1.0)}"
@@ -36,10 +36,10 @@ def motion_words(motion: ScrewMotion, units: Units, size: float = 0.0, part: flo
 
 
 def screw_words(motion: ScrewMotion, units: Units, size: float, part: float = NOISE) -> str:
-    """Return pitch and axis of a motion with rotation; the arguments are those of :func:`motion_words`."""
+    """Return kind, pitch and axis of a motion with rotation; for arguments see :func:`motion_words`."""
     pitch = settled(0.0 if motion.pitch == "inf" else motion.pitch, size, part)
-    words = f"screw of pitch {pitch:.5g} {units.length}" if pitch else "rotation"
-    return f"{words} about {triple(motion.axis, 1.0)}"
+    axis = triple(motion.axis, 1.0)
+    return f"screw, pitch {pitch:.5g} {units.length}, axis {axis}," if pitch else f"rotation about {axis}"
 
 
 def reach_of(motion: ScrewMotion, size: float) -> float:
@@ -49,20 +49,21 @@ def reach_of(motion: ScrewMotion, size: float) -> float:
 
 
 def triple(values: Sequence[float], size: float) -> str:
-    """Return three numbers in parentheses, 0 where they are rounding error relative to a size."""
+    """Return three numbers in parentheses, 0 if they are rounding error relative to a size."""
     return f"({', '.join(number(value, size, digits=4) for value in values)})"
 
 
 def wrench_words(wrench: ScrewWrench, units: Units, size: float) -> str:
-    """Return a wrench in words; the arguments are those of :func:`motion_words`."""
+    """Return a wrench in words; for arguments see :func:`motion_words`."""
     if wrench.point is None or wrench.pitch == "inf":
         return f"couple about {triple(wrench.axis, 1.0)}"
     pitch = settled(wrench.pitch, size)
-    words = f"wrench of pitch {pitch:.5g} {units.length}" if pitch else "force"
-    return f"{words} along {triple(wrench.axis, 1.0)} through {triple(wrench.point, size)}"
+    axis = triple(wrench.axis, 1.0)
+    words = f"wrench, pitch {pitch:.5g} {units.length}, axis {axis}," if pitch else f"force along {axis}"
+    return f"{words} through {triple(wrench.point, size)}"
 
 
-#: Relative change of F from which on a convention is named: F is shown with seven digits.
+#: Smallest relative change of F for which a note names a convention: F is shown with seven digits.
 _NAMED = 1e-6
 
 
@@ -117,14 +118,14 @@ def _unlimited_lines(robot: RobotData, units: Units) -> Iterator[Line]:
 
 
 def idle_words(names: Sequence[str]) -> str:
-    """Return the sentence about actuators with rates that the motion of the platform does not determine."""
+    """Return the sentence about actuators whose rates the motion of the platform does not determine."""
     rates, who = ("rates of actuators", "they") if len(names) > 1 else ("rate of actuator", "it")
     words = f"the platform's motion does not determine the {rates} {', '.join(names)}"
     return f"{words}: {who} can move while the platform stands still"
 
 
 def convention_lines(robot: RobotData) -> Iterator[Line]:
-    """Yield notes where F depends on the characteristic length, or on a centre that the joints do not determine."""
+    """Yield notes if F depends on the characteristic length, or on a limb centre that the joints do not determine."""
     slope = robot.length_dependence or 0.0
     if abs(slope) > _NAMED:
         words = f"F depends on robot.characteristic_length: 1 % more length changes F by {slope:+.2g} %"
@@ -139,7 +140,7 @@ def convention_lines(robot: RobotData) -> Iterator[Line]:
 
 
 def limb_part_table(case: Case, robot: RobotData) -> TextTable | None:
-    """Return F by limb, with the parts of actuation and constraints; None where these are not known."""
+    """Return F by limb, split into actuation and constraint wrenches; None if the split is not known."""
     parts = None if robot.joints is None else robot.joints.limb_parts
     if not parts or robot.task is None:
         return None
@@ -150,8 +151,14 @@ def limb_part_table(case: Case, robot: RobotData) -> TextTable | None:
         share = 100 * each.constraints / total if total > 0 else 0.0
         cells = (number(each.F, total), number(each.actuation, total), number(each.constraints, total))
         rows.append((each.limb, *cells, Figure(f"{share:.3g}", share)))
-    headers = ("limb", f"F\n{unit}", f"actuation\n{unit}", f"constraints\n{unit}", "constraints\n% of F")
-    return TextTable(headers, tuple(rows), "actuation", "F by limb: actuation and constraints")
+    headers = (
+        "limb",
+        f"F\n{unit}",
+        f"actuation\n{unit}",
+        f"constraint wrenches\n{unit}",
+        "constraint wrenches\n% of F",
+    )
+    return TextTable(headers, tuple(rows), "actuation", "F by limb: actuation and constraint wrenches")
 
 
 def _singularity_lines(each: Singularity, robot: RobotData, units: Units) -> Iterator[Line]:

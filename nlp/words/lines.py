@@ -1,4 +1,4 @@
-"""Results as lines of text, with a label and a tone each."""
+"""Results as lines of text; each line has a label and a tone."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ if TYPE_CHECKING:
 
 #: Largest number of violated limits, and of optima, that are shown.
 _VIOLATIONS, _OPTIMA = 8, 5
-#: Digits of the value that would make an infeasible limit feasible.
+#: Digits of the value of a limit with which an infeasible case would be feasible.
 _DIGITS = 6
-#: Relative change of an objective that two solves of one program differ by: a smaller one is no effect of rounding.
+#: Relative difference of the objective between two solves of one nonlinear program; below it, solver error.
 _UNCHANGED = 1e-9
-#: Distance of optimal points, as a part of the ranges, from which on they are a set, not one optimum.
+#: Distance of optimal points, as a fraction of the variable ranges: more distant points are a set, not one optimum.
 SET = 1e-3
 
 
 def counted(count: int, noun: str) -> str:
-    """Return a count with its noun, in the plural unless the count is 1."""
+    """Return a count and its noun; the noun is plural unless the count is 1."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
@@ -46,7 +46,7 @@ def title_line(case: Case) -> Line:
 
 
 def task_lines(task: TaskData, units: Units) -> Iterator[Line]:
-    """Yield a task: name, sense and motion; then the point of its axis nearest to the origin, if not the stated one."""
+    """Yield name, sense and motion of a task; then the axis point nearest to the origin, unless the case states it."""
     points = _stated_and_nearest(task)
     if points is None:
         yield Line(f"{task.name}, {task.sense.value} F: {motion_words(task.motion, units)}", label="task")
@@ -68,14 +68,14 @@ def task_words(task: TaskData, units: Units) -> str:
 
 
 class _Points(NamedTuple):
-    """Points of a task's axis as text: the stated point, and the point nearest to the origin."""
+    """Two points of a task axis as text: the stated point, and the point nearest to the origin."""
 
     stated: str
     nearest: str
 
 
 def _stated_and_nearest(task: TaskData) -> _Points | None:
-    """Return the points of a task's axis; None unless its case states a point other than the nearest one."""
+    """Return both points of a task axis; None if the case states no point or the nearest point."""
     if task.stated_point is None or task.motion.point is None:
         return None
     size = reach_of(task.motion, 0.0)
@@ -129,7 +129,7 @@ def headline(result: SolveResult, case: Case) -> Line:
 
 
 def _no_optimum_words(result: SolveResult) -> str:
-    """Return the status of a solve without an answer, with F of its best points where these did not converge."""
+    """Return the status of a solve without an answer; if the best points did not converge, with their F."""
     reached, starts = result.reached, result.starts
     is_open = result.status is Status.NOT_CONVERGED and bool(starts.optima) and reached is not None
     if not is_open or reached is None or reached.F is None or reached.violated:
@@ -140,13 +140,13 @@ def _no_optimum_words(result: SolveResult) -> str:
 
 
 def _not_proved(result: SolveResult, case: Case, before: str = "") -> str:
-    """Return ``not proved`` with the domain, after a text; empty where no limit over a domain is unproved."""
+    """Return ``before``, then ``not proved`` with the domain; empty if the limits over the domain are proved."""
     proof = result.workspace or result.path
     return "" if proof is None or proof.proved else f"{before}not proved {case.limits_where}"
 
 
 def is_unasked_singularity(robot: RobotData | None, case: Case) -> bool:
-    """Return whether a robot is singular at a pose at least, although its case does not expect a singularity."""
+    """Return whether a robot is singular at one pose or more, although its case does not expect a singularity."""
     if robot is None or case.expect.singular:
         return False
     return robot.singular or (robot.several is not None and any(pose.singular for pose in robot.several.poses))
@@ -170,16 +170,16 @@ def heading_lines(case: Case, result: SolveResult) -> Iterator[Line]:
 
 
 def objective_lines(case: Case) -> Iterator[Line]:
-    """Yield the meaning of F where F is not the sum of squared work rates."""
+    """Yield the meaning of F, if F is not the sum of squared work rates."""
     words = objective_words(case)
     if words:
         yield Line(words, label="F is")
 
 
 def evidence_lines(result: SolveResult, case: Case) -> Iterator[Line]:
-    """Yield the kind of the point, its evidence, and the limits that a failed solve violates or that must be moved."""
+    """Yield the kind of the point, the evidence of optimality, and the violated or infeasible limits."""
     if result.optimality is not None:
-        yield verdict_line(result.optimality)
+        yield optimality_line(result.optimality)
     yield from check_lines(result)
     yield from fault_lines(result, case)
 
@@ -202,13 +202,13 @@ def check_lines(result: SolveResult) -> Iterator[Line]:
 
 
 def fault_lines(result: SolveResult, case: Case) -> Iterator[Line]:
-    """Yield the limits that a failed solve violates, or that must be moved."""
+    """Yield the limits that a failed solve violates, and the values with which the case would be feasible."""
     yield from violation_lines(() if result.reached is None else result.reached.violated)
     for sentence in relaxation_sentences(result, case):
         yield Line(sentence)
 
 
-def verdict_line(evidence: Evidence) -> Line:
+def optimality_line(evidence: Evidence) -> Line:
     """Return the kind of a point, such as a strict local maximum."""
     return Line(evidence.kind.value, label="optimality")
 
@@ -216,7 +216,7 @@ def verdict_line(evidence: Evidence) -> Line:
 def relaxation_sentences(result: SolveResult, case: Case) -> Iterator[str]:
     """Yield the value of each limit with which an infeasible case would be feasible.
 
-    Over a workspace or along a path this value is known from a few poses only, and so it is a necessary one.
+    Over a workspace or along a path, the value follows from a few poses: it is necessary, perhaps not sufficient.
     """
     for row in result.relaxation or ():
         unit, is_upper = f" {row.unit}" if row.unit else "", row.needed > row.limit
@@ -276,7 +276,7 @@ def violation_lines(sides: Sequence[ViolationData]) -> Iterator[Line]:
 
 
 def better_line(starts: StartsData) -> Line | None:
-    """Return the caution that an unconverged search reached a better point; None where there is no such search."""
+    """Return the caution that an unconverged search reached a better point; None without such a search."""
     if starts.better is None or not starts.optima:
         return None
     reached = f"an unconverged search reached F = {number(starts.better)} within the limits"
@@ -289,7 +289,7 @@ def starts_lines(starts: StartsData, robot: RobotData | None = None) -> Iterator
 
     Args:
         starts: starts of a solve.
-        robot: robot at the best optimum, from which the rounding error of F follows; None where it is not known.
+        robot: robot at the best optimum, which gives the rounding error of F; None if unknown.
     """
     if not starts.run:
         return
@@ -327,14 +327,14 @@ def singularity_lines(robot: RobotData, units: Units) -> Iterator[Line]:
 
 
 def tolerance_line(lost: ToleranceLoss, F: float | None, units: Units) -> Line:
-    """Return the loss of F by joint-centre errors."""
+    """Return the loss of F caused by joint-centre errors."""
     part = f" ({100 * lost.loss / F:.2g} %)" if F else ""
     text = f"joint centres off by {lost.tolerance:g} {units.length}: F may be worse by {lost.loss:.4g}{part}"
     return Line(text, label="tolerance")
 
 
 def certificate_lines(certificate: CertificateData | None) -> Iterator[Line]:
-    """Yield the proved statement, the gap, and the size of the search for it."""
+    """Yield the proved statement, the gap, and the number of examined boxes."""
     if certificate is None:
         return
     tone = Tone.ANSWER if certificate.status is CertificateStatus.PROVED else Tone.NO_ANSWER
@@ -351,11 +351,11 @@ def certificate_lines(certificate: CertificateData | None) -> Iterator[Line]:
 def choice_lines(
     choice: ChoiceData | None, rounding: RoundingData | None = None, *, is_answer: bool = True
 ) -> Iterator[Line]:
-    """Yield the values chosen from lists, the rounding of dimensions, and the outcomes of these searches.
+    """Yield the values chosen from lists, the rounding of dimensions, and the outcome of each search.
 
     Args:
         choice: choice among listed values; None without lists.
-        rounding: rounding of the dimensions; None where they are not rounded.
+        rounding: rounding of the dimensions; None without rounding.
         is_answer: If true, the solve gave an answer.
     """
     tone = Tone.PLAIN if is_answer else Tone.FAULT
@@ -392,4 +392,4 @@ def combined_value_lines(combined: CombinedData) -> Iterator[Line]:
         return
     yield Line(number(combined.value), label=f"{combined.method.value} objective")
     if combined.optimality is not None:
-        yield verdict_line(combined.optimality)
+        yield optimality_line(combined.optimality)

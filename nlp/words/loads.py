@@ -51,10 +51,10 @@ def _force_table(case: Case, loads: Sequence[HeldLoad]) -> TextTable:
 
 
 def _constraint_table(case: Case, loads: Sequence[HeldLoad], length: float) -> Iterator[TextTable]:
-    """Yield the constraint wrenches of the limbs under loads, where statics determines at least one of them.
+    """Yield the constraint wrenches of the limbs under loads, if statics determines one or more of these wrenches.
 
-    They balance the part of the load that actuators do not: their rounding error is relative to the load, for moments
-    with the robot's ``length`` as an arm.
+    Constraint wrenches balance the part of a load that actuator forces do not balance. The rounding error is relative
+    to the load; for moments, to the load times the robot's ``length``.
     """
     rows = []
     for load in loads:
@@ -74,9 +74,9 @@ def _constraint_table(case: Case, loads: Sequence[HeldLoad], length: float) -> I
 
 
 def _deflection_table(case: Case, loads: Sequence[HeldLoad], length: float) -> Iterator[TextTable]:
-    """Yield the platform's displacement under every load, where the actuators' stiffness is known.
+    """Yield the platform's displacement under every load, if the actuators' stiffness is known.
 
-    Rounding errors of rotation and translation are relative to the larger of both, with the robot's ``length`` as arm.
+    Rounding errors are relative to the larger of the translation and the rotation times the robot's ``length``.
     """
     rows = []
     for load in loads:
@@ -84,7 +84,9 @@ def _deflection_table(case: Case, loads: Sequence[HeldLoad], length: float) -> I
             continue
         found, none = load.deflection, ("none",) * 3
         way, turn = (max(map(abs, part or ()), default=0.0) for part in (found.translation, found.rotation))
-        of_turn = length * case.units.to_internal(1.0, Dimension.ANGLE)  # the way by a turn of 1 in the case's unit
+        of_turn = length * case.units.to_internal(
+            1.0, Dimension.ANGLE
+        )  # displacement at this arm by a rotation of 1 in the case's unit
         sizes = (max(way, turn * of_turn), max(turn, way / of_turn))
         parts = [
             none if part is None else tuple(number(each, size, digits=5, signed=True) for each in part)

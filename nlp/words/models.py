@@ -19,7 +19,7 @@ def models_table(models: Iterable[tuple[str, str]]) -> TextTable:
 
 
 def models_words(models: Iterable[tuple[str, str]]) -> Iterator[Line | TextTable]:
-    """Yield the names of robots by motion, which is the end of a description, then the descriptions."""
+    """Yield the names of robots, grouped by the motion at the end of each description, then the descriptions."""
     listed = tuple(models)
     motions: dict[str, list[str]] = {}
     for name, description in listed:
@@ -35,7 +35,7 @@ def model_words(name: str, model: Model | None, options: Sequence[ModelOption]) 
 
     Args:
         name: name of the robot.
-        model: the robot; None where an option without a default is not given: then only the options are shown.
+        model: the robot; None if an option without a default is missing, so that only the options are shown.
         options: options of the robot.
     """
     yield Line(name, tone=Tone.TITLE)
@@ -61,7 +61,7 @@ def model_words(name: str, model: Model | None, options: Sequence[ModelOption]) 
         if model.legs:
             words = f"{', '.join(leg.name for leg in model.legs)} (limits on leg lengths apply)"
             yield Line(words, label="straight legs")
-    words = "wrenches whose magnitudes have the norm f do work at a rate of at most f sqrt(F) in the task"
+    words = "if f is the Euclidean norm of all wrench magnitudes, their power in the task is at most f sqrt(F)"
     yield Line(words if not model.actuators else f"{words}; [[load]] gives actuator forces", label="forces")
     if model.quantities:
         rows = [(item.name, item.dimension.value, item.description) for item in model.quantities]
@@ -134,7 +134,7 @@ def unknown_lines(model: Model, *, all_assemblies: bool) -> Iterator[Line]:
 
     Args:
         model: the robot.
-        all_assemblies: If true, all working modes are covered, not only that of home.
+        all_assemblies: If true, the search covers all assembly modes, not only the working mode of home.
     """
     if free := _free_joint_words(model):
         yield Line(f"{free}, which the pose does not determine", label="variables")

@@ -9,7 +9,7 @@ from ...models import Dimension
 from ...models.statics import DrivenJoint, driven_joints
 from ..case.case import Case
 from ..case.forces import dimension_of_force, dimension_of_speed
-from ..case.motors import MotorNumber
+from ..case.motors import ActuatorQuantity
 from ..case.task import Sense
 from ..proof.workspace.verdict import Outcome
 from .numbers import number
@@ -18,24 +18,24 @@ from .text import Line, TextTable, Tone
 if TYPE_CHECKING:
     from ..results.workspace import MotorData, MotorEndData
 
-#: Word of each outcome for people, of a limit or of another quantity.
+#: Word for each outcome of a claim.
 OUTCOME_WORDS = {Outcome.PROVED: "proved", Outcome.REFUTED: "violated", Outcome.OPEN: "undecided"}
 #: Tone of each outcome.
 TONES = {Outcome.PROVED: Tone.HOLDS, Outcome.REFUTED: Tone.FAULT, Outcome.OPEN: Tone.CAUTION}
 #: Outcomes, the worst one first.
 _ORDER = (Outcome.REFUTED, Outcome.OPEN, Outcome.PROVED)
 _NOTHING = "no bound"
-#: Size below which a bound is 0: the proved bound of a quantity that is 0 lies slightly above underflow.
+#: Largest magnitude of a bound that is shown as 0: the proved bound of a zero quantity is a tiny number.
 _UNDERFLOW = 1e-90
 
 
 def ends_of_motor(motor: MotorData) -> tuple[MotorEndData, ...]:
-    """Return the verdicts on the smallest value of an actuator's quantity, where it has one, and on the largest."""
+    """Return the verdicts on the smallest value of an actuator quantity, if there is one, and on the largest value."""
     return tuple(each for each in (motor.smallest, motor.largest) if each is not None)
 
 
 def motor_tables(case: Case, motors: Sequence[MotorData]) -> Iterator[TextTable]:
-    """Yield the motor requirements, a row for each actuator: one table for linear actuators, one for rotary ones.
+    """Yield two tables of motor requirements with a row for each actuator: linear actuators, then rotary actuators.
 
     The values are proved bounds over all poses and all load cases.
     """
@@ -57,11 +57,11 @@ def motor_tables(case: Case, motors: Sequence[MotorData]) -> Iterator[TextTable]
 
 def _row(joint: DrivenJoint, motors: Sequence[MotorData]) -> tuple[str | Line, ...]:
     """Return the row of an actuator: coordinate from and to, force in both senses, speed, power, outcome."""
-    by = {each: [motor for motor in motors if motor.number is each] for each in MotorNumber}
-    forces = [abs(end.bound or 0.0) for motor in by[MotorNumber.FORCE] for end in ends_of_motor(motor)]
+    by = {each: [motor for motor in motors if motor.number is each] for each in ActuatorQuantity}
+    forces = [abs(end.bound or 0.0) for motor in by[ActuatorQuantity.FORCE] for end in ends_of_motor(motor)]
     size = max(forces, default=0.0) + _UNDERFLOW
 
-    def extreme(what: MotorNumber, sense: Sense, *, flipped: bool = False) -> str:
+    def extreme(what: ActuatorQuantity, sense: Sense, *, flipped: bool = False) -> str:
         ends = [motor.smallest if sense is Sense.MIN else motor.largest for motor in by[what]]
         known = [end.bound for end in ends if end is not None]
         if not known:
@@ -70,19 +70,19 @@ def _row(joint: DrivenJoint, motors: Sequence[MotorData]) -> tuple[str | Line, .
         if len(values) < len(known):
             return _NOTHING
         value = min(values) if sense is Sense.MIN else max(values)
-        if what is MotorNumber.FORCE:
+        if what is ActuatorQuantity.FORCE:
             value = max(-value if flipped else value, 0.0)
-        return number(value, size if what is MotorNumber.FORCE else _UNDERFLOW)
+        return number(value, size if what is ActuatorQuantity.FORCE else _UNDERFLOW)
 
     outcomes = [end.outcome for motor in motors for end in ends_of_motor(motor)]
     worst = next((each for each in _ORDER if each in outcomes), Outcome.OPEN)
     return (
         joint.name,
-        extreme(MotorNumber.COORDINATE, Sense.MIN),
-        extreme(MotorNumber.COORDINATE, Sense.MAX),
-        extreme(MotorNumber.FORCE, Sense.MAX),
-        extreme(MotorNumber.FORCE, Sense.MIN, flipped=True),
-        extreme(MotorNumber.SPEED, Sense.MAX),
-        extreme(MotorNumber.POWER, Sense.MAX),
+        extreme(ActuatorQuantity.COORDINATE, Sense.MIN),
+        extreme(ActuatorQuantity.COORDINATE, Sense.MAX),
+        extreme(ActuatorQuantity.FORCE, Sense.MAX),
+        extreme(ActuatorQuantity.FORCE, Sense.MIN, flipped=True),
+        extreme(ActuatorQuantity.SPEED, Sense.MAX),
+        extreme(ActuatorQuantity.POWER, Sense.MAX),
         Line(OUTCOME_WORDS[worst], tone=TONES[worst]),
     )

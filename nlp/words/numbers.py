@@ -22,24 +22,24 @@ def number(value: float, size: float = 0.0, *, digits: int = 7, signed: bool = F
 
     Args:
         value: the number.
-        size: size of its terms, its neighbours or its range, to which its error bound is relative.
+        size: magnitude to which the error bound is relative, such as the largest term or the range of the number.
         digits: number of significant digits.
         signed: If true, a positive number has a sign.
-        part: error bound, as a part of the size.
+        part: error bound, as a fraction of ``size``.
     """
     value = settled(value, size, part)
     return Figure(f"{value:{'+' if signed and value else ''}.{digits}g}", value)
 
 
 def rounded_to(value: float, digits: int, *, up: bool) -> str:
-    """Return the text of a number, rounded up or down after digits without significance are removed."""
+    """Return the text of a number, rounded up or down to the given number of significant digits."""
     settled_value = Context(prec=_SOLVED).create_decimal(value)
     context = Context(prec=digits, rounding=ROUND_CEILING if up else ROUND_FLOOR)
     return f"{float(context.plus(settled_value)):.{digits}g}"
 
 
 def listed(values: Iterable[float]) -> str:
-    """Return numbers with five digits, 0 where they are rounding error of the largest one."""
+    """Return numbers with five digits each; a number within the rounding error of the largest is 0."""
     numbers = list(values)
     size = max(map(abs, numbers), default=0.0)
     return "  ".join(number(value, size, digits=5) for value in numbers)
@@ -51,5 +51,5 @@ def per_words(unit: str | None) -> str:
 
 
 def residual(value: float) -> str:
-    """Return the text of a residual in scaled terms; below its error bound it has no significant digit."""
+    """Return the text of a scaled residual; a residual below the error bound has no significant digit."""
     return f"{value:.1e}" if value > _RESIDUAL else f"below {_RESIDUAL:.0e}"

@@ -18,11 +18,11 @@ from .verdicts import (
     answer_words,
     exchange_lines,
     head_lines,
-    machine_lines,
     open_lines,
     outcome_lines,
     proof_line,
     tightest_table,
+    tolerance_lines,
     verdict_table,
 )
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 #: Title of the table of limits with the smallest margin.
 TIGHTEST_ALONG = "limits with the smallest margin along the path"
-#: Number of words without motion that are shown.
+#: Largest number of ignored G-code words that are shown.
 _SHOWN = 6
 
 
@@ -45,7 +45,7 @@ def path_summary(
     Args:
         case: the case.
         result: the verdicts.
-        command: returns the command that shows a pose; None for a page, where only tables have single claims.
+        command: function that returns the command for a pose; None for a page, which lists claims only in tables.
     """
     path, answer = result.path, verdict_words(result)
     limited = [each for each in path.claims if each.limit is not None]
@@ -72,7 +72,7 @@ def path_summary(
 
 
 def _subject_lines(path: PathData) -> Iterator[Line]:
-    """Yield the path: its file, its time, and its words without motion."""
+    """Yield the file, the time and the ignored words of a path."""
     yield Line(f"{path.file}: {path.segments:,} segment{'s' * (path.segments != 1)}", label="path")
     if path.time is not None:
         yield Line(f"{number(path.time)} s", label="time", after=_untimed_words(path))
@@ -83,7 +83,7 @@ def _subject_lines(path: PathData) -> Iterator[Line]:
 
 
 def _other_faults(path: PathData, first: PathVerdictData | None) -> Iterator[Line]:
-    """Yield the violations of claims other than the first one, in the order of the path."""
+    """Yield the violated claims after the first one, in the order of the path."""
     others = [(each, each.fault) for each in path.claims if each.fault is not None and each is not first]
     others.sort(key=lambda pair: (pair[1].segment, pair[1].parameter) if pair[1] is not None else (0, 0.0))
     for k, (each, fault) in enumerate(others):
@@ -100,7 +100,7 @@ def along_table(case: Case, verdicts: Sequence[PathVerdictData]) -> Iterator[Tex
 
 
 def _untimed_words(path: PathData) -> str:
-    """Return the number of segments without a time; empty where all have one."""
+    """Return the number of segments without a time; empty if all segments have a time."""
     if not path.untimed:
         return ""
     verb = "has" if path.untimed == 1 else "have"
@@ -113,7 +113,7 @@ def _knot_lines(path: PathData, unit: str) -> Iterator[Line]:
     if knots is None:
         return
     lost = knots.number - knots.closed
-    yield Line(f"{knots.number:,}", label="knots", after=f"; {lost:,} of them are out of reach" if lost else "")
+    yield Line(f"{knots.number:,}", label="knots", after=f"; the robot cannot reach {lost:,} of them" if lost else "")
     if knots.within is None:
         return
     asked = f"{number(knots.within)} {unit}"
@@ -130,7 +130,7 @@ def _actuator_table(path: PathData) -> TextTable:
     """Return the table of the actuators' ranges, speeds and accelerations."""
 
     def column(word: str, values: Iterable[float | None]) -> list[str]:
-        """Return a column with its head; empty where no value is known."""
+        """Return a column with its head; empty if no value is known."""
         cells = ["" if each is None else number(each) for each in values]
         return [word, *cells] if any(cells) else []
 
@@ -177,7 +177,7 @@ def path_proof_lines(case: Case, proof: PathProofData) -> Iterator[Line]:
                 between = f" (bounds {' .. '.join(ends)})"
             yield Line(f"{number(given)} {case.units.label(dimension)}", label=f"path placement {name}", after=between)
     yield from exchange_lines(proof, "path")
-    yield from machine_lines(case, proof.joint_centre)
+    yield from tolerance_lines(case, proof.joint_centre)
 
 
 def tightest_along(proof: PathProofData) -> Iterator[TextTable]:
@@ -193,7 +193,7 @@ def first_refuted(result: PathResult) -> PathVerdictData | None:
 
 
 def fault_words(each: PathVerdictData, fault: PathFaultData) -> str:
-    """Return a violated claim at the first point where the violation is known."""
+    """Return a violated claim, with the first point of the path at which the violation is known."""
     where = f"line {fault.line}, {_along_words(fault.parameter)}"
     if each.limit is None or fault.value is None:
         return f"{where}: {SINGULAR[each.name]}"
@@ -203,12 +203,12 @@ def fault_words(each: PathVerdictData, fault: PathFaultData) -> str:
 
 
 def _along_words(parameter: float) -> str:
-    """Return the place on a segment."""
+    """Return the position on a segment."""
     return f"at {number(parameter, 1.0)} of its segment"
 
 
 def _place_words(each: PathVerdictData) -> str:
-    """Return the line and the place on its segment, after a comma; empty where they are not known."""
+    """Return a comma, the line number and the position on the segment; empty if unknown."""
     if each.line is None or each.parameter is None:
         return ""
     return f", in line {each.line} {_along_words(each.parameter)}"

@@ -19,16 +19,16 @@ if TYPE_CHECKING:
     from ..case.overrides import Settings
     from ..evidence.state import WorkspacePose
 
-#: Digits of a pose in a command: the smallest number, the number where no limit is violated, and all digits.
+#: Digits of a pose in a command: the fewest, the number for a pose without a violated limit, and all digits.
 _FEWEST, _ENOUGH, _ALL = 3, 6, 17
-#: Names for a pose without values, and for a pose with open loops, among the names of violated limits.
+#: Names of two faults of a pose, beside names of violated limits: the model has no value; loops are open.
 _IMPOSSIBLE, _OPEN = "impossible", "open loops"
-#: Keys of a rotation, behind the prefix of its pose.
+#: Keys of a rotation, after the prefix of the pose.
 _ROTATION = ("axis", "angle", *(each.value for each in (RotationForm.RPY, RotationForm.QUATERNION)))
 
 
 def _rotation(case: Case, numbers: Mapping[str, list[float]]) -> Rotation:
-    """Return the rotation that numbers state in a form of the case.
+    """Return the rotation that numbers describe in the rotation form of the case.
 
     Raises:
         CaseError: a quaternion is rounded too much.
@@ -123,7 +123,7 @@ def _shown(case: Case, position: Sequence[float], turn: Mapping[str, list[float]
 
 
 def _rounded(values: Sequence[float], digits: int) -> list[float]:
-    """Return numbers rounded at the same decimal place, so that the largest has the given number of digits."""
+    """Return numbers rounded at one decimal place, at which the largest number has the given number of digits."""
     size = max(map(abs, values))
     if size == 0:
         return list(values)

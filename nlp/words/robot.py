@@ -39,9 +39,9 @@ if TYPE_CHECKING:
     from ..results.data import CombinedData, SolveResult
     from ..results.parts import ByOwner, PosesData, PoseStateData, RobotData, TaskData
 
-#: Number of fixed values that are shown beside variables: those with the largest relative sensitivity of F.
+#: Number of fixed values that are shown with the variables: the values with the largest relative sensitivity of F.
 _FIXED = 6
-#: Number of free actuator coordinates that are shown among the variables; further ones stand at the end.
+#: Number of free actuator coordinates that are shown among the variables; all others come last.
 _JOINTS = 12
 #: Number of listed values that are shown; of a longer list, the first two and the last.
 _LISTED = 5
@@ -60,8 +60,8 @@ class _Row(NamedTuple):
 
     Attributes:
         place: place in the table.
-        cells: name, value, unit, bounds, status, and derivative of the optimal F.
-        sensitivity: relative sensitivity: change of F per 100 % change of the value; 0 where it is not known.
+        cells: texts of name, value, unit, bounds, status, and derivative of the optimal F.
+        sensitivity: change of F per 100 % change of the value; 0 if unknown.
     """
 
     place: _Place
@@ -74,14 +74,14 @@ _SIDES = {"min": "at lower bound", "max": "at upper bound", "equal": "fixed by a
 
 
 class _Rows:
-    """Rows of the design table, with the status of each value, and the derivative of the optimal F by a bound or value.
+    """Rows of the design table: values, their status, and derivatives of the optimal F.
 
     Args:
         units: units of the case.
-        size: size of the robot, to which the rounding error of a length of 0 is relative.
-        F: size of the terms of F, to which the rounding error of a derivative is relative.
+        size: length of the robot, to which the rounding errors of lengths are relative.
+        F: magnitude of the terms of F, to which the rounding errors of derivatives are relative.
         active: active bounds and limits.
-        sensitivity: derivatives of the optimal F by the fixed values.
+        sensitivity: derivatives of the optimal F with respect to the fixed values.
         sense: sense of the objective.
     """
 
@@ -115,7 +115,7 @@ class _Rows:
             value: value, in the case's units.
             given: bounds or fixed value in the case.
             dimension: kind of the value.
-            beside: largest of the values that were stated with it, in the case's units.
+            beside: largest component of the vector with this value, in the case's units.
             limits: names of limits of the case on this variable only.
         """
         label = self._units.label(dimension)
@@ -172,8 +172,8 @@ def design_table(
         robot: robot at the point.
         reached: If true, the point is the end of a failed solve.
         active: active bounds and limits.
-        sensitivity: derivatives of the optimal F by the fixed values.
-        F: objective; None where there is none.
+        sensitivity: derivatives of the optimal F with respect to the fixed values.
+        F: objective; None if F is unknown.
         combined: If true, the objective combines several tasks.
     """
     reasons = _Rows(case.units, robot_size(robot), size_of_F(robot, F or 0.0), active, sensitivity, _sense(case))
@@ -208,7 +208,7 @@ def design_table(
 
 
 def _pose_rows(case: Case, k: int, found: PlatformPose, reasons: _Rows) -> list[_Row]:
-    """Return the rows of a stated pose: position, and rotation in the form in which the case states it."""
+    """Return the rows of a stated pose: the position, and the rotation in the form of the case."""
     prefix, pose = case.pose_prefixes[k], case.poses[k]
     largest = max(map(abs, found.position))
     rows = [
@@ -235,7 +235,7 @@ def _pose_rows(case: Case, k: int, found: PlatformPose, reasons: _Rows) -> list[
 
 
 def _free_joint_rows(case: Case, joints: Sequence[FreeJoint], reasons: _Rows) -> list[_Row]:
-    """Return the rows of free actuator coordinates: those that the pose does not determine."""
+    """Return the rows of the actuator coordinates that the pose does not determine."""
     rows = []
     for each in joints:
         dimension = Dimension(each.kind)
@@ -246,7 +246,7 @@ def _free_joint_rows(case: Case, joints: Sequence[FreeJoint], reasons: _Rows) ->
 
 
 def _sense(case: Case) -> Sense:
-    """Return the sense of the objective; of tasks of both senses, a sum is maximised, and the worst loss minimised."""
+    """Return the sense of the objective; for tasks of both senses: maximum of a sum, minimum of the worst loss."""
     senses = {task.sense for task in case.tasks}
     if len(senses) == 1:
         return senses.pop()
@@ -254,7 +254,7 @@ def _sense(case: Case) -> Sense:
 
 
 def solved_design_table(case: Case, result: SolveResult, robot: RobotData) -> TextTable:
-    """Return the design of a solve, with its active bounds where the point is an answer."""
+    """Return the design of a solve; active bounds are shown only if the point is an answer."""
     reached = result.reached is not None
     active = () if reached or result.optimality is None else result.optimality.active
     return design_table(case, robot, reached=reached, active=active, sensitivity=result.sensitivity or (), F=result.F)
@@ -267,9 +267,9 @@ def combined_design_table(case: Case, combined: CombinedData, robot: RobotData) 
     return design_table(case, robot, reached=reached, active=active, F=combined.value, combined=True)
 
 
-#: Relative difference of F up to which a pose counts as a worst one.
+#: Largest relative difference from the worst F at which a pose also counts as worst.
 _AS_BAD = 1e-6
-#: Number of poses that a terminal shows by limb.
+#: Number of poses in tables by limb on a terminal.
 _POSES = 12
 #: Largest component of the difference of two unit axes that count as equal.
 _SAME_AXIS = 1e-6
@@ -282,8 +282,8 @@ class _Measure(NamedTuple):
         name: name of the quantity.
         dimension: kind of its values.
         words: name for people.
-        reference: direction that an angle is measured from, as a limit of the case states it; else empty.
-        unit: unit of its values, with the direction that an angle is measured from.
+        reference: direction from which an angle is measured, if a limit of the case states one; otherwise empty.
+        unit: unit of the values; for an angle, after the reference direction.
     """
 
     name: str
@@ -320,12 +320,12 @@ def _measures(case: Case, robot: RobotData) -> list[_Measure]:
 
 
 def robot_table(case: Case, robot: RobotData) -> TextTable:
-    """Return a row for each pose, or a row for each limb where there is one pose."""
+    """Return a table with a row for each pose; for one pose, with a row for each limb."""
     return _limb_table(case, robot) if robot.several is None else _pose_table(case, robot, robot.several)
 
 
 def robot_tables(case: Case, robot: RobotData) -> Iterator[TextTable]:
-    """Yield the limbs, or the poses where there are several; then actuator forces and constraint wrenches."""
+    """Yield the table of limbs, or of several poses; then actuator forces and constraint wrenches."""
     yield robot_table(case, robot)
     yield from robot_tables_by_limb(case, robot)
     yield from loading_tables(case, robot)
@@ -358,14 +358,14 @@ def _pose_table(case: Case, robot: RobotData, several: PosesData) -> TextTable:
 
 
 def _settled_pose_F(pose: PoseStateData, task: TaskData | None) -> float:  # noqa: N802 - the objective's name
-    """Return F at a pose, 0 where it is rounding error."""
+    """Return F at a pose; an F within its rounding error is 0."""
     if task is None:
         return pose.F
     return settled_F(pose.F, rate_sizes(pose.jacobian, task.motion.twist, pose.pose.position))
 
 
 def _worst(values: Sequence[float], task: TaskData | None) -> list[bool]:
-    """Return for each pose whether its F is the worst; false for all where F is equal or the sense is not known."""
+    """Return for each pose whether its F is the worst; all false if F is equal or the sense is unknown."""
     low, high = min(values), max(values)
     if task is None or high - low <= _AS_BAD * abs(high):
         return [False] * len(values)
@@ -374,7 +374,7 @@ def _worst(values: Sequence[float], task: TaskData | None) -> list[bool]:
 
 
 def _range_text(values: ByOwner, measure: _Measure, case: Case) -> str:
-    """Return the range of a quantity over the limbs; of an angle, the largest value only."""
+    """Return the range of a quantity over the limbs; for an angle, only the largest value."""
     size = size_of(measure.dimension, values.values(), case.units)
     low, high = (number(end(values.values()), size, digits=5) for end in (min, max))
     return high if measure.dimension is Dimension.ANGLE else f"{low} .. {high}"
@@ -437,7 +437,7 @@ def rate_word(model: Model) -> str:
 
 
 def _limb_table(case: Case, robot: RobotData) -> TextTable:
-    """Return the rows of the Jacobian with the quantities of their limbs, and for a single task rate and share of F."""
+    """Return the rows of the Jacobian with the quantities of their limbs; for one task, also rate and share of F."""
     model, task = case.model, robot.task
     rates: Sequence[float] = ()
     if task is not None and robot.rates is not None:
@@ -465,7 +465,7 @@ def _limb_table(case: Case, robot: RobotData) -> TextTable:
 
 
 def jacobian_table(case: Case, robot: RobotData) -> TextTable:
-    """Return the Jacobian; the rounding error of moments is relative to the longest arm."""
+    """Return the table of the Jacobian; rounding errors of moments are relative to the longest moment arm."""
     arm = max((abs(value) for row in robot.jacobian for value in row[3:]), default=0.0)
     rows = []
     for row, values in zip(case.model.rows, robot.jacobian, strict=True):

@@ -1,6 +1,6 @@
 """Summaries of results for a terminal, as lines and tables; the tables of a result by name.
 
-A summary begins with the answer, then its evidence, the design with its active limits, and parts for a longer view.
+A summary has the answer, the evidence, the design with its active limits, and sections for a longer view.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from .lines import (
     heading_lines,
     is_unasked_singularity,
     objective_lines,
+    optimality_line,
     singularity_lines,
     starts_lines,
     task_lines,
     title_line,
     tolerance_line,
-    verdict_line,
     violation_lines,
 )
 from .loads import loading_tables
@@ -66,20 +66,20 @@ def case_summary(case: Case, result: CaseResult) -> Summary:
 
 
 def _task_summary(case: Case, result: SolveResult) -> Summary:
-    """Yield the result of a solve of one task: F, its evidence, the design, active limits; then the parts."""
+    """Yield F, the evidence, the design and the active limits of a solve of one task; then the sections behind them."""
     robot = result.robot
     yield from heading_lines(case, result)
     yield from choice_lines(result.choice, result.rounding, is_answer=result.F is not None)
     yield from fault_lines(result, case)
     if result.F is None:
         yield from starts_lines(result.starts, robot)
-        if case.limits_over == "workspace" and case.not_held is not None:
-            yield Line(case.not_held.sentence, label="note")
+        if case.limits_over == "workspace" and case.outside_workspace is not None:
+            yield Line(case.outside_workspace.sentence, label="note")
     elif (caution := better_line(result.starts)) is not None:
         yield caution
     yield from _proof_lines(case, result)
     if result.optimality is not None:
-        yield verdict_line(result.optimality)
+        yield optimality_line(result.optimality)
     yield from certificate_lines(result.certificate)
     if robot is not None and result.reached is None:
         yield from singularity_lines(robot, case.units)
@@ -91,7 +91,7 @@ def _task_summary(case: Case, result: SolveResult) -> Summary:
 
 
 def _task_parts(case: Case, result: SolveResult) -> Summary:
-    """Yield the parts behind the answer of a solve of one task."""
+    """Yield the sections after the answer of a solve of one task."""
     robot = result.robot
     if robot is not None:
         yield from in_part("limbs" if robot.several is None else "poses", [robot_table(case, robot)])
@@ -116,11 +116,11 @@ def _proof_lines(case: Case, result: CaseResult) -> Iterator[Line]:
     """Yield the proof of a design over a workspace, or along a path."""
     if result.workspace is not None:
         # Few cases have a proof, and these modules load the rooms of proofs.
-        from .verdicts import machine_lines  # noqa: PLC0415
+        from .verdicts import tolerance_lines  # noqa: PLC0415
         from .workspace import proof_lines  # noqa: PLC0415
 
         yield from proof_lines(result.workspace)
-        yield from machine_lines(case, result.workspace.joint_centre)
+        yield from tolerance_lines(case, result.workspace.joint_centre)
     if result.path is not None:
         from .path import path_proof_lines  # noqa: PLC0415 - in the same way
 
@@ -191,12 +191,12 @@ def certified_summary(case: Case, result: CertifiedResult) -> Summary:
 
 
 def _named(lines: Iterable[Line], name: str | None) -> Iterator[Line]:
-    """Yield lines about a task, with the name of the task where there are several."""
+    """Yield lines about a task; with the name of the task if there are several tasks."""
     return (line if name is None else replace(line, text=f"{name}: {line.text}") for line in lines)
 
 
 def evaluation_summary(case: Case, result: EvaluationResult) -> Summary:
-    """Yield the robot at one point: F, violated limits, the rank; then its parts, with its Jacobian."""
+    """Yield F, the violated limits and the rank of J at one point; then the sections, with the Jacobian."""
     robot = result.robot
     yield title_line(case)
     if result.objective is not None:
@@ -230,7 +230,7 @@ def evaluation_summary(case: Case, result: EvaluationResult) -> Summary:
 
 
 def _limb_parts(case: Case, robot: RobotData) -> Summary:
-    """Yield the parts of actuation and constraints by limb, where constraint wrenches contribute to F."""
+    """Yield actuation and constraint wrenches by limb, if constraint wrenches contribute to F."""
     table = limb_part_table(case, robot)
     if table is not None and robot.joints is not None and robot.joints.constrained:
         yield table

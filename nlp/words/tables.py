@@ -28,19 +28,19 @@ if TYPE_CHECKING:
     from ..results.workspace import WorkspaceProofData
     from ..solver.multistart import ProgramSolution
 
-#: Largest number of places where a limit is active that are named.
+#: Largest number of named places at which a limit is active.
 _PLACES = 3
-#: Error of the margin of an active limit, as a part of the limit: tolerance of the test for active limits.
+#: Error of the margin of an active limit, as a fraction of the limit: tolerance of the test for active limits.
 _ON_LIMIT = 10 * ACTIVE
-#: Error bound of the pitch of a principal motion, as a part of the robot's size: eigenvectors of nearly equal F mix,
-#: and robot files give their values with six to nine digits.
+#: Error bound of the pitch of a principal motion, as a fraction of the robot's size. Eigenvectors of nearly
+#: equal F mix, and robot files give dimensions with six to nine digits.
 _EIGENVECTOR = 1e-6
 #: Largest number of optima that are shown in full.
 MOST_OPTIMA = 12
 
 
 def principal_table(motions: TaskAnalysis, units: Units, size: float) -> TextTable:
-    """Return the motions at which F is stationary: motions of unit rotation, then translations of unit speed.
+    """Return the motions at which F is stationary: unit rotations, then unit translations.
 
     Args:
         motions: principal motions.
@@ -49,14 +49,15 @@ def principal_table(motions: TaskAnalysis, units: Units, size: float) -> TextTab
     """
     rows = []
     for kind in (motions.rotations, motions.translations):
-        for rank, motion in zip(("least", "", "most"), kind, strict=True):
+        for rank, motion in zip(("least F", "", "most F"), kind, strict=True):
             words = motion_words(motion.motion, units, size, _EIGENVECTOR)
             rows.append((rank, number(motion.F, kind[-1].F), words))
-    return TextTable(("resistance", "F", "motion"), tuple(rows), "motions")
+    title = "principal motions: stationary values of F among unit rotations, then unit translations"
+    return TextTable(("", "F", "motion"), tuple(rows), "motions", title)
 
 
 def limits_title(case: Case, proof: WorkspaceProofData | PathProofData | None = None) -> str:
-    """Return the poses that the rows of the limits cover, for limits over a domain; empty for limits at stated poses.
+    """Return the poses at which limits over a domain were checked; empty for limits at stated poses.
 
     Args:
         case: the case.
@@ -71,7 +72,7 @@ def limits_title(case: Case, proof: WorkspaceProofData | PathProofData | None = 
 
 
 def limit_table(limits: Sequence[LimitData], F: float = 0.0, title: str = "") -> TextTable:
-    """Return the limits of a case with the value nearest to each, its margin, the derivative of F, and the place.
+    """Return the limits of a case: nearest value, margin, derivative of F, and place.
 
     Violated limits come first, then active ones.
 
@@ -96,7 +97,7 @@ def limit_table(limits: Sequence[LimitData], F: float = 0.0, title: str = "") ->
 
 
 def _text(value: float, size: float) -> str:
-    """Return the text of a number, 0 where it is rounding error relative to a size."""
+    """Return the text of a number; a number within the rounding error of ``size`` is 0."""
     return number(value, size, digits=6) if math.isfinite(value) else "none"
 
 
@@ -117,7 +118,7 @@ def outcome_table(combined: CombinedData, tasks: Sequence[SolveResult] = ()) -> 
 
     Args:
         combined: the combined tasks.
-        tasks: results of the separate solves, from which the rounding error of F follows.
+        tasks: results of the separate solves, which give the rounding errors of F.
     """
     robot = None if combined.point is None else combined.point.robot
     rows = []
@@ -153,7 +154,7 @@ def margin_table(margins: Sequence[Margin]) -> TextTable:
 def active_table(result: SolveResult | CombinedData, F: float, *, is_answer: bool) -> TextTable:
     """Return the active and violated bounds and limits of a point, with their multipliers.
 
-    A point that is no answer has no multipliers: the solver's values of them have no meaning there.
+    A point that is not an answer has no multipliers: the multipliers of the solver have no meaning there.
 
     Args:
         result: result with evidence.
@@ -186,7 +187,7 @@ def _violated(result: SolveResult | CombinedData) -> Collection[str]:
 
 
 def sizes_of_variables(nlp: Nlp) -> list[float]:
-    """Return the sizes of the variables' ranges in the case's units, to which rounding errors are relative."""
+    """Return the widths of the variables' ranges in the case's units; rounding errors are relative to these widths."""
     pairs = zip(nlp.scale, nlp.program.variables, strict=True)
     return [nlp.case.units.shown(float(size), variable.dimension) for size, variable in pairs]
 
@@ -196,7 +197,7 @@ def optimum_table(solution: ProgramSolution, robot: RobotData | None = None) -> 
 
     Args:
         solution: solution of one nonlinear program.
-        robot: robot at the best optimum, from which the rounding error of F follows; None where it is not known.
+        robot: robot at the best optimum, which gives the rounding error of F; None if unknown.
     """
     units, variables = solution.nlp.case.units, solution.nlp.program.variables
     labels = [(variable.name, units.label(variable.dimension)) for variable in variables]
@@ -216,7 +217,7 @@ def optimum_table(solution: ProgramSolution, robot: RobotData | None = None) -> 
 
 
 def origin_table(versions: VersionsData, search: Search | None = None, seconds: float = 0.0) -> TextTable:
-    """Return versions, and seed, starts and time of a search: everything on which the results depend."""
+    """Return everything on which results depend: versions, and seed, starts and time of a search."""
     rows = [(name, str(getattr(versions, name))) for name in versions.fields]
     if search is not None:
         rows += [("seed", str(search.seed)), ("starts", str(search.starts)), ("seconds", f"{seconds:.3g}")]

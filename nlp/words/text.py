@@ -1,4 +1,4 @@
-"""Lines and tables without a format, for the terminal, Markdown and pages."""
+"""Lines and tables of text, independent of the output: terminal, Markdown or page."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Figure(str):
     """Text of a number, with its value for outputs that keep every digit.
 
     Attributes:
-        value: the number; 0 where it is below its error bound.
+        value: the number; 0 if it is below its error bound.
     """
 
     __slots__ = ("value",)
@@ -77,12 +77,12 @@ class TextTable:
         rows: rows with a cell for each column: text, a line with a tone, or a figure with all digits of a number.
         name: name in CSV and for ``--table``, one word; empty for a table that is shown only.
         title: line above the table on a terminal; empty without a title.
-        folded: number of the last rows that are of less interest: a terminal counts them, a page opens them.
-        folded_words: name of the folded rows in the plural.
-        named: number of the last rows that this name fits; None for all rows.
+        folded: number of less important rows at the end: a terminal shows their count, a page shows them on request.
+        folded_words: plural name of the folded rows.
+        named: number of folded rows to which ``folded_words`` applies; None for all.
         part: name of the part of the result that the table belongs to; empty for the answer.
         extra: number of the last columns that a short view leaves out where the table is too long for it.
-        is_curve: If true, the rows are points of a curve: a short view shows some in equal steps, not the first ones.
+        is_curve: If true, the rows are points of a curve: a short view shows rows in equal steps, not the first rows.
     """
 
     headers: tuple[str, ...]
@@ -98,6 +98,6 @@ class TextTable:
 
 
 def in_part(name: str, items: Iterable[Line | TextTable]) -> Iterator[Line | TextTable]:
-    """Yield lines and tables as a part of a result, after the answer."""
+    """Yield lines and tables as one section of a result, after the answer."""
     for item in items:
         yield replace(item, part=name)

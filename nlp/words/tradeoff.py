@@ -9,7 +9,7 @@ from ..case.case import Case
 from ..results.tradeoff import LIMITS, TradeoffPointData, TradeoffResult
 from ..solver.status import Status
 from ..solver.tradeoff import Tradeoff
-from .designs import Column, ColumnKind, Designs, DrawnDesign, Join, PageWords, certificate_columns, free_numbers
+from .designs import Column, ColumnKind, Designs, DrawnDesign, Join, PageWords, certificate_columns, design_values
 from .lines import title_line
 from .numbers import number, per_words
 from .text import Line, Tone
@@ -55,7 +55,7 @@ def tradeoff_designs(result: TradeoffResult, case: Case, found: Tradeoff | None 
 
 
 def _columns(result: TradeoffResult, throughout: Sequence[str]) -> Iterator[Column[TradeoffPointData]]:
-    """Yield the columns: varied value, F, F of each of several tasks, slope, active limits, and the design."""
+    """Yield the columns: varied value, F, F of each task, slope, active limits, and the design."""
     objective, names = ColumnKind.OBJECTIVE, result.tasks
     yield Column(
         result.over,
@@ -88,7 +88,7 @@ def _columns(result: TradeoffResult, throughout: Sequence[str]) -> Iterator[Colu
         lambda point: " ".join(point.active),
         ColumnKind.ACTIVE,
         holds=str,
-        label="also active" if throughout else "active",
+        label="other active limits" if throughout else "active",
         text=lambda point: _listed(name for name in point.active if name not in throughout),
     )
     answer = next((point for point in result.points if point.parameters is not None), None)
@@ -125,7 +125,7 @@ def _drawn(result: TradeoffResult, found: Tradeoff) -> list[DrawnDesign]:
                 DrawnDesign(
                     f"{result.over} = {row.value:.5g} {result.unit}".rstrip(),
                     F or ", ".join(of_each),
-                    free_numbers(outcome.own.nlp, outcome.x),
+                    design_values(outcome.own.nlp, outcome.x),
                     tuple(each.removeprefix(LIMITS) for each in row.active),
                     outcome.own.nlp,
                     outcome.x,

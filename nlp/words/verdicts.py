@@ -20,7 +20,7 @@ from .text import Line, TextTable, Tone
 
 if TYPE_CHECKING:
     from ..results.exchange import ExchangeData
-    from ..results.verdicts import MachineData, VerdictData
+    from ..results.verdicts import JointErrorsData, VerdictData
 
 #: Largest number of claims in the digest, and of kinds of limits in the count of an outcome.
 _TIGHTEST, _GROUPS = 5, 6
@@ -30,12 +30,12 @@ _ORDER = (Outcome.REFUTED, Outcome.OPEN, Outcome.PROVED)
 
 
 def answer_words(ranks: Sequence[Outcome], limits: Sequence[Outcome], where: str, *, is_proved: bool) -> str:
-    """Return the answer: everything is proved, or the numbers of violated, undecided and proved claims.
+    """Return the answer: PROVED, or NOT PROVED with the numbers of violated, undecided and proved claims.
 
     Args:
         ranks: outcomes of the ranks.
         limits: outcomes of the limits.
-        where: the domain, such as ``at every point``.
+        where: the domain in words, such as ``at every point``.
         is_proved: If true, everything is proved.
     """
     if is_proved:
@@ -48,13 +48,13 @@ def answer_words(ranks: Sequence[Outcome], limits: Sequence[Outcome], where: str
 
 
 def proof_line(proof: ExchangeData, where: str, place: str, whose: str = "") -> Line:
-    """Return the outcome of the proof of a solved design at every pose or point.
+    """Return the outcome of the proof for a solved design over its workspace or along its path.
 
     Args:
         proof: the proof.
         where: name of the domain: ``workspace`` or ``path``.
-        place: word for a pose of the domain.
-        whose: words before the answer.
+        place: word for a pose of the domain, ``pose`` or ``point``.
+        whose: text before the answer.
     """
     if proof.proved:
         return Line(
@@ -98,7 +98,7 @@ def head_lines(
         case: the case.
         answer: the answer in words.
         claims: the verdicts.
-        dependent: names of the dependent coordinates; None without any.
+        dependent: names of the dependent coordinates, or None.
         is_proved: If true, everything is proved.
         subject: lines before the answer.
         about: lines after the answer, about the robots and poses that the answer covers.
@@ -123,13 +123,13 @@ def _following_lines(names: Sequence[str], claims: Sequence[VerdictData]) -> Ite
 
 
 def _size_of(name: str, claims: Sequence[VerdictData]) -> float:
-    """Return the size that the rounding error of a coordinate relates to; 0 for a rotation."""
+    """Return the magnitude to which the rounding error of a coordinate is relative; 0 for a rotation."""
     poses = [each.pose for each in claims if each.pose is not None] if name in POSITION else []
     return max((abs(part) for pose in poses for part in pose.position), default=0.0)
 
 
-def machine_lines(case: Case, joint_centre: float | None) -> Iterator[Line]:
-    """Yield the tolerance that a verdict covers; nothing where it is about the exact robot only."""
+def tolerance_lines(case: Case, joint_centre: float | None) -> Iterator[Line]:
+    """Yield the tolerance that a verdict covers; nothing for a verdict on the exact robot only."""
     if joint_centre is not None:
         words = f"covers every robot whose joint centres are off by at most {joint_centre:g} {case.units.length}"
         yield Line(words.rstrip(), label="tolerance")
@@ -162,7 +162,7 @@ def tightest_table(
 
 
 def _room(each: VerdictData) -> float:
-    """Return the margin of a claim's bound, as a part of the limit; negative beyond the limit."""
+    """Return the relative margin between the proved bound and the limit; negative beyond the limit."""
     limit = each.limit or 0.0
     value = each.bound if each.bound is not None else each.reached
     if value is None:
@@ -170,7 +170,7 @@ def _room(each: VerdictData) -> float:
     return (value - limit if each.sense is Sense.MIN else limit - value) / (abs(limit) or 1.0)
 
 
-def violating_robot(case: Case, name: str, machine: MachineData) -> TextTable:
+def violating_robot(case: Case, name: str, machine: JointErrorsData) -> TextTable:
     """Return the joint-centre errors of the robot within the tolerance that violates a claim."""
     unit, title = case.units.length, f"robot within the tolerance that violates: {name}"
     if machine.centres is not None:
@@ -202,7 +202,7 @@ def outcome_lines(claims: Sequence[VerdictData]) -> Iterator[Line]:
 
 
 def _limit_of(claim: VerdictData) -> str:
-    """Return the name of a claim's limit, the same for all limbs, joints and actuators."""
+    """Return the name of the limit of a claim, without limb, joint or actuator."""
     return claim.name.partition(" ")[0].partition(".")[0]
 
 
@@ -216,7 +216,7 @@ def open_lines(claims: Sequence[VerdictData]) -> Iterator[Line]:
 
 
 def _limit_words(each: VerdictData) -> str:
-    """Return the limit of a quantity with its sense and unit."""
+    """Return the limit of a quantity as an inequality with its unit."""
     return f"{'>=' if each.sense is Sense.MIN else '<='} {number(each.limit or 0.0)} {each.unit}".rstrip()
 
 
@@ -230,7 +230,8 @@ def verdict_table(
         name: name of the table; ``ranges`` for quantities without a limit.
         title: title of the table.
         rows: verdicts, a row each.
-        lines: for a path, line of the file for each row; rotations are then roll, pitch and yaw. Empty for a workspace.
+        lines: line number in the path file for each row; empty for a workspace. Along a path, rotations are shown as
+            roll, pitch and yaw.
     """
     has_limits, form = name != "ranges", RotationForm.RPY if lines else None
     cells = []

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 from ...models import Dimension
 from ..case.case import Case
-from ..case.motors import MotorNumber
+from ..case.motors import ActuatorQuantity
 from ..case.pose import ends_of
 from ..case.task import Sense
 from ..interruption import STOPPED
 from ..proof.statement.claims import CONSTRAINTS, REGULAR
 from ..proof.workspace.verdict import EVERYWHERE, Outcome
-from .claims import CLAIM_WORDS, rank_line, seeing_lines
+from .claims import CLAIM_WORDS, rank_line, violation_lines
 from .motors import OUTCOME_WORDS, ends_of_motor, motor_tables
 from .numbers import number
 from .poses import pose_words
@@ -23,11 +23,11 @@ from .verdicts import (
     answer_words,
     exchange_lines,
     head_lines,
-    machine_lines,
     open_lines,
     outcome_lines,
     proof_line,
     tightest_table,
+    tolerance_lines,
     verdict_table,
     violating_robot,
 )
@@ -39,8 +39,8 @@ if TYPE_CHECKING:
 
 
 def _about_lines(case: Case, result: WorkspaceResult) -> Iterator[Line]:
-    """Yield the tolerance and the set of poses that a verdict covers, where these are not the robot and the box."""
-    yield from machine_lines(case, result.joint_centre)
+    """Yield the tolerance and the set of poses that a verdict covers; nothing for the exact robot and all poses."""
+    yield from tolerance_lines(case, result.joint_centre)
     if result.poses is not None:
         yield Line(result.poses, label="poses")
 
@@ -56,12 +56,15 @@ def _objective_lines(extremes: Sequence[VerdictData]) -> Iterator[Line]:
 
 
 def verdict_words(result: WorkspaceResult) -> str:
-    """Return the verdict in one clause: counts of ranks and limits, and of undecided quantities without a limit."""
+    """Return the verdict: counts of singularities, limits, and undecided quantities without a limit."""
     ranks = [each.outcome for each in (result.regular, result.constraints) if each is not None]
     limits = [each.outcome for each in result.extremes if each.limit is not None]
     words = answer_words(ranks, limits, "at every pose", is_proved=result.proved)
     ends = [
-        end for each in result.motors or () if each.number is not MotorNumber.COORDINATE for end in ends_of_motor(each)
+        end
+        for each in result.motors or ()
+        if each.number is not ActuatorQuantity.COORDINATE
+        for end in ends_of_motor(each)
     ]
     shown = sum(each.limit is None and each.outcome is Outcome.OPEN for each in result.extremes)
     shown += sum(each.limit is None and each.outcome is Outcome.OPEN for each in ends)
@@ -89,7 +92,7 @@ def workspace_summary(
     Args:
         case: the case.
         result: the verdicts.
-        command: returns the command that shows a pose; None for a page, where only tables have single claims.
+        command: function that returns the command for a pose; None for a page, which lists claims only in tables.
     """
     limited, answer = [each for each in result.extremes if each.limit is not None], verdict_words(result)
     about = _about_lines(case, result)
@@ -101,7 +104,7 @@ def workspace_summary(
         yield from _regular_lines(case, result.constraints, CONSTRAINTS)
     yield from outcome_lines(limited)
     if command is not None:
-        yield from seeing_lines(result, command)
+        yield from violation_lines(result, command)
         yield from open_lines(limited)
     yield from _needs_line(case, result)
     if result.scale is not None:
@@ -116,7 +119,7 @@ def workspace_summary(
 
 
 def _pose_lines(case: Case) -> Iterator[Line]:
-    """Yield the pose that a workspace of offsets is relative to; nothing for a workspace in world coordinates."""
+    """Yield the reference pose of a workspace of offsets; nothing for a workspace in world coordinates."""
     if case.workspace is not None and case.workspace.about_pose:
         position, (angle, _) = [ends_of(value)[0] for value in case.position], ends_of(case.rotation.angle)
         words = ", ".join(number(each, max(map(abs, position)), digits=5) for each in position)
@@ -125,7 +128,7 @@ def _pose_lines(case: Case) -> Iterator[Line]:
 
 
 def _violating_robot_table(case: Case, extremes: Sequence[VerdictData]) -> Iterator[TextTable]:
-    """Yield the errors of the robot within the tolerance that violates the first such limit."""
+    """Yield the joint-centre errors with which a robot within the tolerance violates a limit."""
     for each in extremes:
         if each.outcome is Outcome.REFUTED and each.machine is not None:
             yield violating_robot(case, each.name, each.machine)
@@ -153,7 +156,7 @@ def _tables(case: Case, extremes: Sequence[VerdictData]) -> Iterator[TextTable]:
 
 
 def _regular_lines(case: Case, regular: RegularData, name: str = REGULAR) -> Iterator[Line]:
-    """Yield the verdict on a rank, by the name of its claim: that of J, or of the constraint wrenches."""
+    """Yield the verdict on the rank of J, or on the rank of the constraint wrenches."""
     after = ""
     if regular.outcome is Outcome.REFUTED:
         after = f" at {'every pose' if regular.reason == EVERYWHERE else 'a pose'}"
@@ -188,7 +191,7 @@ def _scale_lines(case: Case, scale: ScaleData) -> Iterator[Line]:
         yield Line(words, label="largest proved box", tone=Tone.ANSWER, after=ended)
     else:
         within = "the search was interrupted" if scale.reason == STOPPED else "none found within the time limit"
-        words = within if scale.reason else "none found; even the smallest box tried is not proved"
+        words = within if scale.reason else "none found; even the smallest examined box is not proved"
         yield Line(words, label="largest proved box", tone=Tone.NO_ANSWER)
     if scale.claim:
         size = "" if scale.refuted is None else f"{scale.refuted:.4g} times, "
@@ -197,7 +200,7 @@ def _scale_lines(case: Case, scale: ScaleData) -> Iterator[Line]:
 
 
 def _failed_words(claim: str) -> str:
-    """Return a claim with its outcome, of which the results have the name and the outcome's status."""
+    """Return a claim and its outcome in words; the result has the name and the status."""
     name, comma, status = claim.rpartition(", ")
     words = {each.value: word for each, word in OUTCOME_WORDS.items()}
     return f"{CLAIM_WORDS.get(name, name)}{comma}{words.get(status, status)}"

@@ -19,7 +19,7 @@ from screwsynth.models import Dimension, hexapod, robot, three_upu
 from screwsynth.models.catalog import gallery_names
 from screwsynth.models.mechanism import mechanism_of
 from screwsynth.models.mechanism.singularities import closed_configurations
-from screwsynth.models.statics import driven_joints, freedoms_of, statics_hindrance
+from screwsynth.models.statics import degrees_of_freedom, driven_joints, statics_hindrance
 from screwsynth.nlp.case.loads import Load, Loading, Motion
 from screwsynth.nlp.errors import CaseError
 
@@ -39,7 +39,7 @@ def test_all_24_robots_of_the_gallery_have_as_many_actuators_as_freedoms() -> No
     assert len(gallery_names()) == len(GALLERY) == 24
     for name in GALLERY:
         model, ranks = model_of(name), RANKS[name]
-        assert (len(driven_joints(model)), freedoms_of(model)) == (ranks.freedoms, ranks.freedoms)
+        assert (len(driven_joints(model)), degrees_of_freedom(model)) == (ranks.freedoms, ranks.freedoms)
         assert statics_hindrance(model) == ""
 
 

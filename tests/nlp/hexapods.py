@@ -5,7 +5,7 @@ import numpy as np
 from screwsynth.models import FloatArray, hexapod
 from screwsynth.nlp import Case, Free, Task, TurnKind, Turns, Workspace
 from screwsynth.nlp.interruption import within
-from screwsynth.nlp.proof.statement.machine import Legs
+from screwsynth.nlp.proof.statement.fixed_robot import Legs
 from screwsynth.nlp.proof.statement.tolerance import built_model
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal, Minimum, Number, smallest_values
 from screwsynth.nlp.proof.workspace.numbers.clearance import Clearance

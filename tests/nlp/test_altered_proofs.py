@@ -419,7 +419,7 @@ def test_proofs_of_machines_with_settings_or_of_a_result(cli: Run, tmp_path: Pat
     code, _, err = cli("verify-proof", proof, free, "--set", "x2=11.6")
     assert (code, err) == (1, "rejected: the proof is for other joint centres than this case's\n")
     for option in (("--above", "1"), ("--all-assemblies",)):
-        refusal_of(cli("verify-proof", proof, *option), "is no option for this kind of proof")
+        refusal_of(cli("verify-proof", proof, *option), "does not apply to this kind of proof")
 
 
 def test_a_result_in_other_units_or_of_another_robot_is_refused(cli: Run, tmp_path: Path) -> None:
@@ -439,7 +439,9 @@ def test_errors_of_legs_are_refused_for_a_robot_without_six_legs(cli: Run, folde
     case, claim = str(saved(folder / "legless.toml", CRANKS)), ProofClaim("regular", "", "regular", tree=b"\x02")
     proof = Proof("", "legless", Premises((), (), (), 0.01), (claim,)).as_text()
     for command in (("workspace", case), ("verify-proof", str(saved(folder / "legless.json", proof)), case)):
-        refusal_of(cli(*command, *ERROR), "--leg-error 0.01: is only for six straight legs, which '6-rus' is not")
+        refusal_of(
+            cli(*command, *ERROR), "--leg-error 0.01: needs a robot with six straight legs, which '6-rus' is not"
+        )
 
 
 def test_the_smallest_f_at_the_worst_of_several_poses_is_refused(cli: Run, tmp_path: Path) -> None:
@@ -447,7 +449,9 @@ def test_the_smallest_f_at_the_worst_of_several_poses_is_refused(cli: Run, tmp_p
     poses = [{"position": [0, 0, ends(0.5, z)]} for z in (30.5, 40.5)]
     tables = tomllib.loads(PLATFORM) | {"pose": poses, "combine": {"over_poses": "worst"}}
     case, proof = str(case_file(tmp_path, tables)), str(tmp_path / "proof.json")
-    refusal_of(cli("certify", case, "--above", "1"), "--above: is not for the worst of several poses")
+    refusal_of(
+        cli("certify", case, "--above", "1"), "--above: cannot be used if the smallest F of several poses is maximised"
+    )
     assert cli("certify", case, "--proof", proof)[0] == 0
     assert "F being that of task 'one', at the worst of 2 poses" in cli("verify-proof", proof)[1]
     refusal_of(cli("verify-proof", proof, "--above", "1"))

@@ -264,11 +264,13 @@ def test_a_certificate_speaks_of_the_modes_that_it_names() -> None:
     assert own.certificate.status is CertificateStatus.PROVED
     assert not own.certificate.was_beaten
     assert own.certificate.bound == pytest.approx(solution.F, rel=1.1e-4)
-    assert "in home's working mode has F larger than" in own.certificate.statement
+    assert "in the home working mode has F larger than" in own.certificate.statement
     every = certify(solution, all_assemblies=True)
     assert every.certificate.status is CertificateStatus.PROVED
     assert every.certificate.incumbent > 1.1 * solution.F
-    assert "better than the given point, in another working mode than home" in every.certificate.statement
+    assert (
+        "better than the given point, in another working mode than the home working mode" in every.certificate.statement
+    )
     # A solution in another mode is no incumbent of home's: all modes are covered.
     (outcome,) = solution.outcomes
     elsewhere = replace(outcome.own, x=every.certificate.x)
@@ -292,7 +294,7 @@ def test_certify_names_the_limbs_with_unknowns_first(tmp_path: Path, cli: Run) -
     assert shown.startswith("Delta certificate proved")
     assert f"unknowns {words}" in shown
     out = output_of(cli("verify-proof", str(proof)))
-    assert "within the limits of delta in home's working mode" in unbroken(out)
+    assert "within the limits of delta in the home working mode" in unbroken(out)
     every = json.loads(output_of(cli("certify", str(path), "--all-assemblies", "--json", "-")))
     assert every["certificate"]["status"] == "proved"
     status, out, _ = cli("certify", str(path), "--all-assemblies", "--time", "1e-9")

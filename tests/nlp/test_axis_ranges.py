@@ -202,15 +202,15 @@ def test_the_command_shows_ranges_and_pairs(cli: Run, tmp_path: Path) -> None:
     assert "leg_length limb 3+ above 43 in: 54.63139 in" in shown
     for options, words in (
         ("", "the table [path], or the file of a path"),
-        (f"--range --of {out}", "is no result of solve or evaluate"),
-        ("--range --along a.ngc", "--along: cannot be used with --range"),
-        ("--range --unit mm", "--unit: cannot be used with --range"),
+        (f"--range --of {out}", "is not a result of solve or evaluate"),
+        ("--range --along a.ngc", "--along: conflicts with --range"),
+        ("--range --unit mm", "--unit: conflicts with --range"),
         ("--along a.ngc --most 1,1", "--most: needs --range"),
-        ("--range --most 1,-1", "--most 1,-1: must be two positive"),
+        ("--range --most 1,-1", "--most 1,-1: must be LENGTH,ANGLE: two positive numbers"),
     ):
         refusal_of(cli("path", "hexapod-linuxcnc", *options.split()), words)
     free = cli("path", "paper-4.1-helical", "--range")
-    refusal_of(free, "paper-4.1-helical", "pose: has free coordinates", "state it with --start")
+    refusal_of(free, "paper-4.1-helical", "pose: has free coordinates", "give this pose with --start")
 
 
 def test_without_time_nothing_is_claimed() -> None:

@@ -196,7 +196,7 @@ def test_without_webgl_the_drawing_stands_there(browser: Any, opened: Callable[.
         shown = [each for each in chrome.find_elements("css selector", "img.still") if each.is_displayed()]
         assert len(shown) == 1
         assert chrome.execute_script("return arguments[0].naturalWidth", shown[0]) > 300
-        assert "no WebGL" in chrome.find_element("class name", "flat-words").text
+        assert "No WebGL" in chrome.find_element("class name", "flat-words").text
         assert not chrome.find_element("id", "view").is_displayed()
         before = chrome.execute_script(ROWS)
         chrome.execute_script(MOVE, 0)
@@ -215,7 +215,7 @@ def test_slider_shows_each_pose(opened: Callable[..., Any], tmp_path: Path, thre
         np.testing.assert_allclose([number(row[2]) for row in browser.execute_script(ROWS)], rates, rtol=1e-5)
         assert f"pose {k + 1} of 3" in browser.find_element("id", "posed").text
     browser.find_element("id", "worst").click()
-    assert browser.find_element("id", "posed").text.endswith("the worst")
+    assert browser.find_element("id", "posed").text.endswith("worst pose")
 
 
 PATH_LIMBS = """

@@ -31,7 +31,7 @@ from screwsynth.nlp.proof.checker.workspace.motion_matrix import PosedRobot
 from screwsynth.nlp.proof.checker.workspace.number_claims import change_of_jacobian
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import pose_root
 from screwsynth.nlp.proof.checker.workspace.ranks import RankClaim, change_of_rows
-from screwsynth.nlp.proof.statement.machine import Legs, workspace_of_case
+from screwsynth.nlp.proof.statement.fixed_robot import Legs, workspace_of_case
 from screwsynth.nlp.proof.statement.standard_form import Condition, StandardForm, standard_form
 from screwsynth.nlp.solver.multistart import ProgramSolution, solve_program
 
@@ -312,7 +312,7 @@ def test_bounds_of_a_limb_are_shown_for_the_boxes_claimed(count: int, side: int)
             if is_shown:
                 assert show(rule_of(claims), claims.lower, claims.upper) >= count
             else:
-                with pytest.raises(ProofError, match="could not be shown"):
+                with pytest.raises(ProofError, match="could not be proved"):
                     show(rule_of(claims), claims.lower, claims.upper)
 
 
@@ -435,7 +435,7 @@ def test_boxes_outside_of_the_ball_of_rotations_are_shown_by_it(best: ProgramSol
 def test_what_was_tampered_with_is_rejected(proof: ProofClaim, nlp: Nlp) -> None:
     size = abs(proof.bound)
     for less in (2 * GAP, 0.7 * GAP):
-        assert "could not be shown" in rejected(replace(proof, bound=proof.bound - less * size), nlp)
+        assert "could not be proved" in rejected(replace(proof, bound=proof.bound - less * size), nlp)
     leaf = middle_leaf(proof, nlp)
     node = leaf_bytes(leaf.bounds, leaf.g, leaf.Q)
     assert "ends before" in rejected(replace(proof, tree=proof.tree.replace(node, b"")), nlp)
@@ -453,9 +453,9 @@ def test_what_was_tampered_with_is_rejected(proof: ProofClaim, nlp: Nlp) -> None
     for numbers, fault in (
         ((b - off, g, Q), "limb with base_3"),
         ((b + off, g, Q), "sum of the limbs"),
-        ((b, tilted, Q), "could not be shown"),
-        ((b[swap], g[swap], Q[swap]), "could not be shown"),
-        ((empty, g, Q), "could not be shown"),
+        ((b, tilted, Q), "could not be proved"),
+        ((b[swap], g[swap], Q[swap]), "could not be proved"),
+        ((empty, g, Q), "could not be proved"),
         ((b, unknown, Q), "is NaN, or infinite"),
     ):
         assert proof.tree.count(node) == 1
@@ -500,7 +500,7 @@ def test_a_fault_in_dropping_own_boxes_is_found(
 
     monkeypatch.setattr(sharedsearch, "bound_limb", careless)
     wrong = proof_of(best.nlp, GAP, best.x)
-    assert "could not be shown" in rejected(wrong, best.nlp)
+    assert "could not be proved" in rejected(wrong, best.nlp)
 
 
 @pytest.mark.parametrize("kind", ["limb", "minus limb", "zeros", "minus zeros"])

@@ -339,10 +339,13 @@ def numbers_of_the_simulator() -> Iterator[tuple[str, str]]:
     yield "F in the eight poses, m²", ", ".join(f"{each:.2f}" for each in F)
     yield "worst pose", str(int(np.argmin(F)) + 1)
     yield "the worst F with a base of 2 m, m²", f"{min(wide):.2f}"
-    yield "F of surge in the first pose, as it is and with a base of 2 m", f"{surge[0]:.2f} and {surge[1]:.2f}"
+    yield "F of surge in the first pose, for this design and with a base of 2 m", f"{surge[0]:.2f} and {surge[1]:.2f}"
     yield "torque about the roll axis in the worst pose, legs of 40 kN", f"{40 * sum(q):.0f} kN m"
-    yield "roll speed there, legs of 1 m/s", f"{math.degrees(1 / max(q)):.0f} deg/s"
-    yield "resolution of roll there, legs known to 0.1 mm", f"{math.degrees(1e-4 / math.sqrt(worst)) * 1000:.1f} mdeg"
+    yield "roll speed in the worst pose, legs of 1 m/s", f"{math.degrees(1 / max(q)):.0f} deg/s"
+    yield (
+        "roll resolution in the worst pose, leg lengths known to 0.1 mm",
+        f"{math.degrees(1e-4 / math.sqrt(worst)) * 1000:.1f} mdeg",
+    )
 
 
 def states(name: str) -> list[RobotState]:

@@ -112,7 +112,7 @@ def test_a_solve_as_a_process_prints_only_its_table(solved: Solved) -> None:
     assert (ended.returncode, ended.stderr) == (0, "")
     title, task, axis, found, *_ = unbroken(ended.stdout).splitlines()
     assert title == "Pose of a given 6-6 platform for a screw motion of pitch 1"
-    assert task.startswith("task  drive the screw, max F: screw of pitch 1 cm about (0.6667, 0.6667, 0.3333)")
+    assert task.startswith("task  drive the screw, max F: screw, pitch 1 cm, axis (0.6667, 0.6667, 0.3333), through")
     assert task.endswith("through (2, 3, 6)")
     assert axis == "task axis  nearest to the origin at (-1.556, -0.5556, 4.222)"
     assert found.startswith("largest F = 407.2107")

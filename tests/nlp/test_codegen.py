@@ -366,7 +366,7 @@ def test_python_and_no_measure_run_no_compiler(tmp_path: Path, cli: Run, monkeyp
     header, page = ((tmp_path / "c" / each).read_text(encoding="utf-8") for each in (f"{PREFIX}.h", "README.md"))
     assert not macros(header)
     for target, compiler in (("x86-64", "gcc or cc or clang"), ("Cortex-M7", "arm-none-eabi-gcc")):
-        sentence = f"{target}: not measured: no compiler for it is installed: {compiler}"
+        sentence = f"{target}: not measured: no compiler for this target is installed: {compiler}"
         assert sentence in out.splitlines()
         assert f"/* {sentence} */" in header
         assert f"{sentence}." in page.splitlines()

@@ -79,7 +79,7 @@ def test_a_robot_in_the_place_of_another(path: str, tmp_path: Path, cli: Run) ->
     assert (robots["6-sps"]["size"], result["size"]) == pytest.approx((largest, largest), rel=ROUNDING)
     # A Delta translates alone: all of F is constraint, in words and not as an error.
     assert (robots["delta"]["freedoms"], robots["delta"]["tasks"][0]["can_move"]) == (3, False)
-    assert any("which has 3 freedoms, cannot make the motion of tilt" in each for each in robots["delta"]["sentences"])
+    assert any("with 3 degrees of freedom cannot follow the motion" in each for each in robots["delta"]["sentences"])
     # The legs of the 6-SPS have lengths, the rods of the Delta have none that could change.
     left_out = {name: [item["key"] for item in each["limits_left_out"]] for name, each in robots.items()}
     assert (left_out["6-sps"], left_out["delta"]) == ([], ["limits.leg_length"])
@@ -119,7 +119,7 @@ def test_pictures_have_units_sizes_and_one_scale(path: str) -> None:
 
 def test_dimensions_ranges_and_certificates() -> None:
     found = sn.compare(case(), ["6-sps", "case"], part=0.1, starts=2, certified=True)
-    sps, own = sorted(found.entries, key=lambda each: each.contender.is_own)
+    sps, own = sorted(found.entries, key=lambda each: each.contender.is_of_case)
     assert own.solution is not None
     assert sps.solution is not None
     # Each number but the pose is free by a tenth, around the typical ones that are scaled.
@@ -138,7 +138,7 @@ def test_dimensions_ranges_and_certificates() -> None:
         assert each.certificate.bound >= each.value * (1 - 1e-9)
     # With wider ranges the sizes differ; the case's robot keeps its ranges with --part 0 too.
     sentences = comparison_sentences(sn.compare(case(), ["6-sps", "case"], part=0.2, starts=1))
-    assert any("--part 0 for one size of all but the case's robot" in each for each in sentences)
+    assert any("--part 0 for a common size, except for the case's robot" in each for each in sentences)
 
 
 def test_strokes_over_several_poses() -> None:
@@ -177,17 +177,17 @@ def test_bad_input_is_one_sentence(path: str, tmp_path: Path, cli: Run) -> None:
     robot = saved(tmp_path / "mine.toml", "name = 1\n")
     taken = tmp_path / "no" / "out.json"
     for arguments, words in (
-        (("6-ups",), "needs at least two robots, and 1 is given"),
+        (("6-ups",), "needs at least two robots, got 1"),
         (("6-ups", "delt"), "compare: delt: no such robot, and no such robot file; did you mean 'delta'?"),
         (("6-ups", "6-ups"), "compare: 6-ups is given twice"),
         (("6-ups", str(robot)), "mine.toml: name"),
         (("6-ups", "delta", "--size", "-1"), "--size -1: must be positive and finite"),
-        (("6-ups", "delta", "--size", "100", "--no-scale"), "--size: cannot stand beside --no-scale"),
+        (("6-ups", "delta", "--size", "100", "--no-scale"), "--size: conflicts with --no-scale"),
         (("6-ups", "delta", "--part", "1"), "--part 1: must be at least 0 and below 1"),
         (("6-ups", "delta", "--time", "0"), "--time 0: must be positive"),
-        (("6-ups", "delta", "--json", str(taken)), "is no folder"),
+        (("6-ups", "delta", "--json", str(taken)), "is not a folder"),
         (("6-ups", "delta", "--json", "-", "--csv", "-"), "standard output can take one of"),
-        (("delta", "3-puu", "--part", "0", "--starts", "1"), "task tilt: no robot of the comparison has the freedom"),
+        (("delta", "3-puu", "--part", "0", "--starts", "1"), "task tilt: no compared robot has the degrees"),
     ):
         refusal_of(cli("compare", path, *arguments), words)
     with pytest.raises(sn.InputError, match="is given twice"):
@@ -208,18 +208,18 @@ def test_robots_that_do_not_keep_every_limit_have_no_rank_and_what_they_lack_is_
     assert [kept[name][1] for name in names] == [1, 1, 7, 5]
     sentences = {each["name"]: " ".join(each["sentences"]) for each in result["robots"]}
     for name, measure in (("6-pus", "actuator_length"), ("delta", "actuator_angle")):
-        assert "legs between joint centres, and this robot is given joint by joint" in sentences[name]
-        assert f"its own measures are {measure}" in sentences[name]
+        assert "legs between joint centres, and this robot is defined by joints" in sentences[name]
+        assert f"its quantities are {measure}" in sentences[name]
         assert "cannot hold" not in sentences[name]
-    assert "no design within the ranges keeps limits.joint_spacing.min, limits.footprint.platform" in sentences["6-ups"]
+    assert "within the ranges satisfies limits.joint_spacing.min, limits.footprint.platform" in sentences["6-ups"]
     assert "Solved without limits.base_joint_angle, limits.platform_joint_angle" in sentences["6-ups"]
     answered = [each for each in result["robots"] if each["name"] != "6-ups"]
     units = {each["name"]: {rate["unit"] for rate in each["tasks"][0]["rates"]} for each in answered}
     assert units == {"case": {"in/rad"}, "6-pus": {"in/rad"}, "delta": {"rad/rad"}}
-    assert any("not ranked: fewer limits let F be better" in each for each in result["sentences"])
+    assert any("not ranked: F can be better with fewer limits" in each for each in result["sentences"])
     # The headline names the best of those that keep every limit, and counts those that do not.
     best = f"case has the best value, {kept['case'][2]:.7g} (in/rad)²; 1 of 4 robots can be compared, "
-    assert f"{best}1 does not keep every limit." in page.read_text()
+    assert f"{best}1 does not satisfy all limits." in page.read_text()
     # Without a robot that keeps them all, none is ranked.
     status, out, _ = cli("compare", "hexapod-machining", "6-pus", "6-rus", "--starts", "1")
     assert (status, out.count("limits not kept")) == (1, 2)

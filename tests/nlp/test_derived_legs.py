@@ -413,7 +413,7 @@ def test_a_robot_with_fewer_freedoms_and_loops(tolerance: float) -> None:
             # Poses of other machines are not those of the design: the claim stays open, with the reason.
             (extreme,) = (each for each in judged.extremes if each.name == name)
             assert extreme.outcome is Outcome.OPEN
-            assert extreme.reason == "dependent coordinates of the pose differ between robots within the tolerance"
+            assert extreme.reason == "dependent pose coordinates differ between robots within the tolerance"
         else:
             assert outcomes[name] is Outcome.PROVED
             assert bounds[name, "min"] <= segment_distance(base[i], ends[i], base[j], ends[j])

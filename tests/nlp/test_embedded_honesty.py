@@ -17,7 +17,7 @@ from builders import case_from, case_of, case_tables, shipped_tables, soaked, st
 from generated import BAD_INPUT, COMPILERS, INFEASIBLE, OK, OTHER_ASSEMBLY, RANGE_END, needs_compiler, written
 
 from screwsynth.nlp import Case, CompiledCase, formulate, load_case, load_compiled, shipped_cases
-from screwsynth.nlp.embedding.runtimelimits import held_by_fixed_numbers
+from screwsynth.nlp.embedding.runtimelimits import fixed_conditions
 
 ROOT = Path(__file__).parents[2]
 
@@ -377,7 +377,7 @@ def test_pairs_of_fixed_lengths_are_judged(tmp_path: Path) -> None:
 
 def test_what_fixed_numbers_make_hold_is_kept() -> None:
     nlp = formulate(held_delta())
-    held = held_by_fixed_numbers(nlp)
+    held = fixed_conditions(nlp)
     loops = [each.name for each in nlp.program.constraints if each.name.startswith("loop")]
     found = [each.constraint.name for each in held.items]
     every = [each.name for each in nlp.case.model.closure]

@@ -56,7 +56,7 @@ def test_shipped_cases_at_their_last_pose(name: str) -> None:
     assert Tree(export_robot(solution, ["mjcf"], pose=count)["robot.xml"], 50.0).open <= 1e-9
     with pytest.raises(InputError, match=f"--pose {count + 1}: the case has {count} pose"):
         export_robot(solution, ["mjcf"], pose=count + 1)
-    with pytest.raises(InputError, match="--format step: is no format"):
+    with pytest.raises(InputError, match="--format step: no such format"):
         export_robot(solution, ["step"])
 
 
@@ -67,7 +67,7 @@ def test_refusals_are_one_sentence_and_write_nothing(tmp_path: Path, cli: Run, m
     case = "paper-4.1-helical"
     for words, fault in {
         ("--format", "stl", "--out", str(out)): "--format stl: no such format; allowed: mjcf, urdf, csv, dxf, all",
-        ("--format", "mjcf", "--out", str(tmp_path / "full")): "holds mine.txt, which screwsynth did not write",
+        ("--format", "mjcf", "--out", str(tmp_path / "full")): "contains mine.txt, not written by screwsynth",
         ("--format", "mjcf", "--out", str(out), "--pose", "2"): "--pose 2: the case has 1 pose",
     }.items():
         refusal_of(cli("export", case, *words), fault)
@@ -191,7 +191,7 @@ FAULTS: list[tuple[str, str | bytes, tuple[str, ...], str]] = [
     # MJCF.
     ("m.xml", '<mujoco><include file="m.xml"/></mujoco>', BODY, "includes m.xml, which includes itself"),
     ("m.xml", '<mujoco><include file="n.xml"/></mujoco>', BODY, "includes n.xml, which does not exist"),
-    ("m.xml", "<mujoco><include/></mujoco>", BODY, "<include>: file is missing"),
+    ("m.xml", "<mujoco><include/></mujoco>", BODY, "<include>: attribute file is missing"),
     ("m.xml", '<mujoco><worldbody><replicate count="99999999"><body/></replicate></worldbody></mujoco>', BODY, "replicate count = 99999999: must give at most 2000 copies in total"),
     ("m.xml", '<mujoco><worldbody><attach model="arm" prefix="a"/></worldbody></mujoco>', BODY, "attaches 'arm', which is not supported; save the model as a single file first"),
     ("m.xml", HEAD.replace('name="passive_2"', 'name="passive_1"'), BODY, "MuJoCo cannot read it: "),

@@ -15,7 +15,7 @@ from measures import circle_joints
 from path_cases import turns_of
 
 from screwsynth.nlp import Case, CaseError, Solution, case_text, compare, judge_workspace, solve
-from screwsynth.nlp.proof.statement.machine import workspace_of_case
+from screwsynth.nlp.proof.statement.fixed_robot import workspace_of_case
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseNumbers, pose_box
 from screwsynth.nlp.solver.frames import pose_of
 
@@ -263,15 +263,15 @@ def test_what_is_no_box_in_world_coordinates_is_refused(changes: dict[str, Any],
 
 
 def test_a_free_pose_is_refused_where_one_machine_is_judged(tmp_path: Path, cli: Run) -> None:
-    words = "pose.position[2]: is free, but the workspace is about the pose: fix it with --set p_z=..., or use --of"
+    words = "pose.position[2]: must be fixed, as the workspace is relative to the pose: use --set p_z=... or --of"
     command = ("workspace", str(case_file(tmp_path, BASE)), "--set", "x1=0.8")
     refusal_of(cli(*command), words)
     code, out, err = cli(*command, "--set", "p_z=0.8", "--time", "5")
-    assert (code, err, "refuted" in out) == (1, "", True)
+    assert (code, err, "violated" in out) == (1, "", True)
     turned = tables(pose={"position": [0, 0, 1], "rotation": {"angle": ends(10)}})
     del turned["workspace"]["rotation"]
     case_file(tmp_path, turned)
-    refusal_of(cli(*command), "pose.rotation.angle: is free")
+    refusal_of(cli(*command), "pose.rotation.angle: must be fixed")
 
 
 def test_all_commands_take_the_workspace_at_the_pose_of_a_result(tmp_path: Path, cli: Run) -> None:
@@ -283,7 +283,7 @@ def test_all_commands_take_the_workspace_at_the_pose_of_a_result(tmp_path: Path,
     words = ("--of", result, "--proof", proof, *drawn, "--quantity", "condition_number")
     out = output_of(cli("workspace", str(file), *words))
     assert "PROVED at every pose" in unbroken(out)
-    assert f"about  the pose (0, 0, {height:.5g})" in unbroken(out)
+    assert f"workspace relative to  the stated pose (0, 0, {height:.5g})" in unbroken(out)
     assert all(Path(each).stat().st_size > 1000 for each in pictures)
     out = unbroken(output_of(cli("verify-proof", proof, str(file), "--of", result, "--all")))
     low, high = (float(each) for each in out.partition(", z ")[2].partition(" m;")[0].split(" to "))
@@ -293,13 +293,15 @@ def test_all_commands_take_the_workspace_at_the_pose_of_a_result(tmp_path: Path,
     assert high >= height + 0.1
     code, _, err = cli("verify-proof", proof, str(file), "--of", result, "--set", "p_z=0.8")
     assert (code, err) == (1, "rejected: the proof is for another workspace than this case's\n")
-    assert "scale  1" in output_of(cli("workspace", str(file), "--of", result, "--scale", "--time", "8"))
+    assert "largest proved box  1 times the workspace" in output_of(
+        cli("workspace", str(file), "--of", result, "--scale", "--time", "8")
+    )
     assert cli("path", str(file), "--range", "--of", result, "--time", "3")[::2] in ((0, ""), (1, ""))
     output_of(cli("codegen", str(file), "--out", str(tmp_path / "c"), "--no-measure"))
     assert cli("evaluate", str(file), "--of", result)[0] == 0
     other = case_file(tmp_path, BASE, "other.toml")
     code, out, err = cli("workspace", str(other), "--of", result)
-    assert (code, err) == (0, f"--of {result}: has the dimensions and the pose of the case 'base'\n")
+    assert (code, err) == (0, f"--of {result}: gives the dimensions and the pose of the case 'base'\n")
 
 
 def test_robots_are_compared_over_workspaces_about_their_own_poses() -> None:
@@ -334,7 +336,7 @@ HELD = {
 
 def notice_of(given: dict[str, Any]) -> str:
     """The sentence about a workspace that holds no pose; empty for another."""
-    found = case_from(given).not_held
+    found = case_from(given).outside_workspace
     assert found is None or len(found.sentence) < 200
     return "" if found is None else found.sentence
 

@@ -83,7 +83,7 @@ REFUSED = {
     "(x1 - x2 >= 0": ("closes position 1", "got '>=' at position 10"),
     "x1) >= 0": ("got ')' at position 3",),
     "0 <= x1 <= 3": ("expected an operator or the end", "got '<=' at position 9"),
-    "sqrt x1 >= 0": ("expected a bracket after sqrt",),
+    "sqrt x1 >= 0": ('expected "(" after sqrt',),
     "__import__('os') >= 0": ('"\'" at position 12 is not allowed',),
     "__import__(x1) >= 0": ("'__import__' at position 1", "allowed:"),
     "x1.real >= 0": ("'.' at position 3",),

@@ -329,8 +329,8 @@ def test_any_pose_is_drawn_and_the_worst_is_named(tmp_path: Path, cli: Run, thre
     for k, robot in enumerate(drawn):
         np.testing.assert_allclose(robot.posture.position, [[0, 0, 30], [6, 0, 33], [0, 5, 24]][k], atol=1e-12)
         assert sum(row.rate**2 for row in robot.rows) == pytest.approx(values[k], rel=1e-9)
-        assert f"pose {k + 1}, F = {values[k]:.7g} there" in robot.headline
-        assert ("the worst" in robot.headline) == (values[k] == min(values))
+        assert f"pose {k + 1}, F = {values[k]:.7g}" in robot.headline
+        assert ("worst pose" in robot.headline) == (values[k] == min(values))
     file = saved(tmp_path / "poses.toml", three_poses("max"))
     output_of(cli("solve", str(file), "--plot", str(tmp_path / "pose.png"), "--pose", "3"))
     assert "F" in output_of(cli("solve", "paper-4.2", "--starts", "2", "--plot", str(tmp_path / "tasks.png")))

@@ -136,7 +136,7 @@ def test_rails_take_the_places_of_the_best_value(tmp_path: Path, sense: str, hal
     assert pytest.approx(wanted, rel=1e-7) == found.solution.F
     # Where a bound is proved, it is one of the same robots.
     assert certificate.status is CertificateStatus.PROVED
-    assert "in home's working mode" in certificate.statement
+    assert "in the home working mode" in certificate.statement
     assert 0 <= case.tasks[0].sense.sign * (certificate.bound - wanted) <= 2e-4
     assembly = found.solution.outcomes[0].own.optima[0].assembly
     assert assembly is not None
@@ -146,7 +146,7 @@ def test_rails_take_the_places_of_the_best_value(tmp_path: Path, sense: str, hal
 def test_a_bound_over_all_assemblies_covers_elbows_on_both_sides(tmp_path: Path) -> None:
     every = certify(load_case(planar(tmp_path, half=0.01)), all_assemblies=True, gap=0.2).tasks[0]
     assert every.status is CertificateStatus.PROVED
-    assert "in home's working mode" not in every.statement
+    assert "in the home working mode" not in every.statement
     rail = np.linspace(-0.01, 0.01, PLACES)
     most = sum(max(part(limb, rail, side=side).max() for side in (1, -1)) for limb in LIMBS)
     assert most > best("max", 0.01) + 0.5
@@ -195,7 +195,7 @@ def test_rows_are_in_every_answer(tmp_path: Path, cli: Run) -> None:
     assert "joint.3:1,0.2" in table.read_text()
     page = tmp_path / "page.html"
     output_of(cli("report", file, "--out", str(page)))
-    assert "3 numbers are free: joint.1:1, joint.2:1, joint.3:1." in page.read_text(encoding="utf-8")
+    assert "3 variables: joint.1:1, joint.2:1, joint.3:1." in page.read_text(encoding="utf-8")
 
 
 def test_the_robot_of_a_result_has_its_rails(tmp_path: Path, cli: Run) -> None:

@@ -245,7 +245,7 @@ def test_report_and_check_and_codegen_write_what_they_say(tmp_path: Path, cli: R
     text = page.read_text(encoding="utf-8")
     assert "another way" not in text
     # Joint positions that close the loops are no numbers of the case.
-    assert "4 numbers are free: rb, p_x, p_y, p_z. Everything else is fixed." in text
+    assert "4 variables: rb, p_x, p_y, p_z. All other parameters are fixed." in text
     assert cli("codegen", str(path), "--no-measure", "--out", str(folder))[0] == 0
     assert any(folder.iterdir())
 
@@ -366,7 +366,7 @@ def test_results_have_f_by_limb_and_name_conventions() -> None:
     shown = list(case_summary(case, result))
     notes = [item.text for item in shown if isinstance(item, Line) and item.label == "note"]
     assert [note[:13] for note in notes if note.startswith("F depends")] == ["F depends on "] * 2
-    assert f"1 % more of it changes F by {result.robot.length_dependence:+.2g} %" in " ".join(notes)
+    assert f"1 % more length changes F by {result.robot.length_dependence:+.2g} %" in " ".join(notes)
     (table,) = [item for item in shown if isinstance(item, TextTable) and item.name == "actuation"]
     assert [row[0] for row in table.rows] == ["1", "2", "3"]
     assert "actuation" in table_names(case, at_point=False)
@@ -380,7 +380,7 @@ def test_results_have_f_by_limb_and_name_conventions() -> None:
     # The page shows notes and parts by limb.
     page = sn.report(sn.solve(starter("five-bar"), starts=1))
     assert "Note: member 1 resists with 5 wrenches or more" in page
-    assert "Actuation and constraints in F, limb by limb" in page
+    assert "Actuation and constraint parts of F by limb" in page
 
 
 def test_members_of_which_f_says_little_are_named() -> None:

@@ -209,7 +209,7 @@ def test_snap_reads_legs_as_straight_ones(tmp_path: Path, cli: Run) -> None:
     model.write_text(legs_of_decimals(8e-7))
     text = output_of(cli("import", str(model), "--platform", "top", "--out", str(out)))
     words = " ".join(text.split())
-    assert_words(words, "nearly meet: off by 8e-07", "they stay as they are; --snap")
+    assert_words(words, "nearly meet: off by 8e-07", "they were not changed; --snap")
     plain = import_robot(Request(model, Ends("top")))
     found = import_robot(Request(model, Ends("top"), snap=3e-6))
     assert [[joint["type"] for joint in each["joints"]] for each in plain.tables["limb"]] == [list("RRPRRR")] * 6
@@ -655,7 +655,7 @@ def test_keyframes_mocap_bodies_and_tendons(tmp_path: Path) -> None:
         "actuator 'winch' was omitted: it acts on the tendon 'rope'; name a joint by --actuated",
     ):
         assert words in notes
-    with pytest.raises(InputError, match=r"is open by 0\.1 .*--keyframe takes another configuration: 2"):
+    with pytest.raises(InputError, match=r"is open by 0\.1 .*choose another configuration with --keyframe: 2"):
         import_robot(Request(path, Ends("top"), keyframe="up"))
     # The platform follows the legs, which are longer in the keyframe.
     high = import_robot(Request(path, Ends("top"), closes=True, keyframe="up"))

@@ -30,7 +30,7 @@ from screwsynth.nlp.proof.certificate import branch_and_bound
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.enclosure.forms import Forms
-from screwsynth.nlp.proof.statement.machine import Legs
+from screwsynth.nlp.proof.statement.fixed_robot import Legs
 from screwsynth.nlp.proof.workspace import scale
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Bounds, Goal, Number, smallest_values

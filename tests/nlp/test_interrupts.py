@@ -196,7 +196,7 @@ def test_an_interrupted_sweep_says_how_many_points_are_kept(case: str, tmp_path:
     rows = len(out.with_name("sweep.csv.journal").read_text(encoding="utf-8").splitlines()) - 1
     assert 0 < rows < 200
     words = "".join(plain(ended.shown).split())
-    assert f"{rows} of 200 points are in {out}.journal: the same command goes on from there".replace(" ", "") in words
+    assert f"{rows} of 200 points are in {out}.journal: the same command continues from there".replace(" ", "") in words
 
 
 @watches_threads
@@ -557,7 +557,7 @@ def test_a_sweep_whose_time_is_over_goes_on_later(clock: Clock, tmp_path: Path) 
         clock.now += 100.0
 
     options: dict[str, Any] = {"over": over, "starts": 1, "jobs": 1, "engine": "ipopt"}
-    with pytest.raises(InputError, match=r"is over; 1 of 3 points are in .*: the same command goes on"):
+    with pytest.raises(InputError, match=r"is over; 1 of 3 points are in .*: the same command continues"):
         sweep(case, out=out, time_limit=50.0, progress=end, **options)
     assert not out.exists()
     later = sweep(case, out=out, time_limit=50.0, **options)

@@ -12,7 +12,7 @@ from robot_gallery import random_displacements, random_twist, table
 
 from screwsynth.nlp import Case, Free, InputError, Rotation, Task, build_model, evaluate, formulate, inverse, load_case
 from screwsynth.nlp.evidence.closing import closed_start
-from screwsynth.nlp.proof.statement.machine import joint_centres
+from screwsynth.nlp.proof.statement.fixed_robot import joint_centres
 from screwsynth.nlp.units import Units
 
 TASK = Task(np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2]))
@@ -205,7 +205,7 @@ def test_the_command_ends_with_status_1_where_poses_are_not_closed(tmp_path: Pat
     [
         ("x,y,z\n0,0,a\n", ("poses.csv", "row 2, column z", "must be a number")),
         ("x,y,z\n0,0,inf\n", ("poses.csv", "row 2, column z", "finite")),
-        ("x,y\n0,0\n", ("poses.csv", "column z missing")),
+        ("x,y\n0,0\n", ("poses.csv", "column z is missing")),
         ("x,y,z,qw,qx,qy,qz\n0,0,20,1,1,0,0\n", ("poses.csv", "row 2", "unit quaternion")),
         ("x,y,z,angle\n0,0,20,1\n", ("poses.csv", "row 2", "axis")),
         ("", ("poses.csv", "no rows")),

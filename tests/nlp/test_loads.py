@@ -487,7 +487,7 @@ def test_pictures_of_forces_have_no_rates_and_arrows_the_name_of_their_load() ->
     assert drawing.forces is not None
     (arrow,) = drawing.forces.arrows
     assert (arrow.kind, arrow.name, arrow.words) == ("load", "tool", "weight of tool: 19.62 N")
-    assert drawing.forces.words.startswith("weight of tool, forces under load cut: longest arrow 19.62 N")
+    assert drawing.forces.words.startswith("weight of tool, actuator forces under load cut: longest arrow 19.62 N")
     assert drawings_of(handling(), 1)[0].forces.words.startswith("load handling: longest arrow")
 
 

@@ -14,7 +14,7 @@ from screwsynth.models import FloatArray
 from screwsynth.models.joints.model.closedform import closed_form
 from screwsynth.nlp import Case
 from screwsynth.nlp.case.loads import Load, Loading, Motion
-from screwsynth.nlp.case.motors import Motor, MotorNumber
+from screwsynth.nlp.case.motors import ActuatorQuantity, Motor
 from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.cli.proofs import _premises
 from screwsynth.nlp.proof.checker.workspace.check import VerifiedWorkspace
@@ -22,7 +22,7 @@ from screwsynth.nlp.proof.checker.workspace.forms import AffineMatrix, solved
 from screwsynth.nlp.proof.checker.workspace.loop_claims import PosedLoops, posed_loops
 from screwsynth.nlp.proof.checker.workspace.motor_claims import MotorClaims
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import PoseRoot, pose_root
-from screwsynth.nlp.proof.statement.machine import joint_centres, workspace_of_case
+from screwsynth.nlp.proof.statement.fixed_robot import joint_centres, workspace_of_case
 from screwsynth.nlp.proof.statement.motors import motor_claims
 from screwsynth.nlp.proof.statement.tolerance import built_model
 from screwsynth.nlp.proof.workspace.numbers.motors import Motors
@@ -157,7 +157,7 @@ def points(root: PoseRoot, box: FloatArray, rng: np.random.Generator, count: int
     return y
 
 
-def legs_numbers(case: Case, y: FloatArray, errors: FloatArray) -> dict[tuple[str, int], FloatArray]:
+def legs_premise(case: Case, y: FloatArray, errors: FloatArray) -> dict[tuple[str, int], FloatArray]:
     """Forces upwards and downwards under the second load case, and speeds, (N,) each of six legs, in NumPy alone."""
     legs, r = joint_centres(case), y[:, 3:]
     turns = workspace_of_case(case).turns
@@ -194,7 +194,7 @@ def worst_errors(case: Case, y: FloatArray, key: tuple[str, int]) -> FloatArray:
     for j in range(36 if t else 0):
         step = np.zeros((n, 36))
         step[:, j] = 0.1 * t
-        two = (legs_numbers(case, y, sign * step.reshape(n, 2, 6, 3))[key] for sign in (1, -1))
+        two = (legs_premise(case, y, sign * step.reshape(n, 2, 6, 3))[key] for sign in (1, -1))
         slopes[:, j] = next(two) - next(two)
     own = slopes.reshape(n, 2, 6, 3)
     return np.asarray(t * own / np.maximum(np.linalg.norm(own, axis=3, keepdims=True), 1e-300))
@@ -211,20 +211,24 @@ def test_no_claim_about_legs_holds_that_a_pose_of_the_box_refutes(name: str) -> 
         y = points(subject.root, box, rng, 2000 if name == "legs" else 60)
         most = {}
         for word in ("up", "down", "speed"):
-            values = legs_numbers(case, y, worst_errors(case, y, (word, place)))
+            values = legs_premise(case, y, worst_errors(case, y, (word, place)))
             most[word] = values[word, place]
         claims = (
-            (Motor(MotorNumber.FORCE, place, load=load), Sense.MAX, most["up"].max()),
-            (Motor(MotorNumber.FORCE, place, load=load), Sense.MIN, -most["down"].max()),
-            (Motor(MotorNumber.SPEED, place), Sense.MAX, most["speed"].max()),
-            (Motor(MotorNumber.POWER, place, load=load), Sense.MAX, (np.maximum(most["up"], 0) * most["speed"]).max()),
+            (Motor(ActuatorQuantity.FORCE, place, load=load), Sense.MAX, most["up"].max()),
+            (Motor(ActuatorQuantity.FORCE, place, load=load), Sense.MIN, -most["down"].max()),
+            (Motor(ActuatorQuantity.SPEED, place), Sense.MAX, most["speed"].max()),
+            (
+                Motor(ActuatorQuantity.POWER, place, load=load),
+                Sense.MAX,
+                (np.maximum(most["up"], 0) * most["speed"]).max(),
+            ),
         )
         for motor, sense, value in claims:
             said = f"{motor} {sense} {box}"
-            scale = abs(most["up"]).max() if motor.number is not MotorNumber.SPEED else value
+            scale = abs(most["up"]).max() if motor.number is not ActuatorQuantity.SPEED else value
             if value:
                 assert not subject.holds(motor, sense, value - sense.sign * 1e-9 * abs(value), box), said
-            if motor.number is not MotorNumber.POWER:
+            if motor.number is not ActuatorQuantity.POWER:
                 shown += subject.holds(motor, sense, value + sense.sign * 0.05 * scale, box)
     assert shown >= 20
 
@@ -235,7 +239,7 @@ def test_speeds_of_three_freedoms_are_those_of_results(angular: float) -> None:
     case = replace(robot_of("3-rps"), loading=Loading((), Motion(1.0, angular)), characteristic_length=0.6)
     subject, rng = Subject.of(case), np.random.default_rng(2)
     meant = build_problem(case, closed_form(case.model).model, pose_box(workspace_of_case(case)))
-    free = MotorClaims(case, subject.loops, subject.root, [(Motor(MotorNumber.SPEED), Sense.MAX, 1.0)]).free
+    free = MotorClaims(case, subject.loops, subject.root, [(Motor(ActuatorQuantity.SPEED), Sense.MAX, 1.0)]).free
     own = [meant.free.index(each) for each in free]
     for k, claim in enumerate(motor_claims(case)):
         motor = claim.motor or Motor()

@@ -26,7 +26,7 @@ from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.loads import HeldLoad, loads_at
 from screwsynth.nlp.evidence.state import evaluate
 from screwsynth.nlp.program.formulation import formulate
-from screwsynth.nlp.proof.statement.machine import Legs
+from screwsynth.nlp.proof.statement.fixed_robot import Legs
 from screwsynth.nlp.proof.statement.motors import motor_claims
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.searched import Subject, motor_extremes

@@ -203,5 +203,5 @@ def test_an_f_that_counts_as_zero_is_zero_everywhere() -> None:
     assert 1e-12 * nlp.objective_scale < F < 1e-12 * nlp.objective_size
     assert evaluate(nlp, x).is_zero
     assert not np.any(slices_of(nlp, x)[0].F)
-    assert "Here: F = 0 (m/m)² at" in str(surroundings(report_of("", solution, result_of(solution))))
+    assert "This design: F = 0 (m/m)² at" in str(surroundings(report_of("", solution, result_of(solution))))
     assert "smaller than 0; the best known point has 0" in certify(solution).tasks[0].statement

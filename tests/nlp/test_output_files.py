@@ -213,7 +213,7 @@ def test_two_runs_write_one_folder_one_after_the_other(tmp_path: Path) -> None:
 def test_a_manifest_that_is_none(tmp_path: Path) -> None:
     for text in ("", "something else\n"):
         saved(tmp_path / MANIFEST, text)
-        with pytest.raises(InputError, match="did not write"):
+        with pytest.raises(InputError, match="not written by screwsynth"):
             write_folder(str(tmp_path), {"a.c": "1"})
 
 

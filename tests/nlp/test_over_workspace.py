@@ -200,7 +200,7 @@ def test_results_of_several_tasks_have_the_proof(tmp_path: Path) -> None:
     solution = solve(case_from(tables | {"units": {"length": "m"}, "solve": {"starts": 1}}))
     shown, written = solution.table(), solution.to_dict()
     assert "proved: no singularity and no violated limit at any pose" in shown
-    assert "where a pose of the workspace became a constraint" in shown
+    assert "poses that were added as constraints" in shown
     jsonschema.validate(written, result_schema())
     assert json_data(load_result(saved(tmp_path / "out.json", json.dumps(written)))) == written
     assert written["workspace"]["poses"]  # type: ignore[index, call-overload]
@@ -211,7 +211,7 @@ def test_what_cannot_be_combined_over_a_workspace_is_refused(cli: Run, tmp_path:
     worst = {"objective": {"over": "workspace"}}
     poses = [{"position": [0, 0, 20]}, {"position": [0, 0, 21]}]
     both = {"combine": {"method": "weighted-sum"}}
-    average = "combine.method = \"average\": must be 'weighted-sum' or 'worst-case' where limits hold"
+    average = "combine.method = \"average\": must be 'weighted-sum' or 'worst-case' with limits"
     for keys, words in [
         (tables_of([LIFT, TURN]), average),
         (tables_of([LIFT, TURN], **both, **worst), 'objective.over = "workspace": needs exactly one [[task]], got 2'),
@@ -223,7 +223,7 @@ def test_what_cannot_be_combined_over_a_workspace_is_refused(cli: Run, tmp_path:
         refusal_of(cli("solve", str(case_file(tmp_path, keys))), words)
     path = {"file": "path.csv", "place": {"x": {"min": -1, "max": 1}}}
     along = tables_of([LIFT, TURN], limits={"over": "path"}, path=path, **both)
-    with pytest.raises(CaseError, match=r"path\.place: must be fixed where several tasks are combined"):
+    with pytest.raises(CaseError, match=r"path\.place: must be fixed if several tasks are combined"):
         solve(case_from(along))
     # A bound from poses of the workspace has no proof file.
     over = str(case_file(tmp_path, tables_of([TILT], **worst)))

@@ -34,7 +34,7 @@ from screwsynth.nlp.output.report.path import path_page
 from screwsynth.nlp.path.options import Between
 from screwsynth.nlp.path.orientation import ORDERS
 from screwsynth.nlp.path.poses_csv import read_poses
-from screwsynth.nlp.path.sampling import WayKind, spread_points, way_of
+from screwsynth.nlp.path.sampling import ProgressKind, progress_of, spread_points
 from screwsynth.nlp.proof.workspace.judgement import Judgement
 from screwsynth.nlp.proof.workspace.path_judge import judge_path
 from screwsynth.nlp.proof.workspace.path_knots import Knots, Sampling
@@ -153,7 +153,7 @@ def test_limits_on_speeds_and_powers_need_a_motion_of_the_case_or_of_the_path(cl
         str(saved(tmp_path / f"{word}.ngc", f"G20 {word} X1 Y0 Z20\n{word} Z21\nM2")) for word in ("G1 F60", "G0")
     )
     assert "verdict  PROVED at every point" in output_of(cli("path", case, "--along", timed))
-    fault = "case.toml: limits.actuator_speed: needs [motion], the largest speeds"
+    fault = "case.toml: limits.actuator_speed: needs [motion], the largest speeds of the platform"
     refusal_of(cli("path", case, "--along", rapid), f"{fault}, or a path that states times")
     for words in (["workspace", case], ["solve", case], ["path", case, "--range"]):
         assert refusal_of(cli(*words)).strip().endswith(fault)
@@ -490,7 +490,7 @@ def test_the_picture_has_its_panels(spindle: PathPicture) -> None:
     # Of faults that are near to each other there is one label.
     assert words[0] == "lines 4, 5"
     assert set(words[1:]) == {"line 5"}
-    assert "Sampled for the picture; the verdicts are proved." in figure.legends[0].get_title().get_text()
+    assert "The curves are sampled; the verdicts are proved." in figure.legends[0].get_title().get_text()
 
 
 def test_without_times_the_axis_is_the_length_or_the_segment(spindle: PathPicture) -> None:
@@ -502,7 +502,7 @@ def test_without_times_the_axis_is_the_length_or_the_segment(spindle: PathPictur
     assert [each.title for each in picture.panels] == ["leg lengths"]
     turning = pictured(case, np.array([[0, 0, 20, 0, 0, 0], [0, 0, 20, 5, 0, 0], [0, 0, 21, 5, 0, 0]], dtype=float))
     assert turning.label == "segments"
-    assert way_of(spindle.judged.path).kind is WayKind.TIME
+    assert progress_of(spindle.judged.path).kind is ProgressKind.TIME
     assert not turning.marks
     assert not turning.bands
 
@@ -513,7 +513,7 @@ def test_long_paths_have_few_points_with_the_places_that_are_named() -> None:
     points = spread_points(path, 400, [(17, 0.25), (4999, 1.0)])
     assert 400 <= len(points.segments) <= 402
     assert (17, 0.25) in zip(points.segments.tolist(), points.parameters.tolist(), strict=True)
-    along = way_of(path).at(points)
+    along = progress_of(path).at(points)
     assert along[0] == 0
     assert along[-1] == pytest.approx(path.lengths.sum(), rel=1e-12)
     assert (np.diff(along) > 0).all()
@@ -559,7 +559,13 @@ def test_the_page_has_the_postures_of_the_path(spindle: PathPicture) -> None:
     np.testing.assert_allclose(places, poses_at(np.array([each.at for each in spindle.marks]))[0], atol=1e-5)
     # Words, tables and charts need no script.
     words = re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
-    for text in ("First fault: line 4", "leg_length limb 1-", "Leg lengths from", "the text of the case", "command at"):
+    for text in (
+        "First violation: line 4",
+        "leg_length limb 1-",
+        "Leg lengths from",
+        "the text of the case",
+        "command at",
+    ):
         assert text in words
     assert words.count('class="chart"') == 4
     assert words.count('class="cursor"') == 4

@@ -266,7 +266,7 @@ def test_a_bound_beyond_a_value_on_the_path_is_rejected(
     bound = value - Sense(sense).sign * 1e-3 * abs(value)
     given, least = alone(proof, name, sense), bytes([Node.BOUNDED] * 3)
     moved = with_claim(given, name, sense, bound=bound, tree=least, packed=None)
-    assert "could not be shown for segment" in rejected(moved, machine())
+    assert "could not be proved on segment" in rejected(moved, machine())
 
 
 def test_bounds_of_lengths_are_as_sharp_as_dense_samples(proof: Proof) -> None:
@@ -281,12 +281,12 @@ def test_bounds_of_lengths_are_as_sharp_as_dense_samples(proof: Proof) -> None:
             for each in bounds
         )
         assert verified(wider, machine()).claims
-        assert "could not be shown" in rejected(sharper, machine())
+        assert "could not be proved" in rejected(sharper, machine())
 
 
 def test_a_bound_beyond_the_limit_is_rejected(proof: Proof) -> None:
     given = with_claim(alone(proof, "leg_length limb 1-", "max"), "leg_length limb 1-", "max", bound=44.0**2)
-    assert "does not keep the case's limit" in rejected(given, machine())
+    assert "does not satisfy the case's limit" in rejected(given, machine())
 
 
 @pytest.mark.parametrize(
@@ -316,27 +316,27 @@ def test_other_paths_are_rejected(proof: Proof) -> None:
     def carrying(given: Proof, **changes: object) -> Proof:
         return replace(given, premises=replace(premises, **changes))  # type: ignore[type-var, arg-type]
 
-    assert "segment 3 from" in rejected(carrying(lengths, text=edited(TIMED, ("4,3,4", "4,30,4"))), machine())
-    assert "segment 2 from" in rejected(carrying(speeds, text=edited(TIMED, ("4,3,3", "4,3,2.02"))), machine())
+    assert "segment 3 between" in rejected(carrying(lengths, text=edited(TIMED, ("4,3,4", "4,30,4"))), machine())
+    assert "segment 2 between" in rejected(carrying(speeds, text=edited(TIMED, ("4,3,3", "4,3,2.02"))), machine())
     rows = TIMED.splitlines()
     swapped = "\n".join([*rows[:2], rows[3].replace(",3,3", ",3,0.1"), rows[2], rows[4]])
-    assert "segment 1 from" in rejected(carrying(speeds, text=swapped), machine())
+    assert "segment 1 between" in rejected(carrying(speeds, text=swapped), machine())
     assert "goes on after every box" in rejected(carrying(lengths, text="\n".join(rows[:-1])), machine())
     assert "other joint centres" in rejected(carrying(lengths, legs=()), machine())
     assert "another joint-centre tolerance" in rejected(carrying(lengths, joint_centre=0.1), machine())
     assert "cannot be read" in rejected(carrying(lengths, text="x,y\n1,2"), machine())
-    assert "this case has none" in rejected(carrying(lengths, of_case=True), machine())
+    assert "this case has no path" in rejected(carrying(lengths, of_case=True), machine())
     slower = edited(TIMED, ("3,2\n", "3,1.5\n"))
     assert verified(carrying(lengths, text=slower), machine()).claims
 
 
 def test_claims_of_another_case_or_left_out_are_rejected(proof: Proof) -> None:
     fewer = hexapod(limits=LIMITS | {"leg_length": {"max": 43}}, load=LOAD)
-    assert "does not keep" in rejected(proof, hexapod(limits=LIMITS | {"leg_length": {"max": 30}}, load=LOAD))
+    assert "does not satisfy" in rejected(proof, hexapod(limits=LIMITS | {"leg_length": {"max": 30}}, load=LOAD))
     assert "each claim of the case exactly once" in rejected(proof, hexapod(limits=LIMITS))
     assert "each claim of the case exactly once" in rejected(replace(proof, unproved=proof.unproved[1:]), machine())
     assert verified(alone(proof, "leg_length limb 1-", "max"), fewer).claims
-    assert "claims nothing" in rejected(replace(proof, claims=()), machine())
+    assert "the proof has no claims" in rejected(replace(proof, claims=()), machine())
 
 
 #: A circle by eight turns, whose eighths all end at one point.
@@ -355,7 +355,7 @@ def test_a_tree_of_a_program_proves_nothing_of_a_path() -> None:
     others = tuple(Unproved(*each, "") for each in expected)
     proof = Proof("", case.name, premises, (claim,), (), others)
     assert leg_lengths(*path.poses_at([0] * 99, np.linspace(0, 1, 99))).max() > 32.8
-    assert "'program' is no reason of a claim about a path" in rejected(proof, case)
+    assert "'program' is no known kind of proof for a claim about a path" in rejected(proof, case)
 
 
 @pytest.mark.parametrize("turns", [1, 8, 16, 41])
@@ -383,14 +383,14 @@ def test_a_singular_pose_of_a_path_is_proved_by_two_places() -> None:
     assert low < judged.ranks[0].place.parameter < high
     for sides, words in (
         (((0.0,), (0.1,)), "opposite signs"),
-        (((low,), (2.5,)), "not one of the workspace"),
-        (((low,),), "no two poses"),
-        (((low,), (high, 0.0)), "about the exact robot"),
+        (((low,), (2.5,)), "a pose is outside the workspace"),
+        (((low,),), "does not have two poses"),
+        (((low,), (high, 0.0)), "the claim is about the robot without one"),
         (((low,), (1.5,)), "change continuously"),
     ):
         assert words in rejected(with_claim(given, "regular", "", sides=sides), case)
     tree = bytes([Node.BOUNDED] * 2)
-    assert "could not be shown" in rejected(with_claim(given, "regular", "", reason="regular", tree=tree), case)
+    assert "could not be proved" in rejected(with_claim(given, "regular", "", reason="regular", tree=tree), case)
 
 
 #: Robots whose loops are followed, with few and with all coordinates, and a path; seconds make speeds claims too.
@@ -429,7 +429,7 @@ def test_a_proof_of_a_robot_with_loops_holds(name: str) -> None:
     (claim,) = speed.claims
     assert claim.bound is not None
     moved = with_claim(speed, claim.name, claim.sense, bound=0.8 * claim.bound)
-    assert "could not be shown" in rejected(moved, case)
+    assert "could not be proved" in rejected(moved, case)
     assert number in {each.name for each in checked.claims}
 
 
@@ -444,7 +444,7 @@ def test_a_way_out_of_reach_is_rejected() -> None:
     )
     claims = tuple(ProofClaim(each, "", "regular", tree=bytes([Node.BOUNDED] * 2)) for each in names)
     premises = premises_of(case, "part.csv", text, options, of_case=False)
-    assert "could not be shown" in rejected(Proof("", case.name, premises, claims, (), others), case)
+    assert "could not be proved" in rejected(Proof("", case.name, premises, claims, (), others), case)
 
 
 def test_pieces_of_other_assemblies_are_rejected() -> None:
@@ -493,11 +493,9 @@ def test_the_commands_write_and_verify(cli: Run, tmp_path: Path) -> None:
     assert (code, "another path than that of" in said) == (1, True)
     refusal_of(cli("verify-proof", str(out), "--unit", "in"), "--along: is missing")
     refusal_of(
-        cli("verify-proof", str(out), "--leg-error", "0.1"), "--leg-error", "is no option for this kind of proof"
+        cli("verify-proof", str(out), "--leg-error", "0.1"), "--leg-error", "does not apply to this kind of proof"
     )
-    refusal_of(
-        cli("path", "hexapod-linuxcnc", "--range", "--proof", str(out)), "--proof", "cannot be used with --range"
-    )
+    refusal_of(cli("path", "hexapod-linuxcnc", "--range", "--proof", str(out)), "--proof", "conflicts with --range")
 
 
 def test_a_path_of_a_case_is_held_to_its_file(cli: Run, tmp_path: Path) -> None:

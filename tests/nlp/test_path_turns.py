@@ -382,4 +382,4 @@ def test_the_command_takes_motions_and_conventions(cli: Run, tmp_path: Path) -> 
     refusal_of(cli(*command, "--between", "lines"), "--between lines: must be angles or slerp")
     refusal_of(cli(*command, "--angles", "xyx"), "angles = 'xyx'")
     command[3] = str(rows)
-    refusal_of(cli(*command, "--angles", "xyz"), "poses.csv: angles = 'xyz': is for programs")
+    refusal_of(cli(*command, "--angles", "xyz"), "poses.csv: angles = 'xyz': is only for G-code")

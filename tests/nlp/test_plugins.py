@@ -305,7 +305,7 @@ FAULTY = {
     "contradicts-itself": (MODULE.replace('"radius", radius', '"radius", 2 * radius'), "robots:tripod", "expression"),
     "has-a-hint-that-is-nothing": ("def tripod(*, legs: 'Legs' = 3):\n    pass\n", "robots:tripod", "Legs"),
     "takes-anything": ("def tripod(**options):\n    return None\n", "robots:tripod", "tripod"),
-    "takes-positions": ("def tripod(legs=3, /):\n    return None\n", "robots:tripod", "by name"),
+    "takes-positions": ("def tripod(legs=3, /):\n    return None\n", "robots:tripod", "keyword parameter"),
     "exits-at-import": ("raise SystemExit(3)\n", "robots:tripod", "SystemExit"),
     "has-a-hint-that-exits": ("def tripod(*, n: 'object()' = 1): raise SystemExit\n", "robots:tripod", "SystemExit"),
     "exits": ("def tripod(): raise SystemExit\n", "robots:tripod", "SystemExit"),

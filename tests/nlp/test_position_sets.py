@@ -14,7 +14,7 @@ from workspace_cases import on_paper, only, rejected, stating
 from screwsynth.models import FloatArray
 from screwsynth.nlp import Case, Free, Outcome, Workspace, judge_workspace
 from screwsynth.nlp.case.positionsets import HalfSpace, PositionSet, SetKind
-from screwsynth.nlp.proof.checker.proof_file import set_numbers, workspace_numbers
+from screwsynth.nlp.proof.checker.proof_file import set_premise, workspace_premise
 from screwsynth.nlp.proof.checker.tree import Node
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import PoseRoot, pose_root
@@ -147,7 +147,7 @@ def test_proof_of_a_disc(tmp_path: Path) -> None:
     # Without the premise, claims must be proved on the set of the case: more poses need other trees.
     wide = delta(tmp_path, {"disc": {"radius": 125.0, "z": [-236.0, -235.0]}})
     assert wide.workspace is not None
-    numbers = {"workspace": workspace_numbers(wide.workspace), "position_set": set_numbers(wide.workspace)}
+    numbers = {"workspace": workspace_premise(wide.workspace), "position_set": set_premise(wide.workspace)}
     forged = only(stating(proof, **numbers), "actuator_length limb 1", "min")
     assert "does not keep" in rejected(forged, wide) or "could not be shown" in rejected(forged, wide)
     assert "not outside" in rejected(only(proof, "regular", tree=bytes([Node.OUTSIDE])), case)

@@ -141,7 +141,7 @@ def test_what_is_no_tree_is_rejected(proof: ProofClaim, tree: bytes) -> None:
 def test_a_face_that_is_not_the_cases_is_rejected(proof: ProofClaim) -> None:
     # Of the lower half the upper face, of the upper half the lower one; the trees are whole otherwise.
     for halves in ((Node.FACE_UPPER, 0, Node.BOUNDED, Node.BOUNDED), (Node.BOUNDED, Node.FACE_LOWER, 0, Node.BOUNDED)):
-        assert "collapsed on a face" in rejected(proof, load_case(NAME), tree=bytes([Node.HALF, 0, *halves]))
+        assert "collapses on a bound" in rejected(proof, load_case(NAME), tree=bytes([Node.HALF, 0, *halves]))
 
 
 def test_a_proof_is_for_its_case_only(proof: ProofClaim) -> None:
@@ -185,7 +185,7 @@ def test_the_command_line_rejects_what_is_damaged_or_altered(cli: Run, tmp_path:
         (("--time", "0"), "--time"),
         (("--above", "inf"), "--above"),
         (("--proof", "-", "--json", "-"), "standard output"),
-        (("--proof", "/nowhere/p.json"), "no folder"),
+        (("--proof", "/nowhere/p.json"), "is not a folder"),
     ],
 )
 def test_wrong_input_to_certify_is_one_sentence(cli: Run, arguments: tuple[str, ...], fault: str) -> None:
@@ -283,7 +283,7 @@ def test_a_proof_by_limbs_holds_and_its_bounds_must_add_up() -> None:
     assert "together" in rejected(proof, case, bound=proof.bound * (1 - 1e-3))
     (first,) = struct.unpack("<d", proof.tree[1:9])
     lower = proof.tree[:1] + struct.pack("<d", first * (1 - 0.01)) + proof.tree[9:]
-    assert "could not be shown" in rejected(proof, case, tree=lower)
+    assert "could not be proved" in rejected(proof, case, tree=lower)
     assert "ends" in rejected(proof, case, tree=proof.tree[:-1])
     assert "goes on" in rejected(proof, case, tree=proof.tree + bytes([Node.BOUNDED]))
     # Bounds whose sum is no number.
@@ -392,7 +392,7 @@ def test_memory_is_bounded(tmp_path: Path, optimum: Proved, workspace: Proved) -
     attacks: list[tuple[dict[str, Any], int, str]] = [
         (with_trees(workspace[1], bytes(2**27 + 1)), 2, "unpack to more than 128 MB"),
         (with_trees(optimum[1], bytes([Node.HALF, 0]) * 2**23), 1, "deeper than 10000 bisections"),
-        (with_trees(optimum[1], nodes_of_depth(21), bound=0.0), 1, "could not be shown"),
+        (with_trees(optimum[1], nodes_of_depth(21), bound=0.0), 1, "could not be proved"),
     ]
     for content, expected, fault in attacks:
         status, memory, err = checked(tmp_path / "attack.json", content)

@@ -35,9 +35,9 @@ from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.checker.premises import fingerprint
 from screwsynth.nlp.proof.checker.proof_file import ProofClaim
 from screwsynth.nlp.proof.checker.tree import Node
+from screwsynth.nlp.proof.statement.fixed_robot import Legs
 from screwsynth.nlp.proof.statement.form import without_ties
 from screwsynth.nlp.proof.statement.limb_separation import separate
-from screwsynth.nlp.proof.statement.machine import Legs
 from screwsynth.nlp.proof.statement.signs import is_nowhere_positive
 from screwsynth.nlp.proof.statement.standard_form import Condition, StandardForm, standard_form
 from screwsynth.nlp.proof.workspace.ranks import ranks
@@ -278,7 +278,7 @@ def test_a_proven_bound_of_a_sum_of_squares_is_not_below_zero(tmp_path: Path, cl
     case, proof, result = saved(tmp_path / "case.toml", UP), tmp_path / "p.json", tmp_path / "r.json"
     status, out, _ = cli("workspace", str(case), "--json", str(result), "--proof", str(proof))
     assert status == 1  # J is singular where F is 0
-    assert "F  0 to 0.7338" in out
+    assert "F  0 .. 0.7338" in out
     extremes = json.loads(result.read_text())["extremes"]
     (least,) = (each for each in extremes if (each["name"], each["sense"]) == ("F", "min"))
     assert (str(least["bound"]), least["reached"], least["outcome"], least["unit"]) == ("0.0", 0, "proved", "(cm/cm)²")
@@ -357,7 +357,7 @@ def test_boxes_closed_by_a_claim_say_nothing_of_limits() -> None:
 def test_a_value_that_jumps_has_no_rule(jump: Callable[[SX], SX]) -> None:
     """Its derivative is written as 0, and so a search along rising values would step over the place of the optimum."""
     nlp = two_numbers(lambda x, y: 10 * jump(x) - x + (x + y) ** 2)
-    with pytest.raises(UncoveredError, match="the robot's expressions hold the"):
+    with pytest.raises(UncoveredError, match="the robot's expressions contain the"):
         certify_program(nlp, np.array([2.9, -1.0]))
     with pytest.raises(UncoveredError):
         check_proof(ProofClaim("none", "", "program", 0.0, fingerprint(nlp), bytes([Node.BOUNDED])), nlp)

@@ -146,14 +146,14 @@ BAD = [
     ({"p_w": 1}, "p_w: cannot be set; did you mean 'p_z'?"),
     (
         {"limits.leg_lenght.max": 4},
-        "limits.leg_lenght: is nothing that 'stewart-gough' has; did you mean 'leg_length'?",
+        "limits.leg_lenght: no such limit for the robot 'stewart-gough'; did you mean 'leg_length'?",
     ),
     ({"p_z.max": 10}, "pose.position[2].min = 20.0: must be below max = 10 cm"),
-    ({"x2.max": 10}, "x2.max: cannot be set: x2 is not free"),
+    ({"x2.max": 10}, "x2.max: cannot be set: x2 is fixed"),
     ({"x2": -1}, "robot.parameters.x2 = -1.0: must be at least 0 cm"),
     ({"axis": [0, 0]}, "pose.rotation.axis: must have 3 entries, got 2"),
     ({"x2": math.nan}, "robot.parameters.x2 = nan: must be finite"),
-    ({"path.place.x": 1}, "path.place.x: cannot be set: the case has no path"),
+    ({"path.place.x": 1}, "path.place.x: cannot be set: the case has no table [path]"),
 ]
 
 
@@ -202,13 +202,13 @@ def test_components_poses_and_directions_have_names_too() -> None:
     assert math.hypot(*shown) == pytest.approx(1)
     several = ss.solve(ss.load_case("flight-simulator"), starts=1)
     assert several["pose2_p_x"] == several.case.poses[1].position[0]
-    with pytest.raises(ss.InputError, match=r"^p_x: no such number; allowed: x1, x2, x3, x4, pose1_p_x, pose1_p_y"):
+    with pytest.raises(ss.InputError, match=r"^p_x: no such value; allowed: x1, x2, x3, x4, pose1_p_x, pose1_p_y"):
         _ = several["p_x"]
 
 
 def test_a_name_that_a_solution_does_not_have_is_refused(solution: ss.Solution) -> None:
     with pytest.raises(
-        ss.InputError, match=r"^x9: no such number; allowed: x1, x2, x3, x4, p_x, p_y, p_z, angle, axis$"
+        ss.InputError, match=r"^x9: no such value; allowed: x1, x2, x3, x4, p_x, p_y, p_z, angle, axis$"
     ):
         _ = solution["x9"]
     with pytest.raises(TypeError, match="not iterable"):
@@ -239,10 +239,13 @@ def test_rotations_and_translations_are_screws_of_pitch_0_and_infinity() -> None
     ("make", "sentence"),
     [
         (lambda: ss.Task.translation([0, 0, 0]), "task.direction = [0.0, 0.0, 0.0]: must not be zero"),
-        (lambda: ss.Task.translation([0, 1]), "task.direction: must be three finite numbers"),
+        (lambda: ss.Task.translation([0, 1]), "task.direction = [0.0, 1.0]: must be three finite numbers"),
         (lambda: ss.Task.rotation([0, 0, 0], [1, 2, 3]), "task.axis = [0.0, 0.0, 0.0]: must not be zero"),
-        (lambda: ss.Task.rotation([0, 0, 1], [1, 2]), "task.through: must be three finite numbers"),
-        (lambda: ss.Task.rotation([0, 0, 1], [1, 2, math.inf]), "task.through: must be three finite numbers"),
+        (lambda: ss.Task.rotation([0, 0, 1], [1, 2]), "task.through = [1.0, 2.0]: must be three finite numbers"),
+        (
+            lambda: ss.Task.rotation([0, 0, 1], [1, 2, math.inf]),
+            "task.through = [1.0, 2.0, inf]: must be three finite numbers",
+        ),
         (lambda: ss.Task.rotation([0, 0, 1], [1, 2, 3], sense="most"), "task.sense = \"most\": must be 'max' or 'min'"),
     ],
 )
@@ -289,16 +292,16 @@ def test_the_arguments_of_the_first_version_still_work() -> None:
 @pytest.mark.parametrize(
     ("over", "sentence"),
     [
-        ({}, "over: must have one number for a trade-off curve, got none"),
+        ({}, "over: must name exactly one parameter, bound or limit, got none"),
         (
             {"x1": [1, 2], "x2": [1]},
-            "over: must have one number for a trade-off curve, got x1, x2; sweep takes several",
+            "over: must name exactly one parameter, bound or limit, got x1, x2; use sweep for several",
         ),
         ([1, 2], "over: must be a mapping from names to values, such as {'x1': [10, 12, 14]}, got list"),
         ({"x1": []}, "x1: has no values"),
         ({"x1": 12}, "over x1: must be a list of numbers, got int 12"),
         ({"x1": "10:14:3"}, "over x1: must be a list of numbers, got str '10:14:3'"),
-        ({"x1": [12, 12]}, "over x1: has a value twice; each point must be another one"),
+        ({"x1": [12, 12]}, "over x1: contains a value twice; the values must be different"),
         ({"x1": [12, math.inf]}, "x1 = inf: must be a finite number"),
         ({"x9": [12, 13]}, "x9: cannot be set; allowed: x1, x2, x3, x4, p_x"),
     ],
@@ -357,7 +360,7 @@ def test_inverse_takes_roll_pitch_and_yaw(tmp_path: pytest.TempPathFactory) -> N
         ({"rpy": [[0, 0, 0]] * 2}, "rpy: must be an array (N, 3) of roll, pitch and yaw for N = 1 poses, got (2, 3)"),
         (
             {"rpy": [[0, 0, 45]]},
-            "rpy[0][2] = 45: must be at most 2 pi in size; 45 rad = 2578.3 deg; angles are radians",
+            "rpy[0][2] = 45: must be at most 2 pi in magnitude; 45 rad = 2578.3 deg; angles are radians",
         ),
         (
             {"rotations": [[0, 0, 0.1]]},
@@ -414,11 +417,11 @@ def test_limits_are_stated_by_their_keys() -> None:
         ({"leg_length": (1, 2, 3)}, "limits.leg_length: must be (min, max), with None for no limit, or a mapping"),
         ({"leg_length": {"most": 3}}, "limits.leg_length.most: no such key; allowed: min, max"),
         ({"leg_length": (60, 20)}, "limits.leg_length.min = 60.0: must be below max = 20 cm"),
-        ({"leg_length": (None, None)}, "limits.leg_length: must have min, max, or both"),
+        ({"leg_length": (None, None)}, "limits.leg_length: is empty: it must have min, max, or both"),
         ({"leg_length": ("a", 3)}, "limits.leg_length.min: must be a number, got str 'a'"),
         (
             {"leg_lenght": (20, 60)},
-            "limits.leg_lenght: is nothing that 'stewart-gough' has; did you mean 'leg_length'?",
+            "limits.leg_lenght: no such limit for the robot 'stewart-gough'; did you mean 'leg_length'?",
         ),
         (
             {"leg_clearance": 4},
@@ -442,5 +445,5 @@ def test_wrong_limits_are_refused(stated: dict[str, tuple[float, float]], senten
 def test_what_is_no_limit_and_a_limit_given_twice_are_refused() -> None:
     with pytest.raises(ss.CaseError, match=r"limits: must be limits such as LegLength\(min=28\), or keys"):
         ss.Limits((20, 60))  # type: ignore[arg-type]
-    with pytest.raises(ss.CaseError, match=r"limits\.leg_length: is given more than once"):
+    with pytest.raises(ss.CaseError, match=r"limits\.leg_length: must be given once, got 2 limits"):
         ss.Limits(ss.LegLength(min=1), leg_length=(2, 3))

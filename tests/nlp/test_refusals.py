@@ -85,7 +85,7 @@ REFUSALS = {
         changed("x1 = 12", 'x1 = "12 cm"'),
         (
             'case.toml: robot.parameters.x1 = "12 cm": must be a number or { min, max }; write 12: a '
-            "number stands without its unit"
+            "number is written without its unit"
         ),
     ),
     "wrong table": (
@@ -356,7 +356,7 @@ REFUSALS = {
     ),
     "workspace of one pose": (
         above("workspace = { position = [0, 0, 30] }"),
-        "case.toml: workspace: is one pose: give at least one number as { min, max }",
+        "case.toml: workspace: is only one pose: give one coordinate or more as { min, max }",
     ),
     "crossed workspace": (
         above("workspace = { position = [0, 0, { min = 40, max = 30 }] }"),
@@ -458,7 +458,7 @@ REFUSALS = {
     ),
     "CSV with unit": (
         changed(POSE, 'poses = "poses.csv"', "poses.csv", "x,y,z\n1,2,30 cm\n"),
-        'poses.csv: row 2, column z = "30 cm": must be a number; write 30: a number stands without its unit',
+        'poses.csv: row 2, column z = "30 cm": must be a number; write 30: a number is written without its unit',
     ),
     "poses twice": (
         above('poses = "poses.csv"'),

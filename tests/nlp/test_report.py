@@ -127,7 +127,7 @@ def test_tables_are_the_json_result(page: Callable[..., Page], case: str) -> Non
 def test_rounding_is_no_rate_and_published_numbers_stand_beside_computed_ones(page: Callable[..., Page]) -> None:
     found = page("paper-4.4-snu")
     assert 0 < found.data["result"]["F"] < 1e-20
-    assert "F = 0 (mm/rad)² with" in found.words
+    assert "F = 0 (mm/rad)², platform" in found.words
     assert [(number(row[3]), row[5]) for row in found.tables["rates"][1:]] == [(0, "none")] * 6
     case = load_case("paper-4.1-helical")
     rows = page("paper-4.1-helical").tables["compared"][1:]
@@ -275,7 +275,7 @@ def test_robots_with_loops_follow() -> None:
             np.testing.assert_allclose(foot, [head[0], 0, 0], atol=1e-9)
             assert frame["rates"] == pytest.approx([0.8])
         text = page_of(report)
-        assert "loops would open" in text
+        assert "without opening the loops of the robot" in text
         Page(text)
 
 
@@ -324,7 +324,7 @@ def test_bound_against_time() -> None:
     assert [y for _, y in bound] == sorted(y for _, y in bound)
     assert bound[0][1] == bound[1][1] < bound[2][1] == bound[3][1]
     assert bound[-1][1] < best[-1][1], "the bound stays above the best point"
-    assert "from 12 after 0.5 s to 10.1 after 2 s" in words
+    assert "Bound: 12 after 0.5 s, 10.1 after 2 s." in words
 
 
 def test_structure_is_accessible(page: Callable[..., Page]) -> None:
@@ -393,7 +393,7 @@ def test_page_has_every_pose_and_marks_the_worst(sense: str, three_poses: Callab
         np.testing.assert_allclose(frame["position"], at, atol=1e-12)
         assert frame["F"] == pytest.approx(value, rel=1e-9)
     unit = f"({found.data['result']['units']['length']}/rad)²"
-    assert f"The worst: pose {worst + 1} of 3, F = {values[worst]:.7g} {unit}." in found.words
+    assert f"Worst pose: pose {worst + 1} of 3, F = {values[worst]:.7g} {unit}." in found.words
     (slider,) = [a for tag, a in found.elements if tag == "input" and a.get("id") == "pose"]
     assert (slider["min"], slider["max"], slider["value"]) == ("1", "3", "1")
 
@@ -407,6 +407,6 @@ def test_a_page_with_a_refused_certificate(tmp_path: Path, cli: Run, page: Calla
     assert (code, err) == (1, "")
     assert "limits.custom[0]" in out
     shown = refused.read_text(encoding="utf-8")
-    assert re.search(r"Refused: no bound can be proved: [^<]*limits\.custom\[0\]", shown)
+    assert re.search(r"No certificate: no bound can be proved: [^<]*limits\.custom\[0\]", shown)
     assert "407.2107" in shown
     assert "Refused" not in page("paper-4.1-helical").text, "who asks for no proof is refused none"

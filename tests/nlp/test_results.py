@@ -217,12 +217,16 @@ def test_a_result_is_read_again_from_its_file(cli: Run, tmp_path: Path) -> None:
 def test_a_wrong_result_is_refused_with_its_key(change: Callable[[Json], object], fault: str) -> None:
     table = json.loads(json.dumps(json_data(result_of(solve(load_case("paper-4.3-axis-x"), starts=1)))))
     change(table)
-    with pytest.raises(InputError, match=rf"^mine: is no result of screwsynth: {fault}"):
+    with pytest.raises(InputError, match=rf"^mine: is not a result of screwsynth: {fault}"):
         result_from_json(table, "mine")
 
 
 def test_a_file_that_is_no_result_is_refused(tmp_path: Path) -> None:
-    for content, fault in (("{", "is not valid JSON"), ("[1]", "must be an object"), ("{}", "schema: is missing")):
+    for content, fault in (
+        ("{", "is not valid JSON"),
+        ("[1]", r"must contain one JSON object, \{ ... \}"),
+        ("{}", "schema: is missing"),
+    ):
         with pytest.raises(InputError, match=fault):
             load_result(saved(tmp_path / "result.json", content))
     with pytest.raises(InputError, match="cannot be read"):
@@ -474,7 +478,7 @@ def test_a_result_without_its_version_is_none(tmp_path: Path, cli: Run) -> None:
     cli("evaluate", "paper-4.4-min", "--set", "p_z=30", "--json", str(path))
     content = json.loads(path.read_text(encoding="utf-8"))
     del content["schema"]
-    with pytest.raises(InputError, match=r"result\.json: is no result of screwsynth: schema: is missing"):
+    with pytest.raises(InputError, match=r"result\.json: is not a result of screwsynth: schema: is missing"):
         load_result(saved(path, json.dumps(content)))
 
 

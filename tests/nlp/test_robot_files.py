@@ -81,7 +81,7 @@ FAULTS: list[tuple[str, str | bytes, str]] = [
     ('"R", at = "B", axis = "y"', '"U", at = "B", axes = ["x", "-2*x"]', "limb 1, joint 1 (U), axes: are parallel; two different"),
     ('"R"', '"Pa", to = "B"', "limb 1, joint 1 (Pa), to: is the same point as at; a rod needs a nonzero length"),
     ('"R"', '"Pa", to = "B + y"', "limb 1, joint 1 (Pa), axis: is parallel to the rod from at to to; give the axis of its hinges"),
-    (JOINTS, f'joints = [{DRIVEN}, {{ type = "S", at = "A" }}, {{ type = "S", at = "A" }}]', "limb 1, joint 3 (S), at: is the same point as that of the joint S before it"),
+    (JOINTS, f'joints = [{DRIVEN}, {{ type = "S", at = "A" }}, {{ type = "S", at = "A" }}]', "limb 1, joint 3 (S), at: is the point of the preceding joint S too"),
     (JOINTS, 'joints = [{ type = "S", at = "A" }, { type = "C", at = "B", axis = "x" }, { type = "P", at = "B", axis = "y" }]', "the robot: no limb resists the platform: each has six or more independent passive joints"),
     ("count = 1", "angles = [0, 120, 360]", "limb 1, repeat, angles: has 0 twice; each copy needs an angle of its own"),
     # A limb that ends nowhere, or has too much.
@@ -127,9 +127,9 @@ FAULTS: list[tuple[str, str | bytes, str]] = [
     ("[[limb]]", '[[limb]]\nname = "111"\njoints = [{ type = "S", at = "x" }]\n[[limb]]\nname = "11"', "limb: has two limbs with the name '111'"),
     ("B = [", "h = [", "limb 1, point h: has the name of a dimension"),
     ("B = [", "x = [", "limb 1, x: is not a name for a point: expressions use it for something else"),
-    ('half = "rb/2"', 'a = "b"\nb = "a"', "derived, a: is 'b', which needs 'b' before it is given; allowed are names given above"),
-    ('half = "rb/2"', 'a = "a + 1"', "derived, a: is 'a + 1', which needs 'a' before it is given"),
-    ("points = {", 'points = { D = "E", E = "D",', "limb 1, point D: is 'E', which needs 'E' before it is given"),
+    ('half = "rb/2"', 'a = "b"\nb = "a"', "derived, a: is 'b', which uses 'b' before its definition; use names defined above"),
+    ('half = "rb/2"', 'a = "a + 1"', "derived, a: is 'a + 1', which uses 'a' before its definition"),
+    ("points = {", 'points = { D = "E", E = "D",', "limb 1, point D: is 'E', which uses 'E' before its definition"),
     # Keys.
     ("home =", "colour = 1\nhome =", "colour: no such key; allowed: schema, name, description, length_unit, home, dimensions, derived, limb"),
     ("name =", "nme =", "nme: no such key; did you mean 'name'?"),

@@ -359,7 +359,7 @@ def test_an_exchange_that_is_cut_says_so(tmp_path: Path, cli: Run) -> None:
     assert "stopped before the end" in out
     assert "(optimal" not in out
     code, _, err = cli("evaluate", str(path), "--of", str(target))
-    assert (code, "holds no answer" in err) == (2, True)
+    assert (code, "contains no answer" in err) == (2, True)
 
 
 def test_a_design_that_is_refuted_at_the_end_is_no_answer(tmp_path: Path, cli: Run, monkeypatch: Patch) -> None:

@@ -93,7 +93,7 @@ def test_compiled_rows_are_those_of_solve(tmp_path: Path, cli: Run) -> None:
     code, said, _ = cli(*command, "--engine", "compiled", "--plot", str(picture))
     rows = rows_of(out.read_text(encoding="utf-8"))
     assert (code, len(rows), [row["index"] for row in rows]) == (0, 12, [str(k) for k in range(12)])
-    assert said.startswith("12 of 12 points have an answer")
+    assert said.startswith("12 of 12 points have an optimum")
     assert {row["engine"] for row in rows} == {"compiled"}
     assert not list(tmp_path.glob("*.journal"))
     assert b"region" in picture.read_bytes()
@@ -127,7 +127,7 @@ def test_points_of_a_file_and_parquet(tmp_path: Path, cli: Run) -> None:
     assert found["status"] == ["optimal", "optimal", "optimal", "refused", "optimal"]
     assert "task[0].axis" in found["note"][3]
     assert found["F"][3] is None
-    assert said.startswith("4 of 5 points have an answer")
+    assert said.startswith("4 of 5 points have an optimum")
     source = CaseSource.from_file(read_case(CASE))
     one = Sweep.of(source, points_of_csv(points.read_text(), str(points)), starts=2)
     assert ["; ".join(row.active) for row in table_rows(str(out), one)] == found["active"]
@@ -138,7 +138,7 @@ def test_a_sweep_in_python_is_that_of_the_command(tmp_path: Path, cli: Run) -> N
     options = [word for name, file in files.items() for word in (f"--{name}", str(file))]
     over = ("--over", "task.pitch=0.2,1", "--over", "x1=10,12", "--starts", "2", "--engine", "ipopt", "--jobs", "1")
     code, said, err = cli("sweep", CASE, *over, "--out", str(out), *options)
-    assert (code, err, said[:33]) == (0, "", "4 of 4 points have an answer, F f"), err
+    assert (code, err, said[:33]) == (0, "", "4 of 4 points have an optimum, F "), err
     values = {"task.pitch": (0.2, 1), "x1": (10, 12)}
     columns = run_in_python(load_case(CASE), values, starts=2, engine="ipopt", jobs=1)
     rows = rows_of(out.read_text(encoding="utf-8"))
@@ -184,13 +184,13 @@ def test_joints_are_no_design() -> None:
     assert [name for name in found.design if name.startswith("q") and name[1:2].isdigit()] == []
     assert set(found.design) == {"rb", "p_x", "p_y", "p_z", "q_x", "q_y", "q_z"}
     for arguments, words in (
-        ({}, "a sweep needs points"),
-        ({"over": {"rb": (1, 1)}}, "has a value twice"),
+        ({}, "a sweep needs exactly one of over and points"),
+        ({"over": {"rb": (1, 1)}}, "contains a value twice"),
         ({"over": {"rb": (1, "a")}}, "rb = a: must be a finite number"),
         ({"over": {"rb": ()}}, "rb: has no values"),
-        ({"points": {"rb": (1, 2), "rp": (1,)}}, "the counts are rb 2, rp 1"),
+        ({"points": {"rb": (1, 2), "rp": (1,)}}, "got rb 2, rp 1"),
         ({"over": {"rb": (1, 2)}, "engine": "fast"}, "must be compiled or ipopt"),
-        ({"over": {"rp": (1, 0.9)}, "engine": "compiled", "certified": True}, "has no certificates"),
+        ({"over": {"rp": (1, 0.9)}, "engine": "compiled", "certified": True}, "conflicts with --certify"),
         ({"over": {"rb": (1, 2)}, "time_limit": 0}, "must be positive"),
     ):
         with pytest.raises(InputError, match=words):
@@ -205,9 +205,9 @@ def test_joints_are_no_design() -> None:
         (("--over", "x1=1:2:0"), "COUNT = 0 must be a whole number from 1 to"),
         (("--over", "x1=1:2"), "must be NAME=FIRST:LAST:COUNT or NAME=V1,V2,..."),
         (("--over", "x1=1,nan"), "value = 'nan': must be a finite number"),
-        (("--over", "x1=1,1"), "has a value twice"),
+        (("--over", "x1=1,1"), "contains a value twice"),
         (("--over", "x1=-4:2:3"), "robot.parameters.x1 = -4.0: must be at least 0"),
-        (("--over", "x1=1:2:9999", "--over", "x2=1:2:9999"), "and at most 10,000,000 are allowed"),
+        (("--over", "x1=1:2:9999", "--over", "x2=1:2:9999"), "at most 10,000,000 are allowed"),
         (("--over", "x1=1,2", "--over", "x1=3,4"), "x1 is given twice"),
         (("--over", "EMPTY"), "has 0 points"),
         (("--over", "SHORT"), "row 3: must have 2 cells, got 1"),
@@ -215,8 +215,8 @@ def test_joints_are_no_design() -> None:
         (("--over", "x1=1,2", "--over", "EMPTY"), "a file of points cannot be combined with ranges or lists"),
         ((), "--over: is missing: NAME=FIRST:LAST:COUNT, parameter to vary"),
         (("--over", "x1=1,2", "--engine", "fast"), "--engine fast: must be compiled or ipopt"),
-        (("--over", "x1=10,12", "--starts", "17", "--engine", "compiled"), "has 16 starting points, and 17 are wanted"),
-        (("--over", "x1=1,2", "--over", "x2=1,2", "--over", "x3=1,2", "--plot", "p.png"), "3 numbers change on a grid"),
+        (("--over", "x1=10,12", "--starts", "17", "--engine", "compiled"), "at most 16 starting points, and 17 are"),
+        (("--over", "x1=1,2", "--over", "x2=1,2", "--over", "x3=1,2", "--plot", "p.png"), "got a grid over 3 names"),
     ],
 )  # fmt: skip
 def test_bad_input_is_one_sentence(arguments: tuple[str, ...], words: str, tmp_path: Path, cli: Run) -> None:
@@ -232,7 +232,7 @@ def test_bad_input_is_one_sentence(arguments: tuple[str, ...], words: str, tmp_p
 
 def test_other_outputs_are_refused(tmp_path: Path, cli: Run) -> None:
     out = tmp_path / "out.csv"
-    for name, words in (("out.txt", "must end in .parquet or .csv"), ("no/x.csv", "is no folder")):
+    for name, words in (("out.txt", "must end in .parquet or .csv"), ("no/x.csv", "is not a folder")):
         refusal_of(cli("sweep", CASE, *OVER, "--out", str(tmp_path / name)), words)
     journal = Path(f"{out}.journal")
     for path, words in ((out, "is not the table of this sweep"), (journal, "belongs to another sweep")):
@@ -275,7 +275,7 @@ def test_ipopt_without_a_compiler(sweep: Callable[..., Sweep], tmp_path: Path, m
     rows = list(journal.rows())
     journal.close()
     assert [row.engine for row in rows] == ["ipopt", "ipopt"]
-    assert "needs a C compiler" in said[0]
+    assert "no C compiler is installed" in said[0]
     alone = solve(load_case(CASE, {"x1": 11.75}), starts=1)
     assert pytest.approx(alone.F, rel=1e-12) == rows[1].F
 
@@ -326,9 +326,9 @@ def test_regions_of_a_sweep_have_numbers_that_a_legend_explains() -> None:
     axes = figure.axes[0]
     numbers = {text.get_text(): text.get_position() for text in axes.texts if text.get_gid() == "number"}
     lines = {line.partition(": ")[0]: line.partition(": ")[2] for line in legend_of(found)}
-    assert lines.pop("Lines").endswith("Empty: no answer.")
-    limits = {"1": "also leg_length max (limb 1-, limb 1+)", "2": "no other limit is active"}
-    assert lines == {"Active at every number": "x3 min", **limits}
+    assert lines.pop("Lines").endswith("Empty: no optimum.")
+    limits = {"1": "also leg_length max (limb 1-, limb 1+)", "2": "no other active limit"}
+    assert lines == {"Active in all regions": "x3 min", **limits}
     assert set(numbers) == {"1", "2"}
     assert numbers["1"][0] < 28.75 < numbers["2"][0]
     assert numbers["2"][1] < 11.75
@@ -450,4 +450,4 @@ def test_an_unreachable_cluster(tmp_path: Path, cli: Run, monkeypatch: pytest.Mo
     out = tmp_path / "out.csv"
     code, _, err = cli("sweep", CASE, *OVER, "--dask", "tcp://127.0.0.1:9", "--out", str(out))
     assert (code, out.exists()) == (2, False)
-    assert "no Dask scheduler answers there" in err.splitlines()[-1]
+    assert "no Dask scheduler answers at this address" in err.splitlines()[-1]

@@ -180,7 +180,7 @@ def test_a_long_table_loses_columns_before_rows_and_a_curve_keeps_its_ends() -> 
     many = TextTable(("value",), tuple((str(k),) for k in range(101)), is_curve=True)
     shown = printed([many], 50, whole=False).splitlines()
     assert len(shown) == ROOM
-    assert (shown[1], shown[-2], shown[-1]) == ("0", "100", "23 of 101 rows: --all shows every one")
+    assert (shown[1], shown[-2], shown[-1]) == ("0", "100", "23 of 101 rows shown: --all shows all")
     steps = np.diff([int(each) for each in shown[1:-1]])
     assert set(steps) <= {4, 5}
     first = printed([TextTable(("value",), many.rows)], 50, whole=False).splitlines()

@@ -100,7 +100,7 @@ ROBOT = (ROBOTS / "reachy-mini-head.toml").read_text(encoding="utf-8")
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("solve", "paper-4.2", "--set", "limits.leg_lenght.max=5"), "did you mean 'leg_length'? it has leg_length,"),
+        (("solve", "paper-4.2", "--set", "limits.leg_lenght.max=5"), "did you mean 'leg_length'? allowed: leg_length,"),
         (("evaluate", "hexapod-machining", "--set", "p_z.maxx=1"), "did you mean 'p_z.max'?"),
         (("models", "none.toml"), "none.toml"),
         (("solve", "--hlep"), "--hlep: no such option of solve; did you mean '--help'?"),
@@ -123,7 +123,7 @@ ROBOT = (ROBOTS / "reachy-mini-head.toml").read_text(encoding="utf-8")
         (("slove",), "did you mean 'solve'?"),
         (("solve", "paper-4.2", "--set", "x1=12,5"), "must be NAME=NUMBER, or axis=X,Y,Z; write 12.5: a decimal"),
         (("solve", "paper-4.2", "--set", "x1=12 cm"), "; write 12: a number is written without its unit"),
-        (("solve", "paper-4.2", "--time", "10s"), "--time 10s: must be a number; write 10: a number stands"),
+        (("solve", "paper-4.2", "--time", "10s"), "--time 10s: must be a number; write 10: a number is written"),
     ],
     ids=lambda given: " ".join(given) if isinstance(given, tuple) else "",
 )  # fmt: skip

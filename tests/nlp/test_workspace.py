@@ -32,7 +32,7 @@ from screwsynth.models import FloatArray
 from screwsynth.nlp import Case, CaseError, Free, Limits, json_data, load_case, load_result, result_of, solve
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.proof.enclosure.forms import Encloser
-from screwsynth.nlp.proof.statement.machine import Legs, legs_of
+from screwsynth.nlp.proof.statement.fixed_robot import Legs, legs_of
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal, Number
 from screwsynth.nlp.proof.workspace.numbers.jacobian_numbers import WorstError
@@ -260,7 +260,7 @@ def test_the_command_proves_and_refutes(cli: Run, machine: Path, tmp_path: Path)
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        ({"position": [0, 0, 20]}, "workspace: is one pose"),
+        ({"position": [0, 0, 20]}, "workspace: is only one pose"),
         ({"position": [0, 0, {"min": 5, "max": 4}]}, "workspace.position[2].min"),
         ({"position": [0, 0, 20], "rotation": {"angle": 10}}, "workspace.rotation.angle"),
         ({"position": [0, 0, 20], "rotation": {"angle": {"min": -5, "max": 9}}}, "workspace.rotation.angle"),
@@ -401,7 +401,7 @@ def test_slices_show_where_the_determinant_has_which_sign(case: Case, cli: Run, 
     output_of(cli("workspace", str(machine), "--gap", "0.05", "--plot", str(picture)))
     text = picture.read_text(encoding="utf-8")
     assert 'id="workspace"' in text
-    assert 'id="proved: regular, and every limit is kept"' in text
+    assert 'id="proved: no singularity, all limits satisfied"' in text
 
 
 def random_errors(robot: Legs, box: PoseBox, eps: float, count: int, *, extreme: bool) -> tuple[FloatArray, FloatArray]:

@@ -25,7 +25,7 @@ from screwsynth.models.joints.model.closedform import closed_form
 from screwsynth.nlp import Case, CaseError, Outcome, Sense, build_model, json_data, judge_workspace
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.enclosure.forms import Forms
-from screwsynth.nlp.proof.statement.machine import Legs, joint_centres
+from screwsynth.nlp.proof.statement.fixed_robot import Legs, joint_centres
 from screwsynth.nlp.proof.statement.tolerance import built_model, is_smooth
 from screwsynth.nlp.proof.workspace.numbers import expressions
 from screwsynth.nlp.proof.workspace.numbers import within_tolerance as tolerance
@@ -460,7 +460,8 @@ def test_a_page_says_where_the_worst_pose_is_that_of_another_machine(cli: Run, t
     """Numbers of the pose that follow from others are the machine's: the design's loops do not close there."""
     case, page, drawn = case_file(tmp_path, tables_of("3-rps")), tmp_path / "page.html", tmp_path / "robot.png"
     output_of(cli("workspace", str(case), "--gap", "0.1", "--html", str(page)))
-    words = "the worst pose is that of a machine within the tolerance, not of the design"
+    words = "the worst pose was found for joint centres displaced within the tolerance, and the nominal robot does not"
+    words += " reach it"
     assert f"No picture: {words}." in page.read_text(encoding="utf-8")
     refusal_of(cli("workspace", str(case), "--gap", "0.1", "--plot-pose", str(drawn)), words)
     assert not drawn.exists()

@@ -22,7 +22,7 @@ from screwsynth.nlp.case.limits.legs import Actuator, LegLength
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.interruption import within
 from screwsynth.nlp.proof.statement.claims import claims_of
-from screwsynth.nlp.proof.statement.machine import Legs, legs_of, workspace_of_case
+from screwsynth.nlp.proof.statement.fixed_robot import Legs, legs_of, workspace_of_case
 from screwsynth.nlp.proof.statement.posed_layout import posed_layout
 from screwsynth.nlp.proof.statement.tolerance import built_model
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal, Number

@@ -23,7 +23,7 @@ from screwsynth.nlp.case.limits.singular_values import SmallestSingularValue
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.output.pictures.workspaces import drawing_at, slices_legend
-from screwsynth.nlp.proof.statement.machine import legs_of
+from screwsynth.nlp.proof.statement.fixed_robot import legs_of
 from screwsynth.nlp.proof.workspace import judge
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.judgement import Judgement
@@ -37,7 +37,7 @@ from screwsynth.nlp.proof.workspace.slices.slices import slices_of
 from screwsynth.nlp.proof.workspace.verdict import Verdict
 from screwsynth.nlp.results.claims import refuted_claims, worst_claim
 from screwsynth.nlp.results.workspace import WorkspaceResult, workspace_of
-from screwsynth.nlp.words.claims import claim_words, seeing_lines
+from screwsynth.nlp.words.claims import claim_words, violation_lines
 from screwsynth.nlp.words.workspace import verdict_words
 
 Value = TypeVar("Value")
@@ -147,7 +147,7 @@ def changed(value: Value, **parts: object) -> Value:
 
 def counted(result: WorkspaceResult) -> tuple[int, int]:
     """Refuted claims of the verdict's words, and those of the list of commands."""
-    lines = list(seeing_lines(result, lambda _: "command"))
+    lines = list(violation_lines(result, lambda _: "command"))
     shown = {
         each.words.partition(":")[0] + each.words.partition("limit ")[2].partition(";")[0]
         for each in lines
@@ -248,7 +248,7 @@ def test_no_time_and_no_box_are_no_number(tmp_path: Path, cli: Run) -> None:
     path, target, page = tmp_path / "c.toml", tmp_path / "r.json", tmp_path / "p.html"
     for text, time, words, reason in (
         (HORNS, "1e-6", "largest proved box  none found within the time limit", "the time is over"),
-        (edited(HORNS, IMPOSSIBLE), "0.4", "even the smallest box tried is not proved", None),
+        (edited(HORNS, IMPOSSIBLE), "0.4", "even the smallest examined box is not proved", None),
     ):
         pages = ("--html", str(page)) if reason else ()
         found = cli("workspace", str(saved(path, text)), "--scale", "--time", time, "--json", str(target), *pages)
@@ -482,8 +482,8 @@ def test_the_page_has_verdicts_poses_and_slices(refuted: tuple[str, WorkspaceRes
     assert claim_words(worst) in page.words
     assert 'id="limb 1+"' in (folder / "worst.svg").read_text(encoding="utf-8")
     headline = drawing_at(load_case(limited, {"x3": 6}), worst).headline
-    assert headline.startswith(f"refuted: {claim_words(worst)}; shown at ")
-    said = [float(each) for each in re.findall(r"-?[\d.]+(?:e-?\d+)?", headline.partition("shown at ")[2])]
+    assert headline.startswith(f"refuted: {claim_words(worst)}; at ")
+    said = [float(each) for each in re.findall(r"-?[\d.]+(?:e-?\d+)?", headline.partition("; at ")[2])]
     assert said[:3] == pytest.approx(list(worst.pose.position), rel=1e-4, abs=1e-4)
 
 

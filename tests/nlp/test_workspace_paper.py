@@ -44,7 +44,7 @@ from screwsynth.nlp.proof.checker.workspace.number_claims import (
 )
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import BoxClaim, PoseRoot, pose_root
 from screwsynth.nlp.proof.checker.workspace.ranks import RankClaim, rank_claim
-from screwsynth.nlp.proof.statement.machine import Legs, legs_of
+from screwsynth.nlp.proof.statement.fixed_robot import Legs, legs_of
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Number
 from screwsynth.nlp.proof.workspace.numbers.jacobian_numbers import WorstError
 from screwsynth.nlp.proof.workspace.numbers.pose_error import PoseErrors, with_rest
@@ -153,10 +153,10 @@ def test_another_bound_is_rejected(proof: Proof, name: str, sense: str, factor: 
 
 
 def test_a_bound_that_does_not_keep_the_limit_is_rejected(proof: Proof) -> None:
-    assert "does not keep" in refused(changed(alone(proof, "condition_number"), "condition_number", bound=9.0))
+    assert "does not satisfy" in refused(changed(alone(proof, "condition_number"), "condition_number", bound=9.0))
     proof = alone(proof, "leg_length limb 1-", "actuator.stroke_max limb 1-")
     for edit in (("max = 44", "max = 30"), ("stroke_max = 30", "stroke_max = 2")):
-        assert "does not keep" in refused(proof, edit)
+        assert "does not satisfy" in refused(proof, edit)
 
 
 def test_other_trees_are_rejected(proof: Proof) -> None:
@@ -180,7 +180,9 @@ def test_a_proof_is_for_its_case_only(proof: Proof) -> None:
     assert "see regular" in refused(replace(proof, claims=proof.claims[1:]))
     assert "exactly once" in refused(replace(proof, claims=(*proof.claims, proof.claims[0])))
     assert "leg_clearance" in refused(proof, ("leg_clearance = { min = 0.5 }", ""))
-    assert "no reason" in refused(changed(alone(proof, "condition_number"), "condition_number", reason="lengths"))
+    assert "not a valid reason" in refused(
+        changed(alone(proof, "condition_number"), "condition_number", reason="lengths")
+    )
     assert "measure" in refused(stating(proof, quantities=("none",)))
 
 
@@ -188,7 +190,7 @@ def test_a_leaf_across_a_singular_pose_is_rejected(robot: Legs) -> None:
     """40 degrees about any axis: singular. So is every tree that claims otherwise."""
     root = pose_root(turned(TurnKind.ANY_AXIS, 40))
     for tree in (bytes([Node.BOUNDED]), node_bytes(Node.CUT, 0, value=0.5) + bytes([Node.BOUNDED] * 2)):
-        with pytest.raises(ProofError, match="could not be shown"):
+        with pytest.raises(ProofError, match="could not be proved"):
             root.show_on_leaves(rank(root, robot), tree)
 
 
@@ -211,13 +213,13 @@ def test_a_refuted_workspace_carries_two_poses(tolerance: str) -> None:
     given = on_paper(case, text, with_limits=False)[1]
     (found,) = check.check_workspace_proof(given, case).claims
     assert found.is_refuted
-    missing = {"it was not judged", "it requires leg lengths, which have no proof"}
+    missing = {"the claim was not judged", "the claim requires bounds of leg lengths, which have no proof"}
     assert {each.reason for each in given.unproved} <= missing
     first, second = claim(given, "regular").sides
     for sides, fault in (
         ((first, first), "opposite signs"),
-        ((first, (9.0, *second[1:])), "not one of the workspace"),
-        ((first,), "no two poses"),
+        ((first, (9.0, *second[1:])), "outside the workspace"),
+        ((first,), "does not have two poses"),
     ):
         assert fault in rejected(changed(given, "regular", sides=sides), case)
 
@@ -283,14 +285,14 @@ def test_a_robot_is_not_regular_by_the_rounding_of_its_constants() -> None:
     problem = build_problem(case, model, pose_box(still))
     assert prove_rank(problem, problem.locked, most_boxes=1).outcome is not Outcome.PROVED
     root = pose_root(still)
-    with pytest.raises(ProofError, match="could not be shown"):
+    with pytest.raises(ProofError, match="could not be proved"):
         root.show_on_leaves(rank_claim(case, model, root, "regular"), bytes([Node.BOUNDED]))
     # The couples alone are a matrix of their own, and lose their rank where the platform is level, also in the middle.
     for each in turning:
         problem = build_problem(case, model, pose_box(each))
         assert prove_rank(problem, problem.unactuated).outcome is Outcome.REFUTED
         root = pose_root(each)
-        with pytest.raises(ProofError, match="could not be shown"):
+        with pytest.raises(ProofError, match="could not be proved"):
             root.show_on_leaves(rank_claim(case, model, root, "constraints regular"), bytes([Node.BOUNDED]))
 
 

@@ -38,7 +38,7 @@ from screwsynth.nlp.proof.checker.workspace.number_claims import SecondOrderClai
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import PoseRoot, pose_root
 from screwsynth.nlp.proof.checker.workspace.ranks import RankClaim, rank_claim
 from screwsynth.nlp.proof.checker.workspace.statement import RobotsWithinTolerance
-from screwsynth.nlp.proof.statement.machine import Legs
+from screwsynth.nlp.proof.statement.fixed_robot import Legs
 from screwsynth.nlp.proof.statement.tolerance import Directions, length_of_one_robot, second_order_name
 from screwsynth.nlp.proof.workspace.numbers.extremes import NumberSearch
 from screwsynth.nlp.proof.workspace.numbers.searched import Subject, searched_extremes
@@ -134,10 +134,10 @@ def test_another_tolerance_is_rejected(proof: Proof) -> None:
     for name in (*names, "actuator.stroke_max limb 2+"):
         assert "other expressions" in reject(name, "max")
     smaller = TEXT.replace("max = 60 }", f"max = {math.sqrt(longest) - 0.01} }}", 1)
-    assert "does not keep" in rejections(proof, smaller)("leg_length limb 2-", "max")
+    assert "does not satisfy" in rejections(proof, smaller)("leg_length limb 2-", "max")
     reject = rejections(stating(proof, joint_centre=0.0), without)
     assert "other expressions" in reject("F", "max")
-    assert "about the exact robot" in reject("actuator.stroke_max limb 2+", "max")
+    assert "the claim is about the robot without one" in reject("actuator.stroke_max limb 2+", "max")
 
 
 def value_of(name: str, sense: str, number: float) -> float:
@@ -166,7 +166,7 @@ def test_bounds_that_a_machine_violates_are_rejected(both: tuple[Judgement, Proo
     ):
         reached, sign = known[name, sense], 1.0 if sense == "max" else -1.0
         fault = reject(name, sense, bound=value_of(name, sense, reached - sign * 1e-6 * abs(reached)))
-        assert "could not be shown" in fault or "is wrong" in fault, name
+        assert "could not be proved" in fault or "is wrong" in fault, name
 
 
 def test_other_lemmas_and_directions_are_rejected(proof: Proof) -> None:
@@ -180,8 +180,8 @@ def test_other_lemmas_and_directions_are_rejected(proof: Proof) -> None:
     reject, stroke = rejections(proof), claim(proof, name, "max")
     turned = (stroke.sides[0], (0.0, 0.6, 0.8))
     assert "other expressions" in reject(name, "max", sides=turned)
-    assert "no two directions" in reject(name, "max", sides=turned[:1])
-    assert "no reason" in reject("F", "max", reason="one machine")
+    assert "does not have two directions" in reject(name, "max", sides=turned[:1])
+    assert "not a valid reason" in reject("F", "max", reason="one machine")
     # Of no leg is a length known.
     assert "have no proof" in reject("smallest_singular_value", "min")
 
@@ -372,19 +372,24 @@ def test_a_singular_machine_within_the_tolerance_is_on_paper() -> None:
     assert judged.regularity.errors is not None
     (found,) = check.check_workspace_proof(given, case_of(text)).claims
     assert found.is_refuted
-    assert found.by_machine
+    assert found.is_within_tolerance
     design, machine = claim(given, "regular").sides
     assert design == (*machine[:6], *[0.0] * 36)
     for sides, fault in (
         ((design, design), "not have opposite signs"),
-        ((design, (*machine[:6], *(2.0 * part for part in machine[6:]))), "more than the tolerance"),
-        ((design, (*[9.0] * 6, *machine[6:])), "not one of the workspace"),
-        ((design, machine[:-3]), "no two poses"),
-        ((design[:6], machine), "no two poses"),
+        (
+            (design, (*machine[:6], *(2.0 * part for part in machine[6:]))),
+            "the error of a joint centre exceeds the tolerance",
+        ),
+        ((design, (*[9.0] * 6, *machine[6:])), "outside the workspace"),
+        ((design, machine[:-3]), "does not have two poses"),
+        ((design[:6], machine), "does not have two poses"),
     ):
         assert fault in rejected(changed(given, "regular", sides=sides), case_of(text))
     smaller = text.replace("joint_centre = 0.8", "joint_centre = 0.1")
-    assert "more than the tolerance" in rejected(stating(given, joint_centre=0.1), case_of(smaller))
+    assert "the error of a joint centre exceeds the tolerance" in rejected(
+        stating(given, joint_centre=0.1), case_of(smaller)
+    )
 
 
 def test_the_commands_say_which_machines_a_proof_is_about(cli: Run, tmp_path: Path) -> None:
@@ -393,7 +398,7 @@ def test_the_commands_say_which_machines_a_proof_is_about(cli: Run, tmp_path: Pa
     file = saved(tmp_path / "machine.toml", head + tail[tail.index("[workspace]") :])
     output_of(cli("workspace", str(file), "--gap", "0.3", "--proof", str(target)))
     out = unbroken(output_of(cli("verify-proof", str(target), str(file))))
-    assert "for every machine whose joint centres are off by at most 0.02 in" in out
+    assert "for every robot whose joint centres are off by at most 0.02 in" in out
     content = json.loads(target.read_text(encoding="utf-8"))
     content["case"] = edited(content["case"], ("joint_centre = 0.02", "joint_centre = 0.002"))
     code, _, err = cli("verify-proof", str(saved(target, json.dumps(content))))
@@ -410,7 +415,7 @@ def test_asked_singular_values_of_the_exact_machine_are_on_paper() -> None:
         checked = check.check_workspace_proof(alone(given, name), case_of(text)).claims[0]
         assert (checked.name, checked.sense) == (name, sense) == (extreme.name, extreme.sense.value)
         assert checked.bound == pytest.approx(extreme.bound, rel=1e-5)
-        assert "could not be shown" in reject(name, sense, bound=extreme.reached * (1.01 if sense == "min" else 0.99))
+        assert "could not be proved" in reject(name, sense, bound=extreme.reached * (1.01 if sense == "min" else 0.99))
     # Without a length of legs above the errors nothing is known of other machines, and none of the two is proved.
     case = case_of()
     subject = Subject(case, case.model, problem_of(case))

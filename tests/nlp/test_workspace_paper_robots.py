@@ -28,14 +28,14 @@ from screwsynth.models import FloatArray
 from screwsynth.models.joints.model.closedform import closed_form
 from screwsynth.nlp import Case, Judgement, Loading, Motion, Outcome, Verdict
 from screwsynth.nlp.case.source import find_case
-from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, read_proof, workspace_numbers
+from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, read_proof, workspace_premise
 from screwsynth.nlp.proof.checker.tree import Node, node_bytes
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.checker.workspace.closed_loops import Assembly
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import _PoseRule
 from screwsynth.nlp.proof.checker.workspace.statement import robot_claims
 from screwsynth.nlp.proof.statement.claims import REGULAR
-from screwsynth.nlp.proof.statement.machine import workspace_of_case
+from screwsynth.nlp.proof.statement.fixed_robot import workspace_of_case
 from screwsynth.nlp.proof.workspace.numbers.searched import Subject, motor_extremes
 from screwsynth.nlp.proof.workspace.numbers.within_tolerance import RobotsWithinTolerance
 from screwsynth.nlp.proof.workspace.proof_record import ProofRecord
@@ -68,7 +68,7 @@ def reachy() -> Proved:
 
 def test_reachy_mini_is_on_paper(reachy: Proved) -> None:
     case, proof = reachy
-    assert {(each.name, each.reason) for each in proof.unproved} == {("F", "it was not judged")}
+    assert {(each.name, each.reason) for each in proof.unproved} == {("F", "the claim was not judged")}
     checked = check_workspace_proof(proof, case)
     names = [each.name for each in checked.claims]
     assert names[0] == "regular"
@@ -84,7 +84,7 @@ def test_reachy_mini_tampered_with_is_rejected(reachy: Proved) -> None:
     assert "not outside" in rejected(only(proof, "regular", tree=bytes([Node.OUTSIDE])), case)
     moved = node_bytes(Node.CUT, tree[1], value=2.0) + tree[10:]
     assert "outside of it" in rejected(only(proof, "regular", tree=moved), case)
-    assert "no two poses" in rejected(only(proof, "regular", reason="singular"), case)
+    assert "does not have two poses" in rejected(only(proof, "regular", reason="singular"), case)
     bound = claim(proof, "reach limb stewart_1").bound
     # Programs maximise: a reach of at least b is a bound of -b.
     assert "reach limb stewart_1" in rejected(only(proof, "reach limb stewart_1", bound=bound - 0.2), case)
@@ -181,7 +181,7 @@ def test_boxes_with_another_assembly_do_not_belong_together() -> None:
     lower, upper = whole.lower.copy(), whole.upper.copy()
     D = shown.assembly.dependent
     lower[0, D], upper[0, D] = lower[0, D] + 0.5, upper[0, D] + 0.5
-    with pytest.raises(ProofError, match="same assembly"):
+    with pytest.raises(ProofError, match="assembly mode of the start"):
         shown.assembly.refuse_apart(whole._replace(lower=lower, upper=upper))
 
 
@@ -191,9 +191,9 @@ def test_the_tree_of_another_workspace_does_not_hide_a_singular_pose(
     _, proof = reachy
     case = reachy_case(1.0)
     monkeypatch.setattr(_PoseRule, "most_pieces", 100)
-    other = stating(only(proof, "regular"), workspace=workspace_numbers(case.workspace))
+    other = stating(only(proof, "regular"), workspace=workspace_premise(case.workspace))
     # All claims about limits are named, and none is proved.
-    assert "could not be shown" in rejected(other, case)
+    assert "could not be proved" in rejected(other, case)
 
 
 def test_forms_hold_the_entries_and_could_be_no_smaller() -> None:
@@ -219,10 +219,10 @@ def test_a_singular_pose_of_a_robot_without_loops_is_on_paper() -> None:
     assert found.is_refuted
     first, second = claim(proof, "regular").sides
     assert "opposite signs" in rejected(only(proof, "regular", sides=(first, first)), case)
-    assert "not one of the workspace" in rejected(only(proof, "regular", sides=(first, (99.0, *second[1:]))), case)
+    assert "outside the workspace" in rejected(only(proof, "regular", sides=(first, (99.0, *second[1:]))), case)
     small = gallery_case("6-ups", 0.02, 5, 1)
-    other = stating(proof, workspace=workspace_numbers(small.workspace))
-    assert "not one of the workspace" in rejected(other, small)
+    other = stating(proof, workspace=workspace_premise(small.workspace))
+    assert "outside the workspace" in rejected(other, small)
 
 
 @pytest.mark.parametrize(
@@ -231,7 +231,7 @@ def test_a_singular_pose_of_a_robot_without_loops_is_on_paper() -> None:
         ("6-sps", True, ""),
         ("6-rus", True, "the home assembly mode"),
         ("6-rus", False, "every assembly mode"),
-        ("planar-3-prr", True, "every assembly mode in which limbs in closed form are as at home"),
+        ("planar-3-prr", True, "every assembly mode in which limbs with a closed form have the home working mode"),
         ("3-rps", True, "every assembly mode"),
     ],
 )
@@ -281,7 +281,7 @@ def test_a_proof_is_accepted_and_one_with_a_bound_that_a_pose_exceeds_is_not(nam
         if each.reached:
             # A little less than the value at a pose of the workspace; a power of 0 is that of a force of one sign.
             with_less = only(proof, *key, bound=each.reached - each.sense.sign * 1e-4 * abs(each.reached))
-            with pytest.raises(ProofError, match="could not be shown"):
+            with pytest.raises(ProofError, match="could not be proved"):
                 check_workspace_proof(with_less, case)
 
 
@@ -289,10 +289,10 @@ def test_a_proof_for_other_loads_or_motions_is_rejected() -> None:
     """What a number rests on is the case's: the file has nothing of it."""
     case, proof = robot_of("legs"), proof_of("legs")[1]
     for part in ({"force": (3.0, 1.0, -11.0)}, {"point": (0.0, -0.2, 0.1)}, {"any_force": 3.0}, {"any_moment": 0.4}):
-        with pytest.raises(ProofError, match=r"actuator_force .* could not be shown"):
+        with pytest.raises(ProofError, match=r"actuator_force .* could not be proved"):
             check_workspace_proof(proof, replace(case, loading=LOADING._replace(loads=(replace(CUT, **part),))))
     for motion in (Motion(1.1, 0.5), Motion(1.0, 0.7)):
-        with pytest.raises(ProofError, match=r"actuator_speed .* could not be shown"):
+        with pytest.raises(ProofError, match=r"actuator_speed .* could not be proved"):
             check_workspace_proof(proof, replace(case, loading=LOADING._replace(motion=motion)))
 
 
@@ -307,7 +307,7 @@ def test_numbers_under_a_load_are_not_those_under_another() -> None:
     assert {each.name for each in heavy} < {each.name for each in proof.claims}
     check_workspace_proof(proof, case)
     others = tuple(each for each in proof.claims if (each.name, each.sense) not in {(h.name, h.sense) for h in heavy})
-    with pytest.raises(ProofError, match=r"actuator_force .* cut.* could not be shown"):
+    with pytest.raises(ProofError, match=r"actuator_force .* cut.* could not be proved"):
         check_workspace_proof(replace(proof, claims=(*others, *heavy)), case)
 
 

@@ -18,7 +18,7 @@ from screwsynth.nlp.proof.checker.proof_file import Premises, Proof, ProofClaim,
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import PoseRoot, pose_root
 from screwsynth.nlp.proof.checker.workspace.ranks import RankClaim, rank_claim
-from screwsynth.nlp.proof.statement.machine import Legs, workspace_of_case
+from screwsynth.nlp.proof.statement.fixed_robot import Legs, workspace_of_case
 from screwsynth.nlp.proof.workspace.proof_record import ProofRecord
 from screwsynth.nlp.proof.workspace.proof_writer import proof_of
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box

@@ -26,8 +26,8 @@ from ..written.forms import RobotError, UndefinedError, VectorExpression
 from ..written.words import GraphWords, JointWords, LimbWords, RepeatWords, RobotWords
 from .motion import UNIT_VECTORS, AxisKind, JointAxis
 
-#: Tolerance for rounding an entry of the rotation of a copy to -1, -1/2, 0, 1/2 or 1: a rotation by 120 degrees then
-#: leaves no rounding errors in the expressions.
+#: Tolerance for rounding an entry of a copy's rotation to -1, -1/2, 0, 1/2 or 1. A rotation by 120 degrees then leaves
+#: no rounding errors in the expressions.
 _EXACT = 1e-15
 #: Largest number of characters of an expression in a message.
 _LONGEST_SHOWN = 60
@@ -44,7 +44,7 @@ class Joint:
         axes: axes with one coordinate each, from the base side on; those of a spherical joint are along x, y and z.
         actuated: True if an actuator drives the joint.
         name: name of the joint in the robot file; empty for none.
-        parts: written joints that this joint replaces; empty for a joint as it is written.
+        parts: joints of the robot file that this joint replaces; empty for a joint of the robot file itself.
     """
 
     place: str
@@ -112,7 +112,7 @@ class HomeGraph:
         joints: joints between the links.
         couplings: linear relations of joint coordinates (radians and lengths): index of each joint, with a factor (1,
             1).
-        networks: joint indices of each part that belongs to no limb.
+        networks: joint indices of each part of the graph that belongs to no limb.
     """
 
     links: tuple[str, ...]
@@ -132,7 +132,7 @@ class HomeRobot:
         symbols: (d, 1) symbols of the dimensions, in order; radians for angles.
         typical: (d,) typical values of the dimensions.
         home: (3, 1) origin of the platform frame, length.
-        size: (1, 1) characteristic size of the robot, by which lengths become dimensionless.
+        size: (1, 1) characteristic size of the robot, length; lengths are divided by this size.
         limbs: limbs of the robot.
         graph: links and joints, for a robot given by these; None for a robot given limb by limb.
     """
@@ -317,7 +317,7 @@ def _evaluated(place: str, written: str | float, names: Mapping[str, SX], later:
     except UnknownNameError as error:
         if error.name not in later:
             raise RobotError(place, f"is {_shown(written)}, which {error}") from None
-        fault = f"is {_shown(written)}, which needs {error.name!r} before it is given; allowed are names given above"
+        fault = f"is {_shown(written)}, which uses {error.name!r} before its definition; use names defined above"
         raise RobotError(place, fault) from None
     except NoValueError as error:
         raise UndefinedError(place, f"is {_shown(written)}, which {error}", error.values) from None

@@ -98,7 +98,7 @@ def _rods(robot: HomeRobot, path: Sequence[Joint]) -> list[_Pair]:
     for one, other in pairwise(path):
         if {one.type, other.type} in ({"S"}, {"S", "U"}):
             length = ca.norm_2(one.point - other.point) / robot.size
-            fault = f"is the same point as that of the joint {one.type} before it; a rod between them needs a length"
+            fault = f"is the point of the preceding joint {one.type} too; a rod between them needs a length"
             found.append(_Pair(f"{other.place}, at", length, fault))
     return found
 
@@ -118,7 +118,7 @@ def _axes(robot: HomeRobot, path: Sequence[Joint]) -> list[_Pair]:
             words = f"{whose} almost parallel (sine {{}}); if they must be parallel, write both with the same numbers"
             found.append(_Pair(f"{other.place}, axis", ca.norm_2(normal), remark=words))
             if m == k + 1:
-                # For parallel axes this distance has no meaning, and is of the order of 1.
+                # For parallel axes this distance has no meaning, and is about 1.
                 apart = ca.dot(b.point - a.point, normal) / (robot.size * ca.norm_2(normal))
                 meeting = ca.if_else(ca.norm_2(normal) < _ALMOST, 1, apart)
                 words = (

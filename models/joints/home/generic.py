@@ -97,7 +97,7 @@ class PathFrame:
         return np.array([function(each).full().ravel() for each in self.samples])
 
     def is_zero(self, expression: SX) -> bool:
-        """Return True if an expression (k, 1) of the dimensions, of order 1, is zero for all of them."""
+        """Return True if a dimensionless expression (k, 1) of the dimensions is zero for all dimensions."""
         return bool(np.all(np.abs(self.sampled(expression)) < INCIDENT))
 
     def coincide(self, one: SX, other: SX) -> bool:
@@ -130,7 +130,8 @@ def free_screws(joints: Sequence[Joint], values: SX) -> list[list[SX]]:
 def _rank(columns: FloatArray) -> int:
     """Return the rank of columns, each scaled to unit length.
 
-    Rounding leaves 1e-15. A limb close to a lower rank at each of several random points has this lower rank.
+    Rounding changes a zero singular value by about 1e-15, so small ones count as zero. A limb that is close to a lower
+    rank at several random points is taken to have that rank.
     """
     lengths = np.linalg.norm(columns, axis=0)
     nonzero = lengths > _ZERO_COLUMN * lengths.max(initial=0.0)
@@ -146,7 +147,7 @@ def random_values(joints: Sequence[Joint], size: float, seed: int) -> FloatArray
 
 
 def generic_rank(frame: PathFrame, joints: Sequence[Joint], columns: SX, values: SX) -> int:
-    """Return the largest rank of columns of a limb's screws at random dimensions and joint coordinates.
+    """Return the largest rank of columns, made of a limb's screws, at random dimensions and joint coordinates.
 
     Args:
         frame: common data of all paths of the robot.

@@ -1,9 +1,9 @@
-"""Robot given joint by joint with joint-centre errors: a robot as it is built.
+"""Robot given joint by joint, with joint-centre errors of manufacturing.
 
 The robot is assembled at home with an error of each joint centre and the nominal directions of all axes; joint
 coordinates count from there. Joints of a limb with a common centre at home, such as the hinges of a spherical joint,
 share one error. The centre of a slide, and an error along the parallel axes of a joint, have no effect and are left
-out. A parallelogram has two centres, at the ends of its rods, which stay equal.
+out. A parallelogram has two centres, at the ends of its rods; the rods stay equal.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def displaced_robot(model: Model, definition: Mapping[str, object]) -> Displaced
     """
     if not definition:
         raise RobotError(
-            "joint", "is known only as a row of the Jacobian: joint-centre errors need a robot given joint by joint"
+            "joint", "is known only as a row of the Jacobian; joint-centre errors need a robot given joint by joint"
         )
     robot = home_of(read_robot(definition))
     if robot.graph is not None:
@@ -67,19 +67,19 @@ def displaced_robot(model: Model, definition: Mapping[str, object]) -> Displaced
     parameters = [error_parameter(each) for each in displaced.centres]
     legs = _displaced_legs(model, robot.symbols, displaced.centres)
     found = model_of_home(with_errors, np.hstack([exact, off]), definition, parameters, legs)
-    # Of dependent equations those of the nominal robot are kept, even if others would be as good.
+    # Among dependent equations, the model keeps the same ones as the nominal robot, even if others would be as good.
     every = {each.name: each for each in found.loops}
     closure = tuple(replace(every[f"{each.name} in full"], name=each.name) for each in model.closure)
     return DisplacedRobot(replace(found, closure=closure), tuple(displaced.centres))
 
 
 def _displaced_legs(model: Model, dimensions: SX, centres: Sequence[Centre]) -> tuple[Leg, ...]:
-    """Return the straight legs of a robot with joint-centre errors.
+    """Return the straight legs of a robot, with joint-centre errors.
 
     Args:
         model: the robot.
         dimensions: (d, 1) symbols that replace the dimensions.
-        centres: joint centres with an error; for a hinge the full error, including its part along the axis.
+        centres: joint centres with errors. For a hinge this is the full error, including the component along the axis.
     """
     errors, found = {each.name: each.error for each in centres}, []
     for leg in model.legs:
@@ -123,7 +123,7 @@ class _Displaced:
         )
 
     def _groups(self, joints: list[Joint]) -> list[list[Joint]]:
-        """Return groups of a limb's joints with a common centre."""
+        """Return groups of a limb's joints, each with a common centre."""
         groups: list[list[Joint]] = []
         for joint in joints:
             for group in groups:

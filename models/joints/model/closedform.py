@@ -9,8 +9,8 @@ The solution is that of the home working mode: the derivative of the equation wi
 sign as at home, and is 0 at the edge of the reach, where both solutions coincide. The unknown becomes an expression of
 dimensions and pose, and the edge of the reach a separate claim.
 
-Coefficients are derivatives of the equation with respect to the unknown, or its sine and cosine, at 0: differences of
-values would leave terms that cancel, and so wide bounds over boxes. Random values of all symbols test that the
+Coefficients are derivatives of the equation at 0, with respect to the unknown or to its sine and cosine. Differences
+of values would leave terms that cancel, and so wide bounds over boxes. Random values of all symbols test that the
 equation, which is analytic, has no further terms.
 """
 
@@ -35,8 +35,8 @@ from .replacing import Solved, at_turn, with_replaced
 _SAME = 1e-9
 #: Number of random points at which an identity is tested.
 _TESTS = 4
-#: Smallest derivative of an equation of order 1 with respect to its unknown at home: below it, home is on the edge of
-#: the reach.
+#: Smallest derivative of a scaled equation with respect to its unknown at home. With a smaller derivative, home is at
+#: the boundary of the reach.
 _EDGE = 1e-9
 _SEED = 0
 #: Squared sine or cosine of a reach below which an extended square root continues along its tangent.
@@ -129,7 +129,7 @@ def with_joints_at_home(model: Model) -> Model:
 
 
 def _solved(model: Model, unknown: Unknown, equation: Closure, extended: bool) -> Solved | None:
-    """Return the closed form of an unknown from an equation; None if the equation has another form."""
+    """Return the closed form of an unknown from an equation; None if the equation has none of these forms."""
     q = unknown.symbol
     expression = equation.expression / equation.size
 
@@ -173,7 +173,7 @@ def _at_zero(expression: SX, unknowns: SX, by: Sequence[SX | tuple[SX, SX]]) -> 
     Args:
         expression: (1, 1) expression of the unknowns.
         unknowns: (k, 1) symbols.
-        by: symbols of first derivatives, and pairs of symbols for second derivatives.
+        by: symbols with respect to which first derivatives are taken, and pairs of symbols for second derivatives.
     """
     own = {each.element_hash() for each in ca.vertsplit(unknowns)}
     rest = ca.vertcat(SX(0, 1), *[each for each in ca.symvar(expression) if each.element_hash() not in own])

@@ -4,8 +4,9 @@ The equations of a limb are those of its loop, its distances, and the component 
 A rotation changes neither a distance from its axis nor a gap along it, so many of these equations have one unknown less
 than the gap. An unknown follows from one equation, or from the three of the gap:
 
-* an angle from ``A cos t + B sin t = D``, a slide from ``c0 + c1 q + c2 q^2 = 0``: of two solutions that of home, where
-  the derivative of the equation has the same sign; only for limbs with a known sign of the working mode;
+* an angle from ``A cos t + B sin t = D``, a slide from ``c0 + c1 q + c2 q^2 = 0``: of two solutions, the one of the
+home working mode, for which the derivative of the equation has the same sign as at home; only for limbs with a known
+sign of the working mode;
 * an angle from ``a cos t + b sin t + c = 0`` with perpendicular vectors a and b of equal length, ``cos t = -a.c / a.a``
   and ``sin t = -b.c / b.b``; a slide from ``a q + c = 0``: one solution.
 
@@ -36,7 +37,7 @@ _SAME = 1e-9
 #: Number of points at which identities are tested, and their distance from home, relative to the dimensions and the
 #: robot's size and in radians: far enough for other expressions to differ, near enough for limbs to reach them.
 _TESTS, _SPREAD = 4, 0.02
-#: Relative size below which a coefficient or a slope is 0 at home: home is on the edge of the reach there.
+#: Relative value below which a coefficient or a derivative is 0 at home: home is then at the boundary of the reach.
 _EDGE = 1e-6
 _SEED = 0
 #: Number of cached results: a certificate needs those of one robot several times.
@@ -50,7 +51,7 @@ class Root(NamedTuple):
 
     Attributes:
         equation: name of the equation in the model; empty for an equation that follows from several.
-        value: (1, 1) left side of the equation, of order 1.
+        value: (1, 1) left side of the equation, scaled to values of about 1.
         slope: (1, 1) derivative with respect to the unknown, with the sign that makes it positive at home.
         reach: (1, 1) discriminant: not negative where there are solutions, and 1 at home.
     """
@@ -86,7 +87,7 @@ class _Elimination:
         eliminated: eliminated unknowns, in order.
         points: arguments of functions of the symbols: home, then the test points.
         held: indices of unknowns that stay variables if they have two solutions.
-        failed: unsuccessful attempts: number of the attempt, and the open unknowns.
+        failed: unsuccessful attempts, each as the number of the attempt and the open unknowns.
     """
 
     model: Model
@@ -239,7 +240,7 @@ def _from_one(work: _Elimination, k: int, equation: Equation) -> bool:
 
 
 def _angle_of(work: _Elimination, unknown: Unknown, e: SX, sign: float) -> tuple[Solved | None, SX]:
-    """Return the angle with ``A cos q + B sin q + C = 0`` and a given sign of the slope, and its reach, or None."""
+    """Return the angle q with ``A cos q + B sin q + C = 0`` and a slope of given sign, and its reach; or None."""
     q = unknown.symbol
     A, B, C = _harmonics(work, e, q)
     if not work.is_zero(A * ca.cos(q) + B * ca.sin(q) + C - e):
@@ -324,7 +325,7 @@ class Equation(NamedTuple):
 
     Attributes:
         expression: (k, 1) left sides.
-        size: (1, 1) length or number that scales the left sides to order 1.
+        size: (1, 1) length or number by which the left sides are divided, so that their values are about 1.
         limb: name of the limb with the loop; empty for none.
         name: name of a single equation.
     """

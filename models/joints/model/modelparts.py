@@ -36,7 +36,7 @@ from ..posed.loops import ClosedPoint
 from ..posed.opened import OpenedPath
 from ..posed.resistance import Ranks
 
-#: Number of wrenches from which on a member resists nearly all motions alike.
+#: Number of wrenches from which a member resists nearly all motions equally.
 _MANY_WRENCHES = 5
 #: Magnitude below which components of orthonormal motions are zero.
 _ROUNDING = 1e-9

@@ -260,7 +260,10 @@ def _leg_of(sketch: _Sketch, joints: Sequence[PlacedJoint], k: int) -> Place | N
 
 
 def _tip(sketch: _Sketch, joint: PlacedJoint) -> Place:
-    """Return the point of a slide's axis, on the body after it, that is nearest to the platform's origin at home."""
+    """Return the point on a slide's axis nearest to the platform's origin at home.
+
+    The point moves with the body after the slide.
+    """
     if not joint.axes:
         return joint.place
     way = ca.dot(sketch.origin - joint.place.home, joint.axes[0].home)

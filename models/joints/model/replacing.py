@@ -71,7 +71,10 @@ def _applied(
 
 
 def at_turn(expression: SX, q: SX, sine: SX | float, cosine: SX | float) -> SX:
-    """Return an expression with sine and cosine of an angle replaced, and the angle itself set to 0."""
+    """Return an expression with the sine and cosine of an angle replaced by given values.
+
+    Everywhere else the angle is replaced by 0.
+    """
     others = ca.symvar(expression)
     rest = ca.vertcat(*[each for each in others if each.element_hash() != q.element_hash()])
     turned = Solved(SX(0), SX(sine), SX(cosine), SX(0))

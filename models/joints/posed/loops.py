@@ -1,4 +1,4 @@
-"""Independent loop equations, which enter a program, and the free actuator coordinates.
+"""Independent loop equations for the nonlinear program, and free actuator coordinates.
 
 The equations of an overconstrained robot are dependent, and a robot with more actuators than degrees of freedom can
 move joints while the platform stands still. Both are measured at random closed configurations: random dimensions, and a
@@ -25,7 +25,8 @@ from ..written.forms import RobotError
 
 #: Number of closed configurations; the largest rank among them counts.
 _POINTS = 5
-#: Largest number of Newton steps to a closed configuration, and the residual that ends them: equations are of order 1.
+#: Largest number of Newton steps to a closed configuration, and residual that ends the steps; equations are scaled to
+#: values of about 1.
 _STEPS = 40
 _CLOSED = 1e-12
 #: Largest random change of pose coordinates and unknowns, relative to the robot's size and in radians.

@@ -2,9 +2,9 @@
 
 Let ``q`` be the rates of a member's passive joints along a spanning tree from the base, with the loop equations ``L q =
 0`` and the platform twist ``S q``. The member allows the twists ``S N``, with the projector ``N`` on the null space of
-``L``, and the twist ``s - S L^+ l`` for a unit rate of an actuator with the columns ``s`` and ``l``. Projector and
-pseudo-inverse follow from generic ranks without a choice of columns. Loops are processed one after the other, as are
-independent equations of a loop: a recursion for all at once would lose half of the digits.
+``L``, and, for a unit rate of an actuator with the columns ``s`` and ``l``, the twist ``s - S L^+ l``. Projector and
+pseudo-inverse follow from generic ranks without a choice of columns. Loops are processed one after the other, and so
+are the independent equations of a loop. One recursion for all of them would lose half of the digits.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from .loops import ClosedPoint
 from .network import OpenNetwork
 from .states import COORDINATE_PARTS, rotation_angle
 
-_CUT = "it is part of nested loops, which give it no coordinate of its own"
+_CUT = "the joint is part of nested loops and has no coordinate of its own"
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class NestedMember:
     Attributes:
         passive: indices of the joints that move with locked actuators.
         joints: indices of these joints and of all joints on which they depend.
-        still: indices of joints among these that locked actuators and couplings fix.
+        still: indices of the joints in ``joints`` that locked actuators and couplings fix.
         centre: indices of the joints that determine the centre: their mean, or the intersection of their axes.
         is_meeting: True if the centre is the intersection of axes.
     """
@@ -71,7 +71,7 @@ class Motions(NamedTuple):
 
 
 class MotionRanks(NamedTuple):
-    """Rank of each loop in the null space of those before it, and rank of the platform twists that all loops allow."""
+    """Rank of each loop in the null space of the preceding loops, and rank of the allowed platform twists."""
 
     loops: tuple[int, ...]
     twists: int
@@ -100,8 +100,8 @@ def nested_members(robot: HomeRobot, network: OpenNetwork) -> list[NestedMember]
 def motions_of(network: OpenNetwork, frame: PathFrame, member: NestedMember, free: Collection[int]) -> Motions:
     """Return loops and platform twists of a member of a network with some free joints.
 
-    The tree contains the joints that locked actuators fix, then the shortest paths from the base. A loop beside such a
-    joint then has no part in the platform twists: at a dead centre its joint rates are undefined.
+    The tree contains the joints that locked actuators fix, then the shortest paths from the base. A loop next to such
+    a joint then does not influence the platform twists: at a dead centre, the joint rates of this loop are undefined.
 
     Args:
         network: the network.
@@ -118,7 +118,7 @@ def motions_of(network: OpenNetwork, frame: PathFrame, member: NestedMember, fre
     columns = tuple(k for k in moving for _ in network.screws[k])
 
     def block(k: int) -> SX:
-        """Return the twists (6, n) of a joint for rates of order 1, in the columns of all free joints."""
+        """Return the twists (6, n) of a joint for scaled rates, in the columns of all free joints."""
         found = SX(6, count)
         if k in start:
             screws = ca.horzcat(*network.screws[k])
@@ -179,7 +179,7 @@ class MeasuredMotions(NamedTuple):
 def measured(
     motions: Motions, symbols: Sequence[SX], points: Sequence[ClosedPoint], size: SX
 ) -> tuple[MeasuredMotions, ...]:
-    """Return the values of motions at the closed configurations where all of them are finite.
+    """Return the values of motions at closed configurations; configurations with a non-finite value are omitted.
 
     Args:
         motions: loops and platform twists.
@@ -219,9 +219,9 @@ def ranks_of(points: Sequence[MeasuredMotions], loops: Sequence[int]) -> MotionR
 
 
 def platform_loops(points: Sequence[MeasuredMotions]) -> list[int]:
-    """Return the indices of the loops that determine the platform twists, the shortest sufficient ones.
+    """Return the indices of the loops that determine the platform twists: the shortest loops that suffice.
 
-    The other loops may lose rank, as at a dead centre, where the platform twists keep theirs.
+    The other loops may lose rank, for example at a dead centre, although the platform twists keep their rank.
     """
     kept = list(range(len(points[0].loops)))
     twists = ranks_of(points, kept).twists
@@ -234,12 +234,13 @@ def platform_loops(points: Sequence[MeasuredMotions]) -> list[int]:
 
 @dataclass(frozen=True, eq=False)
 class NullSpace:
-    """Null space of a member's loops, each loop restricted to the null space of those before it.
+    """Null space of a member's loops; each loop is restricted to the null space of the preceding loops.
 
     Attributes:
         projector: (n, n) projector on the rates that close all loops.
-        equations: (m, n) equations of each loop; for independent equations, each one separately.
-        inverses: (n, m) pseudo-inverse of each of these, within the rates that satisfy those before it.
+        equations: (m, n) equations of each loop; independent equations are separate entries.
+        inverses: (n, m) pseudo-inverse of each entry of ``equations``, within the rates that satisfy the preceding
+            entries.
         platform: (6, n) platform twists for unit rates.
     """
 
@@ -250,7 +251,7 @@ class NullSpace:
 
     @property
     def screws(self) -> SX:
-        """Platform twists (6, n) that free joints allow, one for each rate."""
+        """Platform twists (6, n) that free joints allow, for a unit value of each rate."""
         return self.platform @ self.projector
 
     def driven(self, screw: SX, loops: SX) -> tuple[SX, SX]:
@@ -261,8 +262,8 @@ class NullSpace:
             loops: (m, 1) coefficients of the joint in all loops, one below the other.
 
         Returns:
-            Platform twist (6, 1), up to those that the member allows, and the residual (m, 1) that passive joints
-            cannot close: 0 if the actuator can move by itself.
+            Platform twist (6, 1), up to the twists that the member allows; and the residual (m, 1) that passive joints
+            cannot close, 0 if the actuator can move by itself.
         """
         rates = SX(self.projector.shape[0], 1)
         open_loops = [SX(0, 1)]
@@ -400,7 +401,7 @@ def add_resisting(
 
 
 def _relations(open_loops: SX, symbols: Sequence[SX], points: Sequence[ClosedPoint]) -> SX:
-    """Return independent relations (r, a) of actuator rates of order 1, which passive joints cannot satisfy for them.
+    """Return the independent relations (r, a) that the loops impose on scaled actuator rates.
 
     Rows that are zero at almost all configurations are left out.
     """

@@ -9,12 +9,13 @@ after them. At the cut, equations state that the joint there holds together:
 * rod of constant length: the distance of its ends is that at home (1); for an actuated rod: none;
 * no joint: both bodies coincide (6).
 
-Each equation has a size that scales it to order 1: for lengths that of the robot.
+Each equation has a scale by which it is divided, so that its values are about 1. For lengths this is the size of the
+robot.
 
 Distance equations follow from these, each without the coordinates of one joint: the distance between a hinge or
 universal joint and the joint at the cut does not change with the joint's own rotation. It equals the distance on the
-other side of the cut. Such an equation lacks one or two unknowns, so that a search over boxes can exclude ranges of the
-others.
+other side of the cut. Such an equation lacks one or two unknowns, so that a search over boxes can exclude ranges of
+the other unknowns.
 """
 
 from __future__ import annotations
@@ -142,7 +143,7 @@ def closures(kind: str, name: str, sides: Iterable[tuple[SX, ...]]) -> list[Clos
 
 
 def loop_equations(expressions: SX, size: SX | None = None) -> list[LoopEquation]:
-    """Return equations from left sides (k, 1) and a common size; without a size they are of order 1."""
+    """Return equations from left sides (k, 1) and a common size; without a size the values are about 1."""
     return [LoopEquation(each, SX(1) if size is None else size) for each in ca.vertsplit(expressions)]
 
 

@@ -23,8 +23,8 @@ class Ranks(NamedTuple):
     Attributes:
         passive: rank of the screws of the passive joints.
         all: rank of the screws of all joints.
-        pinned: rank of the velocities of the centre of the spherical joint at the cut by the other passive joints; None
-            without such a joint.
+        pinned: rank of the velocities that the other passive joints give to the centre of the spherical joint at the
+            cut; None without such a joint.
     """
 
     passive: int
@@ -33,7 +33,10 @@ class Ranks(NamedTuple):
 
 
 class Centre(NamedTuple):
-    """Centre of a path: point (3, 1) at home on the body after a joint; ``slides`` if arbitrary along its axis."""
+    """Centre of a path: point (3, 1) at home on the body after a joint.
+
+    If ``slides`` is true, the centre is arbitrary along the joint's axis.
+    """
 
     point: SX
     behind: int

@@ -29,8 +29,8 @@ COORDINATE_PARTS: Mapping[str, tuple[str, ...]] = {"U": ("first", "second"), "C"
 #: Value of ``a1 . (a2 x d)`` at home above which the solution of an angle that is 0 at home differs from the other one:
 #: rounding leaves 1e-16.
 _DISTINCT = 1e-6
-_ROD = "it ends a rod between two spherical joints, which spins freely"
-_PLANE = "its axes are in one plane at home, where the angles of three rotations are not determined"
+_ROD = "the joint ends a rod between two spherical joints, which spins freely"
+_PLANE = "the joint's axes are in one plane at home, where the angles of three rotations are not determined"
 
 
 class Angle(NamedTuple):
@@ -123,7 +123,7 @@ class PathJoints:
                 cone = self._cone(j) if each.type in ("U", "S") and len(written) == 1 else None
                 unknown = coordinates.unknown if each.type != "S" else ""
                 if each.type in ("U", "S") and cone is None:
-                    unknown = unknown or "it has no link of nonzero length"
+                    unknown = unknown or "the joint has no link of nonzero length"
                 label = labels[id(each)]
                 found.append(LimbJoint(label, each.name, self._limb.name, each.type, tuple(named), cone, unknown))
         return found
@@ -178,7 +178,7 @@ class PathJoints:
         a1, a2 = (axis.axis for axis in (joint.axes if is_base_side else joint.axes[::-1]))
         sign = self._sign(a1, a2, path.joints[end].point - joint.point)
         if sign == 0:
-            return _Coordinates([], "its first axis, its second axis and the rod are in one plane at home")
+            return _Coordinates([], "the joint's two axes and the rod are in one plane at home")
         first, second = two_angles((a1, a2), home / ca.norm_2(home), body.rotation.T @ now / ca.norm_2(now), sign)
         if is_base_side:
             return _Coordinates([_angle(first), _angle(second)])
@@ -192,7 +192,10 @@ class PathJoints:
         return 0.0 if abs(value) < _DISTINCT else float(np.sign(value))
 
     def _cone(self, j: int) -> JointCone | None:
-        """Return the cone directions of a universal or spherical joint; links point to the platform."""
+        """Return the directions that a cone limit on a universal or spherical joint compares.
+
+        The direction of a link points to the platform.
+        """
         path, place = self._path, self._path.joints[j].point
         turn = self._limb.turn
         if path.cut.far is not None and path.rod is not None and j in (path.cut.joint, path.cut.far):
@@ -244,8 +247,8 @@ def _coordinate(axis: JointAxis, value: SX) -> JointCoordinate:
 def limb_links(path: OpenedPath, labels: Mapping[int, str], frame: PathFrame) -> list[LimbLink]:
     """Return the links of a path, from the base on.
 
-    Of joints with a common centre at home, the one nearest the base is the end of links. A slide along the line between
-    its neighbours is not an end: the link includes its travel.
+    Of joints with a common centre at home, the one nearest the base is the end of links. A slide along the line
+    between its neighbours is not an end of a link: the link includes the travel of the slide.
 
     Args:
         path: the path.

@@ -1,1 +1,1 @@
-"""Limits of a case, which a design must keep to be built."""
+"""Limits of a case, which a buildable design satisfies."""

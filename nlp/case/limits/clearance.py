@@ -4,9 +4,9 @@ The squared distance ``d^2`` of the points ``p + s d`` and ``q + t e`` is a conv
 over ``0 <= s, t <= 1`` is found in closed form by three clampings: the best s for the lines, the best t for this s, the
 best s for this t (V. J. Lumelsky, *On fast computation of distance between line segments*, Information Processing
 Letters 21 (1985); C. Ericson, *Real-Time Collision Detection*, 2005, section 5.1.9). Because the minimum is over a
-fixed set, its derivative by the segments' ends is that of the quadratic at the nearest points (Danskin): the result is
-exact, and once continuously differentiable wherever the nearest points are unique, which is everywhere but for parallel
-segments. The second derivatives jump where a nearest point comes to an end of its segment.
+fixed set, its derivative with respect to the segments' ends is that of the quadratic at the nearest points (Danskin):
+the result is exact, and once continuously differentiable wherever the nearest points are unique, which is everywhere
+but for parallel segments. The second derivatives jump where a nearest point comes to an end of its segment.
 
 The constraint is on ``1 - (1 - d^2/D^2)^3`` for d below D, which is twice the limit, and on 1 beyond. This function
 grows with d, is smooth to second order, and does not depend on segments that are far apart: where such segments happen
@@ -30,11 +30,11 @@ from .constraint import BoundedConstraint, Call, Form, Reading, between
 from .interval import LowerLimit
 from .limit import PosedRobot
 
-#: Largest limit to which a constraint can be changed, in parts of the distance D beyond which it is 1: closer to D, the
+#: Largest limit to which a constraint can be changed, divided by the distance D beyond which it is 1: closer to D, the
 #: slope falls below an eighth of the slope at the original limit.
 _MOST = 0.9
 #: Regularisation of the division for parallel lines, relative to the squared lengths. The next two clampings correct
-#: the error in s: the squared distance is too large by at most a quarter of this part of a leg's squared length.
+#: the error in s: the squared distance is too large by at most a quarter of this fraction of a leg's squared length.
 _PARALLEL = 1e-10
 
 

@@ -173,11 +173,11 @@ class Constraint:
         keys: dotted keys below ``limits`` of the lower and the upper limit; empty for a bound that is not a limit of
             the case.
         pose: index of the pose.
-        exact: (1, 1) limited quantity, if the expression follows it only near the limit; else None.
-        measure: function that computes the limited quantity, if the expression is an estimate of it; else None.
-        spectral: matrix of the estimate, if the expression estimates eigenvalues; else None.
+        exact: (1, 1) limited quantity, if the expression follows it only near the limit; otherwise None.
+        measure: function that computes the limited quantity, if the expression is an estimate of it; otherwise None.
+        spectral: matrix of the estimate, if the expression estimates eigenvalues; otherwise None.
         call: call with the expression as value, if the function is called for several legs, joints, tasks or poses.
-        stated: lower and upper bound of the case, if the program's bounds are tighter; else None.
+        stated: lower and upper bound of the case, if the program's bounds are tighter; otherwise None.
     """
 
     name: str
@@ -206,7 +206,7 @@ class Constraint:
 
 @dataclass(frozen=True, eq=False)
 class BoundedConstraint:
-    """Constraint with its lower and upper bound."""
+    """Constraint with a lower and an upper bound."""
 
     constraint: Constraint
     lower: float

@@ -223,7 +223,7 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
             check_axis(key, axis)
         home = self.about
         if isinstance(home, MountingPose) and not all(map(math.isfinite, (*home.position, home.angle))):
-            raise CaseError(key, "must be a mounting pose of finite numbers")
+            raise CaseError(key, "position and angle of the mounting pose must be finite")
 
     @classmethod
     def is_for(cls, model: Model) -> bool:

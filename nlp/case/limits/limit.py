@@ -216,7 +216,7 @@ class Limit(abc.ABC, Generic[TableT]):
         needs_legs: If true, only robots with legs between joint centres can have the limit.
         needs_joints: If true, only robots given joint by joint can have the limit.
         needs_motion: If true, the limited quantity depends on the platform's speeds, from the case or from a path.
-        order: position of the constraints among those of other limits at the same place: lower first, then in the
+        order: position of the constraints among constraints of other limits at the same place: lower first, then in the
             registry's order.
     """
 

@@ -206,7 +206,7 @@ class _Reader:
         if token.text in _FUNCTIONS:
             bracket = self.next()
             if bracket.text != "(":
-                raise self.wrong(bracket, f"expected a bracket after {token.text}")
+                raise self.wrong(bracket, f'expected "(" after {token.text}')
             return ast.Call(ast.Name(token.text), [self._closed(bracket)], [])
         hint = nearest(token.text, [*self._names, *_FUNCTIONS])
         raise ExpressionError(f"{token.text!r} at position {token.place + 1} is not a quantity of this case; {hint}")

@@ -110,7 +110,7 @@ class _Equations(NamedTuple):
 
 
 def _equations(closure: LoopClosure, A: Frame, B: Frame, kept: float | None, twist: FloatArray) -> _Equations:
-    """Return the equations of a closure, and their derivatives by motions of its second body relative to the first.
+    """Return the equations of a closure, and derivatives with respect to relative twists of the second body.
 
     Args:
         closure: the closure.

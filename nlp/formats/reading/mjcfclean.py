@@ -115,7 +115,7 @@ class _Files:
         """Return the elements of an included file."""
         name = element.get("file", "")
         if not name:
-            raise InputError(f'{chain[-1]}: <include>: file is missing; write <include file="NAME"/>')
+            raise InputError(f'{chain[-1]}: <include>: attribute file is missing; write <include file="NAME"/>')
         # MuJoCo searches in the folder of the main file; some models need the folder of the including file.
         places = [self.main.parent / name, chain[-1].parent / name]
         path = next((each for each in places if each.is_file()), places[0])

@@ -180,7 +180,7 @@ class _Rows:
         self._slopes: list[FloatArray] = [np.zeros((0, x.size))]
 
     def add(self, value: FloatArray, *slopes: tuple[int, int, FloatArray]) -> None:
-        """Add equations (k,) with derivatives (k, 3) by the point (part 0) or the axis (part 1) of a joint."""
+        """Add equations (k,), and derivatives (k, 3) with respect to point (part 0) or axis (part 1) of a joint."""
         row = np.zeros((len(value), *self._shape))
         for joint, part, slope in slopes:
             row[:, joint, part] += slope
@@ -198,7 +198,7 @@ def _equations(
     parallelograms: Sequence[tuple[int, ...]],
     x: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return equations (m,) of relations and unit axes, and their derivatives (m, 6 n) by points and axes (n, 2, 3)."""
+    """Return equations (m,), and derivatives (m, 6 n) with respect to points and axes (n, 2, 3)."""
     rows = _Rows(x)
     for k, joint in enumerate(joints):
         if joint.kind != "S":

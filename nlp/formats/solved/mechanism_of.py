@@ -222,7 +222,7 @@ def _range_of(
         joint: elementary joint of the mechanism.
         words: names and coordinate of the elementary joint.
         limits: smallest and largest coordinate from the exported pose; infinite for no limit.
-        size: length of the order of the robot's size.
+        size: length comparable to the robot's size.
     """
     if math.isinf(limits[0]) and math.isinf(limits[1]):
         return None

@@ -31,7 +31,7 @@ class ExportedJoint:
         part: name of the joint coordinate, such as ``first``; empty for a joint with one coordinate.
         actuator: name of the actuator in results; empty for a passive joint.
         coordinate: coordinate from home at the pose, radians or length; None for a spherical joint or a joint of a leg.
-        lever: length of a parallelogram's rod, if limits are on its displacement instead of its angle; else None.
+        lever: length of a parallelogram's rod, if limits are on its displacement instead of its angle; otherwise None.
         follows: True if another hinge of the parallelogram has the coordinate of the limits.
     """
 
@@ -126,8 +126,8 @@ def framed(mechanism: Mechanism, coordinates: Mapping[str, float], size: float) 
 
     Args:
         mechanism: mechanism with the points of prismatic and helical joints on outer links.
-        coordinates: joint coordinates by name, 0 where the points on both links coincide; radians or length.
-        size: length of the order of the robot's size.
+        coordinates: joint coordinates by name, 0 if the points on both links coincide; radians or length.
+        size: length comparable to the robot's size.
     """
     joints = tuple(_on_inner_link(joint, coordinates.get(joint.name, 0.0)) for joint in mechanism.joints)
 
@@ -173,7 +173,7 @@ def _rotation(points: Sequence[FloatArray], axes: Sequence[FloatArray], size: fl
     Args:
         points: (3,) each, centres of the link's joints in the world frame; the first one is the origin of the frame.
         axes: (3,) each, unit axes of these joints in the world frame; zero for spherical joints.
-        size: length of the order of the robot's size.
+        size: length comparable to the robot's size.
     """
     ways = [point - points[0] for point in points[1:]]
     farthest = max((float(np.linalg.norm(way)) for way in ways), default=0.0)

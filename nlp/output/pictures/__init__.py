@@ -1,15 +1,14 @@
-"""Pictures of a robot and its task as files.
+"""Pictures of robots, tasks and results as files.
 
-The modules import each other in this order: ``posture`` (the robot as numbers at one pose and at each pose),
-``loads`` (arrows of forces), ``drawing`` (the robot with its task), ``solutions`` (drawings of a solution), ``view``;
-then, with Matplotlib, ``labels``, ``canvas``, ``joints`` (symbols), ``painting`` and ``figures``, and the pictures of
-numbers (``curves``, ``regions``, ``workspaces``, and ``paths`` after ``pathpanels``, its content), ``robots`` side by
-side, and ``designs``, which chooses the picture of a table; at last ``plot``, which is public. ``style``,
-``requirements`` and ``fonts`` stand alone.
+The modules import each other in this order: ``posture`` (geometry of the robot at a pose), ``loads`` (arrows of
+forces), ``drawing`` (robot with its task), ``solutions`` (drawings of a solution), ``view``; then, with Matplotlib,
+``labels``, ``canvas``, ``joints`` (symbols), ``painting``, ``figures``, the charts (``curves``, ``regions``,
+``workspaces``, ``paths`` with ``pathpanels``), ``robots`` side by side, and ``designs``, which chooses the picture of a
+table; at last ``plot``, which is public. ``style``, ``requirements`` and ``fonts`` import none of these.
 """
 
 import logging
 
-# Matplotlib's advice, on fonts without a weight and folders of its own, would go to standard error, and so into
-# notebooks; a program that sets up logging still gets it.
+# Matplotlib's hints on fonts and cache folders would go to standard error, and into notebooks; a program that sets up
+# logging still gets them.
 logging.getLogger("matplotlib").addHandler(logging.NullHandler())

@@ -1,4 +1,4 @@
-"""Lines, arrows and words on Matplotlib axes, from points in the world and a parallel projection."""
+"""Lines, arrows and labels on Matplotlib axes, from points in the world frame and a parallel projection."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from .labels import Label, Obstacles, place_labels
 from .view import View
 
 INK, MUTED, FAINT, RED = "#17212b", "#55616c", "#b9c1c9", "#a3250f"
-#: A colour in Matplotlib's terms.
+#: Colour in Matplotlib's format.
 Colour: TypeAlias = str | tuple[float, float, float, float]
-#: Room around everything drawn, in parts of the larger side.
+#: Room around the drawing, as a fraction of the larger side.
 _MARGIN = 0.07
-#: An arrow that is shorter on paper, in parts of its length, is seen from its end.
+#: Projected length, as a fraction of its length, below which an arrow is drawn as seen from its end.
 _END_ON = 0.02
 
 
 class Canvas:
-    """Axes in parallel projection. Words are placed at the end, where they cover no line and no other word.
+    """Axes in parallel projection; labels are placed last, so that they cover no line and no other label.
 
     Args:
-        axes: empty.
-        view: the projection.
-        centre: (3,) point from whose place on paper words should lie away.
+        axes: empty Matplotlib axes.
+        view: parallel projection.
+        centre: (3,) centre of the drawing; labels are placed outwards from it.
     """
 
     def __init__(self, axes: Axes, view: View, centre: FloatArray) -> None:
@@ -50,16 +50,16 @@ class Canvas:
         name: str,
         *,
         limb: str = "",
-        **style: Any,  # noqa: ANN401 - Matplotlib's own words
+        **style: Any,  # noqa: ANN401 - Matplotlib's keywords
     ) -> Line2D:
-        """Draw a line through points (k, 3) and keep it free of words; ``limb`` names the limb that it is part of."""
+        """Draw a line through points (k, 3) and keep labels away from it; ``limb`` is the name of its limb."""
         flat = self.view.project(points)
         (line,) = self._axes.plot(flat[:, 0], flat[:, 1], gid=name, **{"solid_capstyle": "round", **style})
         self.keep_free(points, limb)
         return line
 
-    def polygon(self, points: FloatArray, **style: Any) -> None:  # noqa: ANN401 - Matplotlib's own words
-        """Draw a filled polygon with corners (k, 3); words may cover it."""
+    def polygon(self, points: FloatArray, **style: Any) -> None:  # noqa: ANN401 - Matplotlib's keywords
+        """Draw a filled polygon with corners (k, 3); labels may cover it."""
         self._axes.add_patch(Polygon(self.view.project(points), **style))
 
     def marker(
@@ -67,9 +67,9 @@ class Canvas:
         point: FloatArray,
         name: str,
         symbol: str = "o",
-        **style: Any,  # noqa: ANN401 - Matplotlib's own words
+        **style: Any,  # noqa: ANN401 - Matplotlib's keywords
     ) -> None:
-        """Draw a marker at a point (3,), round or with one of Matplotlib's symbols; words may cover it."""
+        """Draw a marker at a point (3,) with a Matplotlib symbol; labels may cover it."""
         x, y = self.view.project(point)
         self._axes.plot([x], [y], marker=symbol, linestyle="none", gid=name, **style)
 
@@ -86,7 +86,7 @@ class Canvas:
     ) -> None:
         """Draw an arrow between two points (3,), with two heads for a moment.
 
-        From its end it is a circle, with a dot where it points towards the eye, and a cross where it points away.
+        Seen from its end, an arrow is a circle, with a dot if it points towards the viewer, else with a cross.
         """
         if self.is_end_on(start, end):
             size, is_near = 5.0 + 2.4 * width, self.view.depth(end) > self.view.depth(start)
@@ -109,7 +109,7 @@ class Canvas:
         self.keep_free(np.array([start, end]))
 
     def is_end_on(self, start: FloatArray, end: FloatArray) -> bool:
-        """Return whether an arrow between two points (3,) is seen from its end."""
+        """Return whether an arrow between two points (3,) is seen end-on."""
         way = end - start
         return bool(np.linalg.norm(self.view.project(way)) <= _END_ON * np.linalg.norm(way))
 
@@ -125,17 +125,17 @@ class Canvas:
         limb: str = "",
         is_led: bool = False,
     ) -> None:
-        """Ask for a word beside a point (3,), preferably in a direction (2,) on paper.
+        """Request a label beside a point (3,), preferably in a direction (2,) of the picture.
 
         Args:
-            text: the word.
-            at: the point, or (k, 3) points to choose from.
-            away: the direction; zero for none.
-            colour: of the letters.
-            size: of the letters, points.
-            bold: whether they are bold.
-            limb: name of the limb that the word belongs to, whose label has a leader line; empty for none.
-            is_led: whether any other word has a leader line.
+            text: text of the label.
+            at: (3,) point, or (k, 3) points to choose from.
+            away: (2,) preferred direction; zero for none.
+            colour: colour of the text.
+            size: size of the text, points.
+            bold: If true, the text is bold.
+            limb: name of the limb of the label, which then has a leader line; empty for none.
+            is_led: If true, a label without a limb has a leader line too.
         """
         length = float(np.linalg.norm(away))
         places = np.atleast_2d(self.view.project(at))
@@ -145,18 +145,18 @@ class Canvas:
         )
 
     def outwards(self, at: FloatArray) -> FloatArray:
-        """Return the direction (2,) on paper from the centre to a point (3,)."""
+        """Return the projected direction (2,) from the centre to a point (3,)."""
         return np.asarray(self.view.project(at) - self._centre)
 
     def keep_free(self, points: FloatArray, limb: str = "") -> None:
-        """Keep a line through points (k, 3) free of words, and within the limits of the axes."""
+        """Keep labels away from a line through points (k, 3), and the line within the limits of the axes."""
         flat = self.view.project(points)
         for a, b in pairwise(flat):
             self._segments.append(np.array([*a, *b]))
             self._owners.append(limb)
 
     def fit_limits(self) -> None:
-        """Set the limits of the axes around everything drawn, with room for words, in the proportion of the panel."""
+        """Set the limits of the axes around the drawing, with room for labels, in the proportion of the panel."""
         flat = np.vstack(self._segments).reshape(-1, 2)
         low, high = flat.min(axis=0), flat.max(axis=0)
         half = (high - low) / 2 + _MARGIN * float(np.max(high - low))
@@ -167,9 +167,9 @@ class Canvas:
         self._axes.set_ylim(middle[1] - half[1], middle[1] + half[1])
 
     def write_labels(self, renderer: RendererAgg) -> None:
-        """Write the words, once the axes have their final place."""
+        """Write the labels, when the axes have their final position."""
         self._axes.apply_aspect()
-        # Limbs stand closest together: their words get the free places first.
+        # Limbs are closest together: their labels are placed first.
         ordered = sorted(self._labels, key=lambda label: not label.owner)
         place_labels(self._axes, renderer, ordered, Obstacles(np.vstack(self._segments), tuple(self._owners)))
 

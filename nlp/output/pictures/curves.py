@@ -1,4 +1,4 @@
-"""Pictures of curves and clouds of designs: F over a number of the case, and one goal over another."""
+"""Charts of designs: F over a varied limit or parameter, and one goal over another."""
 
 from __future__ import annotations
 
@@ -34,70 +34,70 @@ def draw_frame(axes: Axes, title: str) -> None:
 
 #: Width and height of the picture, inches.
 _SIZE = (7.2, 4.6)
-#: A colour and a mark for each task; more tasks begin again.
+#: Colours and marks of the tasks; further tasks repeat them.
 _LOOKS = (("#08519c", "o"), ("#b34700", "s"), ("#3f86c4", "^"), ("#e08a3c", "D"))
 
 
 def numbers_of(column: Column[Row], rows: Sequence[Row]) -> FloatArray:
-    """Return the numbers (n,) of a column, NaN where there is none."""
+    """Return the numbers (n,) of a column; a missing number is NaN."""
     return np.array([math.nan if (cell := column.cell(row)) is None else float(cell) for row in rows])
 
 
-def lines_figure(found: Designs[Row]) -> Figure:
-    """Return F over the number as a Matplotlib figure; the line of each task carries ``F`` and its name as ``gid``."""
+def lines_figure(designs: Designs[Row]) -> Figure:
+    """Return F over the varied value as a Matplotlib figure; the line of a task has the ``gid`` "F" and its name."""
     figure = Figure(figsize=_SIZE, facecolor="white", layout="constrained")
     axes = figure.add_subplot()
-    (over,), columns = found.of_kind(ColumnKind.VARIED), found.of_kind(ColumnKind.OBJECTIVE)
-    values, several = numbers_of(over, found.rows), len(columns) > 1
+    (over,), columns = designs.of_kind(ColumnKind.VARIED), designs.of_kind(ColumnKind.OBJECTIVE)
+    values, several = numbers_of(over, designs.rows), len(columns) > 1
     for k, column in enumerate(columns):
         colour, mark = _LOOKS[k % len(_LOOKS)]
-        F, name = numbers_of(column, found.rows), column.series
+        F, name = numbers_of(column, designs.rows), column.series
         label = name if several else None
         axes.plot(values, F, color=colour, marker=mark, markersize=4.5, linewidth=1.4, label=label, gid=f"F {name}")
-    known = np.any([np.isfinite(numbers_of(column, found.rows)) for column in columns], axis=0)
+    known = np.any([np.isfinite(numbers_of(column, designs.rows)) for column in columns], axis=0)
     for value in values[~known]:
         axes.axvline(value, color=RED, linewidth=0.8, linestyle=":", gid="no answer")
     axes.set_xlabel(over.axis, color=INK, parse_math=False)
-    axes.set_ylabel(objective_label(found.case), color=INK, parse_math=False)
-    draw_frame(axes, found.title)
+    axes.set_ylabel(objective_label(designs.case), color=INK, parse_math=False)
+    draw_frame(axes, designs.title)
     axes.margins(x=0.03)
     if several:
         for text in axes.legend(frameon=False, fontsize=9).get_texts():
             text.set_parse_math(False)
-    if found.missing:
-        note = "\n".join(textwrap.wrap(f"Dotted: {'; '.join(found.missing)}.", 95, max_lines=3, placeholder=" …"))
+    if designs.missing:
+        note = "\n".join(textwrap.wrap(f"Dotted: {'; '.join(designs.missing)}.", 95, max_lines=3, placeholder=" …"))
         figure.supxlabel(note, fontsize=8.5, color=RED, x=0.01, ha="left", parse_math=False)
     return figure
 
 
 _FRONT_SIZE = (6.4, 5.0)
-#: Width and height of a panel of a pair of goals, in inches, and panels in a row.
+#: Width and height of the panel of a pair of goals, inches, and number of panels in a row.
 _PANEL, _ACROSS = (4.6, 3.7), 3
 
 
-def goals_figure(found: Designs[Row]) -> Figure:
-    """Return one goal over the other as a Matplotlib figure; a gap of the front has no line.
+def goals_figure(designs: Designs[Row]) -> Figure:
+    """Return one goal over the other as a Matplotlib figure; the line is interrupted at gaps of the front.
 
-    More than two goals have a panel for each pair of them; of three, the third is the colour.
+    More than two goals have a panel for each pair; with three goals, the colour shows the third.
     """
-    goals = found.of_kind(ColumnKind.OBJECTIVE)
-    labels, values = [goal.axis for goal in goals], np.stack([numbers_of(goal, found.rows) for goal in goals], axis=1)
+    goals = designs.of_kind(ColumnKind.OBJECTIVE)
+    labels, values = [goal.axis for goal in goals], np.stack([numbers_of(goal, designs.rows) for goal in goals], axis=1)
     if len(goals) > 2:
-        return _pairs(labels, values, found.title)
+        return _pairs(labels, values, designs.title)
     figure = Figure(figsize=_FRONT_SIZE, facecolor="white", layout="constrained")
     axes = figure.add_subplot()
     first = 0
-    for last in (*found.gaps, len(values) - 1):
+    for last in (*designs.gaps, len(values) - 1):
         axes.plot(*values[first : last + 1].T, color="#08519c", marker="o", markersize=4.5, linewidth=1.4, gid="front")
         first = last + 1
     axes.set_xlabel(labels[0], color=INK, parse_math=False)
     axes.set_ylabel(labels[1], color=INK, parse_math=False)
-    draw_frame(axes, found.title)
+    draw_frame(axes, designs.title)
     return figure
 
 
 def _pairs(labels: list[str], values: FloatArray, title: str) -> Figure:
-    """Return a panel for each pair of goals; the points (n, k) of three goals have the third as their colour."""
+    """Return a panel for each pair of goals; with three goals, the colour of the points (n, k) shows the third."""
     pairs = list(combinations(range(len(labels)), 2))
     across = min(len(pairs), _ACROSS)
     down = -(-len(pairs) // across)

@@ -1,4 +1,4 @@
-"""Pictures of tables of designs, by how their rows belong together; and small ones of single designs, without words."""
+"""Pictures of tables of designs by the relation of their rows, and small pictures of single designs without text."""
 
 from __future__ import annotations
 
@@ -22,36 +22,36 @@ from .view import View, clearest_view
 _SIZE = (2.9, 2.6)
 
 
-def designs_figure(found: Designs[Row], *, is_on_page: bool = False) -> Figure:
+def designs_figure(designs: Designs[Row], *, is_on_page: bool = False) -> Figure:
     """Return the picture of a table of designs as a Matplotlib figure.
 
     Args:
-        found: the table.
-        is_on_page: whether the sentences of :func:`legend_of` stand beside the picture, and not in it.
+        designs: table of designs.
+        is_on_page: If true, the page shows the sentences of :func:`legend_of`, and the picture does not.
 
     Raises:
-        EvaluationError: nothing can be drawn.
+        EvaluationError: no design can be drawn.
     """
-    if found.join is Join.LIST:
-        return robots_figure(found)
-    if found.join is Join.GRID:
-        return regions_figure(found, () if is_on_page else legend_of(found))
-    if not found.of_kind(ColumnKind.VARIED):
-        return goals_figure(found)
-    if found.join is Join.CLOUD:
-        raise EvaluationError("A picture needs a grid over one or two numbers")
-    return lines_figure(found)
+    if designs.join is Join.LIST:
+        return robots_figure(designs)
+    if designs.join is Join.GRID:
+        return regions_figure(designs, () if is_on_page else legend_of(designs))
+    if not designs.of_kind(ColumnKind.VARIED):
+        return goals_figure(designs)
+    if designs.join is Join.CLOUD:
+        raise EvaluationError("A picture needs a grid over one or two varied names")
+    return lines_figure(designs)
 
 
-def legend_of(found: Designs[Row]) -> list[str]:
-    """Return the sentences about the numbers in a picture; none where it has no numbers."""
-    return regions_legend(found) if found.join is Join.GRID else []
+def legend_of(designs: Designs[Row]) -> list[str]:
+    """Return the legend of the numbered regions in a picture; empty without numbered regions."""
+    return regions_legend(designs) if designs.join is Join.GRID else []
 
 
 def design_pictures(drawings: Sequence[Drawing]) -> list[bytes]:
-    """Return an SVG picture of each design of one robot, in order, all from one view and in one scale.
+    """Return an SVG picture of each design of one robot, in order, with one view and one scale.
 
-    A picture has the robot and the axis of its task; its limbs have the colours of their rates.
+    A picture shows the robot and the axis of its task; the colours of the limbs show their rates.
     """
     view = clearest_view(*drawings)
     plain = [replace(each, free=(), reference=None, forces=None) for each in drawings]
@@ -61,21 +61,21 @@ def design_pictures(drawings: Sequence[Drawing]) -> list[bytes]:
 
 
 def _painted(drawing: Drawing, view: View) -> Figure:
-    """Return the robot on axes that fill a figure, which it fits."""
+    """Return the robot on axes that fill a figure."""
     figure = Figure(figsize=_SIZE, facecolor="white")
     Panel(figure.add_axes((0, 0, 1, 1)), view, drawing).paint()
     return figure
 
 
 def _limits(drawing: Drawing, view: View) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return the lower left and the upper right corner on paper of what a picture shows, in the case's unit."""
+    """Return the lower left and the upper right corner of a picture, in the case's unit."""
     (axes,) = _painted(drawing, view).axes
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     return (left, bottom), (right, top)
 
 
 def _small(drawing: Drawing, view: View, low: Sequence[float], high: Sequence[float]) -> Figure:
-    """Return a picture whose axes have these corners."""
+    """Return a picture with the given corners of its axes."""
     figure = _painted(drawing, view)
     (axes,) = figure.axes
     axes.set_xlim(low[0], high[0])

@@ -1,4 +1,4 @@
-"""A robot with its task as numbers in true proportion, for any robot and any way to paint it."""
+"""Geometry of a robot with its task in true proportion, independent of the drawing library."""
 
 from __future__ import annotations
 
@@ -27,33 +27,34 @@ from ...program.nlp import Nlp
 from .loads import DrawnForces, drawn_forces
 from .posture import Linkage, Posture, state_at_pose
 
-#: The path around the axis: turns at most, part of the axis at most, and radius in parts of the robot's size.
+#: Helix around the axis: largest number of turns, largest fraction of the axis, radius as a fraction of the robot's
+#: size.
 _TURNS = 3.0
 _ALONG = 0.4
 _RADIUS = 0.11
-#: A pitch below this part of the path's radius shows as a circle; its gap shows the sense of the rotation.
+#: Pitch, relative to the radius of the helix, below which it is drawn as a circle with a gap for the sense of rotation.
 _NO_PITCH = 0.01
 _OPEN_CIRCLE = math.radians(320)
 _STEP = math.radians(6)
-#: Length of the axis beyond the robot at each end, in parts of the robot's size.
+#: Length of the axis beyond the robot at each end, as a fraction of the robot's size.
 _BEYOND = 0.22
-#: Distance of a point, in parts of the robot's size, beyond which the start is another posture than the one shown.
+#: Distance of a point, as a fraction of the robot's size, above which the starting posture differs from the shown one.
 _OTHER_POSTURE = 1e-3
-#: Points nearer to each other than this part of the robot's size are one corner.
+#: Distance, as a fraction of the robot's size, below which two points are one corner.
 _SAME_CORNER = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class LimbRate:
-    """A row of the Jacobian as a picture shows it.
+    """Row of the Jacobian in a drawing.
 
     Attributes:
         limb: name of the limb that applies the wrench.
-        kind: a force, or a couple.
-        member: name of the limb's member that applies it.
+        kind: force or couple.
+        member: name of the member that applies the wrench.
         rate: work rate ``L_i ^ chi``.
-        share: part of F, ``rate^2 / F``; nan where F is 0.
-        driving: its work rate in an actuated joint of the limb at unit rate; 0 for a constraint.
+        share: share of F, ``rate^2 / F``; nan if F is 0.
+        driving: work rate of the wrench for a unit rate of an actuated joint of the limb; 0 for a constraint.
     """
 
     limb: str
@@ -66,15 +67,15 @@ class LimbRate:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A twist as a picture shows it, in world coordinates.
+    """Twist in a drawing, in world coordinates.
 
     Attributes:
-        name: a few words.
+        name: short description.
         twist: (6,) angular velocity, then velocity at the world origin.
-        axis: (3,) unit direction.
-        pitch: length; infinite for a translation.
+        axis: (3,) unit vector of the axis.
+        pitch: pitch, length; infinite for a translation.
         line: (2, 3) ends of the axis, in its direction, length.
-        path: (k, 3) path of a point beside the axis: a helix of the true pitch, or a circle without one; empty for a
+        path: (k, 3) path of a point around the axis: a helix of the true pitch, or a circle for zero pitch; empty for a
             translation.
     """
 
@@ -87,30 +88,30 @@ class Motion:
 
     @property
     def has_path(self) -> bool:
-        """Whether a path is drawn: that of a large pitch is as good as straight."""
+        """True if a path is drawn; a helix of large pitch is almost straight."""
         return len(self.path) > 2
 
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """A robot at one posture, with its task where it has one; world coordinates, lengths in the case's unit.
+    """Robot at one posture with its task, if any; world coordinates, lengths in the case's unit.
 
     Attributes:
-        case: the source of names and units; None for a robot without a case.
-        model: the robot.
-        linkage: gives other postures of the same robot.
-        posture: the posture shown.
+        case: case with names and units; None for a robot without a case.
+        model: model of the robot.
+        linkage: robot with its dimensions, for other postures.
+        posture: shown posture.
         links: straight lines, as indices of two points.
         plates: outlines of base and platform, as indices of points.
-        corners: indices of the platform's points that show its velocity, each place once.
-        rows: work rates; empty without a motion.
-        motion: the task.
-        free: motions that no limb resists.
-        reference: posture at the start; None where it is the one shown.
-        forces: arrows of the first load, and of the forces that hold it; None without loads.
+        corners: indices of the platform's points with velocity arrows, without duplicates.
+        rows: rows of the Jacobian with work rates; empty without a motion.
+        motion: motion of the task.
+        free: motions that are free with all actuators locked.
+        reference: posture at the starting point; None if it is the shown posture.
+        forces: arrows of the first load, and of the actuator forces that balance it; None without loads.
         size: half of the diagonal of the robot's bounding box, length.
-        headline: the result in one line.
-        is_answer: whether the solve answers the case, rather than ending at some point.
+        headline: result in one line.
+        is_answer: True if the point is an optimum of the case.
     """
 
     case: Case | None
@@ -143,28 +144,28 @@ class Drawing:
     def limb_rows(self) -> dict[str, int]:
         """Return the index of the row that colours each limb; empty without a motion.
 
-        It is the row that drives the limb's actuator most; without such a row, that of its force, or of its couple
-        where it applies no force.
+        It is the row with the largest work rate in an actuator of the limb; without such a row, the row of its force or
+        of its couple.
         """
         order = sorted(enumerate(self.rows), key=lambda each: (each[1].driving, each[1].kind is WrenchKind.FORCE))
         return {row.limb: k for k, row in order}
 
     def limb_rates(self) -> dict[str, float]:
-        """Return the rate that colours each limb, of the row that :meth:`limb_rows` names."""
+        """Return the rate that colours each limb, from the rows of :meth:`limb_rows`."""
         return {limb: self.rows[k].rate for limb, k in self.limb_rows().items()}
 
     def link_row(self, link: Link) -> int | None:
-        """Return the index of the row that a link carries alone; None for a link that carries others too."""
+        """Return the index of the only row of a link; None for a link with several rows."""
         own = [k for k, row in enumerate(self.rows) if row.limb == link.limb]
         return None if link.row is None or link.row >= len(own) else own[link.row]
 
-    def own_rows(self, limb: str) -> list[LimbRate]:
-        """Return the rows that links of a limb carry alone, such as rods, in order."""
+    def link_rows(self, limb: str) -> list[LimbRate]:
+        """Return the rows of the links of a limb that have only one row, such as rods, in order."""
         found = (self.link_row(link) for _, _, link in self.links if link.limb == limb)
         return [self.rows[k] for k in sorted({k for k in found if k is not None})]
 
     def attachment(self, limb: str) -> int | None:
-        """Return the index of the point that joins a limb to the platform; None where no line of the limb has one."""
+        """Return the index of the point that joins a limb to the platform; None if no line of the limb has one."""
         for start, end, link in self.links:
             if link.limb == limb:
                 for index in (end, start):
@@ -174,10 +175,10 @@ class Drawing:
 
 
 def drawing_of_model(model: Model) -> Drawing:
-    """Return a robot at its parameters' typical values and its platform's home position, without a task.
+    """Return a robot at its typical dimensions and home position, without a task.
 
     Raises:
-        EvaluationError: the robot's expressions have no finite value there.
+        EvaluationError: the robot's expressions have no finite value at these dimensions.
     """
     parameters = model.typical
     middles = np.array([(item.lower + item.upper) / 2 for item in model.unknowns])
@@ -187,7 +188,7 @@ def drawing_of_model(model: Model) -> Drawing:
     # A motion of zero length closes the loops.
     home = linkage.posture_after(guess, np.array([0, 0, 0, 0, 0, 1.0]), 0.0)
     if home is None or not np.isfinite(home.points).all():
-        raise EvaluationError(f"{model.name}: the robot cannot be assembled at its typical values")
+        raise EvaluationError(f"{model.name}: the robot cannot be assembled at its typical dimensions")
     return replace(drawing_without_task(None, model, linkage, home), headline=headline)
 
 
@@ -201,23 +202,25 @@ def drawing_of(
     headline: str = "",
     is_answer: bool = True,
 ) -> Drawing:
-    """Return the robot at a point of a program, with one of its case's tasks.
+    """Return the robot at a point of a nonlinear program, with one task of its case.
 
     Args:
-        nlp: the program of a case.
-        x: (n,) the point.
-        state: the robot there; None where it does not exist.
+        nlp: nonlinear program of a case.
+        x: (n,) point.
+        state: state of the robot at the point; None if it does not exist.
         task: index of the task in the case.
-        pose: index of the pose that the state is at.
-        headline: the result in one line.
-        is_answer: whether the solve answers the case.
+        pose: index of the pose of the state.
+        headline: result in one line.
+        is_answer: True if the point is an optimum of the case.
 
     Raises:
         EvaluationError: the robot does not exist at the point.
     """
     case, model = nlp.case, nlp.program.model
     if state is None:
-        raise EvaluationError(f"{case.source or case.name}: the robot does not exist at the point reached: no picture")
+        raise EvaluationError(
+            f"{case.source or case.name}: no picture: the robot has no configuration at the last point"
+        )
     linkage, posture = _posture(nlp, x, state, pose)
     chosen = case.tasks[task]
     twist = frozen_array(chosen.twist, (6,))
@@ -242,11 +245,11 @@ def drawing_of(
 
 
 def _motion_of_twist(twist: FloatArray, drawing: Drawing, name: str) -> Motion:
-    """Return a twist (6,) as lines beside a robot: an axis as long as the robot, and a path of the twist's pitch."""
+    """Return a twist (6,) as lines: an axis as long as the robot, and a helix of the twist's pitch."""
     screw = axis_from_screw(twist)
     s, size = screw.axis, drawing.size
     if math.isinf(screw.pitch):
-        # A translation has a direction but no line: the platform is a place to show it.
+        # A translation has a direction but no axis: the arrow begins at the platform.
         ends = drawing.posture.position + np.outer([0.0, 0.8 * size], s)
         return Motion(name, frozen_array(twist, (6,)), s, math.inf, frozen_array(ends, (2, 3)), np.zeros((0, 3)))
     reach = (drawing.posture.points - screw.point) @ s
@@ -269,7 +272,7 @@ def _motion_of_twist(twist: FloatArray, drawing: Drawing, name: str) -> Motion:
 
 
 def _posture(nlp: Nlp, x: FloatArray, state: RobotState, pose: int) -> tuple[Linkage, Posture]:
-    """Return the linkage and the posture of a program's robot at a point (n,), at one of its poses."""
+    """Return the linkage and the posture of the robot at a point (n,) of a nonlinear program, at one of its poses."""
     model = nlp.program.model
     parameters = np.array([value for item in model.parameters for value in state.parameters[item.name]])
     unknowns = x[list(nlp.program.places.unknowns[pose])]
@@ -278,7 +281,7 @@ def _posture(nlp: Nlp, x: FloatArray, state: RobotState, pose: int) -> tuple[Lin
 
 
 def _reference(nlp: Nlp, posture: Posture, size: float, pose: int) -> Posture | None:
-    """Return the posture at the start; None where it is the one shown, or where the robot does not exist there."""
+    """Return the posture at the starting point; None for the shown posture, or if the robot does not exist."""
     if nlp.is_fixed:
         return None
     x = close_equations(nlp, nlp.start)
@@ -308,7 +311,7 @@ def drawing_without_task(case: Case | None, model: Model, linkage: Linkage, post
 
 
 def _loop(links: Sequence[tuple[int, int, Link]], body: Body) -> tuple[int, ...]:
-    """Return indices of the points around a body's outline; none where the body's lines are not one closed loop."""
+    """Return indices of the points around a body's outline; none if the body's lines are not one closed loop."""
     following = {start: end for start, end, link in links if link.body is body and link.kind is LinkKind.BAR}
     if len(following) < 3:
         return ()

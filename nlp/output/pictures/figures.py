@@ -1,4 +1,4 @@
-"""Picture files of robots: png, svg and pdf, the same bytes for the same robot and versions."""
+"""Picture files of robots in PNG, SVG and PDF, with the same bytes for the same robot and versions."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from .painting import Panel, rate_colour_map
 from .view import View, clearest_view
 
 _P = ParamSpec("_P")
-#: Without these, two files of one picture would differ, or depend on the user's own settings.
+#: Settings without which two files of one picture would differ, or depend on the user's settings.
 _SETTINGS: dict[Any, Any] = {
     "svg.hashsalt": "screwsynth",
     "svg.fonttype": "path",
@@ -40,11 +40,11 @@ _METADATA: dict[str, dict[str, str | None]] = {
     ".svg": {"Date": None, "Creator": "screwsynth"},
     ".pdf": {"CreationDate": None, "Creator": "screwsynth", "Producer": None},
 }
-#: So many panels stand in one row; more of them stand in rows of two.
+#: Largest number of panels in a single row; more panels are in rows of two.
 _ACROSS = 3
 #: Width and height of a panel, and room for the heading, the legend and the colour bar, in inches.
 _WIDTH, _HEIGHT, _TOP, _BOTTOM, _SIDE = 7.2, 6.0, 0.95, 1.1, 1.15
-#: Room for the line of joints' symbols, in inches.
+#: Room for the line of joint symbols, in inches.
 _SYMBOLS = 0.22
 
 
@@ -52,37 +52,37 @@ def picture(drawings: Sequence[Drawing], ending: str, *, view: View | None = Non
     """Return the content of a picture file.
 
     Args:
-        drawings: one robot, or the same robot with several tasks, which stand side by side.
-        ending: ``.png``, ``.svg`` or ``.pdf``.
-        view: the projection; the clearest for all drawings when left out.
+        drawings: drawings of one robot, or of the same robot with several tasks, side by side.
+        ending: extension ``.png``, ``.svg`` or ``.pdf``.
+        view: parallel projection; by default the clearest one for all drawings.
     """
     return picture_of(ending, figure_of, drawings, view=view)
 
 
 def picture_of(ending: str, make: Callable[_P, Figure], *values: _P.args, **options: _P.kwargs) -> bytes:
-    """Return the content of the picture file of any figure.
+    """Return the content of the picture file of a figure.
 
     Args:
-        ending: ``.png``, ``.svg`` or ``.pdf``.
-        make: returns the figure; called with the settings of this package's pictures.
-        values: arguments of this function.
-        options: the same, by name.
+        ending: extension ``.png``, ``.svg`` or ``.pdf``.
+        make: function that returns the figure; called with the settings of all pictures.
+        values: positional arguments of the function.
+        options: keyword arguments of the function.
     """
     content = io.BytesIO()
     settings = {**mpl.rcParamsDefault, **_SETTINGS, "font.family": list(families())}
     with mpl.rc_context(settings):
         figure = make(*values, **options)
         if any(needs_other_font(text.get_text()) for text in figure.findobj(Text)):
-            # Fonts of this kind hold outlines that only Type 3 embeds.
+            # Fonts of this kind contain outlines that only Type 3 embeds.
             mpl.rcParams["pdf.fonttype"] = 3
         figure.savefig(content, format=ending[1:].lower(), metadata=_METADATA[ending.lower()])
     return content.getvalue()
 
 
 def figure_of(drawings: Sequence[Drawing], *, view: View | None = None) -> Figure:
-    """Return the picture as a Matplotlib figure; arguments as for :func:`picture`.
+    """Return a picture as a Matplotlib figure; arguments as for :func:`picture`.
 
-    Every artist that shows a part of the robot carries its name as ``gid``: ``limb 1``, ``couple 1``, ``axis``,
+    Every artist of a part of the robot has the name of the part as ``gid``: ``limb 1``, ``couple 1``, ``axis``,
     ``path``, ``velocity A1``, ``start limb 1``, ``mark x1``, ``joint B1``.
     """
     view = view or clearest_view(*drawings)
@@ -114,7 +114,7 @@ def figure_of(drawings: Sequence[Drawing], *, view: View | None = None) -> Figur
 
 
 class _HeadingLine(NamedTuple):
-    """A line above a panel; its size is in points."""
+    """Line above a panel, with its size in points."""
 
     text: str
     size: float
@@ -123,7 +123,7 @@ class _HeadingLine(NamedTuple):
 
 
 def _heading(drawing: Drawing) -> list[_HeadingLine]:
-    """Return the lines above a panel: the case or the robot, and the result."""
+    """Return the lines above a panel: name of the case or robot, and result."""
     title = drawing.model.name if drawing.case is None else drawing.case.title or drawing.case.name
     lines = [_HeadingLine(title, 12.0, INK, bold=True)]
     if drawing.headline:
@@ -133,7 +133,7 @@ def _heading(drawing: Drawing) -> list[_HeadingLine]:
 
 
 def _write_heading(figure: Figure, left: float, top: float, height: float, drawing: Drawing) -> None:
-    """Write the heading above a panel; the place is in parts of the figure, whose height is in inches."""
+    """Write the heading above a panel, at a position in fractions of the figure, whose height is in inches."""
     top -= 0.3 / height
     for text, size, colour, bold in _heading(drawing):
         lines = textwrap.wrap(legible(text), int(0.98 * _WIDTH * 72 / (0.58 * size)), max_lines=2, placeholder=" …")
@@ -157,7 +157,7 @@ def add_colour_bar(
     largest: float,
     orientation: Literal["vertical", "horizontal"] = "vertical",
 ) -> Colorbar:
-    """Draw the scale of the rates; the place, left, bottom, width and height, is in parts of the figure."""
+    """Draw the colour scale of the rates; left, bottom, width and height are in fractions of the figure."""
     scale = ScalarMappable(Normalize(-largest, largest), rate_colour_map())
     bar = figure.colorbar(scale, cax=figure.add_axes(place), orientation=orientation)
     unit = rate_unit(drawing.motion.twist, drawing.case.units) if drawing.motion and drawing.case else ""
@@ -170,7 +170,7 @@ def add_colour_bar(
 def add_legend(
     figure: Figure, left: float, bottom: float, entries: Sequence[tuple[Artist | Handles, str]], columns: int = 1
 ) -> None:
-    """Write a legend of handles and texts; the place is in parts of the figure."""
+    """Write a legend of handles and texts, at a position in fractions of the figure."""
     if entries:
         figure.legend(
             handles=[handle for handle, _ in entries],

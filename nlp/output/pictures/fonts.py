@@ -1,4 +1,4 @@
-"""Letters that the fonts of this machine have, and words in the place of those that they lack."""
+"""Installed fonts of pictures, and replacement texts for letters that they lack."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from itertools import groupby
 
 from matplotlib.font_manager import fontManager, get_font
 
-#: The font of every picture, which comes with Matplotlib.
+#: Font of all pictures, included in Matplotlib.
 FONT = "DejaVu Sans"
-#: Fonts with Chinese, Japanese or Korean letters; those that are installed stand in where the first one lacks a letter.
+#: Fonts with Chinese, Japanese or Korean letters; installed ones are used for letters that the first font lacks.
 _OTHERS = (
     "Noto Sans CJK JP",
     "Noto Sans CJK SC",
@@ -40,18 +40,18 @@ _OTHERS = (
 
 @cache
 def families() -> tuple[str, ...]:
-    """Return the names of the fonts of pictures, in the order in which a letter is looked for."""
+    """Return the names of the fonts of pictures, in order of preference."""
     installed = {entry.name for entry in fontManager.ttflist}
     return (FONT, *(name for name in _OTHERS if name in installed))
 
 
 def needs_other_font(text: str) -> bool:
-    """Return whether a text has a letter that the first font lacks and another one has."""
+    """Return whether a text has a letter that the first font lacks and another font has."""
     return any(not _has(FONT, letter) and _is_known(letter) for letter in text)
 
 
 def legible(text: str) -> str:
-    """Return a text with letters that no font has replaced by their number and script, such as [3 letters, CJK]."""
+    """Return a text in which letters without a font are replaced by number and script, such as [3 letters, CJK]."""
     parts = []
     for known, run in groupby(text, _is_known):
         letters = list(run)
@@ -60,7 +60,7 @@ def legible(text: str) -> str:
 
 
 def _in_words(letters: list[str]) -> str:
-    """Return letters that cannot be drawn in words."""
+    """Return the replacement text of letters without a font."""
     scripts = dict.fromkeys(unicodedata.name(letter, "unknown").split()[0] for letter in letters)
     kinds = ", ".join(script if script == "CJK" else script.capitalize() for script in scripts)
     return f"[{len(letters)} {'letter' if len(letters) == 1 else 'letters'}, {kinds}]"

@@ -1,4 +1,4 @@
-"""Symbols of joints in pictures: a mark for each kind, filled where an actuator drives it, and strokes for its axes."""
+"""Symbols of joints in pictures: a mark for each kind, filled if actuated, and strokes for the axes."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from ....models import Body, JointKind
 from .canvas import INK, Canvas
 from .drawing import Drawing
 
-#: Half of the length of an axis' stroke, in parts of the robot's size.
+#: Half of the length of the stroke of an axis, as a fraction of the robot's size.
 _STROKE = 0.06
 
 
 class _Look(NamedTuple):
-    """Matplotlib's mark of a kind of joint with its size in points, a mark within it, and whether axes are shown."""
+    """Marks of a kind of joint: Matplotlib symbol and size in points, inner symbol, and whether axes are shown."""
 
     mark: str
     size: float
@@ -37,7 +37,7 @@ _LOOKS = {
 
 
 def paint_joint_symbols(canvas: Canvas, drawing: Drawing) -> None:
-    """Paint the symbol of every joint, the larger ones below those at the same place."""
+    """Paint the symbol of every joint, with larger symbols below smaller ones at the same position."""
     joints = zip(drawing.model.scene.joints, drawing.posture.joints, strict=True)
     for order, (joint, (place, *axes)) in enumerate(sorted(joints, key=lambda each: -_LOOKS[each[0].kind].size)):
         look = _LOOKS[joint.kind]

@@ -1,4 +1,4 @@
-"""Labels of a picture: words at places where they cover neither each other nor the lines, with leader lines."""
+"""Labels of a picture, with leader lines, at positions where they cover neither each other nor lines."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from ....models import FloatArray
 from .fonts import legible
 from .places import Sheet, Word, arrange
 
-#: Room around a word, in pixels.
+#: Room around a label, in pixels.
 _ROOM = 2.0
 
 
 @dataclass(frozen=True, eq=False)
 class Label:
-    """A word beside a place.
+    """Label beside a point.
 
     Attributes:
-        text: the word; never read as mathematics.
-        at: (k, 2) one or more places to choose from, in data coordinates.
-        away: (2,) the preferred direction from the place; zero for none.
-        color: of the letters.
-        size: of the letters, points.
-        bold: whether they are bold.
+        text: text of the label, not interpreted as mathematics.
+        at: (k, 2) one or more points to choose from, in data coordinates.
+        away: (2,) preferred direction from the point; zero for none.
+        color: colour of the text.
+        size: size of the text, points.
+        bold: If true, the text is bold.
         name: ``gid`` of the artist.
-        owner: name of the limb that the word belongs to; empty for none.
-        is_led: whether a leader line joins the word to its place however near they are.
+        owner: name of the limb of the label; empty for none.
+        is_led: If true, the label has a leader line at any distance.
     """
 
     text: str
@@ -49,11 +49,11 @@ class Label:
 
 @dataclass(frozen=True, eq=False)
 class Obstacles:
-    """Straight lines that words should not cover.
+    """Straight lines that labels should not cover.
 
     Attributes:
-        segments: (k, 4) their ends, in data coordinates.
-        owners: (k,) name of the limb that each is part of; empty for none.
+        segments: (k, 4) ends of the lines, in data coordinates.
+        owners: (k,) names of the limbs of the lines; empty for none.
     """
 
     segments: FloatArray
@@ -61,13 +61,13 @@ class Obstacles:
 
 
 def place_labels(axes: Axes, renderer: RendererAgg, labels: Sequence[Label], obstacles: Obstacles) -> list[Text]:
-    """Put words beside their places, one after the other, each where its cost is least.
+    """Place labels beside their points, one after the other, at the positions of least cost.
 
     Args:
-        axes: with its final limits and place.
-        renderer: measures the words.
-        labels: the more important first.
-        obstacles: lines that words should not cover.
+        axes: axes with their final limits and position.
+        renderer: renderer that measures the labels.
+        labels: labels in order of importance.
+        obstacles: lines that labels should not cover.
     """
     texts = [_text_of(axes, label) for label in labels]
     words = [_word_of(axes, label, text, renderer) for label, text in zip(labels, texts, strict=True)]
@@ -81,7 +81,7 @@ def place_labels(axes: Axes, renderer: RendererAgg, labels: Sequence[Label], obs
 
 
 def _sheet_of(axes: Axes, renderer: RendererAgg, obstacles: Obstacles) -> Sheet:
-    """Return the lines of a picture in pixels, with lines of limbs apart from other lines."""
+    """Return the lines of a picture in pixels, with the lines of limbs separated from other lines."""
     ends = axes.transData.transform(obstacles.segments.reshape(-1, 2)).reshape(-1, 4)
     owners = np.array(obstacles.owners, dtype=np.object_)
     is_limb = owners != ""
@@ -97,7 +97,7 @@ def _word_of(axes: Axes, label: Label, text: Text, renderer: RendererAgg) -> Wor
 
 
 def _text_of(axes: Axes, label: Label) -> Text:
-    """Return a word on the axes, not yet at its place."""
+    """Return the text of a label, before its placement."""
     return axes.text(
         float(label.at[0, 0]),
         float(label.at[0, 1]),
@@ -116,7 +116,7 @@ def _text_of(axes: Axes, label: Label) -> Text:
 
 
 def _draw_leader(axes: Axes, line: FloatArray, label: Label) -> None:
-    """Draw a thin line (2, 2) from a place on a limb, where it has a dot, to a word."""
+    """Draw a leader line (2, 2) from a point, with a dot if it is on a limb, to a label."""
     axes.add_line(
         Line2D(
             line[:, 0], line[:, 1], color="white", linewidth=2.6, zorder=98, solid_capstyle="butt", gid="leader edge"

@@ -1,4 +1,4 @@
-"""Arrows of a load and of the forces of actuators that hold it, beside a robot."""
+"""Arrows of a load, and of the actuator forces that balance it."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from ...evidence.state import RobotState, legs_at
 from ...program.nlp import Nlp
 from .posture import Posture
 
-#: Length of the longest arrow of a force, and of a moment, in parts of the robot's size.
+#: Length of the longest arrow of a force, and of a moment, as a fraction of the robot's size.
 _LONGEST, _LONGEST_MOMENT = 0.45, 0.3
-#: Forces below this part of the largest have no arrow.
+#: Size relative to the largest force below which a force has no arrow.
 _NOISE = 1e-6
 
 
 class ForceArrow(NamedTuple):
-    """An arrow of a force, or of a moment along its axis.
+    """Arrow of a force, or of a moment along its axis.
 
     Attributes:
-        kind: force or moment of the load, a leg that pushes or pulls the platform, or an actuator that drives a slide.
-        name: of the load or of the actuator.
-        ends: (2, 3) its start and its head, in the world frame.
-        words: whose force it is, and how large.
+        kind: force or moment of the load, push or pull of a leg on the platform, or force of an actuator on its slide.
+        name: name of the load or of the actuator.
+        ends: (2, 3) start and head of the arrow, in the world frame.
+        words: description of the force, with its magnitude.
     """
 
     kind: Literal["load", "moment", "push", "pull", "drive"]
@@ -39,17 +39,17 @@ class ForceArrow(NamedTuple):
 
     @property
     def is_beside(self) -> bool:
-        """Whether it lies beside a leg or a slide, and not at the load's point."""
+        """True for an arrow beside a leg or a slide; False for an arrow of the load."""
         return self.kind not in ("load", "moment")
 
 
 class DrawnForces(NamedTuple):
-    """Arrows of one load case, and what they mean.
+    """Arrows of one load case, with their legend.
 
     Attributes:
-        arrows: those of forces and moments.
-        words: the loads with arrows, the load case, its largest force and moment, by which arrows have their scale.
-        torques: torques of actuators that turn, and forces without a place, in words; empty without any.
+        arrows: arrows of forces and moments.
+        words: legend with the loads, the load case, and the largest force and moment, which set the scale.
+        torques: torques of rotary actuators and forces without arrows, as text; may be empty.
     """
 
     arrows: tuple[ForceArrow, ...]
@@ -60,15 +60,15 @@ class DrawnForces(NamedTuple):
 def drawn_forces(
     nlp: Nlp, x: FloatArray, state: RobotState, posture: Posture, pose: int, size: float
 ) -> DrawnForces | None:
-    """Return the arrows of a case's first load at a point; None without a load, and at a singular pose.
+    """Return the arrows of the first load of a case at a point; None without a load or at a singular pose.
 
     Args:
-        nlp: the program.
-        x: (n,) the point.
-        state: the robot there.
-        posture: its drawing there.
+        nlp: nonlinear program of the case.
+        x: (n,) point.
+        state: state of the robot at the point.
+        posture: drawing of the robot at the point.
         pose: index of the pose.
-        size: of the robot, length.
+        size: size of the robot, length.
     """
     cases, units, model = nlp.case.loading.cases, nlp.case.units, nlp.program.model
     if not cases or state.is_singular:
@@ -91,7 +91,7 @@ def drawn_forces(
         along = scale * force * line.direction if abs(force) > _NOISE * largest else np.zeros(3)
         if not line.is_leg:
             arrows.append(_arrow("drive", joint.name, line.place, line.place + along, f"actuator {words}"))
-        elif force > 0:  # the arrow of a push ends at the joint on the platform, that of a pull begins there
+        elif force > 0:  # an arrow of a push ends at the platform joint, an arrow of a pull begins there
             arrows.append(_arrow("push", joint.name, line.place - along, line.place, f"leg {words}"))
         else:
             arrows.append(_arrow("pull", joint.name, line.place, line.place + along, f"leg {words}"))
@@ -102,11 +102,11 @@ def drawn_forces(
     )
     more = "" if len(cases) == 1 else f", the first of {len(cases)}"
     scales = [f"longest arrow {largest:.4g} {units.label(Dimension.FORCE)}"] if largest > 0 else []
-    scales += [f"with two heads {turning:.4g} {units.label(Dimension.TORQUE)}"] if turning > 0 else []
+    scales += [f"longest with two heads {turning:.4g} {units.label(Dimension.TORQUE)}"] if turning > 0 else []
     of_scales = f": {', '.join(scales)}" if scales else ""
     whole = f"load {held.name}"
     shown = " and ".join(part.words for part in given if part.force.any() or part.moment.any()) or whole
-    under = "" if shown == whole else f", forces under {whole}"
+    under = "" if shown == whole else f", actuator forces under {whole}"
     words = f"{shown}{under}{more}{of_scales}{_any_words(held)}"
     return DrawnForces(tuple(each for each in arrows if np.ptp(each.ends, axis=0).any()), words, torques)
 
@@ -126,12 +126,16 @@ def _norm(vector: FloatArray) -> float:
 
 
 def _any_words(held: HeldLoad) -> str:
-    """Return what forces of actuators are where a load has any direction."""
-    return ", actuators at their largest" if any(each.smallest != each.largest for each in held.actuators) else ""
+    """Return the note on actuator forces under a load of any direction; empty for other loads."""
+    return (
+        ", largest actuator forces over all directions"
+        if any(each.smallest != each.largest for each in held.actuators)
+        else ""
+    )
 
 
 class _Part(NamedTuple):
-    """A load of a load case in the world frame: its point (3,), force (3,) and moment (3,) about the point."""
+    """Load of a load case in the world frame: point (3,), force (3,) and moment (3,) about the point."""
 
     name: str
     words: str
@@ -151,7 +155,7 @@ def _parts(case: LoadCase, state: RobotState) -> Iterator[_Part]:
 
 
 class _Line(NamedTuple):
-    """The line of an actuator's force: a point (3,) of it, where the arrow is, and its unit direction (3,)."""
+    """Line of action of an actuator's force: point (3,) for the arrow, and unit direction (3,)."""
 
     place: FloatArray
     direction: FloatArray
@@ -159,7 +163,7 @@ class _Line(NamedTuple):
 
 
 def _legs(nlp: Nlp, x: FloatArray, pose: int) -> dict[str, _Line]:
-    """Return the lines of straight legs, with their joints on the platform, by their actuators."""
+    """Return the lines of action of straight legs, with their platform joints, by actuator."""
     base, span = legs_at(nlp, x, pose)
     limbs = [leg.name for leg in nlp.program.model.legs]
     return {
@@ -171,7 +175,7 @@ def _legs(nlp: Nlp, x: FloatArray, pose: int) -> dict[str, _Line]:
 
 
 def _slides(model: Model, posture: Posture) -> dict[str, _Line]:
-    """Return the lines of actuated slides by their actuators, of limbs whose actuators are all such slides."""
+    """Return the lines of action of actuated slides by actuator, for limbs with actuated slides only."""
     found = {}
     for limb in model.limbs:
         joints = [joint for joint in driven_joints(model) if joint.limb == limb]

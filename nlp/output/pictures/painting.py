@@ -1,4 +1,4 @@
-"""Painting of a robot with its task on Matplotlib axes: from the base up, the nearer over the farther."""
+"""Painting of a robot with its task on Matplotlib axes, near lines over far lines."""
 
 from __future__ import annotations
 
@@ -27,52 +27,52 @@ VELOCITY, FREE = "#6d2a8c", "#0b6b57"
 RAIL, PLAIN = "#8a949d", "#7d8a96"
 _FORCE_WIDTHS = {"load": 3.0, "moment": 3.0, "push": 2.4, "pull": 2.4, "drive": 2.4}
 _FORCE_WORDS = {
-    "push": "leg in compression", "pull": "leg in tension", "drive": "force of an actuator on its slide",
+    "push": "leg in compression", "pull": "leg in tension", "drive": "actuator force on a slide",
 }  # fmt: skip
 #: Width of a link with its edges, in points.
 _WIDTHS = {LinkKind.BAR: 7.0, LinkKind.ROD: 4.4}
-#: Length of the longest velocity arrow, of the frames' axes and of a couple's arrow, in parts of the robot's size.
+#: Length of the longest velocity arrow, of frame axes, and of couple arrows, as a fraction of the robot's size.
 _ARROW, _FRAME, _COUPLE = 0.42, 0.24, 0.24
 _JOINT_AXIS = 0.2
-#: Places on a limb, in parts of its length, that its label may point to.
+#: Points on a limb for its label, as fractions of its length.
 _ALONG_LINK = (0.45, 0.3, 0.6, 0.2, 0.72, 0.1, 0.84)
-#: The same for the arrow of a length.
+#: The same for the arrow of a length parameter.
 _ALONG_ARROW = (0.5, 0.35, 0.7)
-#: Radius of an angle's arc, in parts of its first ray.
+#: Radius of the arc of an angle, as a fraction of its first ray.
 _ARC = 0.72
-#: A rate below this part of the largest, a pitch below this part of the robot's size, and a velocity below this part of
-#: the largest that the motion could cause, show as 0.
+#: Fraction below which a value is shown as 0: of the largest rate, of the robot's size for a pitch, and of the largest
+#: possible velocity of the motion.
 _NOISE = 1e-9
 
 
 def rate_colour_map() -> LinearSegmentedColormap:
-    """Return Matplotlib's colour map of rates, from the fastest shortening to the fastest lengthening."""
+    """Return the colour map of rates, from the fastest shortening to the fastest lengthening."""
     return LinearSegmentedColormap.from_list("rates", RATE_COLOURS)
 
 
 def largest_rate(drawing: Drawing) -> float:
-    """Return the largest rate of a drawing; 0 where F is 0, so that the rates are rounding error, without shares."""
+    """Return the largest rate of a drawing; 0 if F is 0, because the rates are then rounding errors."""
     return max((abs(row.rate) for row in drawing.rows if not math.isnan(row.share)), default=0.0)
 
 
 def _end_on(colour: str) -> Line2D:
-    """Return the mark of a legend for an axis that is seen from its end."""
+    """Return the mark of a legend for an axis that is seen end-on."""
     return Line2D([], [], linestyle="none", marker="o", markersize=8, markeredgecolor=colour, markerfacecolor="white")
 
 
 class Panel:
-    """One robot on one pair of axes.
+    """Picture of one robot on Matplotlib axes.
 
     Args:
-        axes: empty.
-        view: the projection.
-        drawing: the robot.
-        largest: rate at the ends of the colour scale; the largest of the robot when left out.
+        axes: empty Matplotlib axes.
+        view: parallel projection.
+        drawing: robot with its task.
+        largest: rate at the ends of the colour scale; by default the largest rate of the robot.
 
     Attributes:
         largest: rate at the ends of the colour scale, positive.
-        legend: a handle and a text for everything that needs an explanation.
-        symbols: the same for the symbols of joints.
+        legend: handles and texts of the legend.
+        symbols: handles and texts of the legend of joint symbols.
     """
 
     def __init__(self, axes: Axes, view: View, drawing: Drawing, largest: float | None = None) -> None:
@@ -85,7 +85,7 @@ class Panel:
         self._scale = Normalize(-self.largest, self.largest)
 
     def paint(self) -> None:
-        """Paint everything but words, and set the limits of the axes."""
+        """Paint everything except labels, and set the limits of the axes."""
         drawing, posture = self.drawing, self.drawing.posture
         if drawing.reference is not None:
             self._paint_start(drawing.reference)
@@ -110,11 +110,11 @@ class Panel:
         self._canvas.fit_limits()
 
     def write(self, renderer: RendererAgg) -> None:
-        """Write the words, once the axes have their final place."""
+        """Write the labels, when the axes have their final position."""
         self._canvas.write_labels(renderer)
 
     def _paint_start(self, start: Posture) -> None:
-        """Paint the posture at the start, thin and grey."""
+        """Paint the posture at the starting point, thin and grey."""
         for first, last, link in self.drawing.links:
             if link.body is not Body.BASE or not np.allclose(start.points, self.drawing.posture.points):
                 ends = start.points[[first, last]]
@@ -124,10 +124,10 @@ class Panel:
         for body, loop in self.drawing.plates:
             if body is Body.PLATFORM:
                 self._canvas.polygon(start.points[list(loop)], facecolor=FAINT, alpha=0.25, zorder=2.5)
-        self.legend.append((Line2D([], [], color=FAINT, linewidth=2), "where the search started"))
+        self.legend.append((Line2D([], [], color=FAINT, linewidth=2), "starting point of the search"))
 
     def _paint_plate(self, body: Body) -> None:
-        """Paint the outline of base or platform, and the circles that joints of that body lie on."""
+        """Paint the outline of base or platform, and the circles through joints of this body."""
         posture, platform = self.drawing.posture, body is Body.PLATFORM
         for kind, loop in self.drawing.plates:
             if kind is body:
@@ -154,7 +154,7 @@ class Panel:
                 )
 
     def _paint_limbs(self) -> None:
-        """Paint limbs with a dark edge and a light side, in the order in which they cover each other."""
+        """Paint limbs with a dark edge and a light side, near ones over far ones."""
         rates = self.drawing.limb_rates()
         points = self.drawing.posture.points
         self._paint_rails()
@@ -167,7 +167,7 @@ class Panel:
             line, link = lines[index]
             limb, colour = link.limb, self._link_colour(link, rates)
             at, wide = 10 + 20 * place / len(lines), _WIDTHS[link.kind]
-            # The line of the limb itself is what no other limb's words may cover.
+            # Only the limb's coloured line is an obstacle for labels of other limbs.
             self._canvas.line(line, f"limb edge {limb}", color=INK, linewidth=wide, zorder=at)
             self._canvas.line(
                 line, f"limb {limb}", color=colour, linewidth=wide - 1.6, zorder=at + 0.1, limb=limb or ""
@@ -176,7 +176,7 @@ class Panel:
                 line, f"limb light {limb}", color="white", alpha=0.35, linewidth=0.2 * wide, zorder=at + 0.2
             )
         for limb in dict.fromkeys(link.limb for _, link in lines if link.limb):
-            # One label a limb, on its longest link.
+            # One label per limb, on its longest link.
             line, link = max(
                 ((line, link) for line, link in lines if link.limb == limb),
                 key=lambda each: float(np.linalg.norm(np.ptp(each[0], axis=0))),
@@ -187,7 +187,7 @@ class Panel:
             self._canvas.label(text, places, self._canvas.outwards(places[0]), bold=True, size=8.5, limb=limb)
 
     def _paint_rails(self) -> None:
-        """Paint rails, and bars of base and platform that are no outline of an area."""
+        """Paint rails, and bars of base and platform that do not form an outline."""
         drawing = self.drawing
         plates = {body for body, _ in drawing.plates}
         for first, last, link in drawing.links:
@@ -198,7 +198,7 @@ class Panel:
                 self._canvas.line(ends, f"bar {link.body.value}", color=MUTED, linewidth=4.5, zorder=9)
 
     def _paint_joints(self) -> None:
-        """Paint the symbol of every joint; in a drawing without them, a circle at every point that ends a line."""
+        """Paint the symbol of every joint; without joint symbols, a circle at every end of a line."""
         if self.drawing.model.scene.joints:
             paint_joint_symbols(self._canvas, self.drawing)
             self.symbols = symbol_legend(self.drawing)
@@ -227,7 +227,7 @@ class Panel:
                 self._canvas.label(letter, end, self._canvas.view.project(axis), MUTED, 8.5)
 
     def _paint_motion(self, motion: Motion, *, free: bool) -> None:
-        """Paint a twist's axis in bold with the path that shows its pitch; a free motion dashed and without a path."""
+        """Paint the axis of a twist in bold with a helix of its pitch; a free motion dashed and without a helix."""
         colour, width = (FREE, 2.0) if free else (INK, 3.6)
         name = "free axis" if free else "axis"
         is_point = self._canvas.is_end_on(*motion.line)
@@ -240,15 +240,15 @@ class Panel:
             self._canvas.line(motion.path[:-2], "path", color=VELOCITY, linewidth=2.0, zorder=9)
             self._canvas.arrow(motion.path[-3], motion.path[-1], "path head", VELOCITY, 2.0, 9)
         if free:
-            if not any(text.startswith("motion that") for _, text in self.legend):
+            if not any(text.startswith("free motion") for _, text in self.legend):
                 handle = _end_on(FREE) if is_point else Line2D([], [], color=FREE, linewidth=2, linestyle=(0, (3, 2)))
-                self.legend.append((handle, "motion that nothing resists"))
+                self.legend.append((handle, "free motion with all actuators locked"))
             return
         handle = _end_on(INK) if is_point else Line2D([], [], color=INK, linewidth=3.6)
         self.legend.append((handle, f"task: {self._words(motion)}"))
 
     def _words(self, motion: Motion) -> str:
-        """Return the legend's text of the task."""
+        """Return the text of the task in the legend."""
         unit = self.drawing.case.units.length if self.drawing.case else ""
         if math.isinf(motion.pitch):
             return f"{motion.name} (translation)"
@@ -260,7 +260,7 @@ class Panel:
     def _paint_couples(self) -> None:
         """Paint couples as arrows with two heads, at the points that join their limbs to the platform.
 
-        Of several couples of one limb only their plane has a meaning: they have no arrows.
+        Several couples of one limb have no arrows: only their plane is defined.
         """
         couples = [row.limb for row in self.drawing.rows if row.kind is WrenchKind.COUPLE]
         for row, wrench, values in zip(
@@ -277,18 +277,18 @@ class Panel:
             self._canvas.label(text, end, self._canvas.outwards(end), bold=True, size=8.5, is_led=True)
             if not any(text.startswith("couple") for _, text in self.legend):
                 handle = Line2D([], [], color=MUTED, linewidth=2.6, marker=">")
-                self.legend.append((handle, "couple that a limb applies (two heads)"))
+                self.legend.append((handle, "couple of a limb (two heads)"))
 
     @property
     def _most(self) -> float:
-        """The fastest velocity that a part of the robot could have in the motion; 0 without one."""
+        """Upper bound on the velocity of a part of the robot in the task's motion; 0 without a motion."""
         motion = self.drawing.motion
         if motion is None:
             return 0.0
         return float(np.linalg.norm(motion.twist[:3])) * self.drawing.size + float(np.linalg.norm(motion.twist[3:]))
 
     def _paint_velocities(self) -> None:
-        """Paint the velocities of the platform's corners, the fastest with a fixed length."""
+        """Paint the velocities of the platform's corners, with a fixed length of the largest."""
         velocities = self.drawing.velocities_at(self.drawing.posture)
         fastest = float(np.max(np.linalg.norm(velocities, axis=1), initial=0.0))
         if fastest <= _NOISE * self._most:
@@ -303,7 +303,7 @@ class Panel:
         self.legend.append((handle, words))
 
     def _paint_forces(self, forces: DrawnForces) -> None:
-        """Paint a load and the forces that hold it: pushes and pulls of legs differ in colour, and pulls are open."""
+        """Paint a load and the actuator forces that balance it, with different colours for compression and tension."""
         for arrow in forces.arrows:
             start, end = arrow.ends + self._beside(arrow)
             name = f"{arrow.kind} {arrow.name}"
@@ -317,10 +317,10 @@ class Panel:
                 line = Line2D([], [], color=FORCE_COLOURS[kind], linewidth=_FORCE_WIDTHS[kind], marker=mark)
                 self.legend.append((line, words))
         if forces.torques:
-            self.legend.append((Line2D([], [], linestyle="none"), f"held by {forces.torques}"))
+            self.legend.append((Line2D([], [], linestyle="none"), f"without arrows: {forces.torques}"))
 
     def _beside(self, arrow: ForceArrow) -> FloatArray:
-        """Return by how much (3,) an arrow lies beside its leg or slide on paper, away from the middle."""
+        """Return the offset (3,) of an arrow from its leg or slide, outwards in the picture."""
         if not arrow.is_beside:
             return np.zeros(3)
         right, up, _ = self._canvas.view.axes
@@ -330,7 +330,7 @@ class Panel:
         return np.asarray(BESIDE * self.drawing.size * (across[0] * right + across[1] * up))
 
     def _paint_directions(self) -> None:
-        """Paint named directions, such as joints' axes."""
+        """Paint named directions, such as joint axes."""
         for item, (origin, vector) in zip(
             self.drawing.model.scene.directions, self.drawing.posture.directions, strict=True
         ):
@@ -354,7 +354,7 @@ class Panel:
                 self._paint_angle(name, mark.parameter, points, colour)
 
     def _paint_angle(self, name: str, parameter: str, points: FloatArray, colour: str) -> None:
-        """Paint the arc of an angle given by its vertex, start and end, (3, 3)."""
+        """Paint the arc of an angle with given vertex, start and end (3, 3)."""
         vertex, start, end = points
         for ray in (start, end):
             self._canvas.line(np.array([vertex, ray]), f"{name} ray", color=colour, linewidth=1.0, zorder=54)
@@ -372,29 +372,29 @@ class Panel:
         return red, green, blue, alpha
 
     def _link_colour(self, link: Link, rates: Mapping[str, float]) -> Colour:
-        """Return the colour of a link: of its own rate, or else of its limb's."""
+        """Return the colour of a link, from the rate of the link or of its limb."""
         if link.limb is None or link.limb not in rates:
             return PLAIN
-        own = self._own_rate(link)
+        own = self._link_rate(link)
         return self._colour(rates[link.limb] if own is None else own)
 
-    def _own_rate(self, link: Link) -> float | None:
-        """Return the rate of the row that a link carries alone; None for a link that carries others too."""
+    def _link_rate(self, link: Link) -> float | None:
+        """Return the rate of the only row of a link; None for a link with several rows."""
         row = self.drawing.link_row(link)
         return None if row is None else self.drawing.rows[row].rate
 
     def _rates_text(self, limb: str) -> str:
-        """Return the rates of a limb's rods side by side, with their unit; empty for a limb without such rods."""
-        unit, rows = self._rate_unit(), self.drawing.own_rows(limb)
+        """Return the rates of a limb's rods as text with the unit; empty for a limb without rods."""
+        unit, rows = self._rate_unit(), self.drawing.link_rows(limb)
         texts = [f"{row.member}: {self._rate_text(row.rate).removesuffix(unit).strip()}" for row in rows]
         return " and ".join(texts) + f" {unit}".rstrip() if texts else ""
 
     def _rate_text(self, rate: float) -> str:
-        """Return a rate with its sign and unit; rounding error beside the largest rate is 0."""
+        """Return a rate with sign and unit; rounding errors relative to the largest rate are 0."""
         text = "0" if abs(rate) <= _NOISE * max(self.largest, _NOISE * self._most) else rate_text(rate)
         return f"{text} {self._rate_unit()}".strip()
 
     def _rate_unit(self) -> str:
-        """Return the unit of rates and velocities; an empty one without a task or a case."""
+        """Return the unit of rates and velocities; empty without a task or a case."""
         motion, case = self.drawing.motion, self.drawing.case
         return rate_unit(motion.twist, case.units) if motion is not None and case is not None else ""

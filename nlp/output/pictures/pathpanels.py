@@ -1,4 +1,4 @@
-"""Content of pictures of a path: curves of numbers along it, limits, faults and margins, in the units of the case."""
+"""Content of charts along a tool path: curves, limits, violations and margins, in the units of the case."""
 
 from __future__ import annotations
 
@@ -12,44 +12,45 @@ import numpy as np
 from ....models import Dimension, FloatArray
 from ....models.statics import driven_joints
 from ...case.forces import dimension_of_speed
-from ...case.motors import MotorNumber
+from ...case.motors import ActuatorQuantity
 from ...case.task import Sense
-from ...path.sampling import Way, WayKind, way_of
+from ...path.sampling import Progress, ProgressKind, progress_of
 from ...proof.workspace.judgement import Judgement
 from ...proof.workspace.path_samples import PathSamples, SampledNumber, motor_numbers
 from ...proof.workspace.verdict import Outcome
 from ...results.path import PathResult, PathVerdictData
+from ...words.claims import CLAIM_WORDS
 from ...words.numbers import number
 from ...words.path import checked_claims
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Sentence that says what a picture is worth.
-SAMPLED = "Sampled for the picture; the verdicts are proved."
-#: Colours of actuators: distinct with any colour blindness.
+#: Sentence on the evidence of curves.
+SAMPLED = "The curves are sampled; the verdicts are proved."
+#: Colours of actuators, distinct with any colour blindness.
 ACTUATOR_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8a6d00", "#56b4e9")
-#: Colours of limits, where one of them is the nearest.
+#: Colours of the nearest limits.
 LIMIT_COLOURS = ("#08519c", "#e08a3c", "#0b6b57", "#a3559e", "#8a5a00", "#5aa0d8", "#68747f", "#3b3b8f")
-#: Most load cases that have panels.
+#: Largest number of load cases with panels.
 _LOADS = 4
-#: Most lines that are named together.
+#: Largest number of lines in one label.
 _LINES = 6
-#: Sizes of forces and speeds beyond which a curve has a gap, as near singular poses, which would hide all others: in
-#: parts of the size that most of them do not pass, and of the largest limit.
+#: Factors on the typical size and on the largest limit above which curves of forces and speeds have gaps: near singular
+#: poses they would hide all other values.
 _MOST, _BEYOND, _PAST = 95, 10.0, 3.0
-#: Smallest margin of a curve, percent.
+#: Smallest drawn margin, percent.
 _LEAST_MARGIN = -100.0
 
 
 class PathCurve(NamedTuple):
-    """A number at P points.
+    """Curve of a quantity at P points of a path.
 
     Attributes:
-        name: of the actuator.
-        place: index of the actuator, which chooses the colour.
-        values: (P,) in the case's unit; NaN where there is none.
-        is_other: whether it is the smallest of two values, the largest of which is another curve.
+        name: name of the actuator.
+        place: index of the actuator, which selects the colour.
+        values: (P,) values in the case's unit; NaN for missing ones.
+        is_other: True for the smaller of two values; another curve has the larger one.
     """
 
     name: str
@@ -59,14 +60,14 @@ class PathCurve(NamedTuple):
 
 
 class PathPanel(NamedTuple):
-    """Curves over the way along a path.
+    """Chart of curves over the position along a path.
 
     Attributes:
-        title: a few words.
-        unit: of the curves; empty for plain numbers.
-        curves: at least one.
-        limits: of the case, in this unit.
-        is_cut: whether values that would hide all others are left out.
+        title: short title.
+        unit: unit of the curves; empty for dimensionless values.
+        curves: curves of the chart, at least one.
+        limits: limits of the case, in this unit.
+        is_cut: True if very large values are omitted.
     """
 
     title: str
@@ -82,13 +83,13 @@ class PathPanel(NamedTuple):
 
 
 class PathMark(NamedTuple):
-    """A place at which a claim is known to be violated, the first of its claim.
+    """First known violation of a limit or rank along a path.
 
     Attributes:
-        at: way to it.
-        line: of the file.
-        place: index of its segment, and parameter.
-        names: of the claims.
+        at: position along the path.
+        line: line of the path file.
+        place: index of the segment, and parameter in the segment.
+        names: names of the violated claims.
     """
 
     at: float
@@ -98,7 +99,7 @@ class PathMark(NamedTuple):
 
 
 class PathBand(NamedTuple):
-    """Segments that follow each other and are not proved: from and to where, and whether they are known to fail."""
+    """Consecutive segments that are not proved: start, end, and whether a violation is known."""
 
     start: float
     end: float
@@ -107,25 +108,25 @@ class PathBand(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PathPicture:
-    """Content of a picture of a path.
+    """Content of the charts of a path.
 
     Attributes:
-        judged: the verdicts.
-        samples: the machine at points of the path.
-        result: the verdicts as people read them.
-        way: how far the path has come.
-        at: (P,) the way to the points.
-        label: of the way, with its unit.
-        panels: the curves.
-        margins: (P,) the smallest margin, percent; empty without limits.
-        marks: places of faults.
+        judged: judgement of the path.
+        samples: robot at points of the path.
+        result: verdicts along the path.
+        way: time or length along the path.
+        at: (P,) positions of the points along the path.
+        label: label of the position, with its unit.
+        panels: charts of curves.
+        margins: (P,) smallest margins, percent; empty without limits.
+        marks: first violations.
         bands: segments that are not proved.
     """
 
     judged: Judgement
     samples: PathSamples
     result: PathResult
-    way: Way
+    way: Progress
     at: FloatArray
     label: str
     panels: tuple[PathPanel, ...]
@@ -135,19 +136,19 @@ class PathPicture:
 
     @property
     def drawn_margins(self) -> FloatArray:
-        """The smallest margins (P,), percent, as curves show them: near singular poses they would hide all others."""
+        """Smallest margins (P,), percent, cut off below: near singular poses they would hide all other values."""
         return np.maximum(self.margins, _LEAST_MARGIN)
 
     @property
     def limits(self) -> list[tuple[int, str]]:
-        """Indices and words of the limits that are the nearest somewhere."""
+        """Indices and descriptions of the limits that are nearest at some point."""
         shown = sorted({*self.samples.nearest.tolist()} - {-1})
         units, numbers = self.judged.case.units, {each.claim.key: each for each in self.samples.numbers}
         found = []
         for k, key in ((k, self.samples.keys[k]) for k in shown):
             dimension = numbers[key].claim.reading.dimension
             value = number(units.shown(numbers[key].limit or 0.0, dimension))
-            # A relation is a difference that is compared with 0.
+            # A custom relation is a difference that is compared with 0.
             found.append(
                 (k, key if key.startswith("custom[") else f"{key} = {value} {units.label(dimension)}".rstrip())
             )
@@ -155,40 +156,39 @@ class PathPicture:
 
     @property
     def notes(self) -> list[str]:
-        """Sentences about what is shown."""
+        """Notes on the charts."""
         notes = [SAMPLED]
         if self.margins.size:
             notes.append(
-                "The margin is the distance from the nearest limit, in parts of the distance between a number's two "
-                "limits, or of its only limit; it is below 0 beyond a limit."
+                "The margin is the distance from the nearest limit, relative to the range between two limits of a "
+                "quantity, or to its only limit. A negative margin is a violation."
             )
             if (self.margins < _LEAST_MARGIN).any():
-                notes.append(f"Margins are drawn down to {_LEAST_MARGIN:g} %.")
+                notes.append(f"Margins below {_LEAST_MARGIN:g} % are not shown.")
         if any(each.is_refuted for each in self.bands):
-            notes.append("Red: segments that are known to violate a claim; a vertical line is the first fault of one.")
+            notes.append("Red: segments with a known violation. Vertical lines: first violation of each limit or rank.")
         if any(not each.is_refuted for each in self.bands):
-            notes.append(
-                "Grey: segments in which joints are not known somewhere, or which open claims name among others."
-            )
-        unplaced = [each.name for each in checked_claims(self.result) if _is_open(each) and each.segment is None]
+            notes.append("Grey: undecided segments, or segments with unknown joint coordinates.")
+        claims = checked_claims(self.result)
+        unplaced = [CLAIM_WORDS.get(each.name, each.name) for each in claims if _is_open(each) and each.segment is None]
         if unplaced:
-            notes.append(f"Open, with no place known: {', '.join(unplaced)}.")
+            notes.append(f"Undecided without a known segment: {', '.join(unplaced)}.")
         if self.judged.case.joint_centre_tolerance:
-            notes.append("The curves are those of the design itself, without its tolerance.")
+            notes.append("The curves are for the nominal design, without the tolerance.")
         if any(each.is_cut for each in self.panels):
-            notes.append("Curves have gaps where forces or speeds are more than ten times as large as elsewhere.")
+            notes.append("Curves have gaps where forces or speeds are more than ten times their usual size.")
         if self.samples.left_out:
-            notes.append(f"Not drawn: {', '.join(self.samples.left_out)}.")
+            notes.append(f"Not shown: {', '.join(self.samples.left_out)}.")
         more = len(self.judged.case.loading.cases) - _LOADS
         if more > 0:
-            notes.append(f"Forces under {more} further loads are not drawn.")
+            notes.append(f"Forces under {more} further loads are not shown.")
         return notes
 
 
 def path_picture(judged: Judgement, samples: PathSamples, result: PathResult) -> PathPicture:
-    """Return the content of a picture of a judged path."""
-    way = way_of(judged.path)
-    units = {WayKind.TIME: ", s", WayKind.LENGTH: f", {judged.case.units.length}", WayKind.SEGMENTS: ""}
+    """Return the content of the charts of a judged path."""
+    way = progress_of(judged.path)
+    units = {ProgressKind.TIME: ", s", ProgressKind.LENGTH: f", {judged.case.units.length}", ProgressKind.SEGMENTS: ""}
     panels = (*_coordinates(judged, samples), *_speeds(judged, samples), *_forces(judged, samples))
     least = 100 * samples.least if len(samples.keys) else np.zeros(0)
     return PathPicture(
@@ -206,7 +206,7 @@ def path_picture(judged: Judgement, samples: PathSamples, result: PathResult) ->
 
 
 def _coordinates(judged: Judgement, samples: PathSamples) -> Iterator[PathPanel]:
-    """Yield the coordinates of the actuators, those of a kind in a panel."""
+    """Yield charts of the actuator coordinates, one for each kind of actuator."""
     joints = samples.joints
     if joints is None:
         return
@@ -223,8 +223,8 @@ def _coordinates(judged: Judgement, samples: PathSamples) -> Iterator[PathPanel]
 
 
 def _speeds(judged: Judgement, samples: PathSamples) -> Iterator[PathPanel]:
-    """Yield the speeds along a path whose segments have times, or else the largest ones of the case's motions."""
-    units, every = judged.case.units, motor_numbers(samples.numbers, MotorNumber.SPEED).get("", [])
+    """Yield charts of actuator speeds: along a timed path, or otherwise the largest speeds in the case's motions."""
+    units, every = judged.case.units, motor_numbers(samples.numbers, ActuatorQuantity.SPEED).get("", [])
     limited = {each.claim.motor.actuator: each.limit for each in every if each.claim.motor and each.limit is not None}
     timed = [(k, each) for k, each in enumerate(driven_joints(judged.case.model)) if k < samples.speeds.shape[1]]
     if np.isfinite(samples.speeds).any():
@@ -240,19 +240,19 @@ def _speeds(judged: Judgement, samples: PathSamples) -> Iterator[PathPanel]:
 
 
 def _forces(judged: Judgement, samples: PathSamples) -> Iterator[PathPanel]:
-    """Yield the forces of the actuators under each load."""
-    found = motor_numbers(samples.numbers, MotorNumber.FORCE)
+    """Yield charts of the actuator forces under each load."""
+    found = motor_numbers(samples.numbers, ActuatorQuantity.FORCE)
     for load, every in list(found.items())[:_LOADS]:
         yield from _of_motors(judged, every, f"forces, load {load}")
 
 
 def _of_motors(judged: Judgement, every: Sequence[SampledNumber], title: str) -> Iterator[PathPanel]:
-    """Yield panels of numbers of actuators, those of one unit in each."""
+    """Yield charts of a quantity of the actuators, one for each unit."""
     units = judged.case.units
     for dimension in dict.fromkeys(each.claim.reading.dimension for each in every):
         own, factor = [each for each in every if each.claim.reading.dimension is dimension], units.shown(1.0, dimension)
         curves, shown = [], dict[int, FloatArray]()
-        # Largest values come first: a smallest one that is the same, as under a load with one direction, is left out.
+        # Largest values come first; an equal smallest value, as under a load with one direction, is omitted.
         for each in sorted(own, key=lambda each: each.claim.sense is Sense.MIN):
             motor = each.claim.motor
             if motor is None or (motor.place in shown and np.allclose(shown[motor.place], each.values, equal_nan=True)):
@@ -265,7 +265,7 @@ def _of_motors(judged: Judgement, every: Sequence[SampledNumber], title: str) ->
 
 
 def _without_peaks(panel: PathPanel) -> PathPanel:
-    """Return a panel whose curves have gaps where they are far larger than elsewhere."""
+    """Return a chart whose curves have gaps at values far above the typical ones."""
     sizes = np.abs(np.concatenate([each.values for each in panel.curves]))
     sizes = sizes[np.isfinite(sizes)]
     if not sizes.size:
@@ -277,8 +277,8 @@ def _without_peaks(panel: PathPanel) -> PathPanel:
     return panel._replace(curves=tuple(kept), is_cut=True)
 
 
-def _marks(result: PathResult, way: Way) -> Iterator[PathMark]:
-    """Yield the places of faults, in the order of the path."""
+def _marks(result: PathResult, way: Progress) -> Iterator[PathMark]:
+    """Yield the first violations, in the order of the path."""
     faults = [(each.fault, each.name) for each in checked_claims(result) if each.fault is not None]
     ordered = sorted(faults, key=lambda each: (each[0].segment, each[0].parameter))
     for place, group in groupby(ordered, key=lambda each: (each[0].segment, each[0].parameter)):
@@ -288,8 +288,8 @@ def _marks(result: PathResult, way: Way) -> Iterator[PathMark]:
         yield PathMark(at, own[0][0].line, place, tuple(name for _, name in own))
 
 
-def _bands(samples: PathSamples, result: PathResult, way: Way) -> Iterator[PathBand]:
-    """Yield the segments that are not proved, as far as it is known which these are."""
+def _bands(samples: PathSamples, result: PathResult, way: Progress) -> Iterator[PathBand]:
+    """Yield the known segments without a proof."""
     state = np.zeros(len(way.knots) - 1, dtype=int)
     state[samples.points.segments[samples.is_apart]] = 1
     for each in checked_claims(result):
@@ -308,23 +308,23 @@ def _is_open(claim: PathVerdictData) -> bool:
 
 
 def marks_text(marks: Sequence[PathMark]) -> str:
-    """Return the lines of faults that stand together, such as ``lines 4, 5``."""
+    """Return the lines of violations in one label, such as ``lines 4, 5``."""
     lines = list(dict.fromkeys(each.line for each in marks))
     more = [f"and {len(lines) - _LINES} more"] if len(lines) > _LINES else []
     return f"line{'s' * (len(lines) > 1)} {', '.join([*map(str, lines[:_LINES]), *more])}"
 
 
 def actuator_names(picture: PathPicture) -> dict[int, str]:
-    """Return the names of the actuators that have curves, by their places."""
+    """Return the names of the actuators with curves, by index."""
     return {each.place: each.name for panel in picture.panels for each in panel.curves}
 
 
 def percent(margin: float) -> str:
-    """Return a margin as people read it."""
+    """Return the text of a margin in percent."""
     return f"{number(margin, 100.0, digits=3)} %"
 
 
 def nearest_parts(nearest: NDArray[np.intp], key: int, values: FloatArray) -> FloatArray:
-    """Return values (P,) where a limit is the nearest, and at the next point, so that lines have no gaps; else NaN."""
+    """Return values (P,) where a limit is nearest, and at the next point to avoid gaps; NaN elsewhere."""
     own = nearest == key
     return np.where(own | np.concatenate([[False], own[:-1]]), values, np.nan)

@@ -1,4 +1,4 @@
-"""Pictures of a path: coordinates, speeds and forces of actuators along it, and the smallest margin of all limits."""
+"""Charts along a tool path: actuator coordinates, speeds and forces, and the smallest margin of all limits."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from .pathpanels import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: Width, height of a panel, and height of the words above and below, inches.
+#: Width, height of a panel, and heights of the texts above and below, inches.
 _WIDTH, _PANEL, _WORDS = 8.0, 1.75, 1.7
-#: Part of the width within which the words of faults would meet.
+#: Distance, as a fraction of the width, below which labels of violations would overlap.
 _NEAR = 0.06
 _BANDS: dict[bool, dict[str, Any]] = {
     True: {"facecolor": "#f3b8ac", "alpha": 0.55},
@@ -39,11 +39,11 @@ _BANDS: dict[bool, dict[str, Any]] = {
 
 
 def path_figure(picture: PathPicture) -> Figure:
-    """Return curves along a path as a Matplotlib figure, in panels below each other.
+    """Return charts along a path as a Matplotlib figure, below each other.
 
-    Artists carry as ``gid``: ``TITLE ACTUATOR`` each curve, with ``smallest`` before it for the smaller of two;
-    ``limit`` a limit; ``margin KEY`` the smallest margin where this limit is the nearest; ``fault LINE`` a fault;
-    ``refuted`` and ``open`` segments that are not proved.
+    The ``gid`` of artists: ``TITLE ACTUATOR`` for a curve, with the prefix ``smallest`` for the smaller of two values;
+    ``limit`` for a limit; ``margin KEY`` for the smallest margin where this limit is nearest; ``fault LINE`` for a
+    violation; ``refuted`` and ``open`` for segments that are not proved.
     """
     count = len(picture.panels) + bool(picture.margins.size)
     notes = [line for each in picture.notes for line in textwrap.wrap(legible(each), 118)]
@@ -71,7 +71,7 @@ def path_figure(picture: PathPicture) -> Figure:
 
 
 def _paint(axes: Axes, picture: PathPicture, panel: PathPanel) -> None:
-    """Draw the curves of a panel, and its limits."""
+    """Draw the curves and limits of a panel."""
     for curve in panel.curves:
         axes.plot(
             picture.at,
@@ -87,7 +87,7 @@ def _paint(axes: Axes, picture: PathPicture, panel: PathPanel) -> None:
 
 
 def _paint_margins(axes: Axes, picture: PathPicture) -> None:
-    """Draw the smallest margin, each piece in the colour of the nearest limit, with a legend of these."""
+    """Draw the smallest margin in the colours of the nearest limits, with a legend."""
     for k, words in picture.limits:
         axes.plot(
             picture.at,
@@ -107,7 +107,7 @@ def _paint_margins(axes: Axes, picture: PathPicture) -> None:
 
 
 def _mark(axes: Axes, picture: PathPicture) -> None:
-    """Shade segments that are not proved, and draw a line at each fault."""
+    """Shade segments that are not proved, and draw a line at each violation."""
     for band in picture.bands:
         axes.axvspan(
             band.start, band.end, linewidth=0, zorder=0, gid="refuted" if band.is_refuted else "open",
@@ -118,7 +118,7 @@ def _mark(axes: Axes, picture: PathPicture) -> None:
 
 
 def _name_faults(axes: Axes, picture: PathPicture) -> None:
-    """Write the lines of faults above the first panel; faults near each other have words together."""
+    """Write the lines of violations above the first panel; neighbouring violations share a label."""
     width = float(picture.way.knots[-1]) or 1.0
     groups: list[list[PathMark]] = []
     for mark in picture.marks:
@@ -134,13 +134,13 @@ def _name_faults(axes: Axes, picture: PathPicture) -> None:
 
 
 def _add_legend(figure: Figure, picture: PathPicture, notes: Sequence[str]) -> None:
-    """Write notes, and the names of curves, below the panels."""
+    """Write notes and the legend below the panels."""
     handles: list[Line2D] = []
     for place, name in actuator_names(picture).items():
         colour = ACTUATOR_COLOURS[place % len(ACTUATOR_COLOURS)]
         handles.append(Line2D([], [], color=colour, linewidth=1.6, label=legible(f"actuator {name}")))
     if any(each.is_other for panel in picture.panels for each in panel.curves):
-        handles.append(Line2D([], [], color=MUTED, linestyle="--", label="the smaller of two values"))
+        handles.append(Line2D([], [], color=MUTED, linestyle="--", label="smaller of two values"))
     if any(panel.limits for panel in picture.panels) or picture.margins.size:
         handles.append(Line2D([], [], color=RED, linewidth=1.0, label="limit"))
     legend = figure.legend(
@@ -159,6 +159,6 @@ def _add_legend(figure: Figure, picture: PathPicture, notes: Sequence[str]) -> N
 
 
 def _columns(handles: Sequence[Line2D]) -> int:
-    """Return the number of columns of a legend, in at most two rows where its words are short."""
+    """Return the number of columns of a legend, with at most two rows for short texts."""
     longest = max((len(str(each.get_label())) for each in handles), default=0)
     return max(1, min(len(handles), int(120 / (longest + 5))))

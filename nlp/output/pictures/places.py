@@ -1,7 +1,7 @@
-"""Placement of words in a picture: candidate places, costs, and the choice of the cheapest place.
+"""Placement of labels in a picture: candidate positions, costs, and selection of the cheapest position.
 
 All values are in pixels, without Matplotlib. Candidates are sorted by a lower bound of their cost, from distance and
-direction. The costs of lines and other words are computed for many candidates at once. The search ends at the first
+direction. The costs of lines and other labels are computed for many candidates at once. The search ends at the first
 candidate with a lower bound above the smallest cost.
 """
 
@@ -20,47 +20,47 @@ from .segments import BoolArray, distances_to_segments, segments_cross, segments
 
 IndexArray = npt.NDArray[np.intp]
 
-#: Distances, in points, and directions of the places that are tried for a word.
+#: Distances, in points, and directions of the candidate positions of a label.
 _DISTANCES = (7.0, 12.0, 18.0, 26.0, 36.0)
 _DIRECTIONS = np.array([[math.cos(2 * math.pi * k / 16), math.sin(2 * math.pi * k / 16)] for k in range(16)])
-#: Further distances for a word with a leader line, which may stand outside of the robot.
+#: Further distances for a label with a leader line, which may be outside of the robot.
 _LED_DISTANCES = (48.0, 64.0, 84.0, 108.0, 136.0, 168.0, 204.0)
 #: Half of the width of a limb, in points.
 _HALF_LIMB = 4.0
-#: Costs of covering another word, of covering a line that is kept free, and of a point of distance.
+#: Costs of covering another label, of covering a line, and of one point of distance.
 _OVERLAP, _COVERED, _FAR = 50.0, 12.0, 0.12
-#: A word on a limb that is not its own is wrong, and a leader line across one misleads.
+#: Costs of a label on another limb, which is wrong, and of a leader line across another limb, which misleads.
 _ON_OTHER_LIMB, _LEADER_CROSSES = 400.0, 14.0
-#: A leader line that ends where another limb is too, or passes the dot of another one, might mean that one.
+#: Cost of an ambiguous leader line, which ends where another limb is too, or passes the dot of another leader line.
 _AMBIGUOUS = 30.0
-#: A leader line that passes a joint, so near in points, seems to name it.
+#: Distance, in points, at which a leader line that passes a joint seems to name the joint, and its cost.
 _PASSES_JOINT, _NEAR_JOINT = 10.0, 6.0
-#: A word beyond the axes is cut off, which is worse than an overlap.
+#: Cost of a label beyond the axes, which is cut off: higher than that of an overlap.
 _OUTSIDE = 600.0
-#: A leader line should run along no other line: cost of each that is beside it, and the parts of its way looked at.
+#: Cost of each other line along a leader line, and the fractions of its length that are examined.
 _LEADER_ALONG, _LEADER_PARTS = 2.0, np.array([[0.4], [0.6], [0.8], [1.0]])
-#: A leader line is drawn where the word is farther from its place than this, in points.
+#: Distance of a label from its point, in points, above which a leader line is drawn.
 _LED = 4.0
-#: So far from its place, in points, every word has a leader line.
+#: Distance, in points, above which every label has a leader line.
 _ASTRAY = 15.0
-#: Words whose cost is as large are placed again when all others stand, so often.
+#: Cost above which labels are placed again after all others, and the number of repetitions.
 _CROWDED, _ROUNDS = 10.0, 4
-#: Number of candidates in one computation. Fewer need more calls of NumPy; with more, most costs are not needed.
+#: Number of candidates in one computation: fewer need more calls of NumPy, more compute unnecessary costs.
 _AT_ONCE = 160
-#: Directions in which left, bottom, right and top of a box move where the box grows.
+#: Signs of the movement of left, bottom, right and top of a growing box.
 _OUTWARDS = np.array([-1.0, -1.0, 1.0, 1.0])
 
 
 @dataclass(frozen=True, eq=False)
 class Word:
-    """A word before its placement.
+    """Label before its placement.
 
     Attributes:
-        half: (2,) half of the size of the word's box.
-        places: (k, 2) one or more points on the robot; the word names one of them.
-        away: (2,) preferred direction from the point to the word; zero for none.
-        owner: name of the limb that the word belongs to; empty for none.
-        is_led: whether a leader line joins word and point at any distance.
+        half: (2,) half of the size of the label's box.
+        places: (k, 2) one or more points on the robot, one of which gets the label.
+        away: (2,) preferred direction from the point to the label; zero for none.
+        owner: name of the limb of the label; empty for none.
+        is_led: If true, the label has a leader line at any distance.
     """
 
     half: FloatArray
@@ -72,11 +72,11 @@ class Word:
 
 @dataclass(frozen=True, eq=False)
 class Sheet:
-    """Lines of a picture without words.
+    """Lines of a picture without labels.
 
     Attributes:
         limbs: (k, 4) ends of the lines of limbs.
-        owners: (k,) name of the limb that each line is part of.
+        owners: (k,) names of the limbs of these lines.
         lines: (m, 4) ends of all other lines.
         frame: (4,) left, bottom, right and top of the axes.
         per_point: number of pixels in a point, 1/72 inch.
@@ -90,10 +90,10 @@ class Sheet:
 
 
 class Placed(NamedTuple):
-    """A word after its placement.
+    """Label after its placement.
 
     Attributes:
-        middle: (2,) middle of the word's box.
+        middle: (2,) centre of the label's box.
         half: (2,) half of the size of the box.
         leader: (4,) ends of the leader line, from the point on the robot; None without a leader line.
         cost: cost of the place.
@@ -106,10 +106,10 @@ class Placed(NamedTuple):
 
 
 class _Taken(NamedTuple):
-    """Area of the picture that words cover.
+    """Area of the picture that is covered by labels.
 
     Attributes:
-        boxes: (k, 4) left, bottom, right and top of each word's box.
+        boxes: (k, 4) left, bottom, right and top of the labels' boxes.
         leaders: (m, 4) ends of leader lines.
     """
 
@@ -118,18 +118,18 @@ class _Taken(NamedTuple):
 
 
 def arrange(words: Sequence[Word], sheet: Sheet) -> list[Placed]:
-    """Return words at the cheapest places, one word after the other.
+    """Return labels at the cheapest positions, one label after the other.
 
     Args:
-        words: words, the more important first.
-        sheet: lines that words should not cover.
+        words: labels in order of importance.
+        sheet: lines that labels should not cover.
     """
     candidates = [_Candidates(word, sheet) for word in words]
     found: list[Placed] = []
     for each in candidates:
         found.append(each.best(_taken_by(found)))
     for _ in range(_ROUNDS):
-        # Words that came later may be in the way of earlier ones, which take the best place that is left.
+        # Later labels may conflict with earlier ones, which then get the best remaining position.
         crowded = [k for k, each in enumerate(found) if each.cost >= _CROWDED]
         before = [found[k].cost for k in crowded]
         for k in crowded:
@@ -140,29 +140,29 @@ def arrange(words: Sequence[Word], sheet: Sheet) -> list[Placed]:
 
 
 def _taken_by(words: Iterable[Placed]) -> _Taken:
-    """Return the area that words cover."""
+    """Return the area that is covered by labels."""
     boxes = [np.concatenate([each.middle - each.half, each.middle + each.half]) for each in words]
     leaders = [each.leader for each in words if each.leader is not None]
     return _Taken(np.reshape(boxes, (-1, 4)), np.reshape(leaders, (-1, 4)))
 
 
 class _Candidates:
-    """Candidate places (n,) of a word: all distances and directions from each point that the word may name.
+    """Candidate positions (n,) of a label: all distances and directions from each of its points.
 
-    Costs of lines are kept: where a word is placed again, other words have moved, but the lines have not.
+    Costs of lines are stored: when a label is placed again, only other labels have moved.
 
     Args:
-        word: the word.
-        sheet: lines that words should not cover.
+        word: label to place.
+        sheet: lines that labels should not cover.
     """
 
     def __init__(self, word: Word, sheet: Sheet) -> None:
         self._word, self._sheet = word, sheet
         distances = np.array((*_DISTANCES, *_LED_DISTANCES) if word.is_led else _DISTANCES)
-        # The distance is that of the word's edge, not of the word's middle.
+        # The distance is measured to the edge of the label, not to its centre.
         reach = np.min(word.half / np.maximum(np.abs(_DIRECTIONS), 1e-9), axis=1)
         off = _DIRECTIONS * (distances[:, None] * sheet.per_point + reach)[..., None]
-        # One product for each direction: a product of matrices may round in another way, and decide ties otherwise.
+        # One product per direction: a matrix product may round differently, and decide ties differently.
         preferred = np.array([2.0 * float(direction @ word.away) for direction in _DIRECTIONS])
         count = len(word.places)
         self._place = np.repeat(np.arange(count), off.shape[0] * off.shape[1])
@@ -170,25 +170,25 @@ class _Candidates:
         self._box = np.hstack([self._middle - word.half, self._middle + word.half])
         self._is_led = np.tile(np.repeat(distances > (_LED if word.is_led else _ASTRAY), len(_DIRECTIONS)), count)
         self._leader = self._leaders()
-        # Lower bound of the cost: lines and other words only add to it.
+        # Lower bound of the cost: lines and other labels only increase it.
         self._least = np.tile((_FAR * distances[:, None] - preferred).ravel(), count)
         self._order = np.argsort(self._least, kind="stable")
         self._is_own = sheet.owners == word.owner
         self._line_costs = np.full((len(self._least), 4), math.nan)
         self._leader_costs = np.full(len(self._least), math.nan)
-        # Squares around the points, where a leader line has its dot.
+        # Squares around the points for the dots of leader lines.
         room = 1.5 * _HALF_LIMB * sheet.per_point
         self._dots = np.hstack([word.places, word.places]) + room * _OUTWARDS
 
     def _leaders(self) -> FloatArray:
-        """Return leader lines (n, 4), from the point on the robot towards the middle of the box, up to its edge."""
+        """Return leader lines (n, 4), from the point on the robot towards the centre of the box, up to its edge."""
         places = self._word.places[self._place]
         way = places - self._middle
         part = np.min(self._word.half / np.maximum(np.abs(way), 1e-9), axis=1, keepdims=True)
         return np.hstack([places, self._middle + np.minimum(part, 1.0) * way])
 
     def best(self, taken: _Taken) -> Placed:
-        """Return the cheapest candidate beside other words; the first of candidates with equal cost."""
+        """Return the cheapest candidate, given other labels; the first candidate of equal cost."""
         costs = np.full(len(self._least), math.inf)
         least = math.inf
         for first in range(0, len(costs), _AT_ONCE):
@@ -203,19 +203,19 @@ class _Candidates:
         return Placed(self._middle[k], self._word.half, self._leader[k] if self._is_led[k] else None, float(costs[k]))
 
     def _word_cost(self, members: IndexArray, taken: _Taken) -> FloatArray:
-        """Return the cost (m,) of words and lines under the word, for some candidates (m,)."""
+        """Return the cost (m,) of labels and lines under the label, for some candidates (m,)."""
         boxes = self._box[members]
         cost = _overlap_costs(boxes, taken.boxes)
         new = members[np.isnan(self._line_costs[members, 0])]
         if new.size:
             self._line_costs[new] = self._costs_of_lines(new)
-        # Terms are added in a fixed order: rounding in another order might change which of two places is cheaper.
+        # Terms are added in a fixed order: another order may round differently, and select another position.
         for each in self._line_costs[members].T:
             cost += each
         return cost + _OVERLAP * _count(segments_in_boxes(taken.leaders, boxes))
 
     def _costs_of_lines(self, members: IndexArray) -> FloatArray:
-        """Return costs (m, 4) of a word beyond the frame, on other limbs, on the word's limb, and on other lines."""
+        """Return costs (m, 4) of a label beyond the frame, on other limbs, on the label's limb, and on other lines."""
         boxes, frame = self._box[members], self._sheet.frame
         is_outside = (boxes[:, :2] < frame[:2]).any(axis=1) | (boxes[:, 2:] > frame[2:]).any(axis=1)
         on_limb = segments_in_boxes(self._sheet.limbs, boxes + _HALF_LIMB * self._sheet.per_point * _OUTWARDS)
@@ -246,14 +246,14 @@ class _Candidates:
         sheet, leaders, place = self._sheet, self._leader[members], self._place[members]
         others, joints = sheet.limbs[~self._is_own], sheet.limbs.reshape(-1, 2)
         near = _NEAR_JOINT * sheet.per_point
-        # The line of a joint's own name begins at the joint.
+        # The leader line of a joint's name begins at the joint.
         is_apart = np.linalg.norm(joints - self._word.places[:, None], axis=2) > near
         cost = _LEADER_CROSSES * _count(segments_cross(others, leaders))
         cost += _PASSES_JOINT * _count((distances_to_segments(joints, leaders) < near) & is_apart[place])
         if self._word.owner:
-            # Where two limbs cross on paper, a line to one of them might mean the other.
+            # Where two limbs cross in the picture, a leader line is ambiguous.
             cost += _AMBIGUOUS * _count(segments_in_boxes(others, self._dots))[place]
-        # A leader line that runs along another line cannot be told from it.
+        # A leader line along another line cannot be distinguished from it.
         start, end = leaders[:, None, :2], leaders[:, None, 2:]
         on_way = start + _LEADER_PARTS * (end - start)
         beside = np.concatenate([on_way, on_way], axis=2) + 0.75 * _HALF_LIMB * sheet.per_point * _OUTWARDS
@@ -264,12 +264,12 @@ class _Candidates:
 
 
 def _overlap_costs(boxes: FloatArray, taken: FloatArray) -> FloatArray:
-    """Return the cost (n,) of overlaps of boxes (n, 4) with the boxes of other words (k, 4)."""
+    """Return the cost (n,) of overlaps of boxes (n, 4) with the boxes of other labels (k, 4)."""
     low = np.maximum(boxes[:, None, :2], taken[:, :2])
     size = np.minimum(boxes[:, None, 2:], taken[:, 2:]) - low
     wide, high = size[..., 0], size[..., 1]
     costs = np.where((wide > 0) & (high > 0), _OVERLAP + wide * high / 10, 0.0)
-    # A cumulative sum adds in the order of the words; a plain sum may add in another order, and round otherwise.
+    # A cumulative sum adds in the order of the labels; a plain sum may use another order, and round differently.
     return np.asarray(np.cumsum(np.hstack([np.zeros((len(boxes), 1)), costs]), axis=1)[:, -1])
 
 

@@ -13,26 +13,26 @@ from .requirements import check_picture, ending_of
 from .solutions import drawings_of
 
 
-def plot(found: Solution | Model | Sequence[Model], file: str | Path, *, pose: int = 1) -> None:
-    """Draw a solution's robot with its tasks, or robots at their typical values, into a file.
+def plot(subject: Solution | Model | Sequence[Model], file: str | Path, *, pose: int = 1) -> None:
+    """Draw the robot of a solution with its tasks, or robots at their typical dimensions, into a file.
 
     Args:
-        found: a solution, a robot, or several robots, which stand side by side.
-        file: name that ends in ``.png``, ``.svg`` or ``.pdf``.
-        pose: number of the pose that is drawn, 1 for the first, where the case has several.
+        subject: solution, robot, or several robots for a picture side by side.
+        file: path with the extension ``.png``, ``.svg`` or ``.pdf``.
+        pose: number of the drawn pose of a case with several poses, 1 for the first.
 
     Raises:
-        InputError: the ending is another one, Matplotlib is not installed, the file cannot be written, or the case has
+        InputError: the extension is unknown, Matplotlib is not installed, the file cannot be written, or the case has
             no such pose.
-        EvaluationError: the robot does not exist at the point reached, or at its typical values.
+        EvaluationError: the robot does not exist at the final point of the solve, or at its typical dimensions.
     """
     target = str(file)
     check_picture(target)
     check_target(target)
     from .figures import picture  # noqa: PLC0415 - needs Matplotlib, whose absence is reported above
 
-    if isinstance(found, Solution):
-        drawings = drawings_of(found, pose)
+    if isinstance(subject, Solution):
+        drawings = drawings_of(subject, pose)
     else:
-        drawings = [drawing_of_model(model) for model in ([found] if isinstance(found, Model) else found)]
+        drawings = [drawing_of_model(model) for model in ([subject] if isinstance(subject, Model) else subject)]
     write_bytes(target, picture(drawings, ending_of(target)))

@@ -1,4 +1,4 @@
-"""The robot's drawing as numbers: at one pose, at each pose of a case, and after a motion of the platform."""
+"""Geometry of a robot's drawing at one pose, at each pose of a case, and after a motion of the platform."""
 
 from __future__ import annotations
 
@@ -46,13 +46,13 @@ def pose_index(nlp: Nlp, pose: int) -> int:
 
 
 def states_at_poses(outcome: TaskOutcome) -> list[RobotState | None]:
-    """Return the robot of a task's outcome at every pose; None where it does not exist."""
+    """Return the state of the robot of a task's outcome at every pose; None if it does not exist."""
     nlp, x = outcome.own.nlp, outcome.x
     return [outcome.state, *(state_at_pose(nlp, x, k) for k in range(1, len(nlp.program.robots)))]
 
 
 def worst_pose(states: Sequence[RobotState | None], sense: Sense) -> int | None:
-    """Return the index of the pose with the worst F; None where there is one pose, or no F at some pose."""
+    """Return the index of the pose with the worst F; None for a single pose, or if F is missing at a pose."""
     values = [state.F for state in states if state is not None]
     if len(values) < max(2, len(states)):
         return None
@@ -60,35 +60,35 @@ def worst_pose(states: Sequence[RobotState | None], sense: Sense) -> int | None:
 
 
 def state_at_pose(nlp: Nlp, x: FloatArray, pose: int) -> RobotState | None:
-    """Return the robot at a point (n,) and one of its poses; None where it does not exist."""
+    """Return the state of the robot at a point (n,) and one of its poses; None if it does not exist."""
     try:
         return evaluate(nlp, x, pose)
     except EvaluationError:
         return None
 
 
-#: Newton's steps on the loops after a small motion, and the residual that ends them: rounding leaves about as much.
+#: Largest number of Newton steps for the loops after a small motion, and the final residual, near rounding errors.
 _STEPS = 20
 _ROUNDING = 1e-11
 
 
 @dataclass(frozen=True, eq=False)
 class Posture:
-    """Numbers of a drawing at one pose, in the order of the model's scene; world coordinates, the case's length unit.
+    """Geometry of a drawing at one pose, in the order of the model's scene; world coordinates, the case's length unit.
 
     Attributes:
-        rotation: (3, 3) ``R``.
-        position: (3,) ``p``.
+        rotation: (3, 3) rotation ``R`` of the platform.
+        position: (3,) position ``p`` of the platform.
         unknowns: values of the model's internal unknowns.
-        points: (n, 3).
+        points: (n, 3) points of the scene.
         circles: (c, 3, 3) centre, point and normal of each circle.
         directions: (d, 2, 3) origin and unit vector of each direction.
         marks: points of each mark, (k, 3) each.
-        joints: of each joint, (1 + a, 3) its place and the unit vectors of its axes.
+        joints: (1 + a, 3) for each joint: position, and unit vectors of its axes.
         jacobian: (m, 6) unit wrenches, couple rows scaled by the characteristic length.
         driving: (m,) largest work rate of each row for a unit rate of an actuator; zero for a constraint, and for a
             robot without actuated joints.
-        quantities: each of the model's quantities, radians for angles.
+        quantities: values of the model's quantities, radians for angles.
     """
 
     rotation: FloatArray
@@ -105,12 +105,12 @@ class Posture:
 
 
 class Linkage:
-    """A robot with its dimensions, for any pose of its platform.
+    """Robot with its dimensions, for any pose of its platform.
 
     Args:
-        model: the robot.
+        model: model of the robot.
         parameters: components of all parameters in the model's order; radians for angles.
-        characteristic_length: factor of the rows of couples, which makes them comparable to those of forces; length.
+        characteristic_length: factor between couples and forces in the Jacobian, length.
     """
 
     def __init__(self, model: Model, parameters: FloatArray, characteristic_length: float = 1.0) -> None:
@@ -136,8 +136,8 @@ class Linkage:
         """Return the drawing at a pose.
 
         Args:
-            rotation: (3, 3) ``R``.
-            position: (3,) ``p``, length.
+            rotation: (3, 3) rotation ``R``.
+            position: (3,) position ``p``, length.
             unknowns: values of the model's internal unknowns, which must close its loops.
         """
         scene = self.model.scene
@@ -169,13 +169,13 @@ class Linkage:
         )
 
     def posture_after(self, start: Posture, twist: FloatArray, t: float) -> Posture | None:
-        """Return the drawing after the platform has moved from a posture along a twist (6,) for a time ``t``.
+        """Return the drawing after a motion of the platform from a posture along a twist (6,) for a time ``t``.
 
-        Newton's method on the loops gives the internal unknowns, so a robot that has some needs small motions. Driven
-        joints that the pose does not determine stay where they are.
+        Newton's method on the loops gives the internal unknowns, so a robot with internal unknowns needs small motions.
+        Free actuator coordinates stay constant.
 
         Returns:
-            The posture; None where the loops do not close there, or a limb has zero length.
+            Posture after the motion; None if the loops do not close, or a limb has zero length.
         """
         turn, shift = displacement(twist, t)
         rotation, position = turn @ start.rotation, turn @ start.position + shift
@@ -194,11 +194,11 @@ class Linkage:
 
 
 def _joints(columns: FloatArray, sizes: Sequence[int]) -> tuple[FloatArray, ...]:
-    """Return place and unit axes of each joint from the stacked vectors (n, 3) of all of them."""
+    """Return position and unit axes of each joint from the stacked vectors (n, 3) of all joints."""
     found = []
     for part in np.split(columns, np.cumsum(sizes)[:-1]) if sizes else ():
         lengths = np.linalg.norm(part[1:], axis=1, keepdims=True)
-        # An axis has no direction where the two lines that define it are parallel.
+        # An axis has no direction if the two lines that define it are parallel.
         axes = np.divide(part[1:], lengths, out=np.zeros_like(part[1:]), where=lengths > 0)
         found.append(frozen_array(np.vstack([part[:1], axes]), part.shape))
     return tuple(found)

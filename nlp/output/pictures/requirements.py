@@ -1,4 +1,4 @@
-"""Conditions for pictures and pages, checked before the computation begins: kinds of files, installed libraries."""
+"""Requirements of pictures and pages, checked before the computation: file extensions, installed libraries."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from pathlib import PurePath
 
 from ...errors import InputError
 
-#: Kinds of picture files, by their ending.
+#: Extensions of picture files.
 PICTURES = (".png", ".svg", ".pdf")
 
 
 def ending_of(target: str) -> str:
-    """Return the ending of a file's name, in small letters."""
+    """Return the extension of a file name, in lower case."""
     return PurePath(target).suffix.lower()
 
 
 def check_picture(target: str) -> None:
-    """Check that the name of a picture says its kind, and that Matplotlib is installed.
+    """Check that a picture has a known extension, and that Matplotlib is installed.
 
     Raises:
-        InputError: the ending is another one, or Matplotlib is not installed.
+        InputError: the extension is unknown, or Matplotlib is not installed.
     """
     if ending_of(target) not in PICTURES:
         raise InputError(f"{target}: cannot be drawn: a picture's name ends in .png, .svg or .pdf")
@@ -31,8 +31,8 @@ def check_library(name: str, purpose: str) -> None:
     """Check that a library of the extra ``plots`` is installed.
 
     Args:
-        name: of the library.
-        purpose: the outputs that need it, a plural for the message.
+        name: name of the library.
+        purpose: outputs that need the library, a plural for the message.
 
     Raises:
         InputError: the library is not installed.

@@ -1,4 +1,4 @@
-"""Robots at their designs side by side, in one scale and from one view."""
+"""Pictures of several robots at their designs, with one scale and one view."""
 
 from __future__ import annotations
 
@@ -25,63 +25,63 @@ from .joints import Handles
 from .painting import Panel, largest_rate
 from .view import View, clearest_view
 
-#: Width, height and heading of a panel, in inches; panels in a row.
+#: Width, height and heading of a panel, inches; number of panels in a row.
 _WIDTH, _HEIGHT, _HEADING, _ACROSS = 4.2, 4.2, 0.65, 3
 _ROW = _HEIGHT + _HEADING
-#: Least width, and heights of the title and of scales and legend, inches.
+#: Least width of the figure, heights of its title and of scales and legend, inches.
 _LEAST, _TITLE, _FOOT = 6.6, 0.4, 1.65
-#: Part of a panel's width that the bar of the scale may have.
+#: Largest length of the scale bar, as a fraction of a panel's width.
 _BAR = 0.4
 
 
 class _Pair(NamedTuple):
-    """A design of a table, and its drawing without words."""
+    """Design of a table, and its drawing without labels."""
 
     design: DrawnDesign
     drawing: Drawing
 
 
 class _Scale(NamedTuple):
-    """What all panels have in common: the eye, the rate at the ends of the colours, and half of a panel's width."""
+    """Common scale of all panels: view, rate at the ends of the colour scale, and half of a panel's width."""
 
     view: View
     largest: float
     half: float
 
 
-def robots_figure(found: Designs[Row]) -> Figure:
-    """Return robots at their designs, all in one scale, with a bar that states it.
+def robots_figure(designs: Designs[Row]) -> Figure:
+    """Return robots at their designs as a Matplotlib figure, with one scale and a scale bar.
 
     Raises:
-        EvaluationError: no robot has an answer that exists.
+        EvaluationError: no robot has an optimum at which it exists.
     """
-    pairs = _pairs(found)
+    pairs = _pairs(designs)
     across = min(len(pairs), _ACROSS)
     width, height = max(across * _WIDTH, _LEAST), -(-len(pairs) // across) * _ROW + _TITLE + _FOOT
     figure = _empty(width, height)
     scale = _scale_of(pairs)
     for k, pair in enumerate(pairs):
         _draw_panel(figure, k % across * _WIDTH, height - _TITLE - k // across * _ROW, pair, scale)
-    title = "".join(textwrap.wrap(legible(found.title), int(width / 0.11), max_lines=1, placeholder=" …"))
+    title = "".join(textwrap.wrap(legible(designs.title), int(width / 0.11), max_lines=1, placeholder=" …"))
     figure.text(0.15 / width, 1 - 0.15 / height, title, fontsize=12, color=INK, va="top", parse_math=False)
-    _draw_length(figure, _FOOT - 0.28, found, scale)
+    _draw_length(figure, _FOOT - 0.28, designs, scale)
     _draw_legend(figure, pairs, scale)
     return figure
 
 
-def robot_pictures(found: Designs[Row]) -> list[bytes]:
-    """Return an SVG picture of each robot, with the bar of the scale, and at last one of their common legend.
+def robot_pictures(designs: Designs[Row]) -> list[bytes]:
+    """Return an SVG picture of each robot with a scale bar, and last a picture of the common legend.
 
     Raises:
-        EvaluationError: no robot has an answer that exists.
+        EvaluationError: no robot has an optimum at which it exists.
     """
-    pairs = _pairs(found)
+    pairs = _pairs(designs)
     scale = _scale_of(pairs)
 
     def panel(pair: _Pair) -> Figure:
         figure = _empty(_WIDTH, _ROW + 0.3)
         _draw_panel(figure, 0.0, _ROW + 0.3, pair, scale)
-        _draw_length(figure, 0.15, found, scale)
+        _draw_length(figure, 0.15, designs, scale)
         return figure
 
     def legend() -> Figure:
@@ -92,20 +92,20 @@ def robot_pictures(found: Designs[Row]) -> list[bytes]:
     return [*(picture_of(".svg", panel, pair) for pair in pairs), picture_of(".svg", legend)]
 
 
-def _pairs(found: Designs[Row]) -> list[_Pair]:
-    """Return the designs that can be drawn: some exist for the program, but their drawing has no finite points.
+def _pairs(designs: Designs[Row]) -> list[_Pair]:
+    """Return the designs that can be drawn; the drawing of a feasible design may have points that are not finite.
 
     Raises:
-        EvaluationError: there is none.
+        EvaluationError: no design can be drawn.
     """
     pairs = []
-    for each in found.drawn():
+    for each in designs.drawn():
         with suppress(EvaluationError):
             drawing = drawing_of(each.nlp, each.x, each.state, each.task)
-            # Start, free motions and forces have scales of one robot.
+            # Starting point, free motions and forces have scales of a single robot.
             pairs.append(_Pair(each, replace(drawing, reference=None, free=(), forces=None)))
     if not pairs:
-        raise EvaluationError(f"{found.case.source or found.case.name}: no robot has a design to draw")
+        raise EvaluationError(f"{designs.case.source or designs.case.name}: no robot has a design to draw")
     return pairs
 
 
@@ -117,7 +117,7 @@ def _empty(width: float, height: float) -> Figure:
 
 
 def _scale_of(pairs: Sequence[_Pair]) -> _Scale:
-    """Return one eye, one scale of colours and one of lengths, which show which of two robots is larger or faster."""
+    """Return the common view, colour scale and length scale, so that sizes and rates of robots can be compared."""
     drawings = [pair.drawing for pair in pairs]
     view, half = clearest_view(*drawings), 0.0
     for drawing in drawings:
@@ -128,7 +128,7 @@ def _scale_of(pairs: Sequence[_Pair]) -> _Scale:
 
 
 def _draw_panel(figure: Figure, left: float, top: float, pair: _Pair, scale: _Scale) -> None:
-    """Draw a robot below its name; the place of the upper left corner is in inches."""
+    """Draw a robot below its name; the upper left corner is in inches."""
     width, height = figure.get_size_inches()
     axes = figure.add_axes((left / width, (top - _ROW) / height, _WIDTH / width, _HEIGHT / height))
     Panel(axes, scale.view, pair.drawing, scale.largest).paint()
@@ -139,14 +139,14 @@ def _draw_panel(figure: Figure, left: float, top: float, pair: _Pair, scale: _Sc
 
 
 def _draw_legend(figure: Figure, pairs: Sequence[_Pair], scale: _Scale, left: float = 0.48) -> None:
-    """Draw the scale of the rates, from a part of the width on, and the legend of all panels at a figure's bottom."""
+    """Draw the colour scale, from a fraction of the width on, and the common legend at the bottom of a figure."""
     width, height = figure.get_size_inches()
     entries: dict[str, Artist | Handles] = {}
     symbols: dict[str, Artist | Handles] = {}
     for pair in pairs:
         panel = Panel(_empty(_WIDTH, _HEIGHT).add_axes((0, 0, 1, 1)), scale.view, pair.drawing)
         panel.paint()
-        # The fastest corner is another one in each panel.
+        # The largest velocity differs between panels.
         entries |= {text.split(" (fastest")[0]: handle for handle, text in panel.legend}
         symbols |= {text: handle for handle, text in panel.symbols}
     if pairs[0].drawing.rows:
@@ -165,8 +165,8 @@ def _write_heading(figure: Figure, left: float, top: float, design: DrawnDesign)
     figure.text(left, lower, design.words, fontsize=9.5, color=MUTED, va="top", parse_math=False)
 
 
-def _draw_length(figure: Figure, bottom: float, found: Designs[Row], scale: _Scale) -> None:
-    """Draw a bar whose length is a round number of the case's unit, for all panels; its place is in inches."""
+def _draw_length(figure: Figure, bottom: float, designs: Designs[Row], scale: _Scale) -> None:
+    """Draw a scale bar with a round length for all panels; its position is in inches."""
     longest = 2 * scale.half * _BAR
     power = 10.0 ** np.floor(np.log10(longest))
     length = max(step * power for step in (1, 2, 5) if step * power <= longest)
@@ -174,5 +174,5 @@ def _draw_length(figure: Figure, bottom: float, found: Designs[Row], scale: _Sca
     left, part, at = 0.15 / width, length / (2 * scale.half) * _WIDTH / width, bottom / height
     bar = Line2D([left, left + part], [at, at], color=INK, linewidth=2.0, solid_capstyle="butt", gid="scale")
     figure.add_artist(bar)
-    text = f"{found.case.units.text(float(length), Dimension.LENGTH)}, in all panels"
+    text = f"{designs.case.units.text(float(length), Dimension.LENGTH)}, in all panels"
     figure.text(left + part + 0.1 / width, at, text, fontsize=9, color=MUTED, va="center", parse_math=False)

@@ -1,7 +1,7 @@
 """Line segments in a picture: segments within boxes, segments that cross, and distances of points from segments.
 
-All functions compare all pairs at once. A word has up to a thousand candidate places, and a picture some hundred
-segments: with one call of NumPy for each place, the placement of words takes most of the time of a picture.
+All functions compare all pairs at once. A label has up to a thousand candidate positions, and a picture some hundred
+segments: with one call of NumPy per position, the placement of labels would take most of the time of a picture.
 """
 
 from __future__ import annotations
@@ -65,13 +65,13 @@ def segments_cross(segments: FloatArray, lines: FloatArray) -> BoolArray:
 
 
 def _side(p: FloatArray, q: FloatArray, r: FloatArray) -> FloatArray:
-    """Return on which side of the line from p to q the point r is, as a sign; x and y along the first axis."""
+    """Return the side of the line from p to q on which the point r lies, as a sign; x and y along the first axis."""
     u, v = q - p, r - p
     return np.asarray(u[0] * v[1] - u[1] * v[0])
 
 
 def distances_to_segments(points: FloatArray, lines: FloatArray) -> FloatArray:
-    """Return the distance of each point (k, 2) from each segment (n, 4), (n, k); a segment has a length above 0."""
+    """Return the distance of each point (k, 2) from each segment (n, 4), (n, k); segments have positive lengths."""
     start = lines.T[:2, :, None]
     way = lines.T[2:, :, None] - start
     off = points.T[:, None, :] - start

@@ -1,4 +1,4 @@
-"""Drawings of a solution: one for a single task, one for each task of a compromise."""
+"""Drawings of a solution: one for each task."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from .drawing import Drawing, drawing_of
 from .posture import pose_index, states_at_poses, worst_pose
 
 
-def drawings_of(found: Solution, pose: int = 1) -> list[Drawing]:
-    """Return the robot with its task, or at the combined point with each of several tasks; at one of its poses.
+def drawings_of(solution: Solution, pose: int = 1) -> list[Drawing]:
+    """Return the drawings of the robot at one pose: with its task, or at the combined point with each of several tasks.
 
     Args:
-        found: the solution.
+        solution: solution of a case.
         pose: number of the pose, 1 for the first.
 
     Raises:
-        EvaluationError: the robot does not exist at the point reached.
+        EvaluationError: the robot does not exist at the final point of the solve.
         InputError: the case has no such pose.
     """
-    index = pose_index(found.outcomes[0].own.nlp, pose)
+    index = pose_index(solution.outcomes[0].own.nlp, pose)
     return [
         drawing_of(
             outcome.own.nlp,
@@ -31,33 +31,33 @@ def drawings_of(found: Solution, pose: int = 1) -> list[Drawing]:
             states_at_poses(outcome)[index],
             task,
             pose=index,
-            headline=_headline_of(found, outcome) + _pose_words(outcome, index),
-            is_answer=found.status.is_answer,
+            headline=_headline_of(solution, outcome) + _pose_words(outcome, index),
+            is_answer=solution.status.is_answer,
         )
-        for task, outcome in enumerate(found.outcomes)
+        for task, outcome in enumerate(solution.outcomes)
     ]
 
 
-def _headline_of(found: Solution, outcome: TaskOutcome) -> str:
+def _headline_of(solution: Solution, outcome: TaskOutcome) -> str:
     """Return the result for one task in one line."""
-    if found.combination is None:
+    if solution.combination is None:
         return _headline(outcome)
-    if not found.all_solved:
-        return f"{found.status.value}: this is no answer"
-    method, count = found.combination.method.value, len(found.outcomes)
+    if not solution.all_solved:
+        return f"{solution.status.value}: this is not an optimum"
+    method, count = solution.combination.method.value, len(solution.outcomes)
     return f"{outcome.task.name}: F = {outcome.F:.7g} {_unit(outcome)}, {method} of {count} tasks"
 
 
 def _pose_words(outcome: TaskOutcome, index: int) -> str:
-    """Return how F is combined over several poses, the pose shown and its own F; nothing for a single pose."""
+    """Return the combination of F over several poses, the shown pose and its F; empty for a single pose."""
     states = states_at_poses(outcome)
     if len(states) == 1:
         return ""
     state, case = states[index], outcome.own.nlp.case
     if outcome.task.measure:
         return f" (largest over {len(states)} poses). Shown: pose {index + 1}"
-    own = "" if state is None else f", F = {state.F:.7g} there"
-    worst = ", the worst" if worst_pose(states, outcome.task.sense) == index else ""
+    own = "" if state is None else f", F = {state.F:.7g}"
+    worst = ", worst pose" if worst_pose(states, outcome.task.sense) == index else ""
     return f" ({case.over_poses.value} over {len(states)} poses). Shown: pose {index + 1}{own}{worst}"
 
 

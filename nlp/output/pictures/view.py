@@ -1,4 +1,4 @@
-"""Parallel projection of a robot, which keeps proportions, and the order in which lines cover each other."""
+"""Parallel projection of a robot, and painting order of lines."""
 
 from __future__ import annotations
 
@@ -11,30 +11,30 @@ import numpy as np
 from ....models import FloatArray, JointKind, LinkKind
 from .drawing import Drawing, Motion
 
-#: Azimuths that are tried for a view, its elevation, and what is added to it where motions cannot be seen, in degrees.
+#: Candidate azimuths of a view, its elevation, and increments of the elevation for motions that are hidden, degrees.
 _AZIMUTHS = range(-170, 190, 10)
 _ELEVATION, _HIGHER = 18.0, (0.0, 14.0, 28.0)
-#: Least part of the length of a motion's axis, and of the width of its path, that a view shows.
+#: Least visible fraction of the length of a motion's axis, and of the width of its path.
 _LEAST_LENGTH, _LEAST_WIDTH = 0.5, 0.3
-#: Score of a motion that is not seen at all, beside which that of limbs that stand apart is small.
+#: Penalty of a hidden motion, large relative to the score of the distances of limbs.
 _HIDDEN = 10.0
-#: Directions that differ by less are parallel.
+#: Difference below which directions are parallel.
 _PARALLEL = 1e-6
-#: Part of the axis z, in parts of the robot's size, that limbs should not cover.
+#: Length of the axis z, as a fraction of the robot's size, that limbs should not cover.
 _SHOWN_Z = 0.12
-#: Places on a link, in parts of its length, whose distances on paper are compared.
+#: Points on a link, as fractions of its length, whose projected distances are compared.
 _PARTS = (0.2, 0.35, 0.5, 0.65, 0.8)
-#: Two lines that cross on paper nearer to an end than this part of their lengths are joined there, and do not cross.
+#: Distance from the end of a line, as a fraction of its length, below which a projected crossing is a common joint.
 _JOINED = 0.02
 
 
 @dataclass(frozen=True)
 class View:
-    """A parallel projection along a direction, z upwards on paper.
+    """Parallel projection along a direction, with z upwards in the picture.
 
     Attributes:
-        azimuth: angle of the eye about z, from x towards y, degrees.
-        elevation: angle of the eye above the plane of x and y, degrees.
+        azimuth: angle of the viewing direction about z, from x towards y, degrees.
+        elevation: angle of the viewing direction above the plane of x and y, degrees.
     """
 
     azimuth: float
@@ -42,7 +42,7 @@ class View:
 
     @property
     def axes(self) -> FloatArray:
-        """(3, 3) rows: the direction to the right on paper, upwards on paper, and towards the eye."""
+        """(3, 3) rows: directions to the right and upwards in the picture, and towards the viewer."""
         a, e = math.radians(self.azimuth), math.radians(self.elevation)
         return np.array(
             [
@@ -53,20 +53,20 @@ class View:
         )
 
     def project(self, points: FloatArray) -> FloatArray:
-        """Return the places on paper (..., 2) of points (..., 3), in the points' own unit."""
+        """Return the projections (..., 2) of points (..., 3), in the unit of the points."""
         return np.asarray(points @ self.axes[:2].T)
 
     def depth(self, points: FloatArray) -> FloatArray:
-        """Return how near points (..., 3) are to the eye: their coordinate towards it."""
+        """Return the coordinates of points (..., 3) towards the viewer."""
         return np.asarray(points @ self.axes[2])
 
 
 def clearest_view(*drawings: Drawing, elevation: float = _ELEVATION, width: float = _LEAST_WIDTH) -> View:
-    """Return one view of drawings in which limbs stand farthest apart on paper and every motion can be seen.
+    """Return one view of drawings with the largest projected distances of limbs and visible motions.
 
-    A robot that moves in the plane of x and y is seen from above, x to the right; in an upright plane, from its side.
-    Others are seen from the elevation stated, or from higher where an axis would be seen from its end, or a path from
-    its edge: narrower than a part of its own width.
+    A planar robot in the plane of x and y is seen from above, with x to the right; in a vertical plane, from its side.
+    Other robots are seen at the given elevation, or higher if an axis would be seen from its end, or the circle of a
+    path from its edge.
     """
     planes = [_face_on(drawing) for drawing in drawings]
     if planes[0] is not None and all(view == planes[0] for view in planes):
@@ -83,9 +83,9 @@ def clearest_view(*drawings: Drawing, elevation: float = _ELEVATION, width: floa
 
 
 def _face_on(drawing: Drawing) -> View | None:
-    """Return the view at right angles to the plane that a robot moves in; None for a robot that moves in space.
+    """Return the view normal to the plane of a planar robot; None for a spatial robot.
 
-    All hinges of a planar robot are parallel, and its slides are at right angles to them.
+    All hinges of a planar robot are parallel, and its slides are perpendicular to them.
     """
     turning: list[FloatArray] = []
     sliding: list[FloatArray] = []
@@ -103,24 +103,24 @@ def _face_on(drawing: Drawing) -> View | None:
         return View(-90.0, 90.0)
     if abs(normal[2]) > _PARALLEL:
         return None
-    # Of both sides of an upright plane the one from which x points to the right.
+    # For a vertical plane, the side from which x points to the right.
     x, y = normal[:2] if normal[1] < -_PARALLEL or (normal[1] <= _PARALLEL and normal[0] > 0) else -normal[:2]
     return View(math.degrees(math.atan2(y, x)), 0.0)
 
 
 def _hidden(view: View, motions: Sequence[Motion], width: float) -> float:
-    """Return by how much axes of motions are too short on paper, and their paths too narrow; 0 where all are seen."""
+    """Return a measure of hidden motions: axes too short and paths too narrow in projection; 0 if all are visible."""
     missing = 0.0
     for motion in motions:
         missing += max(0.0, _LEAST_LENGTH - float(np.linalg.norm(view.project(motion.axis))))
         if motion.has_path:
-            # A circle about the axis is as wide on paper as the axis points towards the eye.
+            # The projected width of a circle about the axis is the axis' component towards the viewer.
             missing += max(0.0, width - abs(float(view.depth(motion.axis))))
     return missing
 
 
 def _clearness(view: View, drawing: Drawing) -> float:
-    """Return a score: least and mean distance on paper between points of limbs, and the visible part of the axis."""
+    """Return a score: least and mean projected distance of points of limbs, and visible fraction of the axis."""
     points = drawing.posture.points
     if drawing.model.scene.joints:
         return _clearness_of_joints(view, drawing)
@@ -139,9 +139,9 @@ def _clearness(view: View, drawing: Drawing) -> float:
 
 
 def _clearness_of_joints(view: View, drawing: Drawing) -> float:
-    """Return the same score for a robot given joint by joint, whose limbs have several links.
+    """Return the same score for a robot defined by joints, whose limbs have several links.
 
-    Rods of one limb, such as those of a parallelogram, are near to each other in every view: they do not count.
+    Rods of one limb, as in a parallelogram, are close together in every view, and are ignored.
     """
     links = [(a, b, link) for a, b, link in drawing.links if link.limb is not None and link.kind is not LinkKind.RAIL]
     points, parts = drawing.posture.points, np.array(_PARTS)[:, None, None]
@@ -162,11 +162,11 @@ def _clearness_of_joints(view: View, drawing: Drawing) -> float:
 
 
 def painting_order(view: View, lines: Sequence[FloatArray]) -> list[int]:
-    """Return the order in which to paint straight lines, (2, 3) each: the nearer of two that cross comes later."""
+    """Return the painting order of straight lines, (2, 3) each: of two crossing lines, the nearer is later."""
     depths = [float(np.mean(view.depth(line))) for line in lines]
     order = sorted(range(len(lines)), key=lambda i: depths[i])
     for _ in lines:
-        # A line that must come before an earlier one moves ahead of it; as many rounds as there are lines are enough.
+        # A line that must precede an earlier one moves before it; the number of rounds is at most the number of lines.
         for place, i in enumerate(order):
             later = [k for k in order[:place] if _covers(view, lines[k], lines[i])]
             if later:
@@ -179,7 +179,7 @@ def painting_order(view: View, lines: Sequence[FloatArray]) -> list[int]:
 
 
 def _covers(view: View, one: FloatArray, other: FloatArray) -> bool:
-    """Return whether two lines, (2, 3) each, cross on paper and the first is nearer to the eye there."""
+    """Return whether two lines, (2, 3) each, cross in projection, and the first is nearer to the viewer there."""
     (a, b), (c, d) = view.project(one), view.project(other)
     matrix = np.column_stack([b - a, c - d])
     if abs(np.linalg.det(matrix)) <= 1e-12 * float(np.abs(matrix).max()) ** 2:

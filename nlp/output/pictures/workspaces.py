@@ -1,4 +1,4 @@
-"""Pictures of a workspace: the robot at one of its poses, and slices."""
+"""Pictures of a workspace: the robot at a pose, and slices."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ if TYPE_CHECKING:
 
 
 def drawing_at(case: Case, claim: PosedClaim) -> Drawing:
-    """Return the robot at the pose of a claim, with the case's first task.
+    """Return the drawing of the robot at the pose of a claim, with the case's first task.
 
     Args:
-        case: with fixed dimensions.
-        claim: the claim and the pose, in the case's units.
+        case: case with fixed dimensions.
+        claim: claim with its pose, in the case's units.
 
     Raises:
-        EvaluationError: the robot does not exist at the pose, or it is that of another machine within the tolerance.
+        EvaluationError: the robot does not exist at the pose, or it is a pose of another robot within the tolerance.
     """
     pose = claim.pose
     angle = case.units.to_internal(pose.angle, Dimension.ANGLE)
@@ -55,34 +55,37 @@ def drawing_at(case: Case, claim: PosedClaim) -> Drawing:
     except CaseError:
         if case.joint_centre_tolerance is None:
             raise
-        # Numbers of the pose that follow from others are those of the machine: the design's loops do not close there.
-        raise EvaluationError("the worst pose is that of a machine within the tolerance, not of the design") from None
+        # Dependent coordinates of the pose belong to the other robot: the nominal design's loops do not close there.
+        raise EvaluationError(
+            "the worst pose was found for joint centres displaced within the tolerance, and the "
+            "nominal robot does not reach it"
+        ) from None
     x = closed_start(nlp)
-    headline = f"{claim.outcome.value}: {claim_words(claim)}; shown at {pose_words(case, pose)}"
+    headline = f"{claim.outcome.value}: {claim_words(claim)}; at {pose_words(case, pose)}"
     return drawing_of(nlp, x, evaluate(nlp, x), headline=headline, is_answer=claim.outcome is not Outcome.REFUTED)
 
 
 #: Width and height of one slice, and height of a line of the legend, inches.
 _SIZE, _LINE = (3.2, 3.02), 0.185
 _COLUMNS = 3
-#: Width and height of a slice by itself, inches.
+#: Width and height of a single slice, inches.
 _ALONE = 4.2
-#: Place of its axes, left, bottom, width and height, as parts of it.
+#: Left, bottom, width and height of its axes, as fractions of the slice.
 _PLACE = (0.16, 0.13, 0.82, 0.82)
 _GREEN, _PALE, _ORANGE, _BAND = "#b7dcbc", "#f4efe2", "#f3cdb0", "#2f3b46"
-#: Poses out of reach, and those whose closed loops are not proved.
+#: Colours of unreachable poses, and of poses without a proof of closed loops.
 _FAR, _EDGE = "#7d8790", "#aab2b9"
-#: Colours of violated limits, in their order: distinct with any colour blindness beside the green.
+#: Colours of violated limits in order, distinct from the green and from each other with any colour blindness.
 _LIMITS = (
     *("#9ecae1", "#fdd49e", "#c8b3d9", "#f7b6c2", "#d9d9d9", "#8fb8b0"),
     *("#e6d96c", "#bf9b7a", "#c3dd7a", "#e08f8f", "#7f93cf", "#d98fcb"),
 )
-#: Points on each side of a box that is drawn curved.
+#: Number of points on each side of a box that is drawn curved.
 _CURVED = 2
 
 
 class Kind(NamedTuple):
-    """A kind of boxes: its words in the legend, which are the ``gid`` of its boxes too, colour and hatch."""
+    """Kind of boxes: text in the legend and ``gid`` of its boxes, colour, and hatch."""
 
     words: str
     colour: str
@@ -90,7 +93,7 @@ class Kind(NamedTuple):
 
 
 def slices_figure(case: Case, slices: Sequence[Slice]) -> Figure:
-    """Return the slices as a Matplotlib figure; the boxes of each kind carry its words as ``gid``."""
+    """Return the slices as a Matplotlib figure; the ``gid`` of boxes is the text of their kind."""
     columns = min(_COLUMNS, len(slices))
     rows = -(-len(slices) // columns)
     entries, notes = slices_legend(case, slices), slices_notes(slices)
@@ -102,8 +105,8 @@ def slices_figure(case: Case, slices: Sequence[Slice]) -> Figure:
     for k, each in enumerate(slices):
         _paint(figure.add_subplot(rows, columns, k + 1), case, each, kinds)
     title = textwrap.wrap(legible(case.title or case.name), 30 * columns, max_lines=2, placeholder=" …")
-    whose = " for the design itself, without its tolerance" if case.joint_centre_tolerance else ""
-    words = [*title, f"slices through the middle of the workspace{whose}"]
+    whose = " for the nominal design, without the tolerance" if case.joint_centre_tolerance else ""
+    words = [*title, f"slices through the centre of the workspace{whose}"]
     figure.suptitle("\n".join(words), fontsize=10, color=INK, parse_math=False)
     handles = [
         Patch(facecolor=kind.colour, edgecolor=INK, linewidth=0.4, hatch=kind.hatch, label=legible(kind.words))
@@ -125,11 +128,11 @@ def slices_figure(case: Case, slices: Sequence[Slice]) -> Figure:
 
 
 def slice_images(case: Case, slices: Sequence[Slice]) -> list[bytes]:
-    """Return a PNG picture of each slice without words around it, for pages that have their own legend."""
+    """Return a PNG picture of each slice without title and legend, for pages."""
 
     def alone(each: Slice) -> Figure:
         figure = Figure(figsize=(_ALONE, _ALONE), facecolor="white")
-        # The same place in each picture, so that slices side by side stand in line.
+        # The same position in each picture, so that slices side by side are aligned.
         _paint(figure.add_axes(_PLACE), case, each, _kinds(case, slices))
         return figure
 
@@ -137,7 +140,7 @@ def slice_images(case: Case, slices: Sequence[Slice]) -> list[bytes]:
 
 
 def slices_legend(case: Case, slices: Sequence[Slice]) -> list[Kind]:
-    """Return the kinds of boxes that slices have, in the order in which they are painted."""
+    """Return the kinds of boxes of slices, in painting order."""
     kinds = _kinds(case, slices)
     members = [[layer.members.any() for layer in _layers(each, kinds)] for each in slices]
     shown = {layer.kind for row in members for layer, used in zip(_layers(slices[0], kinds), row, strict=True) if used}
@@ -145,11 +148,13 @@ def slices_legend(case: Case, slices: Sequence[Slice]) -> list[Kind]:
 
 
 def slices_notes(slices: Sequence[Slice]) -> list[str]:
-    """Return sentences about limits that the slices do not show, and about the limit that a box is coloured by."""
+    """Return notes on limits that the slices do not show, and on the colour of boxes with several violated limits."""
     left_out = dict.fromkeys(key for each in slices for key in each.left_out)
-    notes = [f"not drawn: {', '.join(left_out)}"] if left_out else []
+    notes = [f"not shown: {', '.join(left_out)}"] if left_out else []
     if len(slices[0].limits) > 1:
-        notes.append("where several limits are violated: the first on the straight line from the middle")
+        notes.append(
+            "if several limits are violated, the colour is that of the first one on the straight line from the centre"
+        )
     return notes
 
 
@@ -166,20 +171,20 @@ def _paint(axes: Axes, case: Case, each: Slice, kinds: Sequence[Kind]) -> None:
 
 
 def _kinds(case: Case, slices: Sequence[Slice]) -> list[Kind]:
-    """Return the kinds of boxes in the order in which they are painted, with one for each limit."""
+    """Return the kinds of boxes in painting order, with one kind for each limit."""
     limits = slices[0].limits
-    # Limits that are violated somewhere have the first colours, so that few of them share one.
+    # Violated limits have the first colours, so that few of them share a colour.
     used = np.unique(np.concatenate([each.binding for each in slices])).tolist()
     order = sorted(range(len(limits)), key=lambda k: (k not in used, k))
     colours = {k: _LIMITS[place % len(_LIMITS)] for place, k in enumerate(order)}
-    kept = "proved: regular, and every limit is kept" if limits else Region.REGULAR.value
+    kept = "proved: no singularity, all limits satisfied" if limits else Region.REGULAR.value
     kinds = [Kind(kept, _GREEN)]
     for k, limit in enumerate(limits):
         value = f"{number(case.units.shown(limit.limit, limit.dimension))} {case.units.label(limit.dimension)}".rstrip()
         how = "" if limit.is_enclosed else " at samples"
         kinds.append(Kind(f"violated{how}: {limit.key} = {value}", colours[k]))
     if limits:
-        kinds.append(Kind("limits open", _PALE))
+        kinds.append(Kind("limits undecided", _PALE))
     return [
         *kinds,
         Kind(Region.BEYOND.value, _ORANGE, "////"),
@@ -192,7 +197,7 @@ def _kinds(case: Case, slices: Sequence[Slice]) -> list[Kind]:
 
 
 class _Layer(NamedTuple):
-    """Boxes (B,) of a slice that are painted in one way: filled or hatched."""
+    """Boxes (B,) of a slice with one colour and hatch."""
 
     kind: Kind
     members: NDArray[np.bool_]
@@ -200,7 +205,7 @@ class _Layer(NamedTuple):
 
 
 def _layers(each: Slice, kinds: Sequence[Kind]) -> list[_Layer]:
-    """Return the layers of a slice, the lowest first; a box may be in two."""
+    """Return the layers of a slice, the lowest first; a box may be in two layers."""
     regions = np.array([region.value for region in each.regions])
     is_judged = (regions != Region.UNREACHED.value) & (regions != Region.UNKNOWN.value)
     is_beyond = {region: regions == region.value for region in (Region.BEYOND, Region.OTHER_SIGN)}
@@ -234,7 +239,7 @@ def _frame(axes: Axes, case: Case, each: Slice) -> None:
         low, high = (_shown(case, each, end) for end in each.whole)
         axes.add_patch(Rectangle((inner[0], inner[1]), *(outer - inner), **outline))
     else:
-        # The corners of the slice are nearest to its middle.
+        # The corners of the slice are nearest to its centre.
         corner = np.abs(_shown(case, each, each.whole[1]))
         low, high = -corner, corner
         axes.add_patch(Circle((0.0, 0.0), case.units.shown(each.ball, Dimension.ANGLE), **outline))
@@ -248,7 +253,7 @@ def _frame(axes: Axes, case: Case, each: Slice) -> None:
 
 
 def _shown(case: Case, each: Slice, points: FloatArray) -> FloatArray:
-    """Return points (..., 2) of a slice in the case's units; of rotations about any axis the rotation vector."""
+    """Return points (..., 2) of a slice in the case's units; rotations about any axis as rotation vectors."""
     points = np.array(points)
     if each.ball is not None:
         cayley = np.tan(points / 2)
@@ -259,7 +264,7 @@ def _shown(case: Case, each: Slice, points: FloatArray) -> FloatArray:
 
 
 def _path(outlines: FloatArray) -> Path:
-    """Return outlines (B, k, 2) as one path, which is a tenth as long in a file as so many polygons."""
+    """Return outlines (B, k, 2) as one path, which needs a tenth of the file size of separate polygons."""
     count, points, _ = outlines.shape
     closed = np.concatenate([outlines, outlines[:, :1]], axis=1).reshape(-1, 2)
     codes = np.tile([Path.MOVETO, *[Path.LINETO] * (points - 1), Path.CLOSEPOLY], count)

@@ -1,1 +1,1 @@
-"""A solved case as one page of HTML."""
+"""Pages of HTML about solutions, workspaces, paths and tables of designs."""

@@ -1,4 +1,4 @@
-"""Small charts as SVG within a page; a chart needs no script, scales with the page, and prints."""
+"""Small charts as SVG in a page: they need no script, scale with the page, and can be printed."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from typing import NamedTuple
 
 from .markup import Markup, join_markup, tag
 
-#: Size of a chart in its own units, and the margins for its axes.
+#: Width and height of a chart in units of its viewBox, and the margins for its axes.
 _WIDTH, _HEIGHT = 320.0, 190.0
 _LEFT, _RIGHT, _TOP, _BOTTOM = 62.0, 12.0, 10.0, 38.0
 
 
 @dataclass(frozen=True)
 class Curve:
-    """A line of a chart.
+    """Line of a chart.
 
     Attributes:
-        x, y: coordinates of its points; the line has a gap where ``y`` is not finite.
-        kind: its class in the page's style.
-        steps: whether it stays level up to each point.
+        x, y: coordinates of the points; the line has a gap at points with an infinite or undefined ``y``.
+        kind: CSS class of the line.
+        steps: If true, the line is a step function, constant up to each point.
     """
 
     x: Sequence[float]
@@ -32,12 +32,12 @@ class Curve:
 
 @dataclass(frozen=True)
 class Spot:
-    """A marked point of a chart.
+    """Marked point of a chart.
 
     Attributes:
-        x, y: its coordinates.
-        kind: its class in the page's style.
-        words: its text for a pointer and for screen readers.
+        x, y: coordinates of the point.
+        kind: CSS class of the mark.
+        words: text for a tooltip and for screen readers.
     """
 
     x: float
@@ -47,7 +47,7 @@ class Spot:
 
 
 class Band(NamedTuple):
-    """A part of the horizontal axis that is shaded, from and to where, and its class in the page's style."""
+    """Shaded interval of the horizontal axis: its two ends and its CSS class."""
 
     start: float
     end: float
@@ -66,24 +66,24 @@ def line_chart(
     ends: tuple[float, float] | None = None,
     has_cursor: bool = False,
 ) -> Markup:
-    """Return a chart of lines over one axis, or a sentence where no point of the lines has a value.
+    """Return a chart of lines over one axis, or a sentence if no point of the lines has a value.
 
     Args:
-        curves: at least one.
+        curves: lines of the chart, at least one.
         spots: marked points.
-        words: the chart's text alternative, a sentence.
-        labels: of the horizontal and the vertical axis.
-        bounds: values on the horizontal axis, each marked by a vertical line.
-        levels: values on the vertical axis, each marked by a horizontal line.
-        bands: shaded parts of the horizontal axis.
-        ends: of the horizontal axis; as the content needs where they are left out.
-        has_cursor: whether a vertical line follows a slider of the page.
+        words: text alternative of the chart, a sentence.
+        labels: labels of the horizontal and the vertical axis.
+        bounds: values on the horizontal axis with vertical lines.
+        levels: values on the vertical axis with horizontal lines.
+        bands: shaded intervals of the horizontal axis.
+        ends: ends of the horizontal axis; by default they enclose the content.
+        has_cursor: If true, a vertical line follows a slider of the page.
     """
     xs = [x for curve in curves for x in curve.x] + [spot.x for spot in spots] + list(bounds)
     ys = [y for curve in curves for y in curve.y if math.isfinite(y)] + [spot.y for spot in spots]
     ys += levels if ys else []
     if not ys:
-        return tag("p", f"{words} Nothing to draw: F has no value here.")
+        return tag("p", f"{words} No chart: F has no value here.")
     across = _range_with_room(min(xs), max(xs), 0.03) if ends is None else _range_with_room(*ends, 0.0)
     scale = _Scale(across, _range_with_room(min(ys), max(ys), 0.08))
     floor = _HEIGHT - _BOTTOM
@@ -96,7 +96,7 @@ def line_chart(
         place = {"cx": f"{scale.x(spot.x):.1f}", "cy": f"{scale.y(spot.y):.1f}", "r": "4.5"}
         parts.append(tag("circle", tag("title", spot.words), class_=spot.kind, **place))
     if has_cursor:
-        # Its place is a part of the way from the left edge to the right one.
+        # The script sets the position as a fraction of the axis.
         start, width = scale.x(scale.across[0]), scale.x(scale.across[1]) - scale.x(scale.across[0])
         ways = {"data_low": scale.across[0], "data_high": scale.across[1], "data_left": start, "data_width": width}
         parts.append(tag("path", d=f"M0 {_TOP:g}V{floor:g}", class_="cursor", **ways))
@@ -104,19 +104,19 @@ def line_chart(
 
 
 def _band(scale: _Scale, band: Band) -> Markup:
-    """Return a shaded part of the horizontal axis."""
+    """Return a shaded interval of the horizontal axis."""
     left, right = scale.x(band.start), scale.x(band.end)
     size = {"width": f"{max(right - left, 0.5):.1f}", "height": f"{_HEIGHT - _BOTTOM - _TOP:g}"}
     return tag("rect", x=f"{left:.1f}", y=f"{_TOP:g}", class_=band.kind, **size)
 
 
 def count_chart(values: Sequence[tuple[float, int]], *, words: str, labels: tuple[str, str]) -> Markup:
-    """Return a chart of counts, one stem for each value.
+    """Return a chart of counts with one stem per value.
 
     Args:
-        values: pairs of value and count, the best first.
-        words: the chart's text alternative, a sentence.
-        labels: of the horizontal and the vertical axis.
+        values: pairs of value and count, with the best value first.
+        words: text alternative of the chart, a sentence.
+        labels: labels of the horizontal and the vertical axis.
     """
     ys = [value for value, _ in values]
     scale = _Scale(_range_with_room(min(ys), max(ys), 0.12), (0.0, 1.12 * max(count for _, count in values)))
@@ -132,7 +132,7 @@ def count_chart(values: Sequence[tuple[float, int]], *, words: str, labels: tupl
 
 @dataclass(frozen=True)
 class _Scale:
-    """Scales of a chart, from values to its own units.
+    """Scales of a chart, from values to units of its viewBox.
 
     Attributes:
         across, up: range of values on the horizontal and on the vertical axis.
@@ -151,7 +151,7 @@ class _Scale:
 
 
 def _svg(parts: Sequence[object], words: str) -> Markup:
-    """Return a chart from its parts, with its text alternative."""
+    """Return a chart with its text alternative."""
     return tag(
         "svg", join_markup(parts), viewBox=f"0 0 {_WIDTH:g} {_HEIGHT:g}", role="img", aria_label=words, class_="chart"
     )
@@ -178,7 +178,7 @@ def _axes(scale: _Scale, labels: tuple[str, str]) -> list[Markup]:
 
 
 def _path(scale: _Scale, curve: Curve) -> str:
-    """Return the path data of a curve, a new piece after each gap."""
+    """Return the SVG path data of a curve, with a new piece after each gap."""
     parts: list[str] = []
     is_new, last = True, 0.0
     for x, y in zip(curve.x, curve.y, strict=True):
@@ -193,8 +193,8 @@ def _path(scale: _Scale, curve: Curve) -> str:
 
 
 def _range_with_room(low: float, high: float, part: float) -> tuple[float, float]:
-    """Return a range with room at its ends, in parts of its width; a range without width is widened first."""
-    # Differences near rounding error would show as noise over the whole height.
+    """Return a range with room at its ends, a fraction of its width; a range without width is widened first."""
+    # Otherwise rounding errors would fill the whole height.
     width = high - low
     if width <= 1e-6 * max(abs(low), abs(high)):
         width = 0.1 * max(abs(low), abs(high)) or 1.0
@@ -203,7 +203,7 @@ def _range_with_room(low: float, high: float, part: float) -> tuple[float, float
 
 
 def _ticks(low: float, high: float, about: int) -> list[float]:
-    """Return at most ``about + 1`` round values within a range."""
+    """Return at most ``about + 1`` round values in a range."""
     step = 10.0 ** math.floor(math.log10((high - low) / about))
     step *= next(factor for factor in (1, 2, 5, 10) if (high - low) / (factor * step) <= about)
     first = math.ceil(low / step - 1e-9)
@@ -211,5 +211,5 @@ def _ticks(low: float, high: float, about: int) -> list[float]:
 
 
 def _tick_text(value: float) -> str:
-    """Return a number as the label of a tick."""
+    """Return the label of a tick."""
     return f"{value + 0.0:.6g}".replace("-", "\N{MINUS SIGN}")

@@ -1,4 +1,4 @@
-"""Charts of F over a number that is varied, on the page about a trade-off and on the page about a case."""
+"""Charts of F over a varied limit or parameter, for pages about trade-offs and solutions."""
 
 from __future__ import annotations
 
@@ -11,46 +11,46 @@ from .charts import Curve, Spot, line_chart
 from .markup import Markup, tag
 
 
-def curve_figures(*found: Designs[Row], here: Mapping[str, float] | None = None) -> Markup:
-    """Return charts of F over a number, one for each table and task, side by side.
+def curve_figures(*designs: Designs[Row], here: Mapping[str, float] | None = None) -> Markup:
+    """Return charts of F over a varied value side by side, one for each table and task.
 
     Args:
-        found: tables of designs along one number.
-        here: value of a number in the case that a page is about, by the number's name; marked in its chart.
+        designs: tables of designs over one varied value.
+        here: values of varied names in the case of the page; a mark in the chart.
     """
     charts = [
         _chart(each, column, None if here is None else here.get(_over(each).name))
-        for each in found
+        for each in designs
         for column in each.of_kind(ColumnKind.OBJECTIVE)
     ]
     return tag("div", *charts, class_="charts")
 
 
-def _over(found: Designs[Row]) -> Column[Row]:
-    (column,) = found.of_kind(ColumnKind.VARIED)
+def _over(designs: Designs[Row]) -> Column[Row]:
+    (column,) = designs.of_kind(ColumnKind.VARIED)
     return column
 
 
 def _numbers(column: Column[Row], rows: Sequence[Row]) -> list[float]:
-    """Return the numbers of a column, NaN where there is none."""
+    """Return the numbers of a column; a missing number is NaN."""
     return [math.nan if (cell := column.cell(row)) is None else float(cell) for row in rows]
 
 
-def _chart(found: Designs[Row], column: Column[Row], here: float | None) -> Markup:
-    over, unit = _over(found), f" {_over(found).unit}" if _over(found).unit else ""
-    values, F = _numbers(over, found.rows), _numbers(column, found.rows)
-    name = f"{column.series}: " if len(found.of_kind(ColumnKind.OBJECTIVE)) > 1 else ""
+def _chart(designs: Designs[Row], column: Column[Row], here: float | None) -> Markup:
+    over, unit = _over(designs), f" {_over(designs).unit}" if _over(designs).unit else ""
+    values, F = _numbers(over, designs.rows), _numbers(column, designs.rows)
+    name = f"{column.series}: " if len(designs.of_kind(ColumnKind.OBJECTIVE)) > 1 else ""
     solved = [(value, each) for value, each in zip(values, F, strict=True) if math.isfinite(each)]
-    words = f"{name}no value of {over.label} from {values[0]:.5g} to {values[-1]:.5g}{unit} has an answer."
+    words = f"{name}no optimum for any value of {over.label} from {values[0]:.5g} to {values[-1]:.5g}{unit}."
     if solved:
         (first, F_first), (last, F_last) = solved[0], solved[-1]
         words = f"{name}F is {F_first:.6g} at {over.label} = {first:.5g}{unit} and {F_last:.6g} at {last:.5g}{unit}."
         missing = len(values) - len(solved)
         if missing:
-            words += f" {missing} of {len(values)} values have no answer."
-    middles = _bend_values(found)
+            words += f" No optimum at {missing} of {len(values)} values."
+    middles = _bend_values(designs)
     if middles:
-        words += " Vertical lines: other bounds and limits become active there."
+        words += " Vertical lines: changes of the active bounds and limits."
     chart = line_chart(
         [Curve(values, F, "curve")],
         [
@@ -58,18 +58,18 @@ def _chart(found: Designs[Row], column: Column[Row], here: float | None) -> Mark
             for value, each in solved
         ],
         words=words,
-        labels=(over.axis, objective_label(found.case)),
+        labels=(over.axis, objective_label(designs.case)),
         bounds=middles,
     )
     return tag("figure", chart, tag("figcaption", words))
 
 
-def _bend_values(found: Designs[Row]) -> list[float]:
-    """Return the middles between neighbouring values with an answer at which other bounds and limits are active."""
-    (active,) = found.of_kind(ColumnKind.ACTIVE)
+def _bend_values(designs: Designs[Row]) -> list[float]:
+    """Return the midpoints between neighbouring values whose optima have different active bounds and limits."""
+    (active,) = designs.of_kind(ColumnKind.ACTIVE)
     has_answer = [
-        any(column.cell(row) is not None for column in found.of_kind(ColumnKind.OBJECTIVE)) for row in found.rows
+        any(column.cell(row) is not None for column in designs.of_kind(ColumnKind.OBJECTIVE)) for row in designs.rows
     ]
-    solved = [row for row, is_solved in zip(found.rows, has_answer, strict=True) if is_solved]
-    values, sides = _numbers(_over(found), solved), [active.cell(row) for row in solved]
+    solved = [row for row, is_solved in zip(designs.rows, has_answer, strict=True) if is_solved]
+    values, sides = _numbers(_over(designs), solved), [active.cell(row) for row in solved]
     return [(values[k - 1] + values[k]) / 2 for k in range(1, len(solved)) if sides[k] != sides[k - 1]]

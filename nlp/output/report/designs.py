@@ -1,4 +1,4 @@
-"""A table of designs as a page of HTML: picture, changes of active limits, drawings of designs, the table."""
+"""Page about a table of designs: picture, changes of active limits, drawings of designs, table."""
 
 from __future__ import annotations
 
@@ -27,90 +27,92 @@ from .markup import (
     whole_page,
 )
 
-#: So many designs are drawn at most; so many rows of a table are on a page: a browser is slow with many more.
+#: Largest number of drawn designs, and of table rows on a page: a browser is slow with many more.
 _MOST, _ROWS = 12, 500
 _WORDS = (
-    "The robot at each design, from one direction and at one scale. Its limbs have the colours of their rates: blue "
-    "for shortening, orange for lengthening."
+    "The robot at each design, with the same view and scale. Colours of limbs: blue for shortening, orange for "
+    "lengthening."
 )
 
 
-def designs_page(found: Designs[Row]) -> str:
-    """Return a whole page about a table of designs, which opens without a network.
+def designs_page(designs: Designs[Row]) -> str:
+    """Return a page about a table of designs, which opens without a network.
 
-    Its script only says which tables scroll: all words, charts, pictures and tables stand there without it.
+    The script only marks tables that scroll: all texts, charts, pictures and tables are complete without it.
     """
-    page = found.page
-    sections = list(_list_sections(found) if found.join is Join.LIST else _sections(found))
+    page = designs.page
+    sections = list(_list_sections(designs) if designs.join is Join.LIST else _sections(designs))
     contents, body = contents_and_body(sections)
     return whole_page(
-        f"{found.title} - {found.word}",
+        f"{designs.title} - {designs.word}",
         page.subtitle,
         answer_box([page.answer], is_answer=page.is_answer),
         body,
-        heading=found.title,
+        heading=designs.title,
         contents=contents,
     )
 
 
-def _sections(found: Designs[Row]) -> Iterator[tuple[str, str, Markup]]:
-    """Yield the sections of a page about designs of one robot: anchor, heading and content of each."""
-    page, designs = found.page, found.drawn()
+def _sections(table: Designs[Row]) -> Iterator[tuple[str, str, Markup]]:
+    """Yield anchor, heading and content of the sections of a page about designs of one robot."""
+    page, designs = table.page, table.drawn()
     aside = bend_lines(designs, page.bends) if page.bends else Markup("")
-    if page.is_answer and (legend := legend_of(found)):
+    if page.is_answer and (legend := legend_of(table)):
         aside = tag("ul", *(tag("li", line) for line in legend), class_="plain")
-    beside = tag("div", tag("div", _picture(found), class_="wide"), aside, class_="beside")
+    beside = tag("div", tag("div", _picture(table), class_="wide"), aside, class_="beside")
     yield (*page.picture, join_markup([paragraphs(page.rules), beside, paragraphs(page.cautions)]))
     yield "designs", page.designs, design_figures(designs)
-    yield (*page.table, designs_rows(found))
+    yield (*page.table, designs_rows(table))
 
 
-def _picture(found: Designs[Row]) -> Markup:
-    """Return the picture of a page, or a sentence where there is none."""
-    page = found.page
-    if found.join is Join.CURVE and found.of_kind(ColumnKind.VARIED):
-        return curve_figures(found)
+def _picture(designs: Designs[Row]) -> Markup:
+    """Return the picture of a page, or a sentence with the reason for the missing picture."""
+    page = designs.page
+    if designs.join is Join.CURVE and designs.of_kind(ColumnKind.VARIED):
+        return curve_figures(designs)
     if not page.is_answer:
         return Markup("")
     try:
-        picture = picture_of(".svg", designs_figure, found, is_on_page=True)
+        picture = picture_of(".svg", designs_figure, designs, is_on_page=True)
     except EvaluationError as error:
         return paragraphs([f"{error}."])
     return picture_figure(picture, page.below)
 
 
-def _list_sections(found: Designs[Row]) -> Iterator[tuple[str, str, Markup]]:
-    """Yield the sections of a page about several robots: anchor, heading and content of each."""
-    page = found.page
-    yield (*page.table, join_markup([paragraphs(page.rules), designs_rows(found)]))
-    with suppress(EvaluationError):  # where no robot has an answer
-        *robots, legend = map(image_source, robot_pictures(found))
-        alt = "A robot at its design; the table has its numbers."
+def _list_sections(designs: Designs[Row]) -> Iterator[tuple[str, str, Markup]]:
+    """Yield anchor, heading and content of the sections of a page about several robots."""
+    page = designs.page
+    yield (*page.table, join_markup([paragraphs(page.rules), designs_rows(designs)]))
+    with suppress(EvaluationError):  # if no robot has an optimum
+        *robots, legend = map(image_source, robot_pictures(designs))
+        alt = "Robot at its design; the values are in the table."
         images = [tag("img", src=source, alt=alt) for source in robots]
-        shown = [tag("div", *images, class_="designs"), tag("img", src=legend, alt="Colours are rates of the limbs.")]
+        shown = [tag("div", *images, class_="designs"), tag("img", src=legend, alt="Colour scale of the limb rates.")]
         yield (*page.picture, tag("figure", *shown, tag("figcaption", page.below)))
     details = []
-    for each in found.details:
+    for each in designs.details:
         details += [tag("h3", each.name), paragraphs(each.sentences)]
         details += [] if each.table is None else [html_table(each.table, f"dimensions of {each.name}")]
-    yield "details", "Each robot", join_markup(details)
+    yield "details", "Robots in detail", join_markup(details)
 
 
-def designs_rows(found: Designs[Row]) -> Markup:
-    """Return the table, and below it what is active in all of its rows."""
-    few = "" if len(found.rows) <= _ROWS else f"The first {_ROWS} of {len(found.rows):,} rows; CSV and JSON have all."
-    below = tag("p", f"Active throughout: {found.throughout}.") if found.throughout else None
-    rows = html_table(designs_table(found, _ROWS), found.caption, id="swept" if found.join is Join.GRID else None)
+def designs_rows(designs: Designs[Row]) -> Markup:
+    """Return the table, and below it the bounds and limits that are active in all rows."""
+    few = (
+        "" if len(designs.rows) <= _ROWS else f"The first {_ROWS} of {len(designs.rows):,} rows; CSV and JSON have all."
+    )
+    below = tag("p", f"Active in all rows: {designs.throughout}.") if designs.throughout else None
+    rows = html_table(designs_table(designs, _ROWS), designs.caption, id="swept" if designs.join is Join.GRID else None)
     return join_markup([tag("p", few) if few else None, rows, below])
 
 
 def bends(active: Sequence[frozenset[str]]) -> list[int]:
-    """Return the indices of the designs at which other bounds and limits are active than at the one before."""
+    """Return the indices of the designs whose active bounds and limits differ from those of the previous design."""
     return [k for k in range(1, len(active)) if active[k] != active[k - 1]]
 
 
 def chosen_designs(active: Sequence[frozenset[str]]) -> list[int]:
-    """Return the indices of the designs that are drawn: both ends, each side of a bend, then evenly spread ones."""
+    """Return the indices of the drawn designs: both ends, both sides of each change of active limits, then others."""
     count = len(active)
     sides = [each for k in bends(active) for each in (k - 1, k)]
     spread = np.rint(np.linspace(0, count - 1, min(count, _MOST))).astype(int).tolist()
@@ -119,16 +121,16 @@ def chosen_designs(active: Sequence[frozenset[str]]) -> list[int]:
 
 
 def changed_words(before: Sequence[str], after: Sequence[str]) -> str:
-    """Return what becomes active and what no longer is; an empty text where nothing changes."""
+    """Return the names of bounds and limits that become active or inactive; empty without a change."""
     new = [each for each in after if each not in before]
     gone = [each for each in before if each not in after]
     parts = [f"{', '.join(new)} become{'s' * (len(new) == 1)} active"] if new else []
-    parts += [f"{', '.join(gone)} no longer {'is' if len(gone) == 1 else 'are'}"] if gone else []
+    parts += [f"{', '.join(gone)} become{'s' * (len(gone) == 1)} inactive"] if gone else []
     return "; ".join(parts)
 
 
 def bend_lines(designs: Sequence[DrawnDesign], heading: str) -> Markup:
-    """Return, below a heading, a sentence for each two neighbours between which other limits become active."""
+    """Return a heading, and a sentence for each pair of neighbours with different active limits."""
     found = bends([frozenset(each.active) for each in designs])
     lines = [
         f"Between {designs[k - 1].name} and {designs[k].name}: "
@@ -141,7 +143,7 @@ def bend_lines(designs: Sequence[DrawnDesign], heading: str) -> Markup:
 
 
 def design_figures(designs: Sequence[DrawnDesign]) -> Markup:
-    """Return a figure of each chosen design that can be drawn, side by side as the width allows."""
+    """Return figures of the chosen designs side by side, as the width allows."""
     chosen = chosen_designs([frozenset(each.active) for each in designs])
     shown = [(designs[k], drawing) for k in chosen if (drawing := _drawing(designs[k])) is not None]
     if not shown:
@@ -150,17 +152,17 @@ def design_figures(designs: Sequence[DrawnDesign]) -> Markup:
     figures = [
         tag(
             "figure",
-            tag("img", src=image_source(content), alt=f"The robot at {each.name}"),
+            tag("img", src=image_source(content), alt=f"Robot at {each.name}"),
             tag("figcaption", tag("b", each.name), f": {each.words}", tag("small", ", ".join(each.numbers))),
         )
         for (each, _), content in zip(shown, pictures, strict=True)
     ]
-    few = [] if len(shown) == len(designs) else [f"{len(shown)} of {len(designs)} designs are drawn."]
+    few = [] if len(shown) == len(designs) else [f"{len(shown)} of {len(designs)} designs are shown."]
     return join_markup([paragraphs([_WORDS, *few]), tag("div", *figures, class_="designs")])
 
 
 def _drawing(design: DrawnDesign) -> Drawing | None:
-    """Return the robot at a design; None where it cannot be drawn."""
+    """Return the drawing of the robot at a design; None if it cannot be drawn."""
     try:
         return drawing_of(design.nlp, design.x, design.state, design.task)
     except EvaluationError:

@@ -1,4 +1,4 @@
-"""Surroundings of the answer as HTML: other optima, slices and maps of F."""
+"""Sections of a report about the surroundings of the design: local optima, slices and maps of F."""
 
 from __future__ import annotations
 
@@ -27,27 +27,25 @@ from .report import Part, Report
 from .slices import Slice, has_loops
 
 _ENCLOSED = (
-    "Here F is drawn over the active limits that cost most. Each point of a curve is a solve of its own, from few "
-    "starting points and from the optima beside it. The dot in colour is this point; the command tradeoff draws such "
-    "curves more closely. Slices along single variables would show little: most variables cannot move alone from this "
-    "point without leaving a limit."
+    "Optimal F over the active limits with the largest effect. Each point of a curve is a new solve from a few "
+    "starting points and from the neighbouring optima. The coloured dot is this design; the command tradeoff computes "
+    "curves with more points. Slices along single variables are not shown: at this design, most variables cannot "
+    "change independently without violating a limit."
 )
 
 
 def optima(report: Report) -> Markup:
-    """Return the distinct optima found from the starts: a chart of counts over F, and a table of their variables."""
+    """Return the distinct local optima: a chart of counts over F, and a table of their variables."""
     parts: list[Markup] = []
     result = report.result
     results = [result] if isinstance(result, SolveResult) else result.tasks
     solutions: list[tuple[str, str, str, ProgramSolution, RobotData | None]] = [
-        (part.name, part.label, part.unit, part.solution, own.robot)
+        (f"Task “{part.name}”", part.label, part.unit, part.solution, own.robot)
         for part, own in zip(report.parts, results, strict=True)
     ]
     if report.combined is not None:
         case = report.case
-        solutions.append(
-            ("the combined program", objective_label(case), unit_of_objective(case), report.combined, None)
-        )
+        solutions.append(("Combined tasks", objective_label(case), unit_of_objective(case), report.combined, None))
     for name, label, unit, solution, robot in solutions:
         if not solution.starts:
             continue
@@ -59,7 +57,7 @@ def optima(report: Report) -> Markup:
 
 def _optima_of(solution: ProgramSolution, robot: RobotData | None, label: str, unit: str) -> Iterator[Markup]:
     converged = sum(found.count for found in solution.optima)
-    yield tag("p", f"{converged} of {counted(len(solution.starts), 'start')} ended in an optimum.")
+    yield tag("p", f"{converged} of {counted(len(solution.starts), 'start')} converged to a local optimum.")
     failed = Counter(start.status for start in solution.starts if start.status is not StartStatus.CONVERGED)
     yield from (tag("p", f"{count}: {status.value}.") for status, count in failed.items())
     if not solution.optima:
@@ -67,33 +65,33 @@ def _optima_of(solution: ProgramSolution, robot: RobotData | None, label: str, u
     if solution.better is not None:
         reached = f"{number(task_F(robot, solution.better))} {unit}".rstrip()
         yield tag(
-            "p", f"A search that did not converge reached F = {reached} within the limits, better than any optimum."
+            "p", f"An unconverged search reached F = {reached} within the limits, better than every local optimum."
         )
     best = solution.optima[0]
     F = f"{number(task_F(robot, best.F))} {unit}".rstrip()
     times = "once" if best.count == 1 else f"{best.count} times"
-    words = f"{len(solution.optima)} distinct optima; the best, F = {F}, was found {times}."
+    words = f"{len(solution.optima)} distinct optima; the best, F = {F}, was reached {times}."
     if len(solution.optima) == 1:
-        words = f"All of these ended in one optimum, F = {F}."
+        words = f"All of them reached the same optimum, F = {F}."
         if best.count == 1:
-            words = f"The optimum that was found: F = {F}."
+            words = f"Local optimum: F = {F}."
         yield tag("p", words)
     else:
         chart = count_chart([(o.F, o.count) for o in solution.optima], words=words, labels=(label, "starts"))
         yield tag("figure", chart, tag("figcaption", words))
     left = len(solution.optima) - MOST_OPTIMA
-    more = f" ({left} worse {'one is' if left == 1 else 'ones are'} left out)" if left > 0 else ""
-    yield html_table(optimum_table(solution, robot), f"Where they lie{more}")
+    more = f" ({left} worse {'optimum' if left == 1 else 'optima'} not shown)" if left > 0 else ""
+    yield html_table(optimum_table(solution, robot), f"Variables at the local optima{more}")
 
 
 def surroundings(report: Report) -> Markup:
-    """Return F along each variable through the answer, and over pairs of variables."""
+    """Return F along each variable through the design, and over pairs of variables."""
     parts: list[Markup] = []
     with_maps = [k for k, part in enumerate(report.parts) if part.planes]
     if not any(part.slices for part in report.parts):
         if any(has_loops(part.nlp) for part in report.parts) and report.parts[0].nlp.n:
             return paragraphs(
-                ["One variable cannot move alone: the robot's loops would open. So there are no slices of F."]
+                ["No slices of F: no variable can change independently without opening the loops of the robot."]
             )
         return Markup("")
     if report.curves:
@@ -102,7 +100,7 @@ def surroundings(report: Report) -> Markup:
         parts += [tag("p", _ENCLOSED), curve_figures(*curves, here=here), *map(designs_rows, curves)]
     parts += _slices(report)
     if with_maps:
-        parts.append(tag("h3", "Two variables at once"))
+        parts.append(tag("h3", "F over two variables"))
         parts.append(_maps(report, with_maps))
     return join_markup(parts)
 
@@ -112,25 +110,25 @@ def _limits(report: Report) -> tuple[LimitData, ...]:
 
 
 def _slices(report: Report) -> Iterator[Markup]:
-    """Yield the slices; beside curves, those of the variables that can move alone only."""
+    """Yield the slices; with trade-off curves, only those of variables that can change independently."""
     shown = [[each for each in part.slices if each.has_room or not report.curves] for part in report.parts]
     if not any(shown):
         return
     if report.curves:
-        yield tag("h3", "Variables that can move alone")
+        yield tag("h3", "Independent variables")
     yield tag(
         "p",
-        "Each slice moves one variable from bound to bound and holds the others. Solid: within every limit; "
-        "dashed: outside of one, or off an equation of the robot. Vertical lines: the bounds. Dot: this point."
+        "In each slice, one variable changes from bound to bound and the others stay fixed. Solid: all limits "
+        "satisfied; dashed: a limit or an equation of the robot violated. Vertical lines: bounds. Dot: this design."
         + (
-            " A component of a free direction moves with the direction's others, which are scaled to unit length."
+            " If the variable is a component of a unit vector, the other components are scaled to keep its length."
             if report.parts[0].nlp.program.places.directions
             else ""
         ),
     )
     for part, slices in zip(report.parts, shown, strict=True):
         if len(report.parts) > 1:
-            yield tag("h3", f"Slices for “{part.name}”")
+            yield tag("h3", f"Slices of task “{part.name}”")
         yield tag("div", *(_slice(part, each) for each in slices), class_="charts")
 
 
@@ -147,23 +145,27 @@ def _slice(part: Part, each: Slice) -> Markup:
     finite = np.isfinite(each.F)
     if finite.any():
         kept = np.isfinite(inside)
-        words = f"{variable.name}: F from {np.nanmin(each.F):.5g} to {np.nanmax(each.F):.5g} on the slice"
+        words = f"{variable.name}: F from {np.nanmin(each.F):.5g} to {np.nanmax(each.F):.5g} along the slice"
         if kept.any():
             k = int(np.nanargmax(inside) if nlp.sign < 0 else np.nanargmin(inside))
             best = "largest" if nlp.sign < 0 else "smallest"
-            words += f", {best} within the limits at {number(values[k], width, digits=5)} {unit}".rstrip()
+            words += f"; {best} F within the limits at {number(values[k], width, digits=5)} {unit}".rstrip()
             if kept.sum() == 1:
-                words += ", the only one of its points within them"
+                words += ", the only point within the limits"
             elif not kept[finite].all():
-                words += f"; within every limit on {100 * np.mean(kept):.0f} % of it"
+                words += f"; all limits are satisfied on {100 * np.mean(kept):.0f} % of the slice"
         else:
-            words += "; no point of it keeps every limit"
-        words += f". Here: F = {here:.6g} {part.unit}".rstrip() + f" at {at:.5g} {unit}".rstrip() + "."
+            words += "; no point satisfies all limits"
+        words += f". This design: F = {here:.6g} {part.unit}".rstrip() + f" at {at:.5g} {unit}".rstrip() + "."
     else:
-        words = f"{variable.name}: it cannot move while the others are held."
+        words = f"{variable.name}: no slice, as this variable cannot change while all others are fixed."
     chart = line_chart(
         [Curve(values, each.F.tolist(), "curve outside"), Curve(values, inside.tolist(), "curve")],
-        [Spot(at, here, "spot", f"here: {variable.name} = {at:.6g} {unit}, F = {here:.7g} {part.unit}".rstrip())],
+        [
+            Spot(
+                at, here, "spot", f"this design: {variable.name} = {at:.6g} {unit}, F = {here:.7g} {part.unit}".rstrip()
+            )
+        ],
         words=words,
         labels=(f"{variable.name}, {unit}" if unit else variable.name, part.label),
         bounds=(values[0], values[-1]),
@@ -172,11 +174,11 @@ def _slice(part: Part, each: Slice) -> Markup:
 
 
 def _maps(report: Report, parts: Sequence[int]) -> Markup:
-    """Return the frame of the maps of F, and the choice of two variables.
+    """Return the frame of the maps of F, and the selection of two variables.
 
     Args:
-        report: the report.
-        parts: indices of the parts with maps.
+        report: content of the report.
+        parts: indices of the tasks with maps.
     """
     options = []
     for k in parts:
@@ -190,5 +192,5 @@ def _maps(report: Report, parts: Sequence[int]) -> Markup:
     )
     shown, every = len(options), sum(part.pairs for part in report.parts)
     picture = script_frame("map", "map", "Map of F over two variables")
-    few = tag("p", f"The first {shown} of {every} pairs are here.") if shown < every else None
+    few = tag("p", f"The first {shown} of {every} pairs are available.") if shown < every else None
     return join_markup([chooser, tag("figure", picture, tag("figcaption", id="map-words")), *([few] if few else [])])

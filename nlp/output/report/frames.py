@@ -1,4 +1,4 @@
-"""Data of the page's 3-D view: the robot's limbs and joints at postures along its task's motion, with its rates."""
+"""Data of the 3-D view of a page: limbs, joints and rates of the robot at postures along the task's motion."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ..pictures.view import View, clearest_view
 
 
 class LinkData(TypedDict):
-    """A line between two points, by their indices; ``row`` is the index of the row that colours it."""
+    """Line between two points by index; ``row`` is the index of the row of the Jacobian that gives the colour."""
 
     ends: list[int]
     limb: str | None
@@ -30,7 +30,7 @@ class LinkData(TypedDict):
 
 
 class JointData(TypedDict):
-    """A joint's symbol: its kind, and its words for people."""
+    """Symbol of a joint: kind, actuation, and tooltip."""
 
     kind: str
     words: str
@@ -38,14 +38,14 @@ class JointData(TypedDict):
 
 
 class MeasureData(TypedDict):
-    """The measure of a limb that stands beside each row: its words, and its unit in each row."""
+    """Quantity of a limb for the table of rates: name, and unit for each row."""
 
     words: str
     units: list[str]
 
 
 class RowData(TypedDict):
-    """A row of the Jacobian: its limb and member, and the index of the point that joins the limb to the platform."""
+    """Row of the Jacobian: limb, member, and index of the point that joins the limb to the platform."""
 
     limb: str
     member: str
@@ -54,7 +54,7 @@ class RowData(TypedDict):
 
 
 def link_data(drawing: Drawing) -> list[LinkData]:
-    """Return the lines with the rows that colour them."""
+    """Return the lines with the rows of the Jacobian that give their colours."""
     rows = drawing.limb_rows()
     found: list[LinkData] = []
     for start, end, link in drawing.links:
@@ -66,7 +66,7 @@ def link_data(drawing: Drawing) -> list[LinkData]:
 
 
 def row_data(drawing: Drawing) -> list[RowData]:
-    """Return the rows; a couple beside others of its limb has no place, because only their plane has a meaning."""
+    """Return the rows; one of several couples of a limb has no point, because only the plane of the couples matters."""
     couples = [row.limb for row in drawing.rows if row.kind is WrenchKind.COUPLE]
     return [
         {
@@ -86,12 +86,12 @@ def joint_data(drawing: Drawing) -> list[JointData]:
 
 
 def _joint_words(joint: JointSymbol) -> str:
-    """Return a joint in words: its name, kind, and whether an actuator drives it."""
+    """Return name, kind and actuation of a joint as text."""
     return f"joint {joint.name}: {joint.kind.words}{', actuated' if joint.is_actuated else ''}"
 
 
 def measure_data(drawing: Drawing, units: Units) -> MeasureData:
-    """Return the measure of limbs: the length of a leg; for a robot given joint by joint, the way of its actuator."""
+    """Return the quantity of limbs: leg length, or actuator coordinate for a robot defined by joints."""
     rows = drawing.model.rows
     if not drawing.model.scene.joints:
         return {"words": "length", "units": [units.length] * len(rows)}
@@ -101,10 +101,10 @@ def measure_data(drawing: Drawing, units: Units) -> MeasureData:
 
 
 def measured_values(drawing: Drawing, posture: Posture, units: Units) -> list[float | None]:
-    """Return the measure of each row's limb.
+    """Return the quantity of the limb of each row.
 
-    It is the robot's own measure of a leg's length, or else the length of the limb's lines; for a robot given joint by
-    joint, the way of the limb's first actuator from home, None without one.
+    It is the leg length of the model, or else the length of the limb's lines. For a robot defined by joints it is the
+    coordinate of the limb's first actuator, None without an actuator.
     """
     lengths: dict[str, float] = {}
     if drawing.model.scene.joints:
@@ -123,30 +123,30 @@ def measured_values(drawing: Drawing, posture: Posture, units: Units) -> list[fl
     return [lengths.get(row.limb, 0.0) for row in drawing.model.rows]
 
 
-#: Postures on each side of the one found, at most, at least, and in all views of a page together.
+#: Largest and smallest number of postures on each side of the design's pose, and largest total of a page.
 _SIDE, _LEAST_SIDE, _SIDES = 20, 2, 80
-#: Largest rotation, and largest displacement of a platform corner in parts of the robot's size.
+#: Largest rotation, and largest displacement of a platform corner as a fraction of the robot's size.
 _TURN = math.radians(20)
 _WAY = 0.3
-#: Significant digits of numbers at postures other than the one found: the page shows seven, and computes with them.
+#: Significant digits of numbers at other postures than the design's: the page shows seven, and computes with them.
 _DIGITS = 11
-#: Rounding error of a rate, in parts of the terms that it sums.
+#: Rounding error of a rate relative to its summands.
 _ROUNDING = 1e-9
-#: First elevation of the eye, degrees, and its largest: from right above, the page's camera would have no upwards.
+#: First and largest elevation of the camera, degrees: seen from exactly above, "up" would be undefined.
 _ELEVATION, _HIGHEST = 26.0, 89.0
-#: Least part of the width of a motion's path that is seen from afar: in perspective, away from the middle, it is less.
+#: Least visible fraction of the width of a motion's path in parallel projection; perspective can reduce it.
 _WIDTH = 0.43
 
 
 class PointData(TypedDict):
-    """A named point of the robot and the body that it moves with."""
+    """Named point of the robot, and the body to which it belongs."""
 
     name: str
     body: str
 
 
 class MotionData(TypedDict):
-    """A twist with the lines that show it; see :class:`~screwsynth.nlp.output.pictures.drawing.Motion`."""
+    """Twist with its lines; see :class:`~screwsynth.nlp.output.pictures.drawing.Motion`."""
 
     words: str
     twist: list[float]
@@ -156,7 +156,7 @@ class MotionData(TypedDict):
 
 
 class ForceData(TypedDict):
-    """An arrow of a force or of a moment; see :class:`~screwsynth.nlp.output.pictures.loads.ForceArrow`."""
+    """Arrow of a force or of a moment; see :class:`~screwsynth.nlp.output.pictures.loads.ForceArrow`."""
 
     kind: str
     name: str
@@ -166,10 +166,10 @@ class ForceData(TypedDict):
 
 
 class FrameData(TypedDict):
-    """The robot at one posture.
+    """Robot at one posture.
 
-    ``t`` is the time along the motion, ``lengths`` has the measure of the limb for each row, ``joints`` has place and
-    axes of each joint, and a rate below ``noise`` is rounding error.
+    ``t`` is the time along the motion, ``lengths`` has the quantity of the limb for each row, ``joints`` has position
+    and axes of each joint, and a rate below ``noise`` is rounding error.
     """
 
     t: float
@@ -190,8 +190,8 @@ class FrameData(TypedDict):
 class ViewData(TypedDict):
     """Content of the 3-D view, in the case's units.
 
-    ``frames`` is in order of ``t``; the frame at index ``zero`` is the posture found. ``task`` and ``pose`` are
-    indices, and ``is_worst`` says whether F is the worst of several poses there.
+    ``frames`` is in order of ``t``; the frame at index ``zero`` is the posture of the design. ``task`` and ``pose`` are
+    indices, and ``is_worst`` is true at the pose with the worst F of several poses.
     """
 
     name: str
@@ -226,30 +226,30 @@ class ViewData(TypedDict):
 
 
 class _TimedPosture(NamedTuple):
-    """A posture after a time along the motion."""
+    """Posture after a time along the motion."""
 
     t: float
     posture: Posture
 
 
 class _PostureSequence(NamedTuple):
-    """Postures in order of time, and the index of the one at ``t = 0``."""
+    """Postures in order of time, and the index of the posture at ``t = 0``."""
 
     postures: list[_TimedPosture]
     zero: int
 
 
 class PoseView(NamedTuple):
-    """The pose and the task that a view shows.
+    """Pose and task of a view.
 
     Attributes:
         task: index of the task.
         pose: index of the pose.
         poses: number of poses of the case.
-        is_worst: whether F is the worst there.
+        is_worst: True at the pose with the worst F.
         views: number of views of the page, which share its size.
-        size: of F without cancellation: F is shown as 0 where it is rounding error beside this.
-        words: the number of the actuators that is optimised instead of F, there and with its unit; empty for F.
+        size: sum of the magnitudes of the terms of F; an F within the rounding error of ``size`` is shown as 0.
+        words: value and unit of the optimised actuator quantity at the pose; empty if F is optimised.
     """
 
     task: int = 0
@@ -265,9 +265,9 @@ def view_data(drawing: Drawing, rates: FloatArray, shown: PoseView = PoseView())
     """Return the data of the 3-D view.
 
     Args:
-        drawing: the robot and its motion.
-        rates: (m,) work rates at its posture as the result has them, so that page and result agree to the last bit.
-        shown: the pose and the task.
+        drawing: robot and its motion.
+        rates: (m,) work rates of the result at the posture, so that page and result agree to the last bit.
+        shown: pose and task of the view.
     """
     model, motion = drawing.model, drawing.motion
     units = drawing.case.units if drawing.case is not None else Units()
@@ -313,13 +313,13 @@ def view_data(drawing: Drawing, rates: FloatArray, shown: PoseView = PoseView())
 
 
 def first_eye(drawing: Drawing) -> list[float]:
-    """Return the direction (3,) to the eye of the first view of a page."""
+    """Return the direction (3,) to the camera of the first view of a page."""
     view = clearest_view(drawing, elevation=_ELEVATION, width=_WIDTH)
     return [float(each) for each in View(view.azimuth, min(view.elevation, _HIGHEST)).axes[2]]
 
 
 def _force_data(drawing: Drawing, forces: DrawnForces | None) -> list[ForceData]:
-    """Return the arrows of forces; those of legs and slides lie beside these, away from the robot's middle."""
+    """Return the arrows of forces; arrows of legs and slides are moved outwards from the robot's centre."""
     found: list[ForceData] = []
     for arrow in () if forces is None else forces.arrows:
         ends = arrow.ends
@@ -336,22 +336,22 @@ def _force_data(drawing: Drawing, forces: DrawnForces | None) -> list[ForceData]
 
 
 def _forces_words(forces: DrawnForces | None) -> str:
-    """Return what arrows of forces mean; empty without a load."""
+    """Return the legend of the arrows of forces; empty without a load."""
     if forces is None:
         return ""
     kinds = {arrow.kind for arrow in forces.arrows}
-    words = [f"Arrows at the pose found: {forces.words} (teal)"]
+    words = [f"Arrows at the pose of the design: {forces.words} (teal)"]
     words += ["legs in compression (magenta)"] if "push" in kinds else []
     words += ["legs in tension (green, from a dot)"] if "pull" in kinds else []
     words += ["forces of actuators on their slides (magenta)"] if "drive" in kinds else []
-    words += [f"held by {forces.torques}"] if forces.torques else []
+    words += [f"without arrows: {forces.torques}"] if forces.torques else []
     return "; ".join(words) + "."
 
 
 def _postures_along_motion(drawing: Drawing, count: int) -> _PostureSequence:
-    """Return postures along the motion of a drawing, at most ``count`` on each side of its own.
+    """Return postures along the motion of a drawing, at most ``count`` before and after the drawing's posture.
 
-    The postures end where the robot cannot be assembled; without a motion, there is only the drawing's own posture.
+    The postures end where the robot cannot be assembled; without a motion, there is only the drawing's posture.
     """
     if drawing.motion is None:
         return _PostureSequence([_TimedPosture(0.0, drawing.posture)], 0)
@@ -361,7 +361,7 @@ def _postures_along_motion(drawing: Drawing, count: int) -> _PostureSequence:
         side: list[_TimedPosture] = []
         last: Posture | None = drawing.posture
         for k in range(1, count + 1):
-            # The nearest posture is the best start for closing loops; without loops, no error adds up from the first.
+            # The nearest posture is the best start for closing loops; without loops, no errors add up from the first.
             closes = bool(drawing.model.unknowns)
             start, t = (last, sign * step) if closes else (drawing.posture, sign * step * k)
             last = None if start is None else drawing.linkage.posture_after(start, drawing.motion.twist, t)
@@ -404,13 +404,13 @@ def _frame_data(drawing: Drawing, t: float, posture: Posture, rates: FloatArray,
 
 
 def _rounded(frame: FrameData) -> FrameData:
-    """Return a frame along the motion with as many digits as the page can show; that of the result keeps all."""
+    """Return a frame along the motion with the digits that the page shows; the frame of the result keeps all digits."""
     found: FrameData = _few_digits(frame)
     return found
 
 
 def _few_digits(value: Any) -> Any:  # noqa: ANN401 - whatever JSON can hold
-    """Return JSON's values with rounded numbers."""
+    """Return JSON values with rounded numbers."""
     if isinstance(value, float):
         return float(f"{value:.{_DIGITS}g}")
     if isinstance(value, list):
@@ -421,7 +421,7 @@ def _few_digits(value: Any) -> Any:  # noqa: ANN401 - whatever JSON can hold
 
 
 def _noise(drawing: Drawing, posture: Posture) -> float:
-    """Return the size below which a rate is rounding error of the terms that it sums."""
+    """Return the magnitude below which a rate is rounding error of its summands."""
     if drawing.motion is None:
         return 0.0
     terms = np.abs(posture.jacobian) @ np.abs(np.concatenate([drawing.motion.twist[3:], drawing.motion.twist[:3]]))
@@ -429,9 +429,9 @@ def _noise(drawing: Drawing, posture: Posture) -> float:
 
 
 def _words(drawing: Drawing, t: float, units: Units) -> str:
-    """Return the platform's displacement in words."""
+    """Return the platform's displacement as text."""
     if drawing.motion is None or t == 0:
-        return "at the pose found" if drawing.is_answer else "at the pose reached"
+        return "at the pose of the design" if drawing.is_answer else "at the final pose of the search"
     omega, v = drawing.motion.twist[:3], drawing.motion.twist[3:]
     turn = float(np.linalg.norm(omega)) * t
     pitch = drawing.motion.pitch
@@ -444,7 +444,7 @@ def _words(drawing: Drawing, t: float, units: Units) -> str:
 
 
 def _motion_data(motion: Motion, units: Units) -> MotionData:
-    """Return the data of a twist with its words."""
+    """Return the data of a twist with its description."""
     if math.isinf(motion.pitch):
         words = f"{motion.name}: translation"
     elif abs(motion.pitch) < 1e-9:

@@ -1,4 +1,7 @@
-"""HTML from Python values, and whole pages of it; all text but markup is escaped: no text of a case becomes markup."""
+"""HTML elements and pages from Python values.
+
+All text that is not markup is escaped, so a text of a case cannot become markup.
+"""
 
 from __future__ import annotations
 
@@ -16,25 +19,25 @@ from ...words.text import Line, TextTable
 
 
 class Markup(str):
-    """HTML text, which is not escaped again."""
+    """Text in HTML, which is not escaped again."""
 
     __slots__ = ()
 
 
-#: A cell with a number shorter than this is not broken into lines.
+#: Length of a number below which its cell is not wrapped.
 _SHORT = 24
 #: Elements without an end tag.
 _VOID = frozenset(["meta", "link", "input", "br", "img"])
 
 
 def tag(name: str, *content: object, **attributes: object) -> Markup:
-    """Return an element.
+    """Return an HTML element.
 
     Args:
-        name: of the element.
-        content: markup, or anything else, whose text is escaped; None is left out.
-        attributes: by name, with ``_`` for ``-`` and at the end of Python's keywords. True writes an attribute without
-            a value; None and False write none.
+        name: name of the element.
+        content: markup, or other values as escaped text; None is skipped.
+        attributes: attributes by name, with ``_`` for ``-`` and after a Python keyword. True gives an attribute without
+            a value; None and False give none.
     """
     parts = [name]
     for key, value in attributes.items():
@@ -54,12 +57,12 @@ def join_markup(content: Iterable[object]) -> Markup:
 
 
 def paragraphs(lines: Iterable[Line | str]) -> Markup:
-    """Return a paragraph for each line of text; its label stands before it."""
+    """Return a paragraph for each line of text, with its label first."""
     return join_markup(tag("p", _line(line)) for line in lines)
 
 
 def _line(line: Line | str) -> object:
-    """Return the content of a paragraph: the label and the words of a line."""
+    """Return the content of a paragraph: label and text of a line."""
     if isinstance(line, str):
         return line
     if not line.label:
@@ -68,15 +71,15 @@ def _line(line: Line | str) -> object:
 
 
 def html_table(table: TextTable, caption: str, **attributes: object) -> Markup:
-    """Return a table of HTML, whose first column names the rows; a wide table scrolls by itself, also by keyboard.
+    """Return an HTML table, whose first column names the rows; a wide table can be scrolled, also by keyboard.
 
     Args:
-        table: of text.
-        caption: of the table.
-        attributes: of the element, as for :func:`tag`.
+        table: table of texts.
+        caption: caption of the table.
+        attributes: attributes of the element, as for :func:`tag`.
     """
     headers = [header.replace("\n", ", ") for header in table.headers]
-    # A header without text names nothing: the cell is an ordinary one.
+    # An empty header is an ordinary cell, since it names nothing.
     head = tag("tr", *(tag("th", header, scope="col") if header else tag("td") for header in headers))
     body = []
     for row in table.rows[: len(table.rows) - table.folded]:
@@ -94,21 +97,21 @@ def html_table(table: TextTable, caption: str, **attributes: object) -> Markup:
 
 
 def script_frame(key: str, name: str, words: str) -> Markup:
-    """Return the frame of a picture that a script draws, with words in its place until then.
+    """Return the frame of a picture that a script draws, with a text until then.
 
     Args:
         key: identifier and class of the frame.
-        name: of the picture, for these words: ``"map"``.
-        words: text in place of the picture, for readers who do not see it.
+        name: kind of picture for the text, such as ``"map"``.
+        words: text alternative of the picture.
     """
-    waiting = tag("p", f"The {name} appears when its script has started.", class_="waiting script")
+    waiting = tag("p", f"The {name} appears when the script has started.", class_="waiting script")
     return tag("div", waiting, id=key, class_=key, role="img", aria_label=words)
 
 
 def view_buttons() -> Markup:
-    """Return the buttons that turn a picture in three dimensions."""
+    """Return the buttons that turn a 3-D view."""
     turns = [("left", "Turn left"), ("right", "Turn right"), ("up", "Tilt up"), ("down", "Tilt down")]
-    turns += [("in", "Nearer"), ("out", "Farther"), ("reset", "First view")]
+    turns += [("in", "Zoom in"), ("out", "Zoom out"), ("reset", "Reset view")]
     return tag(
         "div",
         *(tag("button", words, type="button", data_turn=key) for key, words in turns),
@@ -119,10 +122,10 @@ def view_buttons() -> Markup:
 
 
 def packed_plotly() -> str:
-    """Return the library of pictures in three dimensions, compressed for a script element to two fifths of its size."""
+    """Return the Plotly library, compressed to two fifths of its size and encoded for a script element."""
     from plotly.offline import get_plotlyjs  # noqa: PLC0415 - only some pages need it
 
-    # Without a time in its head, the same text is always the same bytes.
+    # Without a time stamp, the same text always gives the same bytes.
     return base64.b64encode(gzip.compress(get_plotlyjs().encode("utf-8"), mtime=0)).decode("ascii")
 
 
@@ -135,12 +138,12 @@ def script_json(data: Any) -> Markup:  # noqa: ANN401 - whatever JSON can hold
 
 
 def _cell(text: str) -> Markup:
-    """Return a cell of a table, marked where its text is a short number."""
+    """Return a cell of a table, with a class for a short number."""
     return tag("td", text, class_="number" if _is_short_number(text) else None)
 
 
 def _is_short_number(text: str) -> bool:
-    """Return whether a text is a number too short to be broken into lines."""
+    """Return whether a text is a number that is too short to be wrapped."""
     return len(text) < _SHORT and (text[:1].isdigit() or text[:1] in {"+", "-"})
 
 
@@ -157,19 +160,19 @@ def whole_page(
     data: Any = None,  # noqa: ANN401 - whatever JSON can hold
     plotly: str = "",
 ) -> str:
-    """Return a whole page. Without further scripts, its own only says which tables scroll.
+    """Return a page. Without further scripts, its script only marks tables that scroll.
 
     Args:
-        title: of the window, with the package's name.
+        title: title of the window, without the package's name.
         subtitle: line below the heading.
-        answer: element that says the answer.
-        body: sections.
-        heading: left out, the title.
-        contents: list of the sections.
+        answer: element with the main result.
+        body: sections of the page.
+        heading: main heading; by default the title.
+        contents: list of links to the sections.
         styles: names of further style sheets.
         scripts: names of further scripts.
-        data: of these scripts.
-        plotly: the packed library.
+        data: data for the scripts.
+        plotly: packed Plotly library, or an empty text.
     """
     parts = {
         "title": tag("title", f"{title} - screwsynth"),
@@ -187,12 +190,16 @@ def whole_page(
 
 
 def answer_box(lines: Iterable[str], *, is_answer: bool = True) -> Markup:
-    """Return the element that says the answer of a page, or that there is none."""
+    """Return the element with the main result of a page, or with the reason for a missing result."""
     return tag("div", paragraphs(lines), class_="answer" if is_answer else "answer none", id="answer")
 
 
 def contents_and_body(sections: Iterable[tuple[str, str, Markup]]) -> tuple[Markup, Markup]:
-    """Return the list of the sections of a page that have content, and these: anchor, heading and content of each."""
+    """Return the list of links to the sections with content, and these sections.
+
+    Args:
+        sections: anchor, heading and content of each section.
+    """
     found = [each for each in sections if each[2]]
     contents = tag("ul", *(tag("li", tag("a", heading, href=f"#{anchor}")) for anchor, heading, _ in found))
     body = join_markup(
@@ -212,15 +219,15 @@ def picture_figure(svg: bytes, words: str) -> Markup:
     """Return a picture as a figure of a page.
 
     Args:
-        svg: content of the picture's file.
-        words: below the picture, and for readers who do not see it.
+        svg: content of the SVG file.
+        words: caption and text alternative of the picture.
     """
     image = tag("img", src=image_source(svg), alt=words)
     return tag("figure", image, tag("figcaption", words))
 
 
 def image_source(content: bytes, kind: str = "svg+xml") -> str:
-    """Return an image as the address of a page's element."""
+    """Return an image as a data URL."""
     return f"data:image/{kind};base64,{base64.b64encode(content).decode('ascii')}"
 
 

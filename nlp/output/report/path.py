@@ -1,4 +1,4 @@
-"""A page about a judged path: verdicts, the robot along the path, curves of its numbers, places of faults."""
+"""Page about the verification of a tool path: verdicts, violations, the robot along the path, curves."""
 
 from __future__ import annotations
 
@@ -38,36 +38,36 @@ from .markup import (
 from .pathview import MOST_MARGIN, PathView, path_view, thinned
 from .verdicts import origin, refuting_place, shown_verdicts
 
-#: Points of a curve of the page.
+#: Largest number of points of a curve.
 _POINTS = 600
-#: Colour of limits, and of the path beyond one.
+#: Colour of limits, and of the path where a limit is violated.
 _RED = "#a3250f"
 
 
 def path_page(picture: PathPicture, text: str, command: Callable[[WorkspacePose], str]) -> str:
-    """Return the whole page, which opens without a network; verdicts and curves need no script.
+    """Return the page, which opens without a network; verdicts and curves need no script.
 
     Args:
-        picture: the path with its verdicts.
+        picture: path with its verdicts and curves.
         text: text of the case file.
-        command: returns the command that shows a pose.
+        command: function that returns the command for a pose.
     """
     case, result = picture.judged.case, picture.result
     title = case.title or case.name
     view = path_view(picture)
     sections = [
-        # One section, through which the slider stays in sight.
-        ("robot", "The robot along the path", join_markup([_robot(picture, view), _curves(picture)])),
-        ("verdicts", "Verdicts", _verdicts(picture)),
-        ("refuted", "Places that refute a claim", _refuted(picture, command)),
-        ("origin", "Case text and versions", origin(result.versions, text)),
+        ("verdicts", "Verdicts along the path", _verdicts(picture)),
+        ("refuted", "Violated limits and singularities", _refuted(picture, command)),
+        # One section, in which the slider stays visible.
+        ("robot", "Robot along the path", join_markup([_robot(picture, view), _curves(picture)])),
+        ("origin", "Case file and versions", origin(result.versions, text)),
     ]
     contents, body = contents_and_body(sections)
     words = verdict_words(result)
     answers = [f"{words[0].upper()}{words[1:]}."]
     first = first_refuted(result)
     if first is not None and first.fault is not None:
-        answers.append(f"First fault: {fault_words(first, first.fault)}.")
+        answers.append(f"First violation: {fault_words(first, first.fault)}.")
     return whole_page(
         f"{title} - {picture.judged.path.source}",
         f"{case.name}, robot {case.model.name}, along {picture.judged.path.source}",
@@ -83,24 +83,24 @@ def path_page(picture: PathPicture, text: str, command: Callable[[WorkspacePose]
 
 
 def _verdicts(picture: PathPicture) -> Markup:
-    """Return the lines and tables that the terminal shows, without the title."""
+    """Return the lines and tables of the terminal, without the title."""
     words = (
-        "Each proved claim holds at every point of every segment, and not only at samples. A proven bound is not "
-        "passed by any point; the value reached is met in the line, and at the pose, named beside it."
+        "A proved claim holds at every point of every segment, not only at samples. No point exceeds a proved bound. "
+        "The reached value occurs at the line and the pose of its row."
     )
     return shown_verdicts(path_summary(picture.judged.case, picture.result), "path", words)
 
 
 def _robot(picture: PathPicture, view: PathView | None) -> Markup:
-    """Return the 3-D view with its slider and its legend."""
+    """Return the 3-D view with its slider and legend."""
     if view is None:
-        return paragraphs(["There is no point of the path at which the joints of the robot are known."])
+        return paragraphs(["No view: the joint coordinates are not known at any point of the path."])
     data, last = view.data, len(view.data["frames"]) - 1
     words = data["frames"][data["first"]]["words"]
     controls = tag(
         "p",
         tag("button", "Play", type="button", id="play"),
-        tag("label", "Along the path", for_="travel"),
+        tag("label", "Position along the path", for_="travel"),
         tag("input", type="range", id="travel", min=0, max=last, step=1, value=data["first"], aria_valuetext=words),
         tag("output", words, id="travelled", for_="travel"),
         class_="controls travel along script",
@@ -108,53 +108,53 @@ def _robot(picture: PathPicture, view: PathView | None) -> Markup:
     options = [tag("option", "nearest limit", value="nearest"), tag("option", "margin", value="margin")]
     colour = tag("label", "Colour of the path: ", for_="colour"), tag("select", *options, id="colour")
     still = image_source(picture_file([view.drawing], ".svg"))
-    flat = "This browser has no WebGL: the robot is drawn flat and does not move, but the curves follow the slider."
+    flat = "No WebGL in this browser: the drawing of the robot is fixed, but the curves follow the slider."
     figure = tag(
         "figure",
-        script_frame("view", "picture", "The robot in three dimensions, and the path of its platform's origin."),
+        script_frame("view", "picture", "3-D view of the robot and of the path of its platform's origin."),
         tag("p", flat, class_="flat-words", role="status"),
-        tag("img", src=still, alt=f"The robot, {words}.", class_="still chosen"),
+        tag("img", src=still, alt=f"Robot, {words}.", class_="still chosen"),
         view_buttons(),
-        tag("img", id="view-copy", class_="copy", alt="The robot in three dimensions"),
+        tag("img", id="view-copy", class_="copy", alt="3-D view of the robot"),
         tag("figcaption", _legend(picture, data["marks"] != []), id="view-words"),
     )
     coloured = [tag("p", *colour, class_="controls script")] if data["limits"] else []
-    note = "Without a script nothing moves; the curves and tables are here all the same."
+    note = "The view needs JavaScript; all curves and tables are complete without it."
     return join_markup([controls, *coloured, figure, tag("noscript", tag("p", note))])
 
 
 def _legend(picture: PathPicture, has_marks: bool) -> Markup:
-    """Return what the colours of the path mean."""
+    """Return the legend of the colours of the path."""
     entries = [tag("li", _swatch(LIMIT_COLOURS[k % len(LIMIT_COLOURS)]), words) for k, words in picture.limits]
     if (picture.margins < 0).any():
-        entries.append(tag("li", _swatch(_RED), "beyond a limit"))
+        entries.append(tag("li", _swatch(_RED), "limit violated"))
     parts = []
     if entries:
-        parts.append(
-            tag("p", "The path of the platform's origin has the colour of its nearest limit:", class_="by-limit")
-        )
+        parts.append(tag("p", "Path of the platform's origin, coloured by the nearest limit:", class_="by-limit"))
         parts.append(tag("ul", *entries, class_="legend by-limit"))
-        words = f" from 0 % (red) to {MOST_MARGIN} % and more (blue)."
+        words = f" 0 % (red) to {MOST_MARGIN} % and more (blue)."
         bar = tag("span", class_="scale margins", aria_hidden="true")
-        parts.append(tag("p", "The colour of the path is its smallest margin,", words, bar, class_="by-margin"))
-    words = "Red diamonds: the first faults of claims." if has_marks else ""
-    dark = " Joints: dark where an actuator drives them." if picture.judged.case.model.scene.joints else ""
+        parts.append(
+            tag("p", "Path of the platform's origin, coloured by the smallest margin:", words, bar, class_="by-margin")
+        )
+    words = "Red diamonds: first violation of each limit or rank." if has_marks else ""
+    dark = " Dark joints are actuated." if picture.judged.case.model.scene.joints else ""
     return join_markup([*parts, tag("p", f"{words}{dark}".strip())])
 
 
 def _curves(picture: PathPicture) -> Markup:
-    """Return charts of all numbers along the path, with a cursor at the posture shown."""
+    """Return charts of all quantities along the path, with a cursor at the shown posture."""
     names = actuator_names(picture)
     entries = [
         tag("li", _swatch(ACTUATOR_COLOURS[place % len(ACTUATOR_COLOURS)]), f"actuator {name}")
         for place, name in names.items()
     ]
     if any(each.is_other for panel in picture.panels for each in panel.curves):
-        entries.append(tag("li", "dashed: the smaller of two values"))
+        entries.append(tag("li", "dashed: smaller of two values"))
     if any(panel.limits for panel in picture.panels) or picture.margins.size:
         entries.append(tag("li", _swatch(_RED), "limit"))
     if picture.marks:
-        entries.append(tag("li", f"dotted: first faults of claims, {marks_text(picture.marks)}"))
+        entries.append(tag("li", f"dotted: first violations, {marks_text(picture.marks)}"))
     shown = thinned(picture, _POINTS, np.arange(len(picture.at)))
     charts = [_panel(picture, each, shown) for each in picture.panels]
     if picture.margins.size:
@@ -178,11 +178,7 @@ def _panel(picture: PathPicture, panel: PathPanel, shown: list[int]) -> Markup:
         for each in panel.curves
     ]
     every = np.concatenate([each.values[np.isfinite(each.values)] for each in panel.curves])
-    ends = (
-        f" from {every.min():.5g} to {every.max():.5g} {panel.unit}".rstrip()
-        if every.size
-        else ", of which none is known"
-    )
+    ends = f" from {every.min():.5g} to {every.max():.5g} {panel.unit}".rstrip() if every.size else ": no known value"
     return _chart(picture, curves, f"{panel.title}{ends}", panel.unit, panel.limits)
 
 
@@ -194,14 +190,14 @@ def _margins(picture: PathPicture, shown: list[int]) -> Markup:
         for k, _ in picture.limits
     ]
     known = picture.margins[np.isfinite(picture.margins)]
-    words = f"smallest margin of all limits, at least {known.min():.3g} %" if known.size else "no margin is known"
+    words = f"smallest margin of all limits, at least {known.min():.3g} %" if known.size else "no known margin"
     return _chart(
         picture, curves or [Curve(at, picture.drawn_margins[shown].tolist(), "curve")], words, "margin, %", (0.0,)
     )
 
 
 def _chart(picture: PathPicture, curves: list[Curve], words: str, label: str, limits: tuple[float, ...]) -> Markup:
-    """Return a chart over the way along the path, with faults and segments that are not proved."""
+    """Return a chart over the position along the path, with violations and segments that are not proved."""
     words = f"{words[0].upper()}{words[1:]}."
     chart = line_chart(
         curves,
@@ -218,12 +214,12 @@ def _chart(picture: PathPicture, curves: list[Curve], words: str, label: str, li
 
 
 def _swatch(colour: str) -> Markup:
-    """Return a small box of a colour."""
+    """Return a colour sample for a legend."""
     return tag("span", class_="swatch", style=f"--fill: {colour}")
 
 
 def _refuted(picture: PathPicture, command: Callable[[WorkspacePose], str]) -> Markup:
-    """Return each refuted claim with its first known fault and the command that shows it; empty without one."""
+    """Return each violated claim with its first known violation and a command for the pose."""
     case = picture.judged.case
     refuted = [(each, each.fault) for each in checked_claims(picture.result)]
     return join_markup(

@@ -1,4 +1,4 @@
-"""Data of the 3-D view of a path: the postures of the robot along it, the path with its nearest limits, and faults."""
+"""Data of the 3-D view of a path: postures of the robot, path with nearest limits and margins, violations."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict
 import numpy as np
 
 from ....models import FloatArray
+from ...words.claims import SINGULAR
 from ...words.numbers import number
 from ..pictures.drawing import Drawing, drawing_without_task
 from ..pictures.pathpanels import LIMIT_COLOURS, PathPicture, percent
@@ -17,18 +18,18 @@ from .frames import JointData, LinkData, PointData, first_eye, joint_data, link_
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Postures of a page and their numbers, and points of the path, at most.
+#: Largest number of postures of a page, of their values, and of points of the path.
 _POSTURES, _NUMBERS, _POINTS = 300, 60_000, 600
-#: Part of the robot's size to which coordinates are rounded, and part of 1 for directions: a page shows less.
+#: Rounding of coordinates relative to the robot's size, and of directions: finer than a page shows.
 _FINE, _ROUGH = 1e-7, 1e-4
-#: Room around everything that is drawn, in parts of the robot's size.
+#: Room around the drawing, as a fraction of the robot's size.
 _ROOM = 0.08
-#: Margin, percent, from which on its colour stays the same.
+#: Margin, percent, above which the colour is constant.
 MOST_MARGIN = 50
 
 
 class PathFrame(TypedDict):
-    """The robot at one point of the path: its place in words, and points and joints as in the view of a solution."""
+    """Robot at one point of the path: description of the point, and points and joints as in the view of a solution."""
 
     words: str
     at: float
@@ -38,7 +39,7 @@ class PathFrame(TypedDict):
 
 
 class PathMarkData(TypedDict):
-    """A fault: its words, and the platform's origin there."""
+    """Violation: its description, and the position of the platform's origin."""
 
     words: str
     position: list[float]
@@ -47,8 +48,8 @@ class PathMarkData(TypedDict):
 class PathViewData(TypedDict):
     """Content of the view, in the case's units.
 
-    ``path`` has points of the platform's origin, ``nearest`` the index of the limit that is nearest there, -1 for none,
-    ``margins`` the smallest margins in percent, and ``first`` is the index of the frame that is shown first.
+    ``path`` has positions of the platform's origin, ``nearest`` the index of the nearest limit at each of them, -1 for
+    none, ``margins`` the smallest margins in percent, and ``first`` is the index of the initial frame.
     """
 
     unit: str
@@ -70,14 +71,14 @@ class PathViewData(TypedDict):
 
 
 class PathView(NamedTuple):
-    """Data of the view, and the drawing of the robot that is shown first."""
+    """Data of the view, and the initial drawing of the robot."""
 
     data: PathViewData
     drawing: Drawing
 
 
 def path_view(picture: PathPicture) -> PathView | None:
-    """Return the robot along a path; None where it is not assembled anywhere, or its joints are not known."""
+    """Return the view of a path; None if the robot has no known joint coordinates at any point of the path."""
     judged, samples = picture.judged, picture.samples
     case, model, joints = judged.case, judged.case.model, samples.joints
     if joints is None or not joints.closed.any():
@@ -113,7 +114,10 @@ def path_view(picture: PathPicture) -> PathView | None:
             "margins": [_margin(picture, k) for k in way],
             "most": MOST_MARGIN,
             "marks": [
-                {"words": f"line {each.line}: {', '.join(each.names)}", "position": _rounded(position, size)}
+                {
+                    "words": f"line {each.line}: {', '.join(SINGULAR.get(name, name) for name in each.names)}",
+                    "position": _rounded(position, size),
+                }
                 for each, position in zip(picture.marks, marks, strict=True)
             ],
             "first": first,
@@ -124,7 +128,7 @@ def path_view(picture: PathPicture) -> PathView | None:
 
 
 def thinned(picture: PathPicture, most: int, among: NDArray[np.intp]) -> list[int]:
-    """Return the indices of at most so many of some samples, the first and the last one and places of faults too."""
+    """Return the indices of at most ``most`` samples, including the first, the last and those at violations."""
     if len(among) <= most:
         return [int(k) for k in among]
     points, faults = picture.samples.points, {each.place for each in picture.marks}
@@ -136,20 +140,20 @@ def thinned(picture: PathPicture, most: int, among: NDArray[np.intp]) -> list[in
 
 
 def _first(picture: PathPicture, shown: list[int]) -> int:
-    """Return the index, among the samples shown, of the one nearest to the first fault, or else of the first."""
+    """Return the index among the shown samples of the sample nearest to the first violation, 0 without violations."""
     if not picture.marks:
         return 0
     return int(np.argmin(np.abs(picture.at[shown] - picture.marks[0].at)))
 
 
 def _nearest(picture: PathPicture) -> NDArray[np.intp]:
-    """Return the places (P,) of the nearest limits among those that are shown; -1 for none."""
+    """Return the indices (P,) of the nearest limits among the shown limits; -1 for none."""
     order = [k for k, _ in picture.limits]
     return np.array([order.index(k) if k in order else -1 for k in picture.samples.nearest.tolist()])
 
 
 def _margin(picture: PathPicture, k: int) -> float | None:
-    """Return the smallest margin at a sample, percent; None without one."""
+    """Return the smallest margin at a sample, percent; None without a margin."""
     found = float(picture.margins[k]) if picture.margins.size else math.nan
     return float(f"{found:.4g}") if math.isfinite(found) else None
 
@@ -164,7 +168,9 @@ def _frame(picture: PathPicture, k: int, posture: Posture, size: float) -> PathF
     )
     margin, nearest = _margin(picture, k), dict(picture.limits).get(int(samples.nearest[k]))
     if margin is not None and nearest is not None:
-        words += f": {percent(-margin)} beyond {nearest}" if margin < 0 else f": margin {percent(margin)} to {nearest}"
+        words += (
+            f": {nearest} violated by {percent(-margin)}" if margin < 0 else f": margin {percent(margin)} to {nearest}"
+        )
     return {
         "words": words,
         "at": float(picture.at[k]),
@@ -175,5 +181,5 @@ def _frame(picture: PathPicture, k: int, posture: Posture, size: float) -> PathF
 
 
 def _rounded(values: FloatArray, size: float) -> Any:  # noqa: ANN401 - lists as deep as the array
-    """Return coordinates as lists, rounded to a small part of the robot's size."""
+    """Return coordinates as lists, rounded relative to the robot's size."""
     return np.round(values, max(0, math.ceil(-math.log10(_FINE * size)))).tolist()

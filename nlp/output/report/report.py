@@ -1,6 +1,6 @@
-"""Content of a report about a solved case: its result, its robot along the motion, and F beside the point found.
+"""Content of a report about a solved case: result, robot along the task's motion, and F near the design.
 
-A report of a solve that failed shows the point reached, and says that this is no answer.
+The report of a failed solve shows the final point of the search, and says that it is not an optimum.
 """
 
 from __future__ import annotations
@@ -31,23 +31,23 @@ from ..pictures.posture import states_at_poses, worst_pose
 from .frames import PoseView, ViewData, view_data
 from .slices import Plane, Slice, has_loops, planes_of, slices_of
 
-#: Largest number of maps of two variables in a report: seven free variables have 21 pairs.
+#: Largest number of maps of two variables in a report: seven variables have 21 pairs.
 _PLANES = 24
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """One task of a report: its program at the point that the report is about.
+    """Task of a report: nonlinear program of the task at the design.
 
     Attributes:
-        name: of the task.
-        label: F with its unit, for an axis.
-        unit: of F.
-        nlp: its program.
-        x: (n,) the point.
-        solution: of the task by itself.
-        views: the robot there, for the 3-D view, at each pose where it exists.
-        drawings: the same as drawings, in the same order.
+        name: name of the task.
+        label: label of an axis, F with its unit.
+        unit: unit of F.
+        nlp: nonlinear program of the task.
+        x: (n,) variables at the design.
+        solution: separate solution of the task.
+        views: data of the 3-D view, for each pose at which the robot can be assembled.
+        drawings: drawings of the robot, in the order of the views.
         slices: F along each variable.
         planes: F over pairs of variables.
         pairs: number of all pairs of variables.
@@ -68,18 +68,18 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """Content of a page.
+    """Content of a report.
 
     Attributes:
-        case: the case.
+        case: solved case.
         text: text of the case file.
-        result: of the solve.
-        parts: one for each task.
-        combined: the solution of the program that combines several tasks; None without such a program.
-        check: published and expected numbers beside the computed; None where the case has none.
-        is_answer: whether the point is an answer.
-        refusal: why no certificate that was asked for can be given; empty without one.
-        curves: trade-offs over the active limits, which stand in the place of the slices; none for slices.
+        result: result of the solve.
+        parts: tasks of the report.
+        combined: solution of the nonlinear program that combines several tasks; None without such a program.
+        check: published and expected values with the computed ones; None if the case has none.
+        is_answer: True if the point is an optimum of the case.
+        refusal: reason why a requested certificate is impossible; empty otherwise.
+        curves: trade-offs over the active limits, shown instead of slices; empty for slices.
     """
 
     case: Case
@@ -94,12 +94,12 @@ class Report:
 
     @property
     def is_enclosed(self) -> bool:
-        """Whether most variables cannot move alone without leaving a limit: their slices show nothing but the point."""
+        """True if most slices contain only the design, as a single variable cannot change within the limits."""
         slices = [each for part in self.parts for each in part.slices]
         return bool(slices) and 2 * sum(not each.has_room for each in slices) > len(slices)
 
     def as_data(self) -> dict[str, Any]:
-        """Return the data of the page's script, as JSON's own types."""
+        """Return the data for the script of the page, as JSON types."""
         return {
             "result": json_data(self.result),
             "views": [view for part in self.parts for view in part.views],
@@ -110,14 +110,14 @@ class Report:
 def report_of(
     text: str, solution: Solution, result: CaseResult, check: CaseCheck | None = None, refusal: str = ""
 ) -> Report:
-    """Return the content of a page about a solved case; nothing is solved here.
+    """Return the content of a report about a solved case, without solving anything.
 
     Args:
         text: text of the case file.
-        solution: the solve.
-        result: of that solve, with its certificates.
-        check: published and expected numbers beside the computed; None where the case has none.
-        refusal: why no certificate that was asked for can be given; empty without one.
+        solution: solution of the case.
+        result: result of the solution, with certificates.
+        check: published and expected values with the computed ones; None if the case has none.
+        refusal: reason why a requested certificate is impossible; empty otherwise.
     """
     is_answer = solution.status.is_answer
     combined = None if solution.combination is None else solution.combination.combined
@@ -129,7 +129,7 @@ def report_of(
 
 
 def _part(outcome: TaskOutcome, x: FloatArray, task: int, tasks: int, *, is_answer: bool) -> Part:
-    """Return the content about one of several tasks at a point (n,)."""
+    """Return the content of one task at a point (n,)."""
     nlp, state, own = outcome.own.nlp, outcome.state, outcome.own
     states = states_at_poses(outcome)
     values = _measured(nlp, outcome.x, states) if outcome.task.measure else []
@@ -165,18 +165,18 @@ def _part(outcome: TaskOutcome, x: FloatArray, task: int, tasks: int, *, is_answ
 
 
 def _measured(nlp: Nlp, x: FloatArray, states: Sequence[RobotState | None]) -> list[float]:
-    """Return the number of the actuators that is optimised instead of F, at each pose where the robot exists."""
+    """Return the optimised quantity of the actuators at each pose at which the robot can be assembled."""
     return [pose_objective(nlp.case, loads_at(nlp, x, state, k)) for k, state in enumerate(states) if state is not None]
 
 
 def _first_largest(values: Sequence[float]) -> int:
-    """Return the index of the largest value, the first of those that differ by rounding."""
+    """Return the index of the largest value, the first index among values equal up to rounding."""
     rounded = [ordered(value) for value in values]
     return rounded.index(max(rounded))
 
 
 def _plane(part: Part, plane: Plane) -> dict[str, Any]:
-    """Return a map in the case's units, rounded to a picture's precision."""
+    """Return a map in the case's units, rounded to the precision of a picture."""
     nlp, x = part.nlp, part.x
     i, j = plane.variables
     names, units = nlp.program.variables, nlp.case.units
@@ -198,7 +198,7 @@ def _plane(part: Part, plane: Plane) -> dict[str, Any]:
 
 
 def plane_words(nlp: Nlp, x: FloatArray, plane: Plane) -> str:
-    """Return a map in words."""
+    """Return a description of a map."""
     i, j = plane.variables
     names, units = nlp.program.variables, nlp.case.units
 
@@ -208,10 +208,8 @@ def plane_words(nlp: Nlp, x: FloatArray, plane: Plane) -> str:
         return f"{name} = {number(units.shown(value, dimension), width, digits=5)} {units.label(dimension)}".strip()
 
     if not np.isfinite(plane.F).any():
-        return f"{names[i].name} and {names[j].name} cannot move while the others are held."
-    words = (
-        f"F over {names[i].name} and {names[j].name} goes from {np.nanmin(plane.F):.5g} to {np.nanmax(plane.F):.5g}. "
-    )
+        return f"{names[i].name} and {names[j].name} cannot change while the other variables are fixed."
+    words = f"F over {names[i].name} and {names[j].name}: {np.nanmin(plane.F):.5g} to {np.nanmax(plane.F):.5g}. "
     kept = np.where(plane.inside > 0, plane.F, np.nan)
     part = 100 * float(np.mean(plane.inside))
     if np.isfinite(kept).any():
@@ -219,6 +217,10 @@ def plane_words(nlp: Nlp, x: FloatArray, plane: Plane) -> str:
         row, column = divmod(best, kept.shape[1])
         word = "largest" if nlp.sign < 0 else "smallest"
         at = f"{text(i, float(plane.first[column]))}, {text(j, float(plane.second[row]))}"
-        words += f"On this grid and within every limit it is {word} at {at}. "
-    words += f"This point is at {text(i, float(x[i]))}, {text(j, float(x[j]))}."
-    return words if part == 100 else f"{words} Pale: outside of a limit or equation ({100 - part:.3g} % of the map)."
+        words += f"Within all limits, F is {word} at {at} on this grid. "
+    words += f"This design: {text(i, float(x[i]))}, {text(j, float(x[j]))}."
+    return (
+        words
+        if part == 100
+        else f"{words} Pale: a limit or an equation of the robot is violated ({100 - part:.3g} % of the map)."
+    )

@@ -1,11 +1,11 @@
-"""Sections of a report as HTML: words, tables, and charts with text alternatives."""
+"""Sections of a report as HTML: sentences, tables, and charts with text alternatives."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
 from ...case.case import Case
-from ...case.choices import listed_numbers
+from ...case.choices import catalogue_dimensions
 from ...case.pose import sizes_of_turn
 from ...evidence.optimality import CURVED, Evidence
 from ...results.data import CertificateData, CombinedData, CombinedResult, SolveResult
@@ -40,16 +40,16 @@ from .robotview import robot_section
 
 
 def evidence_section(report: Report) -> Markup:
-    """Return the evidence of optimality, from the program alone."""
+    """Return the evidence of optimality, which is computed from the nonlinear program only."""
     result = report.result
     if isinstance(result, SolveResult):
         return join_markup(_evidence_of(report.case, result))
     parts: list[Markup] = []
     for part, own in zip(report.parts, result.tasks, strict=True):
-        parts += [tag("h3", f"“{part.name}” by itself"), *_evidence_of(report.case, own)]
+        parts += [tag("h3", f"Separate optimum of “{part.name}”"), *_evidence_of(report.case, own)]
     optimality = result.combined.optimality
     if optimality is not None:
-        parts += [tag("h3", "The combined program"), tag("p", f"Verdict: {optimality.kind.value}.")]
+        parts += [tag("h3", "Combined tasks"), tag("p", f"Optimality: {optimality.kind.value}.")]
         parts.append(
             _active_table(result.combined, optimality, result.combined.value or 0.0, is_answer=result.status.is_answer)
         )
@@ -57,7 +57,7 @@ def evidence_section(report: Report) -> Markup:
 
 
 def _evidence_of(case: Case, result: SolveResult) -> Iterator[Markup]:
-    """Yield the evidence about one program's point."""
+    """Yield the evidence for the point of one nonlinear program."""
     yield paragraphs(evidence_lines(result, case))
     optimality = result.optimality
     if optimality is None:
@@ -67,7 +67,7 @@ def _evidence_of(case: Case, result: SolveResult) -> Iterator[Markup]:
     if len(optimality.eigenvalues) and result.reached is None:
         values = optimality.eigenvalues
         listed = ", ".join(number(value, 1.0, digits=4, part=CURVED) for value in values)
-        yield tag("p", f"Curvatures along the directions that are left, in scaled variables: {listed}.")
+        yield tag("p", f"Eigenvalues of the reduced Hessian, in scaled variables: {listed}.")
 
 
 def _active_table(result: SolveResult | CombinedData, optimality: Evidence, size: float, *, is_answer: bool) -> Markup:
@@ -80,18 +80,18 @@ def _active_table(result: SolveResult | CombinedData, optimality: Evidence, size
 
 
 def certificate_section(report: Report) -> Markup:
-    """Return the proven bounds, and the course of each search."""
+    """Return the certificates: proved bounds, and bound and incumbent over time."""
     result = report.result
     found: list[tuple[str, CertificateData | None]] = []
     if isinstance(result, CombinedResult):
         pairs = zip(report.parts, result.tasks, strict=True)
-        found += [(f"“{part.name}” by itself", own.certificate) for part, own in pairs]
-        found.append(("The combined program", result.combined.certificate))
+        found += [(f"Separate optimum of “{part.name}”", own.certificate) for part, own in pairs]
+        found.append(("Combined tasks", result.combined.certificate))
     else:
         found.append(("", result.certificate))
     parts: list[Markup] = []
     if report.refusal:
-        parts.append(tag("p", f"Refused: {report.refusal}.", class_="warning"))
+        parts.append(tag("p", f"No certificate: {report.refusal}.", class_="warning"))
     for name, certificate in found:
         if certificate is None:
             continue
@@ -103,7 +103,7 @@ def certificate_section(report: Report) -> Markup:
 
 
 def workspace_section(report: Report) -> Markup:
-    """Return the proof of the design over its workspace; empty where no limit holds there."""
+    """Return the proof of the design over its workspace; empty without limits over the workspace."""
     result = report.result
     if result.workspace is None:
         return Markup("")
@@ -115,7 +115,7 @@ def workspace_section(report: Report) -> Markup:
 
 
 def path_section(report: Report) -> Markup:
-    """Return the proof of the design along its path; empty where no limit holds there."""
+    """Return the proof of the design along its tool path; empty without limits along a path."""
     result = report.result
     if result.path is None:
         return Markup("")
@@ -130,49 +130,55 @@ def bound_chart(history: Sequence[Sequence[float]]) -> list[Markup]:
         return []
     if len(history) == 1:
         ((after, bound, found),) = history
-        return [tag("p", f"It took one round: after {after:.3g} s the bound was {bound:.7g}, the best F {found:.7g}.")]
+        return [tag("p", f"One step: after {after:.3g} s the bound was {bound:.7g} and the best known F {found:.7g}.")]
     seconds, bounds, best = ([row[k] for row in history] for k in range(3))
     words = (
-        f"The bound goes from {bounds[0]:.7g} after {seconds[0]:.3g} s to {bounds[-1]:.7g} after {seconds[-1]:.3g} s; "
-        f"the best F known from {best[0]:.7g} to {best[-1]:.7g}."
+        f"Bound: {bounds[0]:.7g} after {seconds[0]:.3g} s, {bounds[-1]:.7g} after {seconds[-1]:.3g} s. "
+        f"Best known F: {best[0]:.7g}, then {best[-1]:.7g}."
     )
     chart = line_chart(
         [Curve(seconds, bounds, "curve", steps=True), Curve(seconds, best, "curve best", steps=True)],
         [Spot(seconds[-1], bounds[-1], "spot", f"bound {bounds[-1]:.7g}")],
         words=words,
-        labels=("seconds", "F"),
+        labels=("time, s", "F"),
     )
-    return [tag("figure", chart, tag("figcaption", f"Bound (blue) and best point known (orange). {words}"))]
+    return [
+        tag("figure", chart, tag("figcaption", f"Proved bound (blue) and best known F (orange) over time. {words}"))
+    ]
 
 
 def published_section(report: Report) -> Markup:
-    """Return the published numbers beside the computed ones."""
+    """Return the table of published and computed values."""
     if report.check is None:
         return Markup("")
-    caption = "Published numbers beside the computed ones"
+    caption = "Published and computed values"
     return html_table(published_table(report.check), caption, id="compared")
 
 
 def sections(report: Report) -> list[tuple[str, str, Markup]]:
-    """Return the anchor, heading and content of every section; some have no content."""
+    """Return anchor, heading and content of every section; some have no content.
+
+    The order answers a reader's questions: the problem, the design, its evidence, its limits, alternatives, and the
+    data to repeat the solve.
+    """
     return [
-        ("case", "The case in words", _case(report)),
-        ("robot", "The robot and its motion", robot_section(report)),
+        ("case", "Problem", _case(report)),
+        ("robot", "Robot and task motion", robot_section(report)),
         ("result", "Result", _result(report)),
-        ("limits", "Limits: margins and costs", _limits(report)),
-        ("optima", "Optima found", optima(report)),
-        ("around", "F around this point", surroundings(report)),
         ("evidence", "Evidence of optimality", evidence_section(report)),
-        ("certificate", "Certificate", certificate_section(report)),
-        ("workspace", "Workspace", workspace_section(report)),
-        ("path", "Path", path_section(report)),
-        ("published", "Published and computed", published_section(report)),
-        ("origin", "Case text and versions", _origin(report)),
+        ("certificate", "Certificate of the global optimum", certificate_section(report)),
+        ("workspace", "Proof over the workspace", workspace_section(report)),
+        ("path", "Proof along the path", path_section(report)),
+        ("limits", "Limits and margins", _limits(report)),
+        ("optima", "Local optima", optima(report)),
+        ("around", "F near the design", surroundings(report)),
+        ("published", "Comparison with published values", published_section(report)),
+        ("origin", "Case file and versions", _origin(report)),
     ]
 
 
 def answer(report: Report) -> Markup:
-    """Return the answer for the top of the page, or the sentence that there is no answer."""
+    """Return the result for the top of the page, or the status of a solve without an optimum."""
     result = report.result
     if isinstance(result, SolveResult):
         lines = [headline(result, report.case).words]
@@ -182,7 +188,7 @@ def answer(report: Report) -> Markup:
         tasks = f"{len(report.parts)} tasks, combined by {combined.method.value}"
         lines = [f"{tasks}: {result.status.value}{value}"]
         if not report.is_answer:
-            lines.append("This is no answer: the point reached is shown below.")
+            lines.append("This is not an optimum: the page shows the final point of the search.")
     kind = "answer" if report.is_answer else "answer none"
     robot = report.result.robot
     if report.is_answer and is_unasked_singularity(robot, report.case):
@@ -193,7 +199,7 @@ def answer(report: Report) -> Markup:
 
 
 def _objective_lines(case: Case) -> Iterator[str]:
-    """Yield what is optimised: F of each task, or a number of the actuators."""
+    """Yield the objective: F of each task, or a quantity of the actuators."""
     measured = objective_words(case)
     if measured:
         yield f"F is {measured}."
@@ -201,45 +207,42 @@ def _objective_lines(case: Case) -> Iterator[str]:
         return
     for k, task in enumerate(case.tasks):
         word = {"max": "as large as possible", "min": "as small as possible"}[task.sense.value]
-        yield f"Task “{task.name}”: make F {word} for a {task_words(task_data(case, k), case.units)}."
-    yield "F is the sum of the squares of the rates at which the limbs' unit wrenches do work in the task's motion."
+        yield f"Task “{task.name}”: F {word} for a {task_words(task_data(case, k), case.units)}."
+    yield "F is the sum of the squared rates at which the limbs' unit wrenches do work in the task's motion."
 
 
 def _poses_line(case: Case) -> str:
-    """Return how F is combined over the poses of a case, and which pose is shown."""
+    """Return the combination of F over the poses of a case, and the shown pose."""
     is_measured = bool(case.tasks[0].measure)
     over = "largest" if is_measured else case.over_poses.value
     shown = "The picture begins" if is_measured else "The picture and its rates begin"
-    return (
-        f"The robot works at {case.pose_count} poses; F is their {over}. {shown} with the first; a slider shows each."
-    )
+    return f"Poses: {case.pose_count}; F is their {over}. {shown} with the first pose; a slider selects the others."
 
 
 def _case(report: Report) -> Markup:
-    """Return the case in words."""
+    """Return the problem of the case in sentences."""
     case, first = report.case, report.parts[0]
     lines = [f"{case.model.description}.", *(f"Note: {remark}." for remark in case.model.remarks)]
     lines += _objective_lines(case)
     if len(case.tasks) > 1:
-        lines.append(f"The tasks are brought together by the method {case.method.value}.")
+        lines.append(f"Method that combines the tasks: {case.method.value}.")
     program = first.nlp.program
-    # The epigraph's level and the joint positions that close the loops are the program's, not the case's.
+    # The epigraph variable and the joint coordinates of closed loops are not variables of the case.
     internal = set(program.places.inner)
     if program.places.epigraph is not None:
         internal.add(program.places.epigraph.level)
     free = () if first.nlp.is_fixed else enumerate(program.variables)
     names = [variable.name for k, variable in free if k not in internal]
-    chosen = [each.name for each in listed_numbers(case)]
+    chosen = [each.name for each in catalogue_dimensions(case)]
     if chosen:
-        lines.append(f"One of a few values is chosen for each of: {', '.join(chosen)}.")
+        lines.append(f"Variables with listed values: {', '.join(chosen)}.")
     if names:
-        plural = "numbers are" if len(names) > 1 else "number is"
-        lines.append(f"{len(names)} {plural} free: {', '.join(names)}. Everything else is fixed.")
+        lines.append(f"{counted(len(names), 'variable')}: {', '.join(names)}. All other parameters are fixed.")
         turns = [pose.rotation for pose in case.poses if pose.rotation.axis is None]
         if any(sizes_of_turn(turn.angle)[1] > 0 for turn in turns):
-            lines.append("q is the vector part of the unit quaternion that turns the platform.")
+            lines.append("q is the vector part of the unit quaternion of the platform's rotation.")
     else:
-        lines.append("Nothing is free: the robot is evaluated where it stands.")
+        lines.append("No variables: the robot is evaluated at the stated dimensions and pose.")
     if case.pose_count > 1:
         lines.append(_poses_line(case))
     limits = report.result.limits
@@ -248,7 +251,7 @@ def _case(report: Report) -> Markup:
         lines.append(f"Limits: {listed}.")
     search = case.search
     if names:
-        lines.append(f"Searched from {counted(search.starts, 'starting point')}, seed {search.seed}.")
+        lines.append(f"Search: {counted(search.starts, 'starting point')}, seed {search.seed}.")
     return paragraphs(lines)
 
 
@@ -263,54 +266,52 @@ def _result(report: Report) -> Markup:
 
 
 def _combined_result(report: Report, result: CombinedResult) -> Markup:
-    """Return the design at the combined point, then each task by itself."""
+    """Return the design for the combined tasks, then the separate optimum of each task."""
     case, combined = report.case, result.combined
     parts = [paragraphs(choice_lines(result.choice, result.rounding, is_answer=report.is_answer))]
     robot = result.robot
     if robot is not None:
-        words = "The combined robot" if report.is_answer else "What was reached; this is no answer"
+        words = "Dimensions and pose" if report.is_answer else "Final point of the search, not an optimum"
         parts.append(html_table(combined_design_table(case, combined, robot), words, id="design"))
         parts.append(paragraphs(singularity_lines(robot, case.units)))
     if combined.tasks:
-        parts.append(html_table(outcome_table(combined, result.tasks), "What it means for each task", id="outcomes"))
+        parts.append(html_table(outcome_table(combined, result.tasks), "F of each task", id="outcomes"))
     parts += [tag("p", f"Note: {notice}.") for notice in combined.notices]
     parts += [tag("p", f"Violated: {name}", class_="warning") for name in combined.violated]
     for k, own in enumerate(result.tasks):
-        parts.append(tag("h3", f"“{report.parts[k].name}” by itself"))
+        parts.append(tag("h3", f"Separate optimum of “{report.parts[k].name}”"))
         parts.append(paragraphs([headline(own, case)]))
         parts += _task_tables(case, own, f"design-{k + 1}")
     return join_markup(parts)
 
 
 def _task_tables(case: Case, result: SolveResult, anchor: str) -> list[Markup]:
-    """Return the tables of one task's result."""
+    """Return the tables of the result of one task."""
     robot, reached = result.robot, result.reached is not None
     if robot is None:
-        return [tag("p", "The robot does not exist at the point reached.", class_="warning")]
-    caption = "What was reached" if reached else "Dimensions and pose"
+        return [tag("p", "The robot does not exist at the final point of the search.", class_="warning")]
+    caption = "Final point of the search" if reached else "Dimensions and pose"
     parts = [html_table(solved_design_table(case, result, robot), caption, id=anchor)]
     first, *others = robot_tables(case, robot)
-    caption = "Limbs" if robot.several is None else "The robot at every pose"
+    caption = "Limbs" if robot.several is None else "Poses"
     parts.append(html_table(first, caption, id=f"{anchor}-{first.name}"))
     for table in others:
         caption = f"{table.name.replace('-', ' ').capitalize()} by pose and limb"
         parts.append(tag("details", tag("summary", caption), html_table(table, caption, id=f"{anchor}-{table.name}")))
     parts_by_limb = limb_part_table(case, robot)
     if parts_by_limb is not None:
-        parts.append(
-            html_table(parts_by_limb, "Actuation and constraints in F, limb by limb", id=f"{anchor}-actuation")
-        )
+        parts.append(html_table(parts_by_limb, "Actuation and constraint parts of F by limb", id=f"{anchor}-actuation"))
     if not reached:
         parts.append(paragraphs(singularity_lines(robot, case.units)))
     return parts
 
 
 def _limits(report: Report) -> Markup:
-    """Return the limits with their costs, and every margin."""
+    """Return the limits with their effect on F, and all margins."""
     limits, margins = report.result.limits, report.result.margins
     if not limits:
         return Markup("")
-    caption = "Margin and cost of each limit"
+    caption = "Margin of each limit and effect on F"
     held = limits_title(report.case, report.result.workspace or report.result.path)
     caption += f": {held}" if held else ""
     robot = report.result.robot
@@ -322,23 +323,23 @@ def _limits(report: Report) -> Markup:
     result = report.result
     if isinstance(result, SolveResult) and result.tolerance is not None:
         parts.append(paragraphs([tolerance_line(result.tolerance, result.F, report.case.units)]))
-    every = html_table(margin_table(margins), "Every margin, positive inside")
-    parts.append(tag("details", tag("summary", f"Every margin ({len(margins)})"), every))
+    every = html_table(margin_table(margins), "Margins, positive within the limit")
+    parts.append(tag("details", tag("summary", f"All margins ({len(margins)})"), every))
     return join_markup(parts)
 
 
 def _origin(report: Report) -> Markup:
-    """Return versions, settings of the search, and the text of the case."""
+    """Return versions, search settings, and the case file."""
     result = report.result
     origin = origin_table(result.versions, report.case.search, result.seconds)
-    text = tag("pre", tag("code", report.text, id="case-text"), tabindex="0", aria_label="Case text")
+    text = tag("pre", tag("code", report.text, id="case-text"), tabindex="0", aria_label="Case file")
     copy = tag(
         "p",
-        tag("button", "Copy the case", type="button", id="copy"),
+        tag("button", "Copy case file", type="button", id="copy"),
         " ",
         tag("span", id="copied", role="status"),
         class_="controls script",
     )
     return join_markup(
-        [html_table(origin, "What the numbers depend on", id="versions"), tag("h3", "Case file"), copy, text]
+        [html_table(origin, "Versions and search settings", id="versions"), tag("h3", "Case file"), copy, text]
     )

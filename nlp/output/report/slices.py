@@ -1,6 +1,6 @@
-"""F along lines and planes through a point of a program, by evaluation alone.
+"""F along lines and planes through a point of a nonlinear program, by evaluation without solving.
 
-A component of a free unit vector cannot move alone: the vector's other components are scaled to keep its length.
+If a variable is a component of a unit vector, the other components of the vector are scaled to keep its length.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from ...program.epigraph import exact_levels
 from ...program.nlp import Nlp
 from ...program.pairs import with_pairs_at
 
-#: Points along a line, and along each side of a plane: odd, so that the middle of the range is among them.
+#: Number of points along a line, and along each side of a plane: odd, to include the middle of the range.
 _LINE, _PLANE = 121, 41
-#: Where the other components of a unit vector are smaller than this, no scale of them keeps the vector's length.
+#: Size of the other components of a unit vector below which scaling them cannot restore the vector's length.
 _POLE = 1e-9
-#: Violation of a limit, in parts of the limit's size, that is allowed for rounding and the tolerance of a solve.
+#: Allowed violation relative to the limit's size, for rounding and the tolerance of the solver.
 _WITHIN = max(FEASIBLE, 1e-9)
 
 
@@ -32,10 +32,10 @@ class Slice:
     """F along one variable.
 
     Attributes:
-        variable: index in the program.
-        values: (k,) of the variable, in the program's units.
-        F: (k,) objective; nan where the robot is not defined.
-        inside: (k,) 1 where every constraint holds, else 0.
+        variable: index of the variable in the nonlinear program.
+        values: (k,) values of the variable, in the units of the nonlinear program.
+        F: (k,) objective; nan where the robot does not exist.
+        inside: (k,) 1 if all constraints are satisfied, otherwise 0.
     """
 
     variable: int
@@ -45,7 +45,7 @@ class Slice:
 
     @property
     def has_room(self) -> bool:
-        """Whether the line lies within every constraint at more than one point."""
+        """True if more than one point of the line satisfies all constraints."""
         return bool(self.inside.sum() > 1)
 
 
@@ -54,11 +54,11 @@ class Plane:
     """F over two variables.
 
     Attributes:
-        variables: indices in the program.
+        variables: indices of the two variables in the nonlinear program.
         first: (k,) values of the first variable.
-        second: (m,) values of the second.
-        F: (m, k) objective; nan where the robot is not defined.
-        inside: (m, k) 1 where every constraint holds, else 0.
+        second: (m,) values of the second variable.
+        F: (m, k) objective; nan where the robot does not exist.
+        inside: (m, k) 1 if all constraints are satisfied, otherwise 0.
     """
 
     variables: tuple[int, int]
@@ -100,18 +100,18 @@ def planes_of(nlp: Nlp, x: FloatArray, most: int) -> list[Plane]:
 
 
 def has_loops(nlp: Nlp) -> bool:
-    """Return whether the robot has loops, which close at solutions only, so that no variable can move alone."""
+    """Return whether the robot has loop equations, so that no variable can change independently."""
     return bool(nlp.program.model.unknowns)
 
 
 def _movable(nlp: Nlp) -> list[int]:
-    """Return indices of all variables but the epigraph variable, which the others determine."""
+    """Return indices of all variables except the epigraph variable, which depends on them."""
     epigraph = nlp.program.places.epigraph
     return [k for k in range(nlp.n) if epigraph is None or k != epigraph.level]
 
 
 def _range(nlp: Nlp, k: int, count: int, x: FloatArray) -> FloatArray:
-    """Return values of a variable from bound to bound, the point's own among them."""
+    """Return values of a variable from bound to bound, including its value at the point."""
     lower, upper = nlp.lower[k], nlp.upper[k]
     if any(k in direction for direction in nlp.program.places.directions):
         lower, upper = max(lower, -1.0), min(upper, 1.0)
@@ -119,16 +119,16 @@ def _range(nlp: Nlp, k: int, count: int, x: FloatArray) -> FloatArray:
 
 
 def _points_with(nlp: Nlp, x: FloatArray, changed: Sequence[int], values: FloatArray) -> FloatArray:
-    """Return points (n, k) that differ from a point (n,) in some variables, with unit vectors scaled to unit length.
+    """Return points (n, k) with new values of some variables, and unit vectors scaled to unit length.
 
     Args:
-        nlp: the program.
-        x: (n,) the point.
+        nlp: nonlinear program.
+        x: (n,) point.
         changed: indices of the variables.
-        values: (len(changed), k) of these variables.
+        values: (len(changed), k) values of these variables.
 
     Returns:
-        The points; nan where no scale of the other components makes a unit vector.
+        Points (n, k); nan where no scaling of the other components gives a unit vector.
     """
     points = np.repeat(x[:, None], values.shape[1], axis=1)
     points[list(changed)] = values
@@ -149,26 +149,26 @@ def _points_with(nlp: Nlp, x: FloatArray, changed: Sequence[int], values: FloatA
 
 
 class _Values(NamedTuple):
-    """F (k,), nan where it has no value, and 1 where every constraint holds, else 0, (k,)."""
+    """F (k,), nan if undefined; and (k,) 1 if all constraints are satisfied, otherwise 0."""
 
     F: FloatArray
     inside: FloatArray
 
 
 def _values(nlp: Nlp, points: FloatArray) -> _Values:
-    """Return F and the constraints' state at points (n, k)."""
+    """Return F and the satisfaction of the constraints at points (n, k)."""
     nlp = with_pairs_at(nlp, points.T)
     epigraph = nlp.program.places.epigraph
     if epigraph is not None and len(nlp.program.robots) > 1:
         points[epigraph.level] = exact_levels(nlp, points)
     F, g = (each.full() for each in nlp.program.values(points, nlp.arguments))
-    # An infinite bound is absent, and has no size.
+    # An infinite bound is no bound, and has no size.
     bounds = np.nan_to_num(np.abs([nlp.g_lower, nlp.g_upper]), nan=0.0, posinf=0.0)
     size = np.max(bounds, axis=0, initial=1.0)
     with np.errstate(invalid="ignore"):
         low = g >= (nlp.g_lower - _WITHIN * size)[:, None]
         high = g <= (nlp.g_upper + _WITHIN * size)[:, None]
-    # What rounding leaves of F is 0.
+    # Rounding errors of F are set to 0.
     settled = np.where(np.abs(F[0]) > ZERO_F * nlp.objective_size, F[0], 0.0)
     values = np.where(np.isfinite(F[0]), settled, np.nan)
     return _Values(values, np.asarray(np.all(low & high, axis=0) & np.isfinite(values), dtype=np.float64))

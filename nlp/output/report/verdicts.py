@@ -1,4 +1,4 @@
-"""What the pages of verdicts share: the terminal's lines and tables, a place that refutes a claim, the origin."""
+"""Common elements of pages about verdicts: the terminal's lines and tables, violations, case file and versions."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from .markup import Markup, html_table, join_markup, paragraphs, tag
 
 
 def shown_verdicts(items: Iterable[Line | TextTable], key: str, words: str) -> Markup:
-    """Return what the terminal shows without its title, and a sentence about it.
+    """Return the lines and tables of the terminal without the title, and a sentence below them.
 
     Args:
-        items: lines and tables of the terminal; the first is the title.
-        key: identifier of the page, before that of each table.
-        words: the sentence.
+        items: lines and tables of the terminal; the first item is the title.
+        key: prefix of the identifiers of the tables.
+        words: sentence below the tables.
     """
     _, *rest = items
     parts = [
@@ -27,7 +27,7 @@ def shown_verdicts(items: Iterable[Line | TextTable], key: str, words: str) -> M
 
 
 def refuting_place(claim: str, pose: str, command: str) -> Markup:
-    """Return a refuted claim with the pose that refutes it, and the command that shows the pose."""
+    """Return a violated claim with its pose, and the command that shows the pose."""
     return join_markup([tag("h3", claim), tag("p", f"At {pose}."), shown_command(command)])
 
 
@@ -37,7 +37,7 @@ def shown_command(command: str) -> Markup:
 
 
 def origin(versions: VersionsData, text: str) -> Markup:
-    """Return versions, and the text of the case."""
-    table = html_table(origin_table(versions), "What the numbers depend on", id="versions")
-    shown = tag("pre", tag("code", text, id="case-text"), tabindex="0", aria_label="Case text")
+    """Return versions and the case file."""
+    table = html_table(origin_table(versions), "Versions", id="versions")
+    shown = tag("pre", tag("code", text, id="case-text"), tabindex="0", aria_label="Case file")
     return join_markup([table, tag("h3", "Case file"), shown])

@@ -1,4 +1,4 @@
-"""The page about a solved case as one text of HTML that needs no network and no other file."""
+"""Page about a solved case as one HTML text, which needs no network and no other file."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from .sections import answer, sections
 
 
 def page_of(report: Report) -> str:
-    """Return the whole page.
+    """Return the page of a report.
 
-    Words and tables come first and need no script. The library for the 3-D view is at the end, compressed, and starts
-    after the page is first painted.
+    Text and tables come first and need no script. The compressed library of the 3-D view is at the end and starts after
+    the page is first painted.
     """
     contents, body = contents_and_body(sections(report))
     return whole_page(
@@ -39,44 +39,44 @@ def page_of(report: Report) -> str:
     )
 
 
-_WRITTEN = "# The case as Case.to_toml() writes it.\n"
-_NO_CASE_FILE = "This case has no case file: "
+_WRITTEN = "# Case file written by Case.to_toml().\n"
+_NO_CASE_FILE = "No case file can represent this case: "
 
 
 def report(
-    found: Solution | Certified,
+    solved: Solution | Certified,
     *,
     text: str | None = None,
     check: CaseCheck | None = None,
     curves: Sequence[TradeoffResult] = (),
     file: str | Path | None = None,
 ) -> str:
-    """Return a page about a solved case as one text of HTML, which opens without a network.
+    """Return a page about a solved case as one HTML text, which opens without a network.
 
     Args:
-        found: a solution, or a solution with certificates.
-        text: text of the case file; left out, as :meth:`.Case.to_toml` writes it.
-        check: published and expected numbers beside the computed ones; left out, the page does not show them.
-        curves: results of trade-offs, which stand in the place of the slices.
-        file: file that the page is written to; None for none.
+        solved: solution, or solution with certificates.
+        text: text of the case file; by default the text of :meth:`.Case.to_toml`.
+        check: published and expected values with the computed ones, for a section of the page.
+        curves: results of trade-offs, shown instead of slices.
+        file: path of the output file; None for no file.
 
     Raises:
         InputError: Plotly or Matplotlib is not installed, or the file cannot be written.
     """
     check_library("plotly", "reports")
     check_library("matplotlib", "reports")
-    solution = found if isinstance(found, Solution) else found.solution
+    solution = solved if isinstance(solved, Solution) else solved.solution
     if file is not None:
         check_target(str(file))
     shown = _written(solution.case) if text is None else text
-    page = page_of(replace(report_of(shown, solution, result_of(found), check), curves=tuple(curves)))
+    page = page_of(replace(report_of(shown, solution, result_of(solved), check), curves=tuple(curves)))
     if file is not None:
         write_bytes(str(file), page.encode("utf-8"))
     return page
 
 
 def _written(case: Case) -> str:
-    """Return a case as a case file; a sentence where no file can state it."""
+    """Return the case file of a case, or a sentence if no case file can represent it."""
     try:
         return _WRITTEN + case.to_toml()
     except CaseError as error:

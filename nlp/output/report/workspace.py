@@ -1,4 +1,4 @@
-"""A page about a judged workspace: verdicts, numbers with their poses, the robot at the worst pose, slices."""
+"""Page about the verification of a workspace: verdicts, violations, the robot at the worst pose, slices."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ...words.claims import claim_words
 from ...words.numbers import number
 from ...words.poses import pose_words
 from ...words.text import TextTable
-from ...words.verdicts import machine_lines
+from ...words.verdicts import tolerance_lines
 from ...words.workspace import verdict_words, workspace_summary
 from ..pictures.figures import picture
 from ..pictures.workspaces import Kind, drawing_at, slice_images, slices_legend, slices_notes
@@ -39,11 +39,11 @@ class WorkspaceReport:
     """Content of a page about a workspace.
 
     Attributes:
-        case: the case, with fixed dimensions.
-        text: of the case file.
-        result: the verdicts.
-        slices: of the workspace; empty for a robot that has none.
-        command: returns the command that shows a pose.
+        case: case with fixed dimensions.
+        text: text of the case file.
+        result: verdicts over the workspace.
+        slices: slices of the workspace; empty for a robot without slices.
+        command: function that returns the command for a pose.
     """
 
     case: Case
@@ -54,21 +54,21 @@ class WorkspaceReport:
 
 
 def workspace_page(report: WorkspaceReport) -> str:
-    """Return the whole page, which opens without a network and needs no script for its content."""
+    """Return the page, which opens without a network and needs no script for its content."""
     case, result = report.case, report.result
     title = case.title or case.name
     sections = [
-        ("robot", "The machine", join_markup([_robot(report), _dimensions(report)])),
-        ("verdicts", "Verdicts", _verdicts(report)),
+        ("verdicts", "Verdicts over the workspace", _verdicts(report)),
+        ("refuted", "Violated limits and singularities", _refuted(report)),
+        ("robot", "Robot at the worst pose", join_markup([_robot(report), _dimensions(report)])),
         ("slices", "Slices of the workspace", _slices(report)),
-        ("refuted", "Poses that refute a claim", _refuted(report)),
-        ("origin", "Case text and versions", origin(result.versions, report.text)),
+        ("origin", "Case file and versions", origin(result.versions, report.text)),
     ]
     contents, body = contents_and_body(sections)
     words = verdict_words(result)
     return whole_page(
         f"{title} - workspace",
-        f"{case.name}, robot {case.model.name}: the whole workspace",
+        f"{case.name}, robot {case.model.name}, workspace",
         answer_box([f"{words[0].upper()}{words[1:]}."], is_answer=result.proved),
         body,
         heading=title,
@@ -79,16 +79,16 @@ def workspace_page(report: WorkspaceReport) -> str:
 
 
 def _verdicts(report: WorkspaceReport) -> Markup:
-    """Return the lines and tables that the terminal shows, without the title."""
+    """Return the lines and tables of the terminal, without the title."""
     words = (
-        "Each proved claim holds at every pose of the workspace, and not only at samples. A proven bound is not passed "
-        "by any pose; the value reached is met at the pose named beside it."
+        "A proved claim holds at every pose of the workspace, not only at samples. No pose exceeds a proved bound. "
+        "The reached value occurs at the pose of its row."
     )
     return shown_verdicts(workspace_summary(report.case, report.result), "workspace", words)
 
 
 def _refuted(report: WorkspaceReport) -> Markup:
-    """Return each refuted claim with its pose and the command that shows it; empty without one."""
+    """Return each violated claim with its pose and a command for the pose."""
     return join_markup(
         refuting_place(claim_words(claim), pose_words(report.case, claim.pose), report.command(claim.pose))
         for claim in refuted_claims(report.result)
@@ -96,7 +96,7 @@ def _refuted(report: WorkspaceReport) -> Markup:
 
 
 def _dimensions(report: WorkspaceReport) -> Markup:
-    """Return the dimensions of the machine, and the tolerance of its joint centres."""
+    """Return the dimensions of the robot, and the tolerance of its joint centres."""
     case = report.case
     rows = []
     for item in case.model.parameters:
@@ -105,12 +105,12 @@ def _dimensions(report: WorkspaceReport) -> Markup:
         largest, unit = max(map(abs, values)), case.units.label(item.dimension)
         names = case.component_names(item)
         rows += [(name, number(value, largest), unit) for name, value in zip(names, values, strict=True)]
-    table = html_table(TextTable(("", "value", "unit"), tuple(rows), "dimensions"), "Its dimensions", id="dimensions")
-    return join_markup([table, paragraphs(machine_lines(case, report.result.joint_centre))])
+    table = html_table(TextTable(("", "value", "unit"), tuple(rows), "dimensions"), "Dimensions", id="dimensions")
+    return join_markup([table, paragraphs(tolerance_lines(case, report.result.joint_centre))])
 
 
 def _robot(report: WorkspaceReport) -> Markup:
-    """Return a picture of the robot at the worst pose; a sentence where there is none."""
+    """Return a picture of the robot at the worst pose, or a sentence with the reason for the missing picture."""
     worst = worst_claim(report.result, report.case.tasks[0].sense)
     if worst is None:
         return Markup("")
@@ -119,8 +119,8 @@ def _robot(report: WorkspaceReport) -> Markup:
     except EvaluationError as error:
         return tag("p", f"No picture: {error}.")
     at = pose_words(report.case, worst.pose)
-    image = tag("img", src=image_source(content), alt=f"The robot at {at}: {claim_words(worst)}", class_="posed")
-    figure = tag("figure", image, tag("figcaption", f"The machine at its worst pose, {at}: {claim_words(worst)}."))
+    image = tag("img", src=image_source(content), alt=f"Robot at {at}: {claim_words(worst)}", class_="posed")
+    figure = tag("figure", image, tag("figcaption", f"Robot at its worst pose, {at}: {claim_words(worst)}."))
     return join_markup([figure, shown_command(report.command(worst.pose))])
 
 
@@ -130,11 +130,11 @@ def _slices(report: WorkspaceReport) -> Markup:
     if not slices:
         return Markup("")
     words = (
-        "Two coordinates vary in each slice, three times as wide as the workspace; the others stay at its middle. "
-        "The colour of a box is proved for all of its poses."
+        "Each slice varies two coordinates over three times the width of the workspace; the others stay at its centre. "
+        "The colour of a box is proved for all its poses."
     )
     if report.case.joint_centre_tolerance:
-        words += " The slices are those of the design itself, without its tolerance."
+        words += " The slices are for the nominal design, without the tolerance."
     legend = [tag("li", _swatch(kind), kind.words) for kind in slices_legend(report.case, slices)]
     legend.append(tag("li", tag("span", class_="swatch outline"), "workspace"))
     notes = [f"{note[0].upper()}{note[1:]}." for note in slices_notes(slices)]
@@ -153,5 +153,5 @@ def _slices(report: WorkspaceReport) -> Markup:
 
 
 def _swatch(kind: Kind) -> Markup:
-    """Return a small box of a kind's colour."""
+    """Return a colour sample for the legend."""
     return tag("span", class_="swatch hatched" if kind.hatch else "swatch", style=f"--fill: {kind.colour}")

@@ -25,14 +25,15 @@ if TYPE_CHECKING:
 
     from ....models import FloatArray
 
-#: Length of the whole tape, in lengths of the functions' tape, from which gradients of conditions are computed later.
+#: Ratio of the length of the whole tape to that of the functions' tape, above which gradients of conditions are
+#: computed later.
 _MANY_CONDITIONS = 4
-#: Largest number n of variables for the first pass, whose forms have about n^2 / 2 coefficients.
+#: Largest number n of variables for the first pass; forms have about n^2 / 2 coefficients.
 MOST_VARIABLES = 12
 #: Number of boxes examined at once, so large that Python's work between blocks is negligible. The order of the search
 #: depends on this number, so it must not depend on the number of threads.
 BLOCK = 4096
-#: Marks of an end of a box that contraction did not move, and of an end that monotonicity moved to the opposite face.
+#: Marks of a bound of a box: contraction did not move the bound, or monotonicity moved the bound to the opposite face.
 UNMOVED, COLLAPSED = -2, -1
 #: Smallest number of boxes of a piece: two of the kernel's blocks of 32. Starting a piece costs as much as a few boxes.
 _LEAST_PIECE = 64
@@ -100,8 +101,8 @@ class Examination:
         verdict: (B,) :class:`BoxState`.
         reason: (B,) index of the violated condition, or of the variable that is monotone or emptied.
         bound: (B,) upper bound over the feasible part of the box; infinite where a value may be undefined.
-        lower, upper: (n, B) ends of the contracted box, or of the face that it collapsed to.
-        cut_lower, cut_upper: (n, B) index of the expression that moved this end, or ``UNMOVED`` or ``COLLAPSED``.
+        lower, upper: (n, B) bounds of the contracted box, or of the face to which the box collapsed.
+        cut_lower, cut_upper: (n, B) index of the expression that moved the bound, or ``UNMOVED`` or ``COLLAPSED``.
         split: (B,) index of the variable to bisect next.
         value: (B,) lower bound of the maximised value at the centre; -inf where a condition may be violated.
         centre: (n, B) centres of the boxes.
@@ -123,15 +124,16 @@ class Examination:
 class LimbModels(Examination):
     """Results for B boxes of a limb with n variables, the first m of them shared with other limbs, and upper models.
 
-    One limb cannot exclude values of shared variables: monotonicity and contraction apply to the limb's own variables,
-    or to shared ones if the limb has no own ones. The bound is the bound of the limb's function.
+    One limb cannot exclude values of shared variables. Monotonicity and contraction apply to the variables of this
+    limb only; a limb without such variables applies them to the shared variables. The bound is the bound of the limb's
+    function.
 
     Attributes:
         is_possible: (B,) whether an optimum may lie in the box.
         defined: (B,) whether the limb's function is defined in the whole box.
         holds: (B,) whether every condition of the limb is satisfied in the whole box.
-        L: upper models of the Lagrangian, with multipliers for a small gradient in the own variables.
-        slope_lo, slope_hi: (m, B) ends of the gradient of the function along shared variables.
+        L: upper models of the Lagrangian, with multipliers that make the gradient along the limb's own variables small.
+        slope_lo, slope_hi: (m, B) bounds of the gradient of the function along shared variables.
         stops_up, stops_down: (m, B) whether a condition may prevent a motion up or down along a shared variable.
     """
 
@@ -151,7 +153,7 @@ class Engine:
     Args:
         form: form of the search.
         jobs: number of threads; if left out, one for each processor.
-        shared: number of variables that a limb's form shares with other limbs, the first ones; None for a whole form.
+        shared: number of variables that a limb's form shares with other limbs; these come first. None for a whole form.
         tangents: If true, the first pass of a minimum uses tangents to squares.
 
     Raises:
@@ -227,9 +229,10 @@ class Engine:
         Args:
             lower: (n, B) lower ends; shared variables come first.
             upper: (n, B) upper ends.
-            least: (B,) value below which points are irrelevant; None if all points are relevant.
-            tilts: (3 + m + m^2, B) sum of the limbs' best values, sum of their absolute values, bound of the rounding
-                of each sum of tilts, and these sums: gradients, and matrices row by row; None for a limb.
+            least: (B,) value below which a point cannot be the optimum; None without such a value.
+            tilts: (3 + m + m^2, B) sum of the limbs' best values; sum of the absolute best values; bound of the
+                rounding of each sum of tilts; sums of the tilts' gradients, and of the tilts' matrices, row by row.
+                None for a limb.
             threshold: largest bound of a box that is closed.
         """
         (n, count), m = lower.shape, self._shared
@@ -257,9 +260,12 @@ class Engine:
 
 
 def search_tape(form: StandardForm, rows: Rows | None = None, *, is_short: bool = True) -> Tape:
-    """Compile the rows of a form (its R expressions if left out), then their derivatives, row by row.
+    """Compile the rows of a form, then the derivatives of these rows, row by row.
 
-    With ``is_short``, common subexpressions are written once. Their search cannot be interrupted, and doubles the time.
+    The default rows are its R expressions.
+
+    With ``is_short``, common subexpressions are written once. The search for them cannot be interrupted, and doubles
+    the time.
 
     Raises:
         UncoveredError: an expression has an operation without an interval rule, or a jump.
@@ -292,7 +298,7 @@ def without_conditions(form: StandardForm) -> StandardForm:
 
 
 def objective_tape(form: StandardForm, length: int) -> Tape | None:
-    """Compile the functions and their derivatives; None if they are a large part of a tape of the given length."""
+    """Compile the functions and their derivatives; None if this tape would be a large part of the given length."""
     if form.n > MOST_VARIABLES or not form.conditions:
         return None
     # The tape without derivatives is shorter, and often already too long.
@@ -305,7 +311,10 @@ def objective_tape(form: StandardForm, length: int) -> Tape | None:
 
 
 def _uncovered_limit(form: StandardForm) -> str | None:
-    """Return the key of the limit with an operation without a rule; None if it is in the robot's expressions."""
+    """Return the key of the limit with an operation without an interval rule.
+
+    None if a robot expression has the operation.
+    """
     keys = {each.name: next(filter(None, each.keys), None) for each in form.nlp.program.constraints}
     whose = [*(None for _ in form.functions), *(keys.get(each.name) for each in form.conditions)]
     for k, key in enumerate(whose):

@@ -23,12 +23,13 @@ _SAME_VALUE = 1e-9
 _POINTS = 8
 #: Improvement, relative to the objective's scale, from which a new point counts as better than the given point.
 _BETTER = 1e-9
-#: The same between points of a search; smaller differences are rounding, and the first point is kept.
+#: The same improvement between two points of a search. Smaller differences are rounding errors, and the first point is
+#: kept.
 _TIE = 1e-13
 
 
 class IncumbentError(InputError):
-    """The given point is not feasible, or does not have the claimed value."""
+    """Error of a given point that is infeasible or does not have the claimed value."""
 
 
 class _Point(NamedTuple):
@@ -47,7 +48,7 @@ class Incumbent:
 
     def __init__(self, form: StandardForm) -> None:
         self._form, self._best, self._given = form, _Point(None, -math.inf), math.nan
-        # Without an incumbent: the last known part (d,) of each limb, by the indices of its variables.
+        # Last known part (d,) of each limb by the indices of its variables, as long as there is no incumbent.
         self._parts: dict[tuple[int, ...], FloatArray] = {}
 
     @property
@@ -90,7 +91,7 @@ class Incumbent:
         value = form.value_at(point)
         violation = self._violation(point, value)
         if not violation <= FEASIBLE:
-            raise IncumbentError(f"the given point violates the limits by {violation:.3g} half ranges")
+            raise IncumbentError(f"the given point violates the limits by up to {violation:.3g} half ranges")
         if claimed is not None and form.value_of(claimed) > value + _SAME_VALUE * form.size:
             raise IncumbentError(
                 f"the given point has F = {form.objective_of(value):.10g}, but {claimed:.10g} was claimed"
@@ -98,7 +99,7 @@ class Incumbent:
         self._best, self._given = _Point(point, value), value
 
     def consider(self, point: FloatArray) -> None:
-        """Keep a point (n,) if it is feasible and better; also test the points of Newton's method from it."""
+        """Keep a point (n,) if it is feasible and better. Newton's method from this point gives further candidates."""
         if self._form.nlp.sides.equal.any():  # without equations, only the corrected point is tested
             self._keep_if_better(point)
         self.improve_near(point)
@@ -128,7 +129,7 @@ class Incumbent:
     def _violation(self, point: FloatArray, value: float, known: Linearisation | None = None) -> float:
         """Return the largest violation of the program's limits, in half ranges; infinite with open loops.
 
-        The program has only independent loop equations, which joints in another assembly may also satisfy.
+        The program has only independent loop equations. Joints in another assembly mode may satisfy these too.
         """
         nlp, whole = self._form.nlp, self._with_level(point, value)
         if not self._form.keeps_signs(whole):
@@ -146,7 +147,10 @@ class Incumbent:
             self._best = _Point(np.array(point), value)
 
     def with_part(self, limbs: Sequence[Limb], part: FloatArray) -> FloatArray | None:
-        """Return the point with a new part (d,) of limbs; without an incumbent, the parts of all limbs once known."""
+        """Return the incumbent with a new part (d,) of limbs.
+
+        Without an incumbent, combine the parts of all limbs once these are known.
+        """
         given, whole = {each.own: part for each in limbs}, self.x
         if whole is None:
             self._parts |= given
@@ -158,7 +162,7 @@ class Incumbent:
 
 
 class LimbPoint:
-    """Part of the incumbent that belongs to one limb and its copies.
+    """Variables of one limb and its copies in the incumbent.
 
     Args:
         limbs: the limb and its copies.

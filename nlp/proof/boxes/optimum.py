@@ -16,8 +16,8 @@ from .incumbent import Incumbent, LimbPoint
 from .search import SMALL, WHOLE, Boxes, BoxResults, Order, Rule, Search
 from .tree import TreeRecord, halves_of, keys_of
 
-#: Relative widths below which a box is not bisected: without a finite bound, where the functions are probably undefined
-#: at a point; and with one.
+#: Relative widths below which a box is not bisected. The first is for boxes without a finite bound, where functions
+#: are probably undefined at a point; the second for boxes with a finite bound.
 LEAST_WIDTHS = 2.0**-16, 2.0**-40
 
 
@@ -37,7 +37,7 @@ class OptimumRule(Rule[tuple[()]]):
         form: the form.
         incumbent: best known point, which the search improves.
         jobs: number of threads.
-        recorder: recorder of the search's tree for a proof; tangents to squares are not used then.
+        recorder: recorder of the search tree for a proof; a recorded search uses no tangents to squares.
 
     Attributes:
         incumbent: best known point.
@@ -54,7 +54,7 @@ class OptimumRule(Rule[tuple[()]]):
 
     @cached_property
     def _engine(self) -> Engine:
-        """The engine. For long expressions its set-up takes seconds, so it is done in the first step of the search."""
+        """The engine, created in the first step of the search because the set-up for long expressions takes seconds."""
         return Engine(self._form, self._jobs, tangents=self._recorder is None)
 
     def examine(self, boxes: Boxes[tuple[()]]) -> BoxResults[tuple[()]]:
@@ -64,10 +64,10 @@ class OptimumRule(Rule[tuple[()]]):
         self._improve(found)
         bounded = found.verdict == BoxState.BOUNDED
         closed = float(found.bound[bounded].max(initial=-math.inf))
-        # The checker has other arithmetic, and needs a margin up to the threshold to prove these boxes.
+        # The checker has another arithmetic, and needs a margin up to the threshold to prove these boxes.
         if (bounded.any() and self._recorder is not None) or self._is_contracted_by_value(found):
             closed = max(closed, self.target)
-        # Most boxes of a block may be closed; only the open ones are processed here, in one thread.
+        # Most boxes of a block may be closed. Only open boxes are processed here, in one thread.
         rest = np.flatnonzero(found.verdict == BoxState.OPEN)
         lower, upper = found.lower[:, rest].T, found.upper[:, rest].T
         # A box that collapsed to a box that cannot be bisected, such as a corner, must be examined again.
@@ -76,7 +76,7 @@ class OptimumRule(Rule[tuple[()]]):
         return BoxResults(left, closed, len(boxes.split), moved, reasons=(found, rest))
 
     def record(self, boxes: Boxes[tuple[()]], found: BoxResults[tuple[()]], split: NDArray[np.intp]) -> None:
-        """Record a block of boxes; a contraction closes the part that it cuts off."""
+        """Record a block of boxes. A contraction closes the part of the box that is cut off."""
         if self._recorder is None:
             return
         (examined, rest), left = found.reasons, found.left
@@ -112,7 +112,7 @@ class OptimumRule(Rule[tuple[()]]):
 
 
 def _node_of(found: Examination, k: int, upper: FloatArray, functions: int) -> bytes:
-    """Return the bytes of box ``k`` with upper ends (n,), without those of its bisection or its parts."""
+    """Return the bytes of the node of box ``k``, without those of its bisection and sub-boxes; ``upper`` is (n,)."""
     verdict, reason = int(found.verdict[k]), int(found.reason[k])
     if verdict == BoxState.BOUNDED:
         return bytes([Node.BOUNDED])
@@ -137,5 +137,5 @@ def _contraction(found: Examination, k: int, i: int, upper: float, functions: in
 
 
 def _reason(why: int, functions: int) -> bytes:
-    """Return the reason for cutting a part off, from the index of the expression that excludes it."""
+    """Return the reason why a part of a box is cut off, from the index of the expression that excludes this part."""
     return bytes([Node.BOUNDED]) if why < functions else node_bytes(Node.INFEASIBLE, why)

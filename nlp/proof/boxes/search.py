@@ -1,11 +1,11 @@
 """Branch and bound over boxes: the loop of every search.
 
-A rule examines boxes: it closes them, or returns the open part, a bound over it and the coordinate to bisect. The loop
-takes examined boxes in an order, bisects them, has the halves examined, and keeps the open ones. Bounds are upper
-bounds of a maximised value; a rule without a value leaves them at 0.
+A rule examines boxes. It closes a box, or returns the open part of the box, a bound over this part, and the coordinate
+to bisect. The loop takes examined boxes in an order, bisects them, has the halves examined, and keeps the open halves.
+Bounds are upper bounds of a maximised value; a rule without a value has bounds of 0.
 
-The state of a search is one value, :class:`State`, which the last assignment of a step replaces: a search that is
-interrupted in a step keeps the state before the step.
+The state of a search is one value, :class:`State`. The last assignment of a step replaces this value, so a search that
+is interrupted in a step keeps its earlier state.
 """
 
 from __future__ import annotations
@@ -38,7 +38,8 @@ _FEW = 50_000
 _ROOTS = 4096
 #: Seconds between two reports of progress.
 _REPORT_EVERY = 0.1
-#: Values in place of a coordinate to bisect: the box is examined again as it is; the box is too small to be bisected.
+#: Values in place of a coordinate to bisect: ``WHOLE``, the box is examined again without bisection; ``SMALL``, the
+#: box is too small.
 WHOLE, SMALL = -1, -2
 
 Columns = TypeVar("Columns")
@@ -51,7 +52,7 @@ class Boxes(NamedTuple, Generic[Columns]):
     Attributes:
         lower, upper: (B, n) ends.
         bound: (B,) upper bounds.
-        split: (B,) index of the coordinate to bisect; ``WHOLE`` for none.
+        split: (B,) index of the coordinate to bisect; ``WHOLE`` for no bisection.
         more: data of the rule for each box: arrays (B, ...), or tuples of them.
     """
 
@@ -73,7 +74,7 @@ def some(rows: Rows, which: NDArray[np.bool_] | NDArray[np.intp]) -> Rows:
 
 
 def joined(parts: Sequence[Rows]) -> Rows:
-    """Return the rows of arrays, or of tuples of them, one after the other."""
+    """Return the rows of arrays, or of tuples of arrays, one after the other."""
     every: Any = parts
     if len(parts) == 1:
         return parts[0]
@@ -102,21 +103,21 @@ def bisected(boxes: Boxes[Columns]) -> Boxes[Columns]:
 class Order(enum.Enum):
     """Order in which a search takes boxes."""
 
-    NEWEST = "parts of the boxes of the step before: depth first"
-    LARGEST_CHUNK = "parts of the boxes of the step with the largest bound: cheap, for many boxes"
-    LARGEST = "the boxes with the largest bounds; with many open boxes as LARGEST_CHUNK"
+    NEWEST = "sub-boxes from the previous step: depth first"
+    LARGEST_CHUNK = "sub-boxes from the step with the largest bound: cheap, for many boxes"
+    LARGEST = "the boxes with the largest bounds; if many boxes are open, the same as LARGEST_CHUNK"
 
 
 class BoxResults(NamedTuple, Generic[Columns]):
     """Results for boxes.
 
     Attributes:
-        left: (O,) remaining parts of the open boxes, with ``WHOLE`` or ``SMALL`` as in :meth:`Rule.record`.
+        left: (O,) remaining sub-boxes of the open boxes, with ``WHOLE`` or ``SMALL`` as in :meth:`Rule.record`.
         closed: largest bound of closed boxes and of parts that were cut off.
         examined: number of examined boxes.
-        again: (O,) whether a part that is too small to be bisected must be examined again, because it was moved; None
-            for no part.
-        is_better: whether a better point is known, so that too small boxes must be examined again.
+        again: (O,) whether a sub-box that is too small to be bisected must be examined again because it was moved;
+            None if no sub-box must.
+        is_better: If true, a better point is known, so that boxes too small to be bisected must be examined again.
         reasons: additional data for a record of the search.
     """
 
@@ -142,7 +143,7 @@ class Rule(ABC, Generic[Columns]):
     names: Sequence[str] = ()
 
     def divided(self, boxes: Boxes[Columns]) -> Boxes[Columns]:
-        """Return the halves of boxes with their data: all lower halves, then all upper halves."""
+        """Return the halves of boxes with the data of each box: all lower halves, then all upper halves."""
         return bisected(boxes)
 
     @abstractmethod
@@ -168,7 +169,7 @@ class State(NamedTuple, Generic[Columns]):
     """A search after a step.
 
     Attributes:
-        waiting: examined boxes that are to be bisected, or their parts, in the search's order.
+        waiting: examined boxes, or sub-boxes, that are still to be bisected, in the order of the search.
         small: boxes that are too small to be bisected.
         closed: largest bound of closed boxes.
         examined: number of examined boxes.
@@ -232,13 +233,16 @@ class Search(Generic[AnyRule]):
 
     @property
     def bound(self) -> float:
-        """Upper bound over the whole box; -inf if all of it is closed without a bound."""
+        """Upper bound over the whole box; -inf if the whole box is closed without a bound."""
         waiting = self.state.waiting[-1][0] if self.state.waiting else -math.inf
         return max([self.state.closed, waiting, *(float(each.bound.max()) for each in self.state.small)])
 
     @property
     def fault(self) -> str:
-        """Reason for stopping if a small box has no finite bound, with its place; else empty."""
+        """Reason for stopping at a small box without a finite bound, with the place of the box.
+
+        Empty without such a box.
+        """
         for boxes in self.state.small:
             which = int(np.argmin(np.isfinite(boxes.bound)))
             if not np.isfinite(boxes.bound[which]):
@@ -248,7 +252,7 @@ class Search(Generic[AnyRule]):
         return ""
 
     def step(self, target: float) -> None:
-        """Examine the parts of some boxes, and close parts with bounds of at most a target."""
+        """Bisect some boxes, examine the sub-boxes, and close those with bounds of at most a target."""
         waiting, small = list(self.state.waiting), list(self.state.small)
         parts = self._divided(self._take(waiting))
         self.rule.target = target
@@ -272,7 +276,7 @@ class Search(Generic[AnyRule]):
         self.state = State(waiting, small, closed, examined)
 
     def _divided(self, boxes: Boxes[Any]) -> Boxes[Any]:
-        """Return the parts of boxes; some boxes may stay whole."""
+        """Return the sub-boxes of boxes; some boxes may stay whole."""
         is_cut = boxes.split >= 0
         if not is_cut.any():
             return boxes
@@ -281,7 +285,7 @@ class Search(Generic[AnyRule]):
         return joined([some(boxes, ~is_cut), self.rule.divided(some(boxes, is_cut))])
 
     def _divisions(self, found: BoxResults[Any]) -> NDArray[np.intp]:
-        """Return the coordinates to bisect of the remaining parts: see :meth:`Rule.record`."""
+        """Return the coordinates along which the remaining sub-boxes are bisected: see :meth:`Rule.record`."""
         lower, upper, bound, split, _ = found.left
         place = np.arange(len(split)), np.maximum(split, 0)
         middle = 0.5 * lower[place] + 0.5 * upper[place]
@@ -299,9 +303,10 @@ class Search(Generic[AnyRule]):
             insort(waiting, (key, self._newest, boxes))
 
     def _take(self, waiting: list[_Chunk[Any]]) -> Boxes[Any]:
-        """Remove and return boxes for one block of parts; at least one box must be waiting.
+        """Remove and return boxes for one block of sub-boxes; at least one box must be waiting.
 
-        Chunks are ordered only by their largest bounds, so some other boxes may have larger bounds than these.
+        Chunks are ordered only by their largest bounds, so some waiting boxes may have larger bounds than the returned
+        boxes.
         """
         taken: list[Boxes[Any]] = []
         room, count = self.rule.block, self.left
@@ -325,7 +330,7 @@ class Search(Generic[AnyRule]):
 
 
 class Steps(Protocol):
-    """A search that is run step by step, of one box or of several; see :class:`Search`."""
+    """A search of one or several boxes, run step by step; see :class:`Search`."""
 
     @property
     def is_open(self) -> bool:
@@ -345,7 +350,7 @@ class Effort:
 
     Attributes:
         most_boxes: number of boxes after which the search stops.
-        progress: function that is called with the seconds, about ten times a second.
+        progress: function that is called with the elapsed seconds, about ten times a second.
         began: time at the start.
     """
 
@@ -361,7 +366,7 @@ class Effort:
     def run(
         self, search: Steps, ending: Callable[[], str | None], target: Callable[[], float] = lambda: -math.inf
     ) -> str:
-        """Run a search until no box is open; return the reason for stopping before, or an empty text.
+        """Run a search until no box is open. Return the reason for an earlier stop, or an empty text.
 
         Args:
             search: the search.

@@ -1,9 +1,9 @@
 """Symmetries of a form, from its expressions: mirrors, and copies of parts.
 
-A mirror changes the signs of some variables, and no function or condition of the form; for example, the axis of a joint
-may have either sense. It exists if every intermediate value either keeps or changes its sign, for all values of the
-variables. This is a linear condition, modulo 2, on the set of variables that change sign. So the mirrors are a group,
-and for each generator one half of the box contains an optimum of the whole box.
+A mirror changes the signs of some variables, but no function or condition of the form. For example, the axis of a
+joint may point either way. It exists if every intermediate value either keeps or changes its sign, for all values of
+the variables. This is a linear condition, modulo 2, on the set of variables that change sign. So the mirrors are a
+group, and for each generator one half of the box contains an optimum of the whole box.
 
 Copies are forms with the same operations, constants and bounds, in other variables. They have the same maximum.
 """

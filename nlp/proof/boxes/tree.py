@@ -1,6 +1,6 @@
 """Record of a search as the tree of a proof; :mod:`screwsynth.nlp.proof.checker.tree` defines the nodes.
 
-The key of a node is the ends of its box.
+The bounds of a node's box are the key of the node.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from ....models import FloatArray
 
-#: Relative outward shift of the bound of a limb, half of the shift of the whole bound.
+#: Relative outward shift of the bound of a limb: half of the shift of the total bound.
 _OUTWARDS = 5e-13
 
 
@@ -40,7 +40,7 @@ class TreeRecord:
         self._limbs: list[tuple[TreeRecord, Callable[[], float]]] = []
 
     def limb(self, bound: Callable[[], float]) -> TreeRecord:
-        """Return the record of the next limb's tree; the whole tree consists of the limbs' trees then.
+        """Return the record of the next limb's tree. The whole tree then consists of the trees of the limbs.
 
         Args:
             bound: function that returns the limb's bound at the end of the search; -inf without a feasible point.
@@ -50,7 +50,7 @@ class TreeRecord:
         return record
 
     def add(self, key: bytes, text: bytes, *parts: bytes) -> None:
-        """Record a node: its bytes, and the keys of the parts of its box in the order of their trees."""
+        """Record a node: its bytes, and the keys of the sub-boxes in the order of their trees."""
         # The first box of a search is the whole box.
         self._root = self._root or key
         self._nodes[key] = text, parts
@@ -64,7 +64,7 @@ class TreeRecord:
     def contractions(
         self, before: tuple[FloatArray, FloatArray], after: tuple[FloatArray, FloatArray], outside: NDArray[np.bool_]
     ) -> None:
-        """Record boxes contracted to the ball of rotations: ends before and after, and whether each is empty."""
+        """Record boxes contracted to the ball of rotations: bounds before and after, and whether each box is empty."""
         for k, (old, new) in enumerate(zip(keys_of(*before), keys_of(*after), strict=True)):
             if outside[k]:
                 self.add(old, bytes([Node.OUTSIDE]))
@@ -75,8 +75,8 @@ class TreeRecord:
         """Return the whole tree.
 
         Args:
-            with_open: If true, boxes without a node are leaves: open boxes, which the bound of a stopped search covers
-                too, or boxes that a search of poses did not bisect.
+            with_open: If true, boxes without a node become leaves. These are open boxes, which the bound of a stopped
+                search also covers, or boxes that a search of poses did not bisect.
 
         Raises:
             ProofError: a box is not closed.
@@ -88,12 +88,12 @@ class TreeRecord:
     def tree_below(self, key: bytes, *, with_open: bool = False) -> bytes:
         """Return the tree of a box with a key; see :meth:`tree`."""
         parts, waiting = list[bytes](), [key]
-        # A leaf of shared variables has additional values, which an open box does not have.
+        # A leaf of shared variables has additional values, and an open box has none.
         missing = bytes([Node.BOUNDED]) if with_open and not self.begin else None
         while waiting:
             text, following = self._nodes.get(waiting.pop(), (missing, ()))
             if text is None:
-                raise ProofError("the search did not close every box, so there is no proof to write")
+                raise ProofError("the search did not close every box: there is no proof to write")
             parts.append(text)
             waiting += reversed(following)
         return b"".join(parts)

@@ -1,8 +1,8 @@
 """Proved bound of the global optimum, by branch and bound over the whole box.
 
-The C kernel examines boxes in blocks. A box is closed when its bound does not exceed the incumbent by more than the
-gap, when a condition cannot hold in it, or when no maximum can lie in it; otherwise it is bisected. A search that stops
-early has a bound from the open boxes, which is weaker, but also proved.
+The C kernel examines boxes in blocks. A box is closed in three cases: its bound does not exceed the incumbent by more
+than the gap, a condition is violated everywhere in the box, or no maximum lies in the box. Otherwise the box is
+bisected. A search that stops early has a bound from the open boxes, which is weaker, but also proved.
 
 No solver is trusted: the value of an incumbent is computed by the program's functions.
 """
@@ -37,11 +37,11 @@ from .certificate import Certificate, CertificateStatus
 GAP = 1e-4
 #: Relative outward shift of every final bound: constants that CasADi folded into the graph are rounded.
 _FOLDED = 1e-12
-#: Part of the objective's scale below which an incumbent counts as 0, and a relative gap has no meaning.
+#: Fraction of the objective's scale below which an incumbent counts as 0, and a relative gap has no meaning.
 _NEAR_ZERO = 1e-6
 #: Relative excess of a gap that counts as rounding of sums.
 _GAP_ROUNDING = 1e-9
-#: Largest number of variables for a search of the whole box if limbs share variables; it takes fewer boxes then.
+#: Largest number of variables for a search of the whole box if limbs share variables; this search needs fewer boxes.
 _WHOLE_BOX = 12
 #: Largest number of entries in a history.
 _HISTORY = 200
@@ -68,10 +68,12 @@ def certify_program(
         nlp: the program.
         x: (n,) best known point, such as the result of :func:`screwsynth.nlp.solve`; if None, a few points are tried.
         claimed: claimed objective at this point; a wrong claim is refused.
-        gap: largest difference of bound and incumbent, relative to the incumbent; near 0, to the objective's scale.
-        above: value below F that is proved instead, on the whole box. The program must be a minimisation.
+        gap: largest difference of bound and incumbent, relative to the incumbent. Near 0 it is relative to the
+            objective's scale.
+        above: lower bound of F to be proved on the whole box, instead of the optimum. The program must be a
+            minimisation.
         time_limit: seconds after which the search stops with its present bound.
-        jobs: number of threads; the result does not depend on it. If left out, one for each processor.
+        jobs: number of threads; if left out, one for each processor. The result does not depend on this number.
         progress: function that is called about ten times a second.
         recorder: recorder of the search's tree for a proof.
 
@@ -99,12 +101,12 @@ def certify_program(
 
 
 def _certify_point(nlp: Nlp, above: float | None, seconds: float) -> Certificate:
-    """Return the certificate of a program without variables of the case: the value at its single point."""
+    """Return the certificate of a nonlinear program without variables of the case: the value at its single point."""
     x = frozen_array(with_exact_level(nlp, nlp.start), (nlp.n,))
     F, violation = nlp.evaluate(x)[0], linearise(nlp, x).violation
     status, reason = CertificateStatus.PROVED, ""
     if not ((nlp.lower <= x) & (x <= nlp.upper)).all():  # ends of a level are estimates, not limits of the case
-        status, reason = CertificateStatus.INCOMPLETE, "the level of the worst case is beyond its estimated ends"
+        status, reason = CertificateStatus.INCOMPLETE, "the level of the worst case is beyond its estimated range"
     elif not violation <= FEASIBLE:
         status = CertificateStatus.INFEASIBLE
     elif not math.isfinite(F):
@@ -140,7 +142,7 @@ class _Search:
     ) -> None:
         self._form, self._gap, self._above, self._jobs, self._progress = form, gap, above, jobs, progress
         self._effort, self.incumbent = replace(effort, progress=self._report), Incumbent(form)
-        # Another method may replace this one; its set-up can be interrupted.
+        # Another method may replace this one; the set-up of a method can be interrupted.
         self._method: Search[Any] | IndependentSearch = optimum_search(form, self.incumbent, jobs, None)
         # (seconds, bound, incumbent) as objectives of the program, and number of boxes of earlier methods.
         self._history: list[tuple[float, float, float]] = []
@@ -149,8 +151,8 @@ class _Search:
     def run(self, recorder: TreeRecord | None) -> str:
         """Search until no box is open; return the reason for stopping earlier, or an empty text.
 
-        With a worse incumbent, limbs may have been closed that leave too little of the gap for other limbs, or boxes
-        bisected until they were too small. Then the search begins again with the better point.
+        A worse incumbent may have closed limbs with too large a part of the gap, or may have caused boxes to be
+        bisected until they were too small. The search then begins again with the better point.
         """
         while not (reason := reason_to_stop(self._effort.seconds)):
             self._boxes_before += self._method.boxes
@@ -164,7 +166,7 @@ class _Search:
         return reason
 
     def _new_method(self, recorder: TreeRecord | None) -> Search[Any] | IndependentSearch:
-        """Return the search for the form: by limbs if it separates, else of the whole box.
+        """Return the search for the form: by limbs if the form separates, otherwise of the whole box.
 
         A proof covers the whole box, without the use of mirror symmetries.
         """
@@ -180,7 +182,7 @@ class _Search:
     def _threshold(self) -> float:
         """Largest bound of a box that may be closed."""
         if self._above is not None:
-            # Strictly below, by more than the final outward shift of the bound.
+            # The bound must be strictly below, by more than the final outward shift.
             value = self._form.value_of(self._above)
             return math.nextafter(value - 2 * _FOLDED * abs(value), -math.inf)
         if self.incumbent.x is None:
@@ -204,7 +206,7 @@ class _Search:
 
     @property
     def _bound(self) -> float:
-        """Upper bound of the maximum, at this state of the search."""
+        """Upper bound of the maximum, in the present state of the search."""
         bound = self._bound_of_tree
         # The signs of a long expression take time, and few searches need them.
         return min(bound, self._form.ceiling) if 0 < bound < math.inf else bound
@@ -216,7 +218,7 @@ class _Search:
         return known + _FOLDED * abs(known) if math.isfinite(known) else known
 
     def _is_met(self) -> bool:
-        """Return whether the bound has the requested gap, once no box is open."""
+        """Return whether the bound reaches the requested gap once no box is open."""
         if self._above is not None:
             return self._bound_of_tree < self._form.value_of(self._above)
         return self._method.bound <= self._threshold + _GAP_ROUNDING * self._allowed_gap()[0]
@@ -247,7 +249,7 @@ class _Search:
         return bound, incumbent
 
     def certificate(self, reason: str) -> Certificate:
-        """Return the certificate at this state of the search."""
+        """Return the certificate for the present state of the search."""
         nlp, x, seconds, left = self._form.nlp, self.incumbent.program_point(), self._effort.seconds, self._method.left
         bound, incumbent = self._noted(seconds)
         if x is not None and self._has_counterexample():

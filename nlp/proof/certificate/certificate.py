@@ -13,7 +13,7 @@ from ...case.task import Sense
 from ...evidence.state import ZERO_F
 from ...program.nlp import Nlp
 
-#: Part of the incumbent below which a lower bound counts as 0.
+#: Fraction of the incumbent below which a lower bound counts as 0.
 _OBVIOUS = 1e-9
 #: Scope of every statement: CasADi's expressions of the robot, in double precision.
 SCOPE = "for the double-precision expression graph of this case"
@@ -33,28 +33,28 @@ class Certificate(Whole, Shown):
     """Proved bound of the global optimum.
 
     Attributes:
-        status: ``proved``: the requested gap is reached, or F is above the value on the whole box; ``incomplete``: the
-            bound is proved, but its gap is larger than requested; ``infeasible``: no point of the box satisfies the
-            limits; ``refused``: a known point contradicts the claim.
+        status: ``proved``: the requested gap is reached, or F is above the requested value on the whole box;
+            ``incomplete``: the bound is proved, but its gap is larger than requested; ``infeasible``: no point of the
+            box satisfies the limits; ``refused``: a known point contradicts the claim.
         nlp: the nonlinear program.
         x: (n,) incumbent; None without one. If ``was_beaten`` is true, it is not the given point.
         incumbent: objective at ``x``; NaN without a point.
-        bound: bound of the objective over all feasible points of the box; infinite without one.
-        allowed: requested gap, in the objective's unit.
-        is_relative: whether the gap is relative to the incumbent; near 0 it is relative to the objective's scale.
-        above: value below F that was to be proved; None without one.
+        bound: proved bound of the objective over all feasible points of the box; infinite without a proof.
+        allowed: requested gap, in the unit of the objective.
+        is_relative: whether the gap is relative to the incumbent. Near 0 the gap is relative to the objective's scale.
+        above: requested lower bound of F; None for a search of the optimum.
         was_beaten: whether the search found a better point than the given one.
         engine: ``c``, or ``none`` for a program without variables.
         boxes: number of examined boxes.
         open: number of open boxes at the end.
         seconds: wall time.
-        reason: reason for a search that stopped before every box was closed, or for a refused claim; else empty.
+        reason: reason why the search stopped before every box was closed, or why the claim is refused; otherwise empty.
         history: (seconds, bound, incumbent) during the search; only finite values.
-        bound_of_tree: upper bound from the search's boxes of the maximised value in standard form; above 0 for a sum of
-            squares with a ``bound`` of 0.
-        in_other_mode: whether the incumbent is in another working mode than home.
-        scope: dimensions for which the bound is valid, such as ``with the rounded dimensions``; empty for the whole
-            box.
+        bound_of_tree: upper bound of the maximised value of the standard form, from all boxes of the search tree. For
+            a sum of squares, it may be above 0 although ``bound`` is 0.
+        in_other_mode: whether the incumbent is in another working mode than the home working mode.
+        scope: dimensions for which the bound is valid, such as ``with the rounded dimensions``; empty for all
+            dimensions of the box.
     """
 
     status: CertificateStatus
@@ -93,7 +93,7 @@ class Certificate(Whole, Shown):
 
     @property
     def is_obvious(self) -> bool:
-        """Whether the bound only states that F, a sum of squares, is at least 0, and the best known F is larger."""
+        """Whether the bound only states that F is at least 0, as a sum of squares, while the best known F is larger."""
         # An absolute gap is used near 0, where the bound 0 is a proof of it.
         met = self.status is CertificateStatus.PROVED and not self.is_relative
         floor = 0.0 if math.isnan(self.incumbent) else _OBVIOUS * abs(self.incumbent)
@@ -111,9 +111,12 @@ class Certificate(Whole, Shown):
 
     @property
     def _mode(self) -> str:
-        """Restriction of the statement to a part of the box, as words at the end of a clause; empty without one."""
+        """Restriction of the statement to some dimensions or to the home working mode, as words at the end of a clause.
+
+        The text is empty without a restriction.
+        """
         scope = f" {self.scope}" if self.scope else ""
-        return f"{scope} in home's working mode" if self.nlp.in_home_mode else scope
+        return f"{scope} in the home working mode" if self.nlp.in_home_mode else scope
 
     @property
     def _bound_statement(self) -> str:
@@ -122,7 +125,7 @@ class Certificate(Whole, Shown):
         value = 0.0 if abs(self.incumbent) <= ZERO_F * self.nlp.objective_size else self.incumbent
         best = "" if math.isnan(value) else f"; the best known point has {value:.10g}"
         beaten = ", better than the given point" if self.was_beaten else ""
-        beaten += ", in another working mode than home" if self.in_other_mode else ""
+        beaten += ", in another working mode than the home working mode" if self.in_other_mode else ""
         if self.above is not None and self.status is CertificateStatus.PROVED:
             obvious = ", which is trivial: F is at least 0" if self.above < 0 else ""
             where = f"on the whole box within the limits{self._mode}"

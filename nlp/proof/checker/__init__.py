@@ -1,4 +1,4 @@
-"""Proof files and their checker, which shares the statement of claims with the search, and nothing else.
+"""Proof files and their checker. The checker shares the statement of claims with the search, and nothing else.
 
 The modules import each other in this order: ``packed`` (trees in files, and their budget), ``proof_file`` (JSON),
 ``tree`` (boxes as bytes, and the claims of their leaves), ``bisection`` (the loop that proves claims), ``premises``

@@ -31,14 +31,14 @@ def _hypot(y: Polynomial, x: Polynomial) -> Polynomial:
 
 
 def _power(u: Polynomial, exponent: Polynomial) -> Polynomial:
-    """Return a constant whole or half power.
+    """Return a power with a constant exponent, a multiple of 1/2.
 
     Raises:
-        UncoveredError: the exponent is not constant, or not whole or half.
+        UncoveredError: the exponent is not a constant multiple of 1/2.
     """
     power = exponent.number
     if power is None or not ((2 * power).is_integer() and 0 < abs(power) <= _LARGEST_POWER):
-        raise UncoveredError("a power with an exponent that is not constant, or not whole or half")
+        raise UncoveredError("a power whose exponent is not a constant multiple of 1/2")
     base, left = (u, int(abs(power))) if power.is_integer() else (sqrt(u), int(abs(2 * power)))
     result: Polynomial | None = None
     while left:
@@ -75,7 +75,7 @@ _BINARY: dict[int, Callable[[Polynomial, Polynomial], Polynomial]] = {
     ca.OP_DIV: operator.truediv,
     ca.OP_POW: _power,
     ca.OP_CONSTPOW: _power,
-    # Off the negative x-axis.
+    # Valid off the negative x-axis.
     ca.OP_ATAN2: lambda y, x: atan(y / (_hypot(y, x) + x)) * 2.0,
     ca.OP_HYPOT: _hypot,
     ca.OP_FMAX: lambda u, v: v + ramp(u - v),
@@ -102,7 +102,7 @@ class PolynomialArithmetic:
             if op == ca.OP_CONST:
                 self._constants[k] = constant(function.instruction_constant(k))
             elif op not in {ca.OP_INPUT, ca.OP_OUTPUT, *_UNARY, *_BINARY}:
-                raise UncoveredError(f"operation number {op} of CasADi")
+                raise UncoveredError(f"the CasADi operation number {op}")
             self._steps.append((op, function.instruction_input(k), function.instruction_output(k)))
         self._offset = np.concatenate([[0], np.cumsum([function.numel_out(i) for i in range(function.n_out())])])
 

@@ -26,9 +26,10 @@ class Shown:
 
     Attributes:
         holds: (N,) whether the claim is proved on the piece.
-        change: (n, N) estimated gain of the claim from halving each variable.
-        lower, upper: (n, N) ends of the part of each piece that remains to be proved; crossed where nothing remains.
-        is_wrong: (N,) whether the centre is a counterexample by more than rounding; None where this was not tested.
+        change: (n, N) estimated improvement of the bound when each variable is halved.
+        lower, upper: (n, N) bounds of the part of each piece that remains to be proved; lower above upper where
+        nothing remains.
+        is_wrong: (N,) whether the centre is a counterexample, beyond rounding; None where this was not tested.
     """
 
     holds: NDArray[np.bool_]
@@ -62,14 +63,14 @@ class Rule(Protocol):
     most_pieces: int
 
     def examine(self, lower: FloatArray, upper: FloatArray, of: NDArray[np.intp]) -> Shown:
-        """Examine pieces with ends (n, N); ``of`` has the number of the claim of each piece.
+        """Examine pieces with bounds (n, N); ``of`` has the index of the claim of each piece.
 
         Raises:
             ProofError: a claim is wrong.
         """
 
     def sentence(self, claim: int) -> str:
-        """Return the sentence that a claim could not be shown."""
+        """Return the message for a claim that could not be proved."""
 
 
 def show(rule: Rule, lower: FloatArray, upper: FloatArray) -> int:
@@ -90,7 +91,7 @@ def show(rule: Rule, lower: FloatArray, upper: FloatArray) -> int:
     owner: NDArray[np.intp] = np.zeros(0, dtype=np.intp)
     depth: NDArray[np.intp] = np.zeros(0, dtype=np.intp)
     while begun < count or owner.size:
-        # The last pieces come first: claims are finished before others begin, as far as blocks allow.
+        # The last pieces come first, so that most claims are finished before new ones begin.
         more = np.arange(begun, min(begun + max(rule.block - owner.size, 0), count))
         begun += more.size
         a, b = (np.concatenate([old, new[:, more]], axis=1) for old, new in zip(waiting, (lower, upper), strict=True))
@@ -121,7 +122,7 @@ def show(rule: Rule, lower: FloatArray, upper: FloatArray) -> int:
 def _variables_to_bisect(
     found: Shown, lower: FloatArray, upper: FloatArray, width: FloatArray, depth: NDArray[np.intp]
 ) -> NDArray[np.intp]:
-    """Return the variable (N,) to bisect in the rest of each piece, with ends (n, N) and a depth (N,)."""
+    """Return the variable (N,) to bisect in the rest of each piece, with bounds (n, N) and a depth (N,)."""
     wide = found.upper - found.lower
     score = found.change * (wide / np.where(upper > lower, upper - lower, 1.0))
     relative = wide / np.where(width > 0, width, np.inf)[:, None]

@@ -1,6 +1,6 @@
 """Check of a proof about a program, without trust in its author.
 
-The boxes of the tree start from the program's own bounds, so that the leaves cover them by construction. Every leaf and
+The root box of the tree has the bounds of the program, so the leaves cover this box by construction. Every leaf and
 every face is a *claim* about one box. The check proves each claim again with the polynomials of
 :mod:`screwsynth.nlp.proof.checker.polynomials`, and bisects boxes where their error balls are too large. It uses
 neither the arithmetic of the search nor its multipliers; both share the case's expressions and CasADi's derivatives.
@@ -38,9 +38,9 @@ class VerifiedProof:
 
     Attributes:
         leaves: number of leaves and faces of the tree.
-        pieces: number of boxes evaluated for their proof.
-        bound: upper bound of the maximised value over the feasible part of the root, at most 0 where the value is minus
-            a sum of squares; -inf without a feasible point.
+        pieces: number of boxes evaluated in the check.
+        bound: upper bound of the maximised value over the feasible part of the root box; at most 0 if the value is
+            minus a sum of squares, and -inf without a feasible point.
     """
 
     leaves: int
@@ -59,7 +59,7 @@ def check_proof(claim: ProofClaim, nlp: Nlp) -> VerifiedProof:
         ProofError: the proof is for another program, its bytes are no tree, or a claim could not be proved.
     """
     if not is_same_program(fingerprint(nlp), claim.graph):
-        raise ProofError("the proof is for other expressions or bounds than this case's")
+        raise ProofError("the proof is for other expressions or bounds than those of this case")
     form = standard_form(nlp)
     refuse_jumps(form.expressions, form.x)
     bound, tree = -np.inf if claim.bound is None else claim.bound, claim.unpacked()
@@ -95,7 +95,9 @@ def _of_limbs(tree: bytes, form: StandardForm, bound: float) -> Iterator[_Block]
     """
     separation = separate(form)
     if separation is None or separation.shared:
-        raise ProofError("the tree is for limbs without shared variables, which this case does not have")
+        raise ProofError(
+            "the tree needs limbs that share no variables, but the limbs of this case share some or cannot be separated"
+        )
     reader, bounds, fault = (
         TreeReader(tree, 1),
         list[float](),
@@ -126,7 +128,7 @@ def _claims_of(claims: dict[tuple[Node, int], Box], form: StandardForm, bound: f
     for (kind, i), (lower, upper) in claims.items():
         ends, whole = (upper, form.upper) if kind == Node.FACE_UPPER else (lower, form.lower)
         if kind in FACES and (ends[i] != whole[i]).any():
-            raise ProofError(f"a box is collapsed on a face of {form.names[i]} that is not the case's")
+            raise ProofError(f"a box collapses on a bound of {form.names[i]} that is not a bound of the case")
         every.append(Claims(form, kind, i, lower, upper, np.full(lower.shape[1], bound)))
     return sum(each.bounds.size for each in every), every
 
@@ -142,7 +144,7 @@ def _of_shared_limbs(tree: bytes, form: StandardForm, bound: float) -> Iterator[
         raise ProofError("the tree is for limbs with shared variables, which this case does not have")
     common, limbs = separation.common, [limb.form for limb in separation.limbs]
     for leaves in read_shared(tree, common.lower, common.upper, len(limbs)):
-        # The sums first: they are quick, and without them the limbs' bounds prove nothing.
+        # The sums come first: they are quick, and the limbs' bounds prove nothing without them.
         every = [_of_sum(leaves.select(leaves.bounds.min(axis=0) > -np.inf), common, bound)]
         for k, limb in enumerate(limbs):
             claimed = leaves.select(leaves.bounds[k] < np.inf)
@@ -155,7 +157,7 @@ def _of_shared_limbs(tree: bytes, form: StandardForm, bound: float) -> Iterator[
 
 
 def _of_sum(leaves: SharedLeaves, common: StandardForm, bound: float) -> Claims:
-    """Return the claims about the part with shared variables only: its tilts are minus the sum of the limbs' tilts."""
+    """Return the claims about the common part. Its tilts are minus the sum of the limbs' tilts."""
     lower, upper, bounds, g, Q = leaves
     tilts = Tilts.over(lower, upper, -g.sum(axis=0), -Q.sum(axis=0))
     # The sum of the tilts is rounded, and so is the sum of their bounds.

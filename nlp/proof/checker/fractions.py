@@ -43,7 +43,10 @@ def sine_cosine_ends(angle: float) -> tuple[tuple[Fraction, Fraction], tuple[Fra
 
 
 def _partial_sums(first: Fraction, x: Fraction, order: int) -> tuple[Fraction, Fraction]:
-    """Return two consecutive partial sums of an alternating series, the lower one first."""
+    """Return a lower and an upper bound of sin x (first = x, order 1) or cos x (first = 1, order 0).
+
+    They are consecutive partial sums of the Taylor series.
+    """
     term, total, before = first, first, first
     for k in range(_TERMS):
         term = -term * x * x / ((order + 2 * k + 1) * (order + 2 * k + 2))

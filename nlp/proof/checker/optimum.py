@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 #: Least and largest number of boxes that are evaluated at once, and largest number of coefficients of their values in
 #: between: one NumPy call costs as much as a hundred boxes, and more coefficients do not fit into a cache.
 _FEWEST, _MOST, _COEFFICIENTS = 128, 1024, 2**16
-#: Relative distance from a claim, or absolute below 1, that is more than rounding.
+#: Distance from a claim that is more than rounding; relative for values above 1, otherwise absolute.
 _CLEARLY = 1e-9
 
 
@@ -43,7 +43,7 @@ class Claims:
         kind: ``BOUNDED``, ``INFEASIBLE``, ``MONOTONE`` or the kind of a face.
         index: index of the condition or variable; 0 where the kind has none.
         lower, upper: (n, L) ends of the boxes.
-        bounds: (L,) bounds of the value of the form, minus its tilt; -inf where there is no feasible point.
+        bounds: (L,) bounds of the value of the form minus its tilt; -inf for boxes without a feasible point.
         tilts: tilts of the claims about a limb, over the shared variables, which come first; None without any.
     """
 
@@ -78,7 +78,7 @@ class FormRule:
         return other
 
     def sentence(self, claim: int) -> str:
-        """Return the sentence that a claim could not be shown."""
+        """Return the message for a claim that could not be proved."""
         claims, names = self._claims, self._form.names
         what = f"the reason '{claims.kind.name.lower()} {claims.index}'"
         if claims.tilts is not None:
@@ -86,7 +86,7 @@ class FormRule:
             what = f"the bound of {f'the limb with {own[0]}' if own else 'the sum of the limbs'}"
         ends = zip(names, claims.lower[:, claim], claims.upper[:, claim], strict=False)
         box = ", ".join(f"{name} in [{low:.6g}, {high:.6g}]" for name, low, high in ends)
-        return f"{what} could not be shown for the box {box}"
+        return f"{what} could not be proved for the box {box}"
 
     def _use_conditions(
         self, shown: Shown, which: NDArray[np.intp], forms: Forms, lower: FloatArray, upper: FloatArray
@@ -108,12 +108,14 @@ class FormRule:
 class BoundRule(FormRule):
     """Rule for claims that no feasible point of a box has a value above a bound.
 
-    The proof is that a function is at most the bound, or a condition cannot hold, or a weighted sum of both is at most
-    the bound. The claim that a condition holds nowhere in a box uses the same rule with that condition only.
+    The proof is one of three: a function is at most the bound, a condition is violated everywhere, or a weighted sum
+    of both is at most the bound. The claim that a condition holds nowhere in a box uses the same rule with that
+    condition only.
 
-    The rest of a limb's box collapses on a face if the limb rises along a variable of its own that no condition stops:
-    any feasible point above the bound could move to that face and remain feasible and above the bound. Tilts do not
-    change this gradient, as they depend only on the shared variables. A tree over all variables states its faces.
+    The rest of a limb's box collapses on a face if the limb rises along one of its own variables and no condition
+    stops a motion along this variable. Any feasible point above the bound could then move to that face, and remain
+    feasible and above the bound. Tilts do not change this gradient, as they depend only on the shared variables. A
+    tree over all variables states its faces.
     """
 
     def __init__(self, claims: Claims) -> None:
@@ -166,7 +168,7 @@ class BoundRule(FormRule):
             shown.upper[i, which] = np.where(down & ~up, low[i], high[i])
 
     def _are_wrong(self, points: FloatArray, of: NDArray[np.intp]) -> NDArray[np.bool_]:
-        """Return which points (n, K) are counterexamples of claims (K,) by more than rounding."""
+        """Return which points (n, K) are counterexamples of claims (K,), beyond rounding."""
         values, bound = self._at_centres(points).full(), self._claims.bounds[of]
         best = values[: self._J].min(axis=0, initial=np.inf)
         sizes = sum(np.where(np.isfinite(each), np.abs(each), 0.0) for each in (best, bound))
@@ -178,7 +180,7 @@ class BoundRule(FormRule):
 
 
 class _Slopes:
-    """Derivatives of a form's functions, and of the conditions that depend on a variable, along some variables.
+    """Derivatives along some variables: of a form's functions, and of the conditions that depend on the variable.
 
     Args:
         form: the form.
@@ -198,13 +200,13 @@ class _Slopes:
         self.expressions = ca.densify(ca.vertcat(*(form.jacobian[r, i] for r, i in entries)))
 
     def rise(self, i: int, side: int, slopes: Sequence[Polynomial], high: FloatArray) -> NDArray[np.bool_]:
-        """Return where (N,) all functions rise towards a side, and no condition may stop a point before it.
+        """Return where (N,) all functions rise towards a side, and no condition stops a point on its way there.
 
         Args:
             i: index of the variable.
             side: 1 for the upper end of the variable, -1 for the lower one.
             slopes: derivatives over the boxes.
-            high: (R, N) upper ends of functions and conditions.
+            high: (R, N) upper bounds of functions and conditions.
         """
 
         def grows(r: int, way: int) -> NDArray[np.bool_]:
@@ -222,8 +224,8 @@ class _Slopes:
 class MonotoneRule(FormRule):
     """Rule for claims that no maximum lies in a box.
 
-    Every function rises along a variable, and no condition stops a point: in either direction for ``MONOTONE``, which
-    needs room beyond the box, and in one direction for a face.
+    Every function rises along a variable, and no condition stops a point that moves along this variable. ``MONOTONE``
+    requires this in both directions, and room beyond the box; a face requires one direction.
     """
 
     def __init__(self, claims: Claims) -> None:

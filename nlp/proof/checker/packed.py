@@ -13,12 +13,12 @@ from dataclasses import dataclass, field
 
 from ...errors import InputError
 
-#: Largest number of bytes of all unpacked trees of a file: a hundred times that of the proofs in docs/certificate.md.
+#: Largest total number of bytes of a file's unpacked trees: a hundred times that of the proofs in docs/certificate.md.
 LARGEST_TREES = 2**27
 
 
 class DamagedProofError(InputError):
-    """A proof file with a damaged tree, or with trees that are too large."""
+    """Error of a proof file with a damaged tree, or with trees that are too large."""
 
 
 class TreeBudget:
@@ -66,14 +66,14 @@ class PackedTree:
                 their budget.
         """
         most, reader = self.budget.most_of(self.number), zlib.decompressobj()
-        damaged = f"{self.source}: is damaged at '{self.claim}'"
+        damaged = f"{self.source}: the proof of '{self.claim}' is damaged"
         try:
             # One byte more than allowed reveals a tree that is too large.
             tree = reader.decompress(base64.b64decode(self.text, validate=True), most + 1)
         except (ValueError, zlib.error):
             raise DamagedProofError(f"{damaged}: its tree cannot be unpacked") from None
         if len(tree) > most:
-            size = f"{LARGEST_TREES // 2**20} MB, which all trees of a file may have together"
+            size = f"{LARGEST_TREES // 2**20} MB, the allowed total for a file"
             raise DamagedProofError(f"{self.source}: the trees up to that of '{self.claim}' unpack to more than {size}")
         if not reader.eof or reader.unused_data:
             raise DamagedProofError(f"{damaged}: its tree is incomplete")

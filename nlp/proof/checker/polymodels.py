@@ -1,6 +1,6 @@
 """Quadratic models over boxes for the check of a proof: weighted sums of polynomials, their weights, and tilts.
 
-Coordinates of a box are e in [-1, 1]^n, as for its polynomials.
+The coordinates of a box are e in [-1, 1]^n, the same as those of its polynomials.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Forms(NamedTuple):
 
     Attributes:
         values: the R polynomials.
-        low, high: (R, N) ends of their ranges.
+        low, high: (R, N) bounds of the expressions.
         share: (n, N) widths of the boxes relative to the whole box, scaled so that the largest of each box is 1.
     """
 
@@ -96,7 +96,7 @@ class SumModel:
 
     @property
     def reach(self) -> FloatArray:
-        """Largest change (n, N) of each slope from its value at the centre."""
+        """Largest change (n, N) of each derivative from its value at the centre."""
         return np.asarray(np.abs(self.H).sum(axis=1))
 
     def bound(self) -> FloatArray:
@@ -164,7 +164,7 @@ def _largest(b: FloatArray, H: FloatArray, s: FloatArray) -> FloatArray:
 def reaching_part(
     model: SumModel, level: FloatArray | float, lower: FloatArray, upper: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return ends (n, N) of the parts of boxes in which a model may reach a level; crossed if there is none."""
+    """Return bounds (n, N) of the parts of boxes in which a model may reach a level; crossed if no point can."""
     with np.errstate(all="ignore"):
         missing = level - model.fixed - _SUMS * (np.abs(level) + np.abs(model.fixed))
         half = 0.5 * model.reach
@@ -194,7 +194,7 @@ def weights_of(functions: int, is_equation: Sequence[bool], forms: Forms) -> Flo
     finds the weights: those of functions on the squares of the gradient, those of conditions on this bound.
 
     Args:
-        functions: number of functions, which come before the conditions.
+        functions: number of functions; conditions follow.
         is_equation: whether each of the R expressions must be 0.
         forms: forms of the expressions over the boxes.
     """
@@ -217,7 +217,7 @@ def weights_of(functions: int, is_equation: Sequence[bool], forms: Forms) -> Flo
 
 
 def _move_towards(r: int, functions: int, weights: FloatArray, G: FloatArray, left: FloatArray) -> None:
-    """Move the weights of the functions towards function r only, as far as the gradient ``left`` gets smaller."""
+    """Move the weights of the functions towards function r as long as the gradient ``left`` decreases."""
     direction = G[r] - np.einsum("jn,jin->in", weights[:functions], G[:functions])
     size = np.einsum("in,in->n", direction, direction)
     part = -np.einsum("in,in->n", direction, left) / np.where(size > 0, size, np.inf)
@@ -232,7 +232,7 @@ def _move_towards(r: int, functions: int, weights: FloatArray, G: FloatArray, le
 def _minimise_bound(
     weight: FloatArray, gradient: FloatArray, value: FloatArray, left: FloatArray, is_equation: bool
 ) -> None:
-    """Change one weight (N,) so that ``weight value + sum |left|`` is least; written in place, like ``left`` (n, N).
+    """Change one weight (N,) in place so that ``weight value + sum |left|`` is least; ``left`` (n, N) is updated too.
 
     The function is convex and piecewise linear in the weight: its minimum lies where a component of ``left`` is 0, or
     at 0.
@@ -252,7 +252,7 @@ def _minimise_bound(
 
 @dataclass(frozen=True, eq=False)
 class Tilts:
-    """Quadratic functions of m shared variables, one for each of L boxes of these.
+    """Quadratic functions of m shared variables, one for each of L boxes of these variables.
 
         t(s) = g.e + 1/2 e'Q e,    e_i = (s_i - c_i) / r_i
 
@@ -281,7 +281,7 @@ class Tilts:
         return Tilts(self.centre[:, which], self.radius[:, which], self.g[:, which], self.Q[:, :, which])
 
     def sizes(self, e: FloatArray | float = 1.0) -> FloatArray:
-        """Return the sums (L,) of the absolute values of all terms, for coordinates of at most ``e``, (m, L)."""
+        """Return sums (L,) of the absolute values of all terms, for absolute coordinates of at most ``e``, (m, L)."""
         far = np.broadcast_to(e, self.g.shape)
         return np.asarray(
             (np.abs(self.g) * far).sum(axis=0) + 0.5 * np.einsum("ib,ijb,jb->b", far, np.abs(self.Q), far)

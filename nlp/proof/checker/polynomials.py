@@ -17,7 +17,8 @@ terms of third order than the quotient has, so both are one operation. For any n
 
 The first part is linear in N and D. With rho near ``N / D`` at the centre, E is small over the whole box.
 
-A value that may be undefined has NaN for ``s`` and ``V``, and so has every value computed from it; NaN proves nothing.
+A value that may be undefined has NaN for ``s`` and ``V``. So has every value computed from such a value. NaN proves
+nothing.
 """
 
 from __future__ import annotations
@@ -44,9 +45,9 @@ _ONCE = 2 * UNIT
 #: Number of roundings of each term of an operation before the last one, with a margin. A product and a square make at
 #: most two, a quotient five, and a Taylor polynomial eleven, including those of its slope and its curvature.
 _PRODUCT, _QUOTIENT, _TAYLOR = 4 * UNIT, 10 * UNIT, 14 * UNIT
-#: Error of a library's sine, cosine, exponential, logarithm and arc tangent, relative to their size or to 1.
+#: Error of a library's sine, cosine, exponential, logarithm and arc tangent, relative to the value or to 1.
 _LIBRARY = 4e-15
-#: Outward directions of the two ends of a range, as infinite numbers.
+#: Outward directions of the lower and the upper bound of a range, as infinite numbers.
 _SIDES = np.array([[-1.0], [1.0]])
 _ENDS = _SIDES * np.inf
 
@@ -107,7 +108,7 @@ class Polynomial:
         rad: (N,) sum of the absolute linear coefficients.
         curved: (N,) largest absolute value of the part of second order.
         size: (N,) sum of the absolute values of all coefficients.
-        root: value whose square this is; None where none is known.
+        root: value of which this one is the square; None if no such value is known.
     """
 
     on: tuple[int, ...]
@@ -178,14 +179,14 @@ def middles(lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArra
 def settled(
     on: tuple[int, ...], P: FloatArray, s: FloatArray | float, V: FloatArray, rounding: float = _ONCE
 ) -> Polynomial:
-    """Return a value, its range intersected with that of its polynomial; undefined unless that is finite.
+    """Return a value with its range intersected with that of its polynomial; undefined unless the latter is finite.
 
     Args:
         on: variables of the value.
         P: (m, N) coefficients.
         s: (N,) radius of the error ball without the last rounding of each coefficient.
         V: (2, N) range of the value.
-        rounding: relative size of the last rounding of each coefficient; 0 for exact ones.
+        rounding: relative last rounding error of each coefficient; 0 for exact coefficients.
     """
     at = places(len(on))
     sizes = np.abs(P)
@@ -204,7 +205,7 @@ def settled(
 
 
 def variable(i: int, lower: FloatArray, upper: FloatArray) -> Polynomial:
-    """Return variable number i over boxes, whose ends along it are given (N,)."""
+    """Return variable number i over boxes, from its lower and upper bounds (N,)."""
     centre, radius = middles(lower, upper)
     none = np.zeros(lower.size)
     P = np.array([centre, radius, none])
@@ -251,7 +252,7 @@ def square(u: Polynomial) -> Polynomial:
 
 
 def _quotient(u: Polynomial, v: Polynomial) -> Polynomial:
-    """Return ``u / v = P + (u - P v) / v``, P the quotient's polynomial: ``u - P v`` has only terms of third order.
+    """Return ``u / v = P + (u - P v) / v`` with the quotient's polynomial P; ``u - P v`` has only third-order terms.
 
     The error ball of P v, and rounding in its lower terms, are divided by the smallest absolute value of v.
     """
@@ -367,7 +368,7 @@ def log(u: Polynomial) -> Polynomial:
 
 
 def atan(u: Polynomial) -> Polynomial:
-    """Return the arc tangent; its third derivative is at most 2 in size."""
+    """Return the arc tangent; the absolute value of its third derivative is at most 2."""
     value, slope = np.arctan(u.P[0]), 1 / (1 + u.P[0] * u.P[0])
     terms = value, slope, -u.P[0] * slope * slope
     return _taylor(u, _near(np.arctan(u.V)), terms, 1 / 3 + 1e-15, _LIBRARY)
@@ -385,7 +386,7 @@ def ramp(u: Polynomial) -> Polynomial:
 
 
 def step(u: Polynomial) -> Polynomial:
-    """Return 1 where u is not negative, else 0."""
+    """Return 1 where u is not negative, and 0 elsewhere."""
     V = np.array([u.V[0] > 0, ~(u.V[1] < 0)], dtype=float)
     P = np.zeros_like(u.P)
     P[0] = 0.5 * (V[0] + V[1])
@@ -414,12 +415,12 @@ def _add_square(P: FloatArray, a: FloatArray, at: Places, by: FloatArray | float
 
 
 def _out(V: FloatArray) -> FloatArray:
-    """Return ends (2, N) moved outwards by one double."""
+    """Return bounds (2, N) moved outwards by one double."""
     return np.nextafter(V, _ENDS)
 
 
 def _near(V: FloatArray, least: float = 1e-280) -> FloatArray:
-    """Return ends (2, N) from a library, moved outwards by its relative error, with a least size."""
+    """Return bounds (2, N) from a library, moved outwards by its relative error and at least by a minimum."""
     return V + _SIDES * (_LIBRARY * (np.abs(V) + least))
 
 

@@ -1,7 +1,7 @@
-"""Program of a case that a proof bounds, its fingerprint, and the proven claim in words.
+"""Nonlinear program that a proof bounds, its fingerprint, and the proved claim in words.
 
 Tasks, weights, senses, poses, limits and dimensions come from the case. A :class:`.proof_file.Statement` names one of
-the few programs that a case has.
+the few nonlinear programs of a case.
 """
 
 from __future__ import annotations
@@ -44,15 +44,15 @@ def has_both_senses(case: Case) -> bool:
 
 
 def check_minimum(case: Case) -> None:
-    """Refuse a case whose smallest F is not the bound of one program.
+    """Refuse a case whose smallest F is not the optimum of one nonlinear program.
 
     Raises:
-        InputError: the case has several tasks, or its F is the least of several poses.
+        InputError: the case has several tasks, or F is the least over several poses.
     """
     if len(case.tasks) > 1:
-        raise InputError("above: is for a case with one task")
+        raise InputError("above: needs a case with one task")
     if case.pose_count > 1 and case.over_poses is OverPoses.WORST and case.tasks[0].sense is Sense.MAX:
-        raise InputError("above: is not for the worst of several poses, where F is to be maximised")
+        raise InputError("above: cannot be used if the smallest F of several poses is maximised")
 
 
 def program_of(case: Case, statement: Statement) -> Nlp:
@@ -66,11 +66,11 @@ def program_of(case: Case, statement: Statement) -> Nlp:
 
 
 def _program(case: Case, statement: Statement) -> Nlp:
-    """Formulate the program for all working modes."""
+    """Formulate the nonlinear program for all working modes."""
     if statement.is_minimum:
         check_minimum(case)
     if len(statement.best) != (len(case.tasks) if _has_losses(case) else 0):
-        raise ProofError("the proof is for other tasks, or another combination of them, than this case's")
+        raise ProofError("the proof is for other tasks, or for another combination of tasks, than this case")
     if len(case.tasks) == 1:
         nlp = formulate(case)
         return replace(nlp, sense=Sense.MIN) if statement.is_minimum else nlp
@@ -103,12 +103,12 @@ def fingerprint(nlp: Nlp) -> str:
     values = [function(x, nlp.arguments).full().ravel() for x in points]
     size = nlp.n
     if nlp.in_home_mode:
-        # Unknowns with a closed form are no variables of the tree's boxes.
+        # The boxes of the tree have no unknowns with a closed form.
         form = standard_form(nlp)
         size, function = form.n, ca.Function("form", [form.x], [form.expressions])
         values += [function(form.point_of(x)).full().ravel() for x in points]
     numbers = np.concatenate([*values, nlp.arguments, nlp.lower, nlp.upper, nlp.g_lower, nlp.g_upper])
-    # A number counts by its size and by its sign; if it is not finite, by a constant.
+    # A value counts by its magnitude and its sign; a value that is not finite counts as a constant.
     known = np.isfinite(numbers)
     parts = np.where(known, numbers / (1 + np.abs(np.where(known, numbers, 0.0))), np.where(numbers > 0, 2.0, -2.0))
     sums = rng.normal(size=(_SUMS, numbers.size)) @ parts
@@ -128,8 +128,8 @@ def is_same_program(one: str, other: str) -> bool:
         return False
 
 
-def hold_statement(case: Case, statement: Statement, *, above: float | None, all_assemblies: bool) -> None:
-    """Refuse a proof whose statement is not the requested one.
+def check_statement(case: Case, statement: Statement, *, above: float | None, all_assemblies: bool) -> None:
+    """Refuse a proof that does not prove the requested statement.
 
     Args:
         case: the case.
@@ -138,19 +138,19 @@ def hold_statement(case: Case, statement: Statement, *, above: float | None, all
         all_assemblies: If true, request a proof for all working modes; otherwise for the home working mode only.
 
     Raises:
-        ProofError: the statement is another one.
+        ProofError: the proof is for another statement.
         InputError: the case has no such statement.
     """
     if above is not None:
         check_minimum(case)
     if statement.is_minimum and above is None:
-        raise ProofError("the proof bounds the smallest F, but the case asks for the largest: see --above")
+        raise ProofError("the proof bounds the smallest F, but the case maximises F: give --above to check it")
     if above is not None and case.tasks[0].sense is Sense.MAX and not statement.is_minimum:
-        raise ProofError("the proof bounds the largest F, but --above asks for the smallest")
+        raise ProofError("the proof bounds the largest F, but --above requests a bound of the smallest F")
     if statement.in_home_mode and all_assemblies:
-        raise ProofError("the proof covers only home's working mode, but --all-assemblies asks for all modes")
+        raise ProofError("the proof covers only the home working mode, but --all-assemblies requests all working modes")
     if statement.in_home_mode and not has_modes(case.model):
-        raise ProofError("the proof is for home's working mode, but this robot has no distinct working modes")
+        raise ProofError("the proof is for the home working mode, but this robot has no distinct working modes")
 
 
 def claim_words(case: Case, statement: Statement, bound: float | None, unit: str = "") -> str:
@@ -159,14 +159,14 @@ def claim_words(case: Case, statement: Statement, bound: float | None, unit: str
     Args:
         case: the case.
         statement: statement of the proof.
-        bound: upper bound of the maximised value, minus F for a minimum; None where there is no feasible point.
+        bound: upper bound of the maximised value, which is minus F for a minimum; None without a feasible point.
         unit: unit of the objective.
     """
     where = f"within the limits of {case.name}"
     if case.limits_over:
         where += ", taken at the stated pose only,"
     if has_modes(case.model):
-        where += " in home's working mode" if statement.in_home_mode else " in every working mode"
+        where += " in the home working mode" if statement.in_home_mode else " in every working mode"
     if bound is None:
         return f"there is no feasible point {where}"
     measure = case.tasks[0].measure
@@ -183,7 +183,7 @@ def claim_words(case: Case, statement: Statement, bound: float | None, unit: str
 
 
 def root_below(square: float) -> float:
-    """Return a number that is at most the square root of another one; 0 for a negative one."""
+    """Return a lower bound of the square root of a number; 0 for a negative number."""
     return math.nextafter(math.sqrt(max(square, 0.0)), 0.0)
 
 
@@ -226,5 +226,5 @@ def outward(value: float, *, up: bool) -> str:
 
 
 def exact(value: float) -> str:
-    """Return a number of a premise as text that identifies this double."""
+    """Return a number of a premise as text from which the same double can be read."""
     return repr(value).removesuffix(".0")

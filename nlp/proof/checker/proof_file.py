@@ -56,12 +56,12 @@ class ProofError(InputError):
 
 @dataclass(frozen=True)
 class Statement:
-    """Program of a case that a proof is about; everything else follows from the case.
+    """Nonlinear program of a case that a proof is about; everything else follows from the case.
 
     Attributes:
         is_minimum: whether the proof bounds the smallest F of a task that the case maximises.
         in_home_mode: whether the proof covers only the home working mode.
-        best: value of F of each task from which its loss is measured, for the worst case of tasks of both senses.
+        best: reference F of each task for its loss, if a case has the worst case of maximised and minimised tasks.
     """
 
     is_minimum: bool = False
@@ -77,15 +77,17 @@ class ProofClaim:
         name: name of the claim, in the words of the command.
         sense: ``min`` or ``max`` for a quantity over a workspace, else empty.
         reason: kind of the proof, in the words of this module's docstring.
-        bound: bound of the quantity in the unit of its search: the maximised value of a program (minus F for a
-            minimum), a distance, a singular value or a condition number, or, for a pose error, its first-order part for
-            leg errors of one unit of length; None without a quantity, and for a program without a feasible point.
+        bound: bound of the quantity in the unit of its search. The quantity is the maximised value of a nonlinear
+            program (minus F for a minimum), a distance, a singular value or a condition number. For a pose error it is
+            the first-order part for leg-length errors of one unit. None without a quantity, and for a nonlinear
+            program without a feasible point.
         graph: fingerprint of the program; empty for other reasons.
         tree: nodes in bytes; empty for a claim without a tree, and for one with a packed tree.
-        sides: two poses (6,) with determinants of opposite signs, each followed by the m joint-centre errors (3 m,) of
-            its robot where these are not 0; or two directions (3,) of a leg, in the world frame and in the platform
-            frame; empty for other reasons.
-        packed: tree of a file, to be unpacked when the claim is checked; None for a claim that was not read.
+        sides: two poses (6,) with determinants of opposite signs. Each pose is followed by the m joint-centre errors
+            (3 m,) of its robot if these are not 0. For a leg length of one robot: two directions (3,) of the leg, in
+            the world frame and in the platform frame. Empty for other reasons.
+        packed: tree of a file, to be unpacked when the claim is checked; None for a claim that was not read from a
+            file.
     """
 
     name: str
@@ -124,12 +126,12 @@ class Premises:
     """Premises of a proof about a workspace, as stated in its file; everything else follows from the case.
 
     Attributes:
-        workspace: poses of the workspace, from :func:`workspace_numbers`.
-        legs: (12, 3) joint centres of six straight legs, base before platform; empty for another robot.
+        workspace: poses of the workspace, from :func:`workspace_premise`.
+        legs: (12, 3) joint centres of six straight legs, base before platform; empty for other robots.
         quantities: names of the requested quantities.
         leg_error: largest error of a leg's length.
-        joint_centre: largest error of each joint centre for the claims; 0 for the exact robot.
-        position_set: set of positions, from :func:`set_numbers`; empty for all positions of the box.
+        joint_centre: largest error of each joint centre in the claims; 0 for the nominal design.
+        position_set: set of positions, from :func:`set_premise`; empty for all positions of the box.
     """
 
     workspace: Poses
@@ -145,13 +147,13 @@ class PathPremises:
     """Premises of a proof about a path, as stated in its file; everything else follows from the case.
 
     Attributes:
-        file: name of the path's file; its ending distinguishes tables from programs.
+        file: name of the path's file; its ending distinguishes tables from G-code programs.
         text: text of the file.
-        of_case: If true, the path belongs to the case, at its place; otherwise it was given separately.
+        of_case: If true, the path is that of the case; otherwise it was given separately.
         between, angles, unit, start, offsets: options of reading that the file leaves open, see
             :class:`~screwsynth.nlp.path.options.PathOptions`; ``between`` by its value.
         legs, joint_centre: joint centres and their largest error, see :class:`Premises`.
-        with_angles: whether closed forms replace joint angles; not a premise, but a help for the check.
+        with_angles: If true, closed forms replace joint angles. This is not a premise, but a help for the check.
     """
 
     file: str
@@ -188,7 +190,7 @@ class Proof:
         name: name of the case.
         premises: program of the case for its only claim, or premises of claims about a workspace or a path.
         claims: proved claims.
-        lemmas: claims on which others depend.
+        lemmas: claims on which other claims depend.
         unproved: claims without a proof.
     """
 
@@ -209,7 +211,7 @@ class Proof:
         size = sum(map(len, {each.tree for each in (*self.claims, *self.lemmas)}))
         if size > LARGEST_TREES:
             raise ProofError(
-                f"the trees of the proof have {size // 2**20} MB, and at most {LARGEST_TREES // 2**20} MB are read"
+                f"the trees of the proof have {size // 2**20} MB; at most {LARGEST_TREES // 2**20} MB can be read"
             )
         about = next(word for word, kind in _PREMISES.items() if isinstance(self.premises, kind))
         claims, lemmas = (tuple(map(_table_of, some)) for some in (self.claims, self.lemmas))
@@ -219,13 +221,13 @@ class Proof:
         return json.dumps(asdict(file), indent=1, allow_nan=False) + "\n"
 
 
-def workspace_numbers(workspace: Workspace) -> Poses:
+def workspace_premise(workspace: Workspace) -> Poses:
     """Return a workspace as texts and numbers: ranges of the position, kind, ranges of the angles, axis."""
     position, angles = (tuple(map(ends_of, values)) for values in (workspace.position, workspace.turns.angles))
     return position, workspace.turns.kind.value, angles, tuple(workspace.turns.axis)
 
 
-def set_numbers(workspace: Workspace) -> Poses:
+def set_premise(workspace: Workspace) -> Poses:
     """Return the set of positions of a workspace as text and numbers; empty for all positions of the box.
 
     These are shape, radii, points, directions and displacement, then normal and point of each half space.
@@ -268,7 +270,7 @@ class _File:
 
 
 def _table_of(claim: ProofClaim) -> _ClaimTable:
-    """Return a claim with its tree packed."""
+    """Return the entry of a claim in a proof file, with its tree in packed form."""
     tree = claim.unpacked()
     own = {each.name: getattr(claim, each.name) for each in fields(claim) if each.name != "packed"}
     return _ClaimTable(**{**own, "tree": packed_text(tree)}, digest=digest_of(tree))
@@ -300,7 +302,7 @@ def read_proof(text: str | bytes, source: str) -> Proof:
     except CaseError as error:
         raise ProofError(str(error)) from None
     except ValueError as error:
-        raise ProofError(f"{source}: is not a proof by certify, workspace or path: {error}") from None
+        raise ProofError(f"{source}: is not a proof file of certify, workspace or path: {error}") from None
     budget, tables = TreeBudget(), (*found.claims, *found.lemmas)
     every = tuple(_claim_of(each, source, number, budget) for number, each in enumerate(tables))
     count = len(found.claims)
@@ -308,7 +310,7 @@ def read_proof(text: str | bytes, source: str) -> Proof:
 
 
 def _check_texts(found: _File, quantities: tuple[str, ...]) -> None:
-    """Refuse texts that are longer than in any written proof, and names that occur twice.
+    """Refuse texts that are longer than in any proof written by this package, and names that occur twice.
 
     Raises:
         ValueError: there is such a text or name.
@@ -335,6 +337,6 @@ def _check_texts(found: _File, quantities: tuple[str, ...]) -> None:
 
 
 def _claim_of(table: _ClaimTable, source: str, number: int, budget: TreeBudget) -> ProofClaim:
-    """Return a claim with its tree packed."""
+    """Return a claim of a proof file; its tree stays in packed form until it is needed."""
     packed = PackedTree(table.tree, table.digest, source, f"{table.name} {table.sense}".rstrip(), number, budget)
     return ProofClaim(table.name, table.sense, table.reason, table.bound, table.graph, b"", table.sides, packed)

@@ -70,11 +70,11 @@ class Node(enum.IntEnum):
     OUTSIDE = 12
 
 
-#: Largest depth of a tree, in waiting parts of boxes. Bisections of a search end at least widths, so that searches with
-#: hundreds of variables stay below it.
+#: Largest depth of a tree, in waiting sub-boxes. A search does not bisect below a least width, so searches with
+#: hundreds of variables stay below this depth.
 _DEEPEST = 10_000
-#: Numbers in a block of a tree, including an allowance for the objects of each leaf; least number of leaves in a block;
-#: and number of ends that are read ahead.
+#: Number of values in a block of a tree, including an allowance for the objects of each leaf; least number of leaves
+#: in a block; and number of box bounds that are read ahead.
 _BLOCK, _OBJECTS, _FEWEST, _AHEAD = 2**20, 32, 64, 2**20
 #: Kinds of nodes for faces of a box.
 FACES = (Node.FACE_UPPER, Node.FACE_LOWER)
@@ -87,18 +87,18 @@ Block = TypeVar("Block")
 
 
 def node_bytes(kind: Node, *indices: int, value: float | None = None) -> bytes:
-    """Return the bytes of a node before those of its children."""
+    """Return the bytes of a node, which precede those of its children."""
     return bytes([kind, *indices]) + (b"" if value is None else _VALUE.pack(value))
 
 
 def halves(lower: FloatArray, upper: FloatArray, i: int, value: float | None = None) -> tuple[Box, Box]:
-    """Return the ends of both parts of a box with ends (n,), bisected along variable i at a value or in the middle."""
+    """Return the bounds of both parts of a box, bisected along variable i at a value or at the centre."""
     at = 0.5 * lower[i] + 0.5 * upper[i] if value is None else value
     return (lower, with_end(upper, i, at)), (with_end(lower, i, at), upper)
 
 
 def with_end(ends: FloatArray, i: int, value: float) -> FloatArray:
-    """Return ends (n,) with another value at one index."""
+    """Return bounds (n,) with another value at one index."""
     changed = ends.copy()
     changed[i] = value
     return changed
@@ -152,7 +152,7 @@ class TreeReader:
             lower: (n,) lower ends.
             upper: (n,) upper ends.
             inner: allowed kinds of nodes with children. Other kinds are leaves; the caller must read the bytes after
-                the first byte of a leaf before it asks for the next one.
+                the first byte of a leaf before requesting the next leaf.
 
         Raises:
             ProofError: the bytes are no such tree.
@@ -191,13 +191,13 @@ class TreeReader:
 
 
 def ahead(blocks: Iterator[Block], size: Callable[[Block], int]) -> Iterator[Block]:
-    """Yield blocks of a tree, after reading ahead as many as the allowed number of box ends.
+    """Yield blocks of a tree; blocks are read ahead up to the allowed number of box bounds.
 
     A tree of usual size that ends too early or too late is thus refused before any proof.
 
     Args:
         blocks: the blocks.
-        size: function that returns the number of ends of a block.
+        size: function that returns the number of box bounds in a block.
     """
     waiting, kept = deque[Block](), 0
     for block in blocks:
@@ -210,7 +210,7 @@ def ahead(blocks: Iterator[Block], size: Callable[[Block], int]) -> Iterator[Blo
 
 
 def read_claims(reader: TreeReader, form: StandardForm) -> Iterator[dict[tuple[Node, int], Box]]:
-    """Yield the claims of a tree in blocks, as box ends (n, L) by kind of node and by condition or variable (or 0).
+    """Yield the claims of a tree in blocks: box bounds (n, L) by kind of node and by condition or variable (or 0).
 
     The boxes of all blocks cover the box of the form.
 
@@ -239,7 +239,7 @@ def read_claims(reader: TreeReader, form: StandardForm) -> Iterator[dict[tuple[N
 def blocks_of(leaves: Iterator[Leaf], numbers: int) -> Iterator[Iterator[Leaf]]:
     """Yield the leaves of a tree in blocks; each block must be consumed before the next one.
 
-    A leaf takes only a few bytes of a tree, and all leaves of a large tree exceed the memory.
+    A leaf takes only a few bytes of a tree, but all leaves of a large tree together would exceed the memory.
 
     Args:
         leaves: the leaves.
@@ -301,7 +301,7 @@ def read_shared(tree: bytes, lower: FloatArray, upper: FloatArray, limbs: int) -
 
 
 def _numbers_of_leaf(reader: TreeReader | None, K: int, m: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return bounds and tilts of a bounded leaf from the next bytes, or those of an infeasible leaf.
+    """Return bounds and tilts of a bounded leaf from the next bytes, or the values of an infeasible leaf.
 
     Raises:
         ProofError: a number is NaN, or infinite where this is not allowed.

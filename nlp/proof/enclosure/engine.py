@@ -1,4 +1,4 @@
-"""The C kernel, which only searches for proofs need."""
+"""Access to the C kernel. Only searches for proofs need this kernel."""
 
 from __future__ import annotations
 

@@ -93,7 +93,7 @@ class Encloser:
 
 
 class Ends(NamedTuple):
-    """Ranges of the ``e_i`` of points that can reach a level.
+    """Ranges of the coordinates ``e_i`` of the points that can reach a level.
 
     Attributes:
         low: (n, B) smallest ``e_i``; above ``high`` if no point can reach the level.
@@ -132,7 +132,7 @@ class QuadraticModel:
         return bound
 
     def ends_reaching(self, level: float | FloatArray) -> Ends:
-        """Return the ranges of each ``e_i`` in which the model can reach a level, a number or (B,)."""
+        """Return the ranges of each ``e_i`` in which the model can reach a level: one number, or (B,)."""
         low, high = np.empty(self.b.shape), np.empty(self.b.shape)
         self._call(None, np.full(self.middle.size, level), low, high)
         return Ends(low, high)

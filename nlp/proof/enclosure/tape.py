@@ -58,8 +58,8 @@ class Tape:
 
     Attributes:
         op: (N,) :class:`Op` of each instruction.
-        to: (N,) register written, or the index of the result for an output.
-        a, b: (N,) registers read, or the index of the variable for an input; 0 if there is none.
+        to: (N,) register to write; for an output, the index of the result.
+        a, b: (N,) registers to read; for an input, the index of the variable; 0 without an operand.
         k: (N,) constants.
         first, last: (N,) span of variables: the written value depends only on variables ``first <= i < last``.
         inputs: number of variables.
@@ -101,7 +101,7 @@ class _Value:
     Attributes:
         op, a, b, k: the operation.
         register: register of the result; -1 for any free register.
-        reach: variables that the result depends on, as bits; -1 until it is written.
+        reach: variables on which the result depends, as bits; -1 for a result that is not written yet.
     """
 
     __slots__ = ("a", "b", "is_constant", "k", "op", "reach", "register")
@@ -163,7 +163,8 @@ def _power(a: _Value, b: _Value) -> _Value:
     return _constant(1.0) / product if b.k < 0 else product
 
 
-#: CasADi's operations by operations of a tape, with identities that are exact for real numbers. As pi is not a double,
+#: CasADi's operations expressed as operations of a tape, by identities that are exact for real numbers. As pi is not a
+#: double,
 #: pi / 2 is twice the arc tangent of 1.
 _FORMULAS: dict[int, Callable[[_Value, _Value], _Value]] = {
     ca.OP_ADD: lambda a, b: a + b,
@@ -285,7 +286,7 @@ def compile_tape(function: ca.Function) -> Tape:
         if op == ca.OP_CONST:
             value = function.instruction_constant(index)
             if not math.isfinite(value):
-                raise UncoveredError(f"the constant {value}")
+                raise UncoveredError(f"a constant that is not finite ({value})")
             writer.put(target[0], _constant(value))
         elif op == ca.OP_INPUT:
             writer.put_input(target[0], source[1])

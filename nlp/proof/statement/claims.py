@@ -28,11 +28,11 @@ from ...program.layout import Layout
 
 #: Names of the claims that J has full rank, and that the constraint wrenches have full rank.
 REGULAR, CONSTRAINTS = "regular", "constraints regular"
-#: Key of the claims that limbs reach every pose.
+#: Key of the claims that the limbs reach every pose.
 REACH = "reach"
 #: First part of the keys of a case's ranges for dependent coordinates of the pose.
 WORKSPACE = "workspace"
-#: Ends of a range, by sense.
+#: Key of the bound of a range, by sense.
 _ENDS = {Sense.MIN: "lower", Sense.MAX: "upper"}
 #: Names of the measures of J, which are not quantities of a robot file.
 SPECTRAL = (SmallestSingularValue.key, ConditionNumber.key)
@@ -65,15 +65,16 @@ class Claim:
             kind ``EXPRESSION``.
         reading: conversion of the expression's value to the quantity in results.
         key: dotted key of the limit below ``limits`` in the case; empty without a limit.
-        limit: largest or smallest allowed value of the expression; None without a limit.
+        limit: largest or smallest allowed value of the expression, by ``sense``; None without a limit.
         kind: subject of the claim.
-        legs: index of the leg of a length or a stroke; indices of the two legs of a clearance; else empty.
+        legs: index of the leg, for a length or a stroke; indices of both legs, for a clearance; empty for other
+            quantities.
         weights: factors of the longest and of the shortest length of the leg, if they are combined.
         length: length that divides moments in a singular value or condition number.
         motor: actuator and its quantity, for a claim about an actuator.
-        uncovered: reason for a claim that covers only the design instead of all robots within the tolerance; else
-            empty.
-        is_coordinate: whether the quantity is a dependent coordinate of the pose, which is often 0.
+        uncovered: reason why a claim covers only the nominal design instead of all robots within the tolerance;
+            otherwise empty.
+        is_coordinate: whether the quantity is a dependent coordinate of the pose; such quantities are often 0.
     """
 
     name: str
@@ -98,7 +99,7 @@ class Claim:
 
 #: Claims that J, and that the constraint wrenches, have full rank, by name.
 RANKS = {name: Claim(name, Sense.MIN, kind=ClaimKind.RANK) for name in (REGULAR, CONSTRAINTS)}
-#: Errors of the platform's position and rotation, for robots within their tolerances.
+#: Claims about the platform's position error and rotation error, for robots within the tolerances.
 ERRORS = (
     Claim("position error", Sense.MAX, reading=LENGTH, kind=ClaimKind.ERROR),
     Claim("rotation error", Sense.MAX, reading=Reading(Dimension.ANGLE), kind=ClaimKind.ERROR),
@@ -106,7 +107,7 @@ ERRORS = (
 
 
 def one_robot_name(claim: str) -> str:
-    """Return the name of the lemmas for a claim about the same robot at two poses."""
+    """Return the name of the lemmas for a claim about one robot at two poses."""
     return f"{claim}, lengths of one machine"
 
 
@@ -130,7 +131,7 @@ def dependent_claims(robot: RobotInstance, workspace: Workspace) -> Iterator[Cla
 
 
 def _turn(R: SX, turns: Turns, k: int) -> tuple[SX, Reading]:
-    """Return coordinate k of a rotation (3, 3), and its conversion for results."""
+    """Return coordinate k of a rotation (3, 3), and the conversion of this coordinate for results."""
     if turns.kind is TurnKind.ROLL_PITCH_YAW:
         angles = ca.atan2(R[2, 1], R[2, 2]), ca.asin(-R[2, 0]), ca.atan2(R[1, 0], R[0, 0])
         return angles[k], Reading(Dimension.ANGLE)
@@ -177,7 +178,7 @@ def searched_claims(case: Case, quantities: Sequence[str] = ()) -> Iterator[Clai
     for measure in dict.fromkeys(quantities):
         if measure in SPECTRAL and limited.get(measure) != length:
             asked = _spectrum(measure, length)
-            # A limit may divide moments by another length, and its claim has the shorter name.
+            # A limit may divide moments by another length; the claim of the limit keeps the shorter name.
             yield replace(asked, name=f"{measure} with the characteristic length") if measure in limited else asked
 
 

@@ -1,11 +1,12 @@
 """Nonlinear program in standard form: the smallest of some functions is maximised over a box under conditions.
 
-A form may lack variables of the program that follow from others; its lift returns them.
+A form may omit variables of the program that follow from other variables; its lift returns the omitted variables.
 
-CasADi writes the derivative of ``fmax(a, b)`` by a as ``(b <= a) / ((a <= b) + (b <= a))``, which is 1, 0, or 1/2 where
-both are equal. An enclosure of the divisor may contain 0. So the sum of the two comparisons is written as 1 here. The
-derivative is then 1 where both are equal, and unchanged elsewhere. Bounds use integrals of derivatives along lines, and
-any value from 0 to 1 is a generalised derivative there. Expressions with jumps have no such derivative.
+CasADi writes the derivative of ``fmax(a, b)`` with respect to a as ``(b <= a) / ((a <= b) + (b <= a))``, which is 1,
+0, or 1/2 where both are equal. An enclosure of the divisor may contain 0. So the sum of the two comparisons is written
+as 1 here. The derivative is then 1 where both are equal, and unchanged elsewhere. Bounds use integrals of derivatives
+along lines, and any value from 0 to 1 is a generalised derivative there. Expressions with jumps have no such
+derivative.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ from .signs import is_nowhere_positive
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Difference of a variable from its closed form, in radians or parts of a slide's range, above which the point is
-#: another solution of the loops. Near a double solution, loops closed to 1e-9 allow differences of this size.
+#: Difference of a variable from its closed form above which the point is another solution of the loops, in radians or
+#: relative to a slide's range. Near a double solution, loops closed to 1e-9 allow differences of this size.
 _SAME = 1e-4
 #: Operations with jumps. Their derivative is written as 0, so its integral along a line is not the change.
 _JUMPS = {ca.OP_LE: "the comparison 'le'", ca.OP_SIGN: "the operation 'sign'"}
@@ -42,7 +43,7 @@ class Kind(enum.Enum):
 
     LIMIT = "a constraint of the program"
     LOOP = "a loop equation of the robot, or a bound that follows from it"
-    ASSEMBLY = "a sign or reach of the assembly mode, which is not a constraint of the program"
+    ASSEMBLY = "a condition on the sign or reach of the assembly mode, which is not a constraint of the program"
     FOLLOWS = "a redundant condition that follows from others: it excludes boxes, and has no multiplier"
 
 
@@ -53,7 +54,7 @@ class Condition:
     Attributes:
         name: name of the condition, in the terms of case files.
         expression: (1, 1) expression.
-        is_equation: whether the expression must be 0; else at most 0.
+        is_equation: If true, the expression must be 0; otherwise at most 0.
         kind: origin of the condition.
     """
 
@@ -64,20 +65,20 @@ class Condition:
 
     @property
     def is_of_joints(self) -> bool:
-        """Whether it is a condition on closed loops or on the assembly mode."""
+        """Whether the condition concerns closed loops or the assembly mode."""
         return self.kind in (Kind.LOOP, Kind.ASSEMBLY)
 
 
 class Lift(NamedTuple):
-    """Closed forms of variables of a program that a form does not have.
+    """Closed forms of the program variables that a form omits.
 
     Attributes:
         x: (n,) symbols of all variables of the program.
         places: indices of the replaced variables.
         values: (k, 1) closed forms of the replaced variables, in the form's variables.
-        is_angle: whether each replaced variable is an angle, so that full turns make no difference.
+        is_angle: whether each replaced variable is an angle; angles may differ by full turns.
         ranges: (k,) half range of each replaced variable; differences of slides are relative to it.
-        signs: (s, 1) expressions of all variables that are at most 0 in the assembly mode of the form.
+        signs: (s, 1) expressions of all variables; they are at most 0 in the assembly mode of the form.
     """
 
     x: SX
@@ -98,8 +99,8 @@ class StandardForm:
         lower, upper: (n,) ends of the box.
         functions: functions ``phi_j``; the smallest is maximised.
         conditions: conditions ``h_k``; in a common numbering they follow the functions.
-        places: indices of the form's variables in the program; None if they are the first ones.
-        lift: closed forms of variables of the program that this form does not have; None if it has them all.
+        places: indices of the form's variables in the program; None if the form has the first variables of the program.
+        lift: closed forms of the program variables that this form omits; None if it omits none.
     """
 
     nlp: Nlp
@@ -128,7 +129,7 @@ class StandardForm:
 
     @property
     def size(self) -> float:
-        """Typical size of the maximised value."""
+        """Typical magnitude of the maximised value."""
         return float(self.nlp.objective_size**self.power)
 
     def objective_of(self, value: float) -> float:

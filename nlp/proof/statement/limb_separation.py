@@ -1,10 +1,10 @@
-"""Separation of a form into limbs, from its expressions: terms of a sum that share only some variables.
+"""Separation of a form into limbs: groups of terms of a sum that share only some variables.
 
     phi(x) = phi_0(s) + sum_k phi_k(s, o_k),   conditions on (s) or on (s, o_k)
 
-``s`` are shared variables and ``o_k`` are variables of part k only. For a design with free joint coordinates the parts
-are the limbs, and the pose is shared; for several poses with free coordinates the parts are the poses, and the
-dimensions are shared. A part is called a limb in both cases.
+``s`` are shared variables, and ``o_k`` are variables that only part k has. For a design with free joint coordinates
+the parts are the limbs, and the pose is shared; for several poses with free coordinates the parts are the poses, and
+the dimensions are shared. A part is called a limb in both cases.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Separation:
 
 
 def separate(form: StandardForm) -> Separation | None:
-    """Return the separation of a form; None if it has several functions, or no parts smaller than the whole form."""
+    """Return the separation of a form; None for several functions, or without parts smaller than the whole form."""
     if len(form.functions) != 1:
         return None
     terms = terms_of(form.functions[0])
@@ -95,8 +95,8 @@ def _part(form: StandardForm, terms: Sequence[SX], places: Sequence[int], chosen
 def _smallest_groups(n: int, links: Sequence[frozenset[int]], terms: int) -> list[frozenset[int]]:
     """Return the own variables of each limb, for the separation with the smallest largest part.
 
-    For each number N, variables of at most N terms are candidates for own variables; candidates in a common term or
-    condition belong to one limb. The list is empty if no separation has parts smaller than the whole.
+    For each number N, variables that occur in at most N terms are candidates for own variables. Candidates in a common
+    term or condition belong to one limb. The list is empty if no separation has parts smaller than the whole.
 
     Args:
         n: number of variables.
@@ -115,7 +115,7 @@ def _smallest_groups(n: int, links: Sequence[frozenset[int]], terms: int) -> lis
 
 
 def _connected(own: frozenset[int], links: Sequence[frozenset[int]]) -> list[frozenset[int]]:
-    """Return the connected sets of own variables, by their links."""
+    """Return the connected sets of own variables; common terms and conditions are the links."""
     groups = [frozenset((i,)) for i in own]
     for link in links:
         touched = [group for group in groups if group & link]

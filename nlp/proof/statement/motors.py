@@ -16,7 +16,7 @@ from ...case.forces import dimension_of_force, dimension_of_speed
 from ...case.limits.constraint import Reading
 from ...case.limits.forces import ActuatorForce, ActuatorLimit, ActuatorPower, ActuatorSpeed
 from ...case.loads import Motion
-from ...case.motors import Motor, MotorNumber
+from ...case.motors import ActuatorQuantity, Motor
 from ...case.task import Sense
 from ...program.layout import Layout
 from .claims import ACTUATED, Claim, ClaimKind
@@ -25,8 +25,8 @@ from .claims import ACTUATED, Claim, ClaimKind
 def motor_claims(case: Case) -> Iterator[Claim]:
     """Yield the claims about a case's actuators with their limits, grouped by actuator and load.
 
-    Names are the same as for constraints at a pose. If one limit concerns all actuators and another one a single
-    actuator, the tighter one counts.
+    Names are the same as for constraints at a pose. If one limit applies to all actuators and another limit to a
+    single actuator, the tighter limit counts.
     """
     yield from _tightest(_claims(case))
 
@@ -76,7 +76,7 @@ def _claims(case: Case) -> Iterator[Claim]:
         reading = Reading(dimension_of_force(joint))
         yield from _speeds(case, k, joint) if loading.motion is not None else ()
         for load in loading.cases:
-            motor = Motor(MotorNumber.FORCE, k, joint.name, load.name)
+            motor = Motor(ActuatorQuantity.FORCE, k, joint.name, load.name)
             for limit in forces:
                 low, high = (limit.min, limit.max) if isinstance(limit, ActuatorForce) else (None, None)
                 if low is None and high is not None:  # a largest force without a smallest one limits both directions
@@ -85,19 +85,19 @@ def _claims(case: Case) -> Iterator[Claim]:
                     yield _claim(motor, " smallest", Sense.MIN, reading, limit, "min", low)
                 yield _claim(motor, "", Sense.MAX, reading, limit)
             for limit, part in itertools.product(powers if loading.motion is not None else (), ("", " backwards")):
-                power = Motor(MotorNumber.POWER, k, joint.name, load.name, is_backwards=bool(part))
+                power = Motor(ActuatorQuantity.POWER, k, joint.name, load.name, is_backwards=bool(part))
                 yield _claim(power, part, Sense.MAX, Reading(Dimension.POWER), limit)
 
 
 def _speeds(case: Case, k: int, joint: DrivenJoint) -> Iterator[Claim]:
     """Yield the claim about the speed of an actuator for each of its limits, or without a limit."""
     for limit in _limits(case, ActuatorSpeed, joint.name):
-        motor = Motor(MotorNumber.SPEED, k, joint.name)
+        motor = Motor(ActuatorQuantity.SPEED, k, joint.name)
         yield _claim(motor, "", Sense.MAX, Reading(dimension_of_speed(joint)), limit)
 
 
 def _limits(case: Case, kind: type[ActuatorLimit], actuator: str) -> list[ActuatorLimit | None]:
-    """Return the limits of a kind on an actuator: for all actuators and for this one; None stands for no limit."""
+    """Return the limits of a kind that apply to an actuator; None stands for no limit."""
     found: list[ActuatorLimit | None] = []
     found += [each for each in case.limits if isinstance(each, kind) and each.actuator in ("", actuator)]
     return found or [None]
@@ -112,7 +112,7 @@ def _claim(
     end: str = "max",
     value: float | None = None,
 ) -> Claim:
-    """Return the claim about a quantity of an actuator; without a value its limit is the end of the limit."""
+    """Return the claim about a quantity of an actuator; without a value, the bound of the case's limit is used."""
     if end == "max" and value is None:
         value = getattr(limit, "max", None)
     key = "" if limit is None or value is None else f"{limit.name}.{end}"

@@ -18,7 +18,7 @@ from ....models.rotation import turn_about
 from ...case.case import Case
 from ...case.limits.constraint import Reading
 from ...case.limits.limits import Limits
-from ...case.pose import HERE, Pose, Rotation, Value
+from ...case.pose import NO_DISPLACEMENT, Pose, Rotation, Value
 from ...case.task import Sense
 from ...case.workspace import TurnKind, Workspace
 from ...program.layout import Layout, StatedPoseSymbols, assemble, lay_out
@@ -29,7 +29,8 @@ from .claims import REACH, Claim
 
 #: Number of points at which the size of an expression is sampled.
 _POINTS = 33
-#: Number of poses at which an equation is tested, and its largest residual, of order 1, if it holds at every pose.
+#: Number of poses at which an equation (scaled to values of about 1) is tested, and largest residual of an equation
+#: that is satisfied at every pose.
 _TESTS, _IDENTITY = 32, 1e-11
 _SEED = 0
 
@@ -40,7 +41,7 @@ def at_one_pose(case: Case, position: Sequence[Value], rotation: Rotation) -> Ca
         case,
         position=position,
         rotation=rotation,
-        displacements=(HERE,),
+        displacements=(NO_DISPLACEMENT,),
         further=(),
         worst_everywhere=False,
         workspace=None,
@@ -49,7 +50,7 @@ def at_one_pose(case: Case, position: Sequence[Value], rotation: Rotation) -> Ca
 
 
 def posed_layout(case: Case, workspace: Workspace) -> Layout:
-    """Return a case with fixed dimensions as expressions of one pose of a workspace; its stated poses are not used."""
+    """Return a case with fixed dimensions as expressions of one pose of a workspace, instead of its stated poses."""
     turns = workspace.turns
     if turns.kind is not TurnKind.ROLL_PITCH_YAW:
         axis = turns.axis if turns.kind is TurnKind.AXIS else None
@@ -65,7 +66,9 @@ def posed_layout(case: Case, workspace: Workspace) -> Layout:
         ]
         about = [turn_about(k, ca.cos(angle), ca.sin(angle)) for k, angle in enumerate(angles)]
         turned = about[2] @ about[1] @ about[0]
-        return StatedPoseSymbols(turned, position.symbols, position.places, position.symbols, None, [], (HERE,))
+        return StatedPoseSymbols(
+            turned, position.symbols, position.places, position.symbols, None, [], (NO_DISPLACEMENT,)
+        )
 
     return lay_out(one, one.tasks, add_turns)
 
@@ -92,16 +95,16 @@ def varies(layout: Layout, expressions: Sequence[SX]) -> list[bool]:
 
 
 def reach_claims(case: Case, closed: ClosedForm, workspace: Workspace) -> tuple[Layout, tuple[Claim, ...]]:
-    """Return the claims that limbs reach every pose, one for each closed form, and the case as expressions of the pose.
+    """Return the case as expressions of the pose, and a claim for each closed form: the limb reaches every pose.
 
-    The case has no loops, signs and limits: out of reach, a closed form has no value.
+    The returned case has no loops, signs and limits, because a closed form has no value out of reach.
     """
     layout = _bare_layout(case, closed.model, workspace)
     return layout, reach_claims_on(layout, closed.reaches)
 
 
 def reach_claims_on(layout: Layout, reaches: Sequence[Reach]) -> tuple[Claim, ...]:
-    """Return the claims that limbs reach every pose in the symbols of a layout of their robot."""
+    """Return the claims that limbs reach every pose, in the symbols of a layout of the robot."""
     values, reading = _on(layout, [each.value for each in reaches]), Reading(Dimension.NUMBER)
     return tuple(
         Claim(f"reach limb {each.limb}", Sense.MIN, value, reading, REACH, 0.0)
@@ -110,11 +113,11 @@ def reach_claims_on(layout: Layout, reaches: Sequence[Reach]) -> tuple[Claim, ..
 
 
 def closed_layout(case: Case, closed: ClosedForm, workspace: Workspace) -> Layout:
-    """Return a case as expressions of the pose, with closed forms in place of unknowns; limbs must reach every pose.
+    """Return a case as expressions of the pose, with closed forms of unknowns; all limbs must reach every pose.
 
-    If no unknown remains, loop equations that hold at every pose are left out. A Delta robot without rotation is an
-    example: the second rod of a limb closes with the first. A bound without an equation is also valid with it, because
-    it covers more poses.
+    If no unknown remains, loop equations that hold at every pose are left out. In a Delta robot without rotation, for
+    example, the second rod of a limb closes with the first. A bound that omits an equation covers more poses, and so
+    is also valid with the equation.
     """
     model = closed.model
     if not model.unknowns and model.closure:

@@ -2,9 +2,10 @@
 
     maximise  min_j phi_j(x)   over  lower <= x <= upper,   h_k(x) <= 0 or h_k(x) = 0
 
-A minimum becomes a maximum of ``-F``. The program states the worst case of several tasks by an epigraph: a variable
-``level`` with one constraint for each task. Here it is the smallest of the tasks' functions again, without ``level``.
-The program's arguments become double constants, and a proof is about the expression graph with these constants.
+A minimum becomes a maximum of ``-F``. The nonlinear program states the worst case of several tasks by an epigraph: a
+variable ``level`` with one constraint for each task. The standard form has the smallest of the tasks' functions
+instead, without ``level``. The program's arguments become double constants; a proof is about the expression graph with
+these constants.
 
 A limit on the smallest singular value is a limit on an estimate of the smallest eigenvalue of ``A = J'J`` with
 thousands of operations. Its enclosure is useful only on small boxes. The estimate is a lower bound; if it is at least
@@ -16,8 +17,8 @@ So no principal minor of M is negative. Minors are polynomials in J with terms t
 eigenvalues of M are negative in a box, the determinant is positive, but smaller minors are negative, by interlacing.
 A limit c on the condition number gives the same conditions with ``A_ii / c^2`` in place of ``s^2``: the largest
 eigenvalue is at most ``c^2`` times the smallest one, and every entry ``A_ii`` is at most the largest eigenvalue. i is
-the index of the largest entry at one point; the entry equals the eigenvalue if motion i is a principal motion, as for
-many robots at symmetric poses.
+the index of the largest entry at one point; the entry equals the largest eigenvalue if motion i is a principal motion,
+as for many robots at symmetric poses.
 
 In the home working mode, closed forms replace unknowns that follow from dimensions and pose
 (:mod:`screwsynth.models.joints.model.elimination`). The form has the condition that the limb reaches the pose instead.
@@ -61,11 +62,11 @@ _ROUNDING = 1e-9
 _SIZE = 6
 #: Number of points of the box at which a condition is tested, and least number of them within reach.
 _TESTS, _LEAST = 24, 4
-#: Largest value of a condition that counts as 0; conditions of loops are of order 1.
+#: Largest value of a condition that counts as 0; loop conditions are scaled to values of about 1.
 _ZERO = 1e-10
-#: Smallest reach of a limb, 1 at home, at points of the box, for which a root replaces an unknown.
+#: Smallest reach of a limb (scaled to 1 at home) at points of the box, for which a root replaces an unknown.
 _NEAR = 0.02
-#: Violation of the reach of a limb, 1 at home, that counts as rounding.
+#: Violation of a limb's reach (scaled to 1 at home) that counts as rounding.
 _BEYOND = 1e-12
 _SEED = 0
 
@@ -104,7 +105,7 @@ def standard_form(nlp: Nlp) -> StandardForm:
 
 
 def is_in_home_mode(nlp: Nlp, x: FloatArray) -> bool | None:
-    """Return whether a robot is in the home working mode at a point (n,); None if its mode has no signs."""
+    """Return whether a robot is in the home working mode at a point (n,); None if no sign tells the mode."""
     if not nlp.n or not any(each.is_mode for each in nlp.program.model.signs):
         return None
     return standard_form(replace(nlp, in_home_mode=True)).keeps_signs(x)
@@ -142,9 +143,9 @@ def _conditions(name: str, expression: SX, low: float, high: float, kind: Kind) 
 def _of_joints(nlp: Nlp) -> Iterator[Condition]:
     """Yield conditions on a robot's joints in addition to the program's constraints, in its symbols.
 
-    First come loop equations that the program leaves out, and distances that follow from them, with a tolerance for
-    rounding. They follow from the program's equations near a solution, but not in the whole box, where joints that do
-    not fit together may satisfy the program's equations. Then come the signs of the assembly mode; signs of the home
+    First come loop equations that the program omits, and distance equations that follow from these, with a tolerance
+    for rounding. Near a solution they follow from the program's equations. Elsewhere in the box, joints that do not
+    fit together may satisfy the program's equations. Then come the signs of the assembly mode; signs of the home
     working mode count if the program requires it.
     """
     model, names = nlp.program.model, {constraint.name for constraint in nlp.program.constraints}
@@ -211,10 +212,12 @@ class _Replaced(NamedTuple):
 
     Attributes:
         solved: closed forms, by index of the variable.
-        conditions: conditions on the reach, and equation and side of unknowns with two solutions that stay variables.
-        reaches: (r, 1) expressions that are not negative where all limbs reach the poses.
-        stated: names of the robot's equations that these conditions replace.
-        edges: unknowns of each pose with one solution at a point of the box where limbs hardly reach the pose.
+        conditions: conditions on the reach; and, for unknowns with two solutions that stay variables, their equation
+            and the sign of their solution.
+        reaches: (r, 1) expressions; they are not negative where all limbs reach the poses.
+        stated: names of the loop equations that these conditions replace.
+        edges: unknowns of each pose whose two solutions coincide somewhere in the box, because a limb hardly reaches
+            the pose there.
     """
 
     solved: dict[int, Solved]
@@ -267,7 +270,7 @@ def _replaced(form: StandardForm, held: Sequence[frozenset[int]]) -> _Replaced:
 
     Args:
         form: the form.
-        held: indices of the unknowns, at each pose, that stay variables if they have two solutions.
+        held: indices, for each pose, of the unknowns that stay variables if they have two solutions.
     """
     nlp, program = form.nlp, form.nlp.program
     # The pose does not depend on an epigraph variable, which a form lacks.
@@ -302,7 +305,7 @@ def _replaced(form: StandardForm, held: Sequence[frozenset[int]]) -> _Replaced:
 
 
 def _edges(form: StandardForm, unknowns: Sequence[int], reaches: Sequence[SX]) -> frozenset[int]:
-    """Return the unknowns with random points of the box at the edge of their reach (1, 1)."""
+    """Return the unknowns whose reach (1, 1) is at its boundary at some random point of the box."""
     shares = np.random.default_rng(_SEED).uniform(0, 1, (_TESTS, form.n))
     shares[_TESTS // 2 :] = np.round(shares[_TESTS // 2 :])
     values = _values_at(form.x, reaches, form.lower + shares * (form.upper - form.lower))
@@ -319,7 +322,7 @@ def _values_at(x: SX, expressions: Sequence[SX], points: FloatArray) -> FloatArr
 def _at_pose(nlp: Nlp, each: Eliminated, given: list[SX]) -> list[SX]:
     """Return value, sine, cosine, reach, equation and slope of an unknown at a robot's dimensions and pose.
 
-    Entries that the unknown does not have are 0.
+    An entry that does not exist for the unknown is 0.
     """
     symbols = Substitution.identity(nlp.program.model).all
     solved, root = each.solved, each.root
@@ -330,7 +333,7 @@ def _at_pose(nlp: Nlp, each: Eliminated, given: list[SX]) -> list[SX]:
 
 
 def _at_size(nlp: Nlp, place: int) -> float:
-    """Return the factor that scales a limb's reach by an unknown to 1 at home with typical dimensions.
+    """Return the factor that scales the reach of a limb with an unknown to 1 at home, for typical dimensions.
 
     The reach of a slide is scaled by the square of a length.
     """
@@ -348,7 +351,7 @@ def _numbers(expression: SX) -> tuple[float, ...] | None:
 
 
 def _idle(form: StandardForm, may_go: Sequence[int], reaches: SX) -> set[int]:
-    """Return indices of conditions that hold at random points wherever reaches (r, 1) are not negative.
+    """Return indices of conditions that are satisfied at all random points within reach (r, 1).
 
     A condition that is left out by mistake makes the feasible set larger and the bound weaker, but not wrong.
     """

@@ -1,8 +1,8 @@
-"""Robots within the joint-centre tolerance: model with errors, case as expressions of pose and errors, and claims.
+"""Robots within the joint-centre tolerance: their model, their expressions of pose and joint-centre errors, and claims.
 
 A robot within the tolerance is the design with each joint centre displaced by a vector of at most the tolerance. Its
-quantities are expressions of these errors, and of the pose in the coordinates of a search: three of position, three of
-rotation.
+quantities are expressions of these errors and of the pose. The pose has the coordinates of a search: three for the
+position and three for the rotation.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ from ...case.limits.constraint import LENGTH, BoundedConstraint, Constraint, Rea
 from ...case.limits.joints import BaseJointAngle, JointAngle, MountingPose, unit_axes
 from ...case.limits.limit import Limit
 from ...case.limits.limits import Limits
-from ...case.pose import HERE, Free, Pose, Rotation, Value
+from ...case.pose import NO_DISPLACEMENT, Free, Pose, Rotation, Value
 from ...case.task import Sense
 from ...program.layout import Layout, StatedPoseSymbols, lay_out
 from ...program.places import SymbolTable
 from .claims import Claim, claims_of, one_robot_name
-from .machine import joint_centres
+from .fixed_robot import joint_centres
 from .posed_layout import at_one_pose, reach_claims_on, without_loops
 
-#: Part of the norm of a derivative below which the norm is smoothed; and relative place in the ranges of the pose at
-#: which the norm is taken.
+#: Fraction of the norm of a derivative below which the norm is smoothed; and relative position in the ranges of the
+#: pose at which this norm is evaluated.
 _PART, _PLACE = 0.03, 0.75
-#: Operations that are smooth wherever their derivatives have values.
+#: Operations that are smooth wherever their derivatives exist.
 _SMOOTH = (
     *(ca.OP_CONST, ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_ASSIGN, ca.OP_NEG, ca.OP_TWICE, ca.OP_SQ, ca.OP_SQRT, ca.OP_INV),
     *(ca.OP_SIN, ca.OP_COS, ca.OP_TAN, ca.OP_ATAN, ca.OP_ASIN, ca.OP_ACOS, ca.OP_EXP, ca.OP_LOG, ca.OP_ADD, ca.OP_SUB),
@@ -51,7 +51,7 @@ class BuiltModel(NamedTuple):
     Attributes:
         model: model with closed forms in place of unknowns; the errors are its last parameters.
         names: names of the joint centres.
-        reaches: edges of the reach of limbs with errors.
+        reaches: boundaries of the reach of the limbs, with joint-centre errors.
     """
 
     model: Model
@@ -64,7 +64,7 @@ def built_model(model: Model, *, extended: bool = False, with_angles: bool = Tru
 
     Args:
         model: the robot.
-        extended: If true, closed forms also have values out of reach.
+        extended: If true, closed forms also have values for poses out of reach.
         with_angles: If true, closed forms replace joint angles too.
 
     Raises:
@@ -74,13 +74,15 @@ def built_model(model: Model, *, extended: bool = False, with_angles: bool = Tru
     closed = closed_form(displaced.model, extended=extended, with_angles=with_angles)
     if _kinds_of(closed_form(model, with_angles=with_angles).model) != _kinds_of(closed.model):
         raise RobotError(
-            "", "joint-centre errors remove degrees of freedom (overconstrained robot): its limbs or loops change"
+            "",
+            "joint-centre errors remove degrees of freedom from this overconstrained robot: "
+            "the tolerance cannot be verified",
         )
     return BuiltModel(closed.model, tuple(each.name for each in displaced.centres), closed.reaches)
 
 
 def _kinds_of(model: Model) -> tuple[object, ...]:
-    """Return the structure that joint-centre errors must not change: unknowns, members, rows, equations and ranks."""
+    """Return the properties that joint-centre errors must not change: unknowns, members, rows, equations and ranks."""
     members = [(item.rank, item.screws.shape, item.is_pinned) for item in model.members]
     rows, equations = [item.label for item in model.wrenches], [item.name for item in model.closure]
     return [item.name for item in model.unknowns], members, rows, equations, model.generic
@@ -105,8 +107,8 @@ class PoseCoordinates(NamedTuple):
     """Coordinates of the poses of a workspace.
 
     Attributes:
-        values: three values of position and three of rotation; a varying rotation is the range of the tangent of half
-            an angle or of a component of a Cayley vector, a fixed one an angle.
+        values: three values of position and three of rotation. A fixed rotation is an angle. A varying rotation is a
+            range: of the tangent of half an angle, or of a component of a Cayley vector.
         rotation: function that returns the rotation (3, 3) with coordinates (3, 1).
         ball: largest squared norm of a Cayley vector; infinite if rotations are not in a ball.
     """
@@ -117,7 +119,10 @@ class PoseCoordinates(NamedTuple):
 
 
 def coordinate_layout(case: Case, at: PoseCoordinates) -> Layout:
-    """Return a case as expressions of one pose in the coordinates of a search; poses of the case are not used."""
+    """Return a case as expressions of one pose in the coordinates of a search.
+
+    The poses stated in the case are ignored.
+    """
     one = at_one_pose(case, tuple(at.values[:3]), Rotation(None, 0.0))
 
     def add_pose(pose: Pose, prefix: str, table: SymbolTable) -> StatedPoseSymbols:
@@ -129,7 +134,9 @@ def coordinate_layout(case: Case, at: PoseCoordinates) -> Layout:
         turn = ca.vertcat(*turns)
         ball = Constraint(f"{prefix}turn", ca.sumsqr(turn), Reading(Dimension.NUMBER))
         held = [BoundedConstraint(ball, -math.inf, at.ball)] if at.ball < math.inf else []
-        return StatedPoseSymbols(at.rotation(turn), placed.symbols, placed.places, placed.symbols, None, held, (HERE,))
+        return StatedPoseSymbols(
+            at.rotation(turn), placed.symbols, placed.places, placed.symbols, None, held, (NO_DISPLACEMENT,)
+        )
 
     return lay_out(one, one.tasks, add_pose)
 
@@ -138,9 +145,10 @@ class ToleranceLayout(NamedTuple):
     """All robots within the tolerance of a case, as expressions of one pose and of joint-centre errors.
 
     Attributes:
-        layout: the case; its first variables are the errors, 3 for each centre, then coordinates of the pose.
+        layout: the case. Its variables are the joint-centre errors, 3 for each centre, followed by the pose
+            coordinates.
         built: the robot with joint-centre errors.
-        tolerance: largest norm of each error, length.
+        tolerance: largest norm of each joint-centre error, length.
     """
 
     layout: Layout
@@ -165,10 +173,12 @@ class ToleranceLayout(NamedTuple):
         return function.call([ca.vertcat(errors, pose), numbers])[0]
 
     def near_zero(self, expression: SX, design: Layout) -> FloatArray:
-        """Return smoothing terms (m,) for the norms of the derivatives g_j of an expression (1, 1) by centre errors.
+        """Return smoothing terms (m,) for the norms of the derivatives g_j of an expression (1, 1).
 
-        ``sqrt(|g_j|^2 + term^2)`` is at least ``|g_j|``, close to it where ``|g_j|`` is large, and smooth where it is
-        0. Each term is a small part of ``|g_j|`` at one pose of the design.
+        The derivative g_j is with respect to the error of joint centre j.
+
+        ``sqrt(|g_j|^2 + term^2)`` is at least ``|g_j|``, close to ``|g_j|`` where that is large, and smooth where
+        ``|g_j|`` is 0. Each term is a small part of ``|g_j|`` at one pose of the design.
         """
         at = ca.DM([each.lower + _PLACE * (each.upper - each.lower) for each in design.table.bounds])
         slopes = ca.densify(ca.gradient(expression, self.errors))
@@ -176,7 +186,7 @@ class ToleranceLayout(NamedTuple):
         return np.asarray(_PART * np.nan_to_num(np.linalg.norm(values, axis=1), posinf=0.0))
 
     def claims(self, quantities: Sequence[str], *, with_objective: bool = True) -> tuple[list[Claim], list[Claim]]:
-        """Return the claims that limbs reach every pose, and the claims about quantities, which depend on the reach.
+        """Return the claims that limbs reach every pose, and the claims about quantities that depend on this reach.
 
         Raises:
             InputError: the robot has no measure of a given name.
@@ -210,7 +220,7 @@ def _mounted(case: Case, limit: Limit[Any]) -> Limit[Any]:
 
 
 def design_layout(case: Case, model: Model, at: PoseCoordinates) -> Layout:
-    """Return the design, a case with a model without unknowns, as expressions of one pose.
+    """Return the nominal design as expressions of one pose, from a model without unknowns.
 
     Loop equations that hold at every pose are left out; a bound without an equation covers more poses.
     """
@@ -252,10 +262,10 @@ class Directions(NamedTuple):
 
 
 def length_of_one_robot(robots: ToleranceLayout, leg: int, sense: Sense, about: Directions) -> Claim:
-    """Return the claim about the length of a leg minus ``f.c_p - e.c_b``, which is the same at every pose.
+    """Return the claim about the length of a leg minus ``f.c_p - e.c_b``, a term that is the same at every pose.
 
-    e and f are the errors of the leg's joints on base and platform. In the difference of two lengths of one robot, the
-    part with the fixed vectors c_p and c_b cancels. If the leg's direction changes little, little error remains.
+    e and f are the errors of the leg's joints on base and platform. In the difference of two leg lengths of one robot,
+    this term cancels. If the leg's direction changes little, the remaining error is small.
 
     Args:
         robots: robots within the tolerance, with two joint-centre errors for each leg.

@@ -1,8 +1,9 @@
 """Free travel from a pose along each coordinate, and along each pair, up to the first limit.
 
-A coordinate moves along a path of one segment, which is judged as a tool path. The next range ends just before the
-first known point that refutes a claim; without one it is bisected. So each end is proved, and just beyond it a claim is
-refuted or open. A pair of coordinates moves in a box about the pose, a scaled copy of the ranges of both.
+A coordinate moves along a path of one segment, which is judged as a tool path. If a point is known that refutes a
+claim, the next trial range ends just before this point; otherwise the range is bisected. So every point of the range
+is proved, and just beyond its end a claim is refuted or open. A pair of coordinates moves in a box about the pose, a
+scaled copy of the ranges of both.
 """
 
 from __future__ import annotations
@@ -60,12 +61,12 @@ class AxisRanges:
     Attributes:
         case: the case, its dimensions fixed.
         start: (6,) the pose: position, length, and roll, pitch and yaw, radians.
-        most: largest length, and largest angle in radians, by which a coordinate moves.
-        stops: claims that are not proved at the pose itself; with any, there are no ranges.
+        most: largest displacement of a coordinate: a length, and an angle in radians.
+        stops: claims that are not proved at the pose itself; if there are any, there are no ranges.
         axes: ranges of the independent coordinates.
         pairs: ranges of pairs of independent coordinates.
         others: names of the dependent coordinates.
-        reason: reason for work that ended before all axes and pairs were judged; else empty.
+        reason: reason why the work ended before all axes and pairs were judged; otherwise empty.
     """
 
     case: Case
@@ -79,7 +80,7 @@ class AxisRanges:
 
 
 class _Found(NamedTuple):
-    """Largest proved part of a range, smallest part that is not proved, and the claim that fails there."""
+    """Largest proved fraction of a range, smallest fraction that is not proved, and the claim that fails there."""
 
     proved: float
     failed: float | None
@@ -87,12 +88,12 @@ class _Found(NamedTuple):
 
 
 class _Failed(NamedTuple):
-    """Smallest known part of a range that is not proved.
+    """Smallest known fraction of a range that is not proved.
 
     Attributes:
-        part: part of the largest range.
-        stop: claim that is not proved there.
-        is_first: whether the claim is proved at every smaller part.
+        part: fraction of the largest range.
+        stop: claim that is not proved for this fraction.
+        is_first: whether the claim is proved for every smaller fraction.
     """
 
     part: float
@@ -100,7 +101,7 @@ class _Failed(NamedTuple):
     is_first: bool = False
 
 
-#: Judges a part of the largest range; None if it is proved.
+#: Function that judges a fraction of the largest range; None if this range is proved.
 _Judge = Callable[[float], _Failed | None]
 
 
@@ -121,7 +122,7 @@ def axis_ranges(
         case: case with fixed dimensions; tasks and workspace are not used.
         start: (6,) the pose: position, length, and roll, pitch and yaw, radians; the case's first pose if left out.
         axes: names of the requested coordinates; dependent coordinates are left out.
-        most: largest length, and largest angle in radians, by which a coordinate moves; if left out, the size of the
+        most: largest displacement of a coordinate: a length, and an angle in radians; if left out, the size of the
             robot and 90 degrees.
         with_pairs: If true, also prove the travel along pairs of coordinates.
         time_limit: seconds for all judgements together; None for no limit.
@@ -140,7 +141,7 @@ def axis_ranges(
     case.require_motion()
     most = (robot_size(case, here[:3].tolist()), LARGEST_ANGLE) if most is None else most
     if not all(0 < each < math.inf for each in most):
-        raise InputError("the largest length and angle to move by must be positive and finite")
+        raise InputError("the largest displacements, a length and an angle, must be positive and finite")
     report = progress or (lambda _: None)
     with within(time_limit, _EACH):
         report("the pose")
@@ -198,7 +199,9 @@ def _of_case(case: Case) -> FloatArray:
     fixed = [each for each in values if not isinstance(each, Free)]
     if len(fixed) < len(values) or axis is None:
         name = case.source or case.name
-        raise InputError(f"{name}: pose: has free coordinates; ranges begin at one fixed pose: state it with --start")
+        raise InputError(
+            f"{name}: pose: has free coordinates, but ranges start at one fixed pose: give this pose with --start"
+        )
     half = fixed[3] / 2
     turn = roll_pitch_yaw(np.array([[math.cos(half), *(math.sin(half) * axis)]]))[0]
     # Adding zero removes negative zeros.
@@ -267,7 +270,7 @@ def _samples(case: Case, start: FloatArray, ranges: Sequence[AxisRange]) -> Edge
 
 
 def _pair(case: Case, start: FloatArray, samples: EdgeSamples | None, *ranges: AxisRange) -> PairRange:
-    """Return the free travel along two coordinates together, as a part of their ranges."""
+    """Return the free travel along two coordinates together, as a fraction of their ranges."""
     one, other = ranges
 
     def judge(part: float) -> _Failed | None:
@@ -293,7 +296,7 @@ def _pair(case: Case, start: FloatArray, samples: EdgeSamples | None, *ranges: A
 
 
 def _largest(judge: _Judge, tolerance: float, guess: float = 1.0) -> _Found:
-    """Return the largest proved part of a range, to a tolerance; the search begins at a guess."""
+    """Return the largest proved fraction of a range, to a tolerance; the search starts at a guess."""
     failed: float | None = None
     stop: RangeStop | None = None
     proved = 0.0
@@ -305,7 +308,7 @@ def _largest(judge: _Judge, tolerance: float, guess: float = 1.0) -> _Found:
         if first is None:
             proved = part
         elif not (is_requested() and first.stop.outcome is Outcome.OPEN and failed is not None):
-            # A known failed claim is kept: a stopped judgement is no evidence.
+            # A known failed claim is kept, because a stopped judgement is no evidence.
             failed, stop = first.part, first.stop
         # All claims may hold up to just before a known refuting point. Short steps would take too many judgements.
         is_sharp = first is not None and first.is_first and (before is None or before - first.part > _SHORT * TOLERANCE)
@@ -339,8 +342,8 @@ def _judged(case: Case, start: FloatArray, *ends: FloatArray) -> Judgement:
 def _failures(judged: Judgement) -> Iterator[_Failed]:
     """Yield the claims that are not proved, in the order of the parts of the path at which they fail.
 
-    At the same place a refuted claim comes before an open one. Claims about several points, and claims about boxes,
-    fail at the end.
+    At the same place a refuted claim comes before an open claim. Claims about several points, and claims about boxes,
+    count as failing at the end of the path.
     """
     found = []
     for each in (verdict for verdict in judged.verdicts if verdict.fails):

@@ -1,4 +1,4 @@
-"""Limits at sampled poses on the edges of a box: a first guess of the largest box that can be proved."""
+"""Limits at sampled poses on the edges of a box, for a first guess of the largest box that can be proved."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class EdgeSamples:
         return high
 
     def _fails(self, y: FloatArray) -> NDArray[np.bool_]:
-        """Return whether a limit is violated at poses (P, 6), or the determinant has another sign than at the start."""
+        """Return whether poses (P, 6) violate a limit, or have another sign of the determinant than the start."""
         z = y[:, list(self._problem.free)]
         with np.errstate(all="ignore"):
             fails = ~(self._values.values(self._problem.exact(z)) >= self._least).all(axis=1)

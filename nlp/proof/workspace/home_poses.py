@@ -1,6 +1,6 @@
 """Single poses of a robot in the home assembly mode, as ``evaluate`` computes them.
 
-A pose refutes a claim only if the robot violates the claim in the home assembly mode. Searches that treat the loop
+A pose refutes a claim only if the robot violates the claim in the home assembly mode. A search that treats the loop
 equations as conditions may find the pose in another assembly mode.
 """
 
@@ -25,7 +25,7 @@ from ...evidence.state import evaluate
 from ...program.layout import Layout, robot_length
 from ...program.nlp import Nlp
 from ..statement.claims import REACH, Claim, claims_of
-from ..statement.machine import JointErrors
+from ..statement.fixed_robot import JointErrors
 from ..statement.posed_layout import extreme_program
 from ..statement.tolerance import coordinate_layout
 from .numbers.within_tolerance import RobotsWithinTolerance
@@ -34,8 +34,9 @@ from .verdict import Outcome, Verdict, slack_of
 
 #: Reasons for a claim that stays open because of other assembly modes.
 _ELSEWHERE = "violations of the limit are known only in other assembly modes than home"
-_WIDER = "the bound covers every assembly mode, the best known value is in the home assembly mode"
-#: Relative difference of two values in one assembly mode, and part of the quantity's size below which values are 0.
+_WIDER = "the bound covers every assembly mode, but the best known value is in the home assembly mode"
+#: Relative difference of two values in one assembly mode; and fraction of the quantity's typical value below which
+#: values are 0.
 _SAME, _SMALL = 1e-6, 1e-6
 
 
@@ -71,7 +72,10 @@ class Homes:
 
     @cached_property
     def _claims(self) -> dict[tuple[str, Sense], tuple[Claim, ca.Function]]:
-        """Claims with functions for their values, by name and sense; the first one of two with one label."""
+        """Claims with functions for their values, by name and sense.
+
+        Of two claims with the same name and sense, the first one is kept.
+        """
         program, found = self._nlp.program, {}
         for each in reversed(claims_of(self._layout, self._quantities)):
             value = ca.Function("value", [program.x, program.p], [ca.densify(each.expression)])
@@ -91,7 +95,7 @@ class Homes:
         x = self._closed(y, errors)
         if x is None:
             return False
-        # Where nested loops lose their rank, motions of the actuators are undefined and do not define constraints.
+        # Where nested loops lose rank, the motions due to actuators are undefined and define no constraints.
         if constraints and self._nlp.program.model.nested and is_passive_singular(self._nlp, x):
             return False
         try:
@@ -104,7 +108,10 @@ class Homes:
         return found is None or generic is None or found.constraint_rank < generic.constraints
 
     def shown(self, each: Verdict) -> Verdict:
-        """Return a verdict with the value in the home assembly mode; open if only another assembly mode refutes it."""
+        """Return a verdict with the value in the home assembly mode.
+
+        Open if only another assembly mode refutes the claim.
+        """
         if not self.case.model.unknowns or each.pose is None or each.key == REACH:
             return each
         x = self._closed(self.box.coordinates(each.pose), each.errors)
@@ -127,13 +134,16 @@ class Homes:
         return replace(opened if is_other else each, reached=reached)
 
     def _size_of(self, claim: Claim) -> float:
-        """Return the typical size of a claim's quantity: the robot's size for lengths, F without cancellation for F."""
+        """Return the typical value of a quantity: the robot's size for lengths, F without cancellation for F."""
         if claim.reading.dimension is Dimension.LENGTH:
             return robot_length(self.case) ** claim.reading.power
         return self._nlp.objective_size if claim.name.partition(" ")[0] == "F" else 1.0
 
     def _closed(self, y: FloatArray, errors: JointErrors | None) -> FloatArray | None:
-        """Return the point of the program with closed loops at a pose (6,) of a robot; None if they do not close."""
+        """Return the point of the program with closed loops at a pose (6,) of a robot.
+
+        None if the loops do not close.
+        """
         nlp = self._nlp
         x, inner = nlp.start.copy(), set(nlp.program.places.inner)
         given = y[list(self.box.free)]

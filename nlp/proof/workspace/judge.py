@@ -20,7 +20,7 @@ from ...case.workspace import Workspace
 from ...interruption import one_call, within
 from ..enclosure.engine import kernel
 from ..statement.claims import REACH, REGULAR, SPECTRAL, Claim, claims_of, dependent_claims
-from ..statement.machine import check_leg_error, has_straight_legs, workspace_of_case
+from ..statement.fixed_robot import check_leg_error, has_straight_legs, workspace_of_case
 from ..statement.posed_layout import closed_layout, posed_layout, reach_claims
 from ..statement.tolerance import Directions, coordinate_layout, length_of_one_robot
 from .home_poses import Homes
@@ -40,7 +40,8 @@ from .verdict import Outcome, Verdict, not_judged
 if TYPE_CHECKING:
     from .proof_record import ProofRecord
 
-#: Default time limit of all searches together, in seconds: singular values in six dimensions need one. Each search
+#: Default time limit of all searches together, in seconds; singular values in six dimensions would take longer. Each
+#: search
 #: takes at most half of the time left.
 TIME_LIMIT = 60.0
 _PART = 0.5
@@ -50,7 +51,8 @@ _AS_NEEDED = 1.0
 _SAMPLES, _SEED = 1000, 0
 #: Reason for quantities of a robot that may not reach all poses.
 _OUT_OF_REACH = "not proved: a robot within the joint-centre tolerance may not reach every pose"
-#: Called before each quantity with its name, the count of completed ones, and the count of all of its kind.
+#: Function that is called before each quantity, with the name of the quantity, the number of completed quantities of
+#: this kind, and the number of all.
 Progress = Callable[[str, int, int], None]
 
 
@@ -71,7 +73,7 @@ def judge_workspace(
     progress: Progress | None = None,
     record: ProofRecord | None = None,
 ) -> Judgement:
-    """Judge a robot over a box of poses: prove full rank and all limits, or give a pose that refutes them.
+    """Judge a robot over a box of poses: prove full rank and all limits, or find a pose that refutes a claim.
 
     Args:
         case: case with fixed dimensions.
@@ -83,9 +85,9 @@ def judge_workspace(
         jobs: number of threads.
         with_limits: If false, judge only ranks.
         with_objective: If true, bound F of each task, and quantities of actuators without a limit.
-        until_fault: If true, stop at the first rank or limit that is not proved.
-        leg_error: largest leg-length error, length. With it, or with a joint-centre tolerance, pose errors are bounded
-            if ``with_objective`` is true.
+        until_fault: If true, stop at the first claim about a rank or limit that is not proved.
+        leg_error: largest leg-length error, length. If this error or the joint-centre tolerance is not 0 and
+            ``with_objective`` is true, pose errors are bounded.
         rank_progress: function that is called during the search for singular poses.
         progress: function that is called before each quantity.
         record: record of the searches for a proof.
@@ -123,7 +125,7 @@ class _OverBox(Judging):
         super().__init__(case, workspace, measures, search, until_fault=until_fault)
         self._box, self._closed = pose_box(workspace), closed_form(case.model)
         self._names = [name for name in measures if name not in SPECTRAL]
-        # All robots within the tolerance; None without a tolerance.
+        # Robots within the tolerance; None without a tolerance.
         self._robots: RobotsWithinTolerance | None = None
         self._problem: Problem | None = None
         # The design; made when it is needed.
@@ -137,7 +139,7 @@ class _OverBox(Judging):
         except NotJudgedError as error:
             self._reason = str(error)
         self._homes = Homes(case, self._box, self._names, self._robots)
-        # Proves a claim about a leg length with a smaller gap; set by the search that proved the leg lengths.
+        # Function that proves a claim about a leg length with a smaller gap; the search of the leg lengths sets it.
         self._prove: Callable[[Claim, NumberSearch], Verdict] | None = None
 
     def sampled_fault(self) -> Verdict | None:
@@ -230,7 +232,8 @@ class _OverBox(Judging):
             layout, reaches = reach_claims(case, closed, workspace)
             yield from self._proved(reaches, partial(prove_extreme, layout))
         is_reached = not any(each.fails for each in self.verdicts.values() if not each.is_rank)
-        # Closed forms reduce the number of coordinates. If a limb may not reach a pose, its loop equations are kept.
+        # Closed forms reduce the number of coordinates. The loop equations of a limb that may not reach a pose are
+        # kept.
         is_closed = closed.reaches and is_reached
         layout = closed_layout(case, closed, workspace) if is_closed else posed_layout(case, workspace)
         claims = claims_of(layout, self._names, with_objective=self.with_objective)
@@ -260,10 +263,10 @@ class _OverBox(Judging):
         yield from self._proved(every, robots.extreme, decided)
 
     def _in_home(self, design: Problem, *, is_reached: bool) -> Iterator[Verdict]:
-        """Yield the verdicts on expressions of a design with loops that are decided in the home assembly mode.
+        """Yield the verdicts on expressions of a design with loops, decided in the home assembly mode.
 
-        Loop equations as constraints of a program hold in every assembly mode, and F is unbounded if one of these modes
-        is singular. This search follows the loops in the home assembly mode.
+        In a nonlinear program, loop equations as constraints admit every assembly mode, and F is unbounded if one of
+        these modes is singular. This search follows the loops in the home assembly mode only.
         """
         robots = self._design_robots(design)
         claims = robots.symbols.claims(self._names, with_objective=self.with_objective)[1]
@@ -276,7 +279,7 @@ class _OverBox(Judging):
     def _proved(
         self, claims: Sequence[Claim], prove: Callable[[Claim, NumberSearch], Verdict], decided: Iterable[Verdict] = ()
     ) -> Iterator[Verdict]:
-        """Yield the verdicts on claims; decided claims are searched again only for the proof record."""
+        """Yield the verdicts on claims. Decided claims are searched again only for the proof record."""
         self._prove = prove
         # A proof for the design does not cover other robots within the tolerance.
         uncovered = self._reason if self.case.joint_centre_tolerance else ""

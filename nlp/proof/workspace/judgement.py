@@ -69,7 +69,7 @@ class Judgement:
 
     @property
     def faults(self) -> dict[tuple[str, Sense], Fault]:
-        """First known points of a path that refute limits, by label; only those before the point of the verdict."""
+        """First known points of a path that refute limits, by label; only points before the point of the verdict."""
         return {(each.name, each.sense): each.fault for each in self.verdicts if each.fault is not None}
 
     @property
@@ -79,7 +79,7 @@ class Judgement:
 
     @property
     def is_proved(self) -> bool:
-        """Whether all ranks and limits are proved, and the requested distance of the knots' motion from the path."""
+        """Whether all ranks and limits are proved, and the requested largest distance from the path."""
         return not any(each.fails for each in self.verdicts) and (self.knots is None or not self.knots.reason)
 
     @property

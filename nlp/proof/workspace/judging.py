@@ -1,4 +1,4 @@
-"""Steps of a judgement over any domain: ranks first, then quantities, which use earlier verdicts."""
+"""Steps of a judgement over any domain: ranks first, then quantities, with the use of earlier verdicts."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Judging(ABC):
         workspace: box that contains the domain's poses, with the dependent coordinates.
         measures: names of measures of the robot whose smallest and largest values are requested.
         search: gap, threads and record of the searches.
-        until_fault: If true, stop at the first rank or limit that is not proved.
+        until_fault: If true, stop at the first claim about a rank or limit that is not proved.
 
     Attributes:
         case, workspace, measures, search, until_fault: the arguments.
@@ -58,7 +58,7 @@ class Judging(ABC):
         self.verdicts: dict[Claim, Verdict] = {}
 
     def judgement(self, *, with_numbers: bool = True) -> Judgement:
-        """Return the judgement; without numbers it has only the verdicts on ranks."""
+        """Return the judgement; with ``with_numbers`` false it has only the verdicts on ranks."""
         sampled = self.sampled_fault() if with_numbers and self.until_fault else None
         if sampled is not None and (fault := self.shown(sampled)).outcome is Outcome.REFUTED:
             return Judgement(self.case, self.workspace, (not_judged(REGULAR, _SAMPLED), fault))
@@ -72,11 +72,14 @@ class Judging(ABC):
         return Judgement(self.case, self.workspace, tuple(map(self.shown, self.verdicts.values())))
 
     def _is_over(self) -> bool:
-        """Return whether a claim has failed that ends the judgement."""
+        """Return whether the judgement ends because a claim has failed."""
         return self.until_fault and any(each.fails for each in self.verdicts.values())
 
     def _numbers(self) -> Iterator[Verdict]:
-        """Yield the verdicts on quantities; leg lengths that a stroke needs with a smaller gap come again before it."""
+        """Yield the verdicts on quantities.
+
+        If a stroke needs leg lengths with a smaller gap, these come again before the stroke.
+        """
         yield from self.expressions()
         lengths = [each for each in self.verdicts.values() if each.name.startswith(_LENGTH)]
         subject = self.subject(min((each.bound for each in lengths if each.sense is Sense.MIN), default=0.0))
@@ -117,7 +120,8 @@ class Judging(ABC):
     def finer(self, claim: Claim, gap: float, about: Directions | None) -> Verdict | None:
         """Return the verdict on a leg length with a smaller gap; None if there is none.
 
-        With directions, the length is reduced by the part of the errors along them, which is the same at every pose.
+        With directions, the length is reduced by the components of the errors along these directions, which are the
+        same at every pose.
         """
 
     def shown(self, verdict: Verdict) -> Verdict:

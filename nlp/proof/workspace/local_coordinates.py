@@ -18,8 +18,8 @@ from .robot.posed_robot import NotJudgedError, Problem, build_problem
 
 #: The six coordinates of a pose, in order: the position, and ``Rz(yaw) Ry(pitch) Rx(roll)``.
 AXES = ("x", "y", "z", "roll", "pitch", "yaw")
-#: Part of the robot's size, or angle, by which coordinates move in the test for independence; and the relative work of
-#: a constraint wrench that counts as 0.
+#: Displacement of coordinates in the test for independence, relative to the robot's size or as an angle; and relative
+#: work of a constraint wrench that counts as 0.
 _NEAR, _ZERO = 1e-3, 1e-9
 
 
@@ -49,7 +49,7 @@ def box_about(start: FloatArray, ends: dict[int, tuple[float, float]]) -> Worksp
 
 
 def local_coordinates(case: Case, start: FloatArray, length: float) -> LocalCoordinates:
-    """Return which coordinates of the pose the robot controls independently near a pose, and which ones follow.
+    """Return the independent and the dependent coordinates of the pose, near a given pose.
 
     Args:
         case: the robot with fixed dimensions.

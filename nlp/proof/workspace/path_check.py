@@ -28,19 +28,20 @@ def check_path(
         case: the robot with fixed dimensions, and its limits.
         path: the tool path, or its file: a G-code program, or a table of poses whose name ends in ``.csv``.
             None for the path of the case.
-        options: choices that the file leaves open. Left out, the path of the case has the case's options.
+        options: reading options that the file leaves open. If left out, the path of the case is read with the case's
+            options.
         gap: largest relative gap of a quantity without a limit.
         time_limit: seconds for all searches together; None for no limit.
         progress: function that is called with the name of the next step.
 
     Returns:
         A verdict on each claim: proved at every point, refuted with a point and its pose, or open with the reason.
-        ``is_proved`` says whether all ranks and limits are proved.
+        ``is_proved`` tells whether all ranks and limits are proved.
 
     Raises:
         CaseError: a dimension of the robot is free, or the case has no path.
-        InputError: the file cannot be read or has words that are not supported, the rotations of the path are not
-            covered, or there is no C kernel.
+        InputError: the file cannot be read or has unsupported words, the rotations of the path are not supported, or
+            there is no C kernel.
     """
     if path is None:
         path = path_of_case(case, options)

@@ -24,7 +24,7 @@ _POINTS, _FAR = 512, math.radians(150)
 
 
 def closed_form_along(case: Case, path: ProgrammedPath) -> ClosedForm:
-    """Return a robot with fixed dimensions, its unknowns replaced by closed forms where these hold all along a path."""
+    """Return a robot with fixed dimensions, with closed forms of the unknowns that are valid all along a path."""
     closed = closed_form(case.model)
     left = {each.name for each in closed.model.unknowns}
     names = [each.name for each in case.model.unknowns if each.dimension is Dimension.ANGLE and each.name not in left]
@@ -43,7 +43,7 @@ def closed_form_along(case: Case, path: ProgrammedPath) -> ClosedForm:
 def unknowns_at(case: Case, closed: ClosedForm, pose: PoseNumbers) -> FloatArray | None:
     """Return the robot's unknowns at a pose in the home assembly mode, angles within half a turn from home.
 
-    None if no motion from home to the pose is known.
+    The result is None if no motion from home to the pose is known.
     """
     try:
         found = inverse(case, pose.position[None], pose.rotation[None])

@@ -25,7 +25,7 @@ from .robot.posed_robot import NotJudgedError, Problem, build_problem
 
 #: Relative width of the box of all poses if the path stays at one pose.
 _ROOM = 1e-9
-#: Largest change of a coordinate, in parts of the robot's size or as an angle, that counts as rounding.
+#: Largest change of a coordinate that counts as rounding, relative to the robot's size or as an angle.
 _STILL = 1e-9
 
 
@@ -37,7 +37,7 @@ def covered(path: ProgrammedPath, size: float) -> tuple[PathCover, PoseBox, Work
         size: characteristic size of the robot, length.
 
     Raises:
-        InputError: the path has no motion, or its rotations are not covered.
+        InputError: the path has no motion, or its rotations are not supported.
     """
     if not len(path):
         raise InputError(f"{path.source}: has no motion")
@@ -76,9 +76,9 @@ def design_along(case: Case, closed: ClosedForm, box: PoseBox, cover: PathCover)
     first = cover.points(cover.pieces[:1], 0.0)[0]
     near = partial(unknowns_at, case, closed, box.pose(first))
     design = replace(build_problem(case, closed.model, box, first, near), cover=cover)
-    # An equation whose coordinate hardly changes counts as dependent on others, but must hold.
+    # An equation whose coordinate hardly changes counts as dependent on other equations, but must be satisfied.
     if not np.array_equal(design.start[design.stated], first[[design.free[j] for j in design.stated]]):
-        raise NotJudgedError("its loops could not be closed at the first point of the path")
+        raise NotJudgedError("no solution of its loop equations at the first point of the path")
     return design
 
 
@@ -105,7 +105,7 @@ def with_dependent(case: Case, box: PoseBox, workspace: Workspace) -> tuple[Pose
             " and ".join(found.names[k] for k in which) for which in (moved, [k for k in range(6) if k not in places])
         )
         raise NotJudgedError(
-            f"the path moves {names}, which this robot does not control: its independent coordinates are {chosen}"
+            f"the path moves {names}, which this robot does not control; its independent coordinates are {chosen}"
         )
     wide = pose_box(found)
     lower, upper = box.lower.copy(), box.upper.copy()

@@ -16,14 +16,14 @@ from .robot.pose_box import PoseNumbers
 from .robot.posed_robot import Problem
 from .verdict import Fault, Outcome, Verdict
 
-#: Number of sampled points: of all segments together, and least and most of one segment.
+#: Number of sampled points on all segments together; smallest and largest number on one segment.
 _ALL_SAMPLES, _LEAST_SAMPLES, _MOST_SAMPLES = 50_000, 5, 129
 #: Number of bisections between two sampled points.
 _STEPS = 80
 
 
 def pose_at(problem: Problem, cover: PathCover, place: Place) -> PoseNumbers:
-    """Return the pose at a place of a path; if the robot has dependent coordinates, the pose of the design."""
+    """Return the pose at a place of a path; for a robot with dependent coordinates, the pose of the design."""
     piece = np.array([[place.segment, place.parameter, place.parameter]])
     if not problem.box.dependent:
         return problem.box.pose(cover.points(piece, 0.0)[0])
@@ -41,7 +41,7 @@ def refuted(verdicts: Sequence[Verdict]) -> dict[int, Verdict]:
 
 
 def first_faults(numbers: Number, wrong: Mapping[int, Verdict], cover: PathCover) -> dict[Claim, Fault]:
-    """Return the first known points at which the design violates limits, if they are before the points of worst values.
+    """Return the first known points where the design violates limits, if they precede the points of worst values.
 
     Args:
         numbers: quantities of claims.
@@ -90,24 +90,24 @@ class _Sampled:
         self._values = np.stack([self._values_at(z) for z in self._points], axis=1)
 
     def _closed(self, near: FloatArray, pieces: FloatArray, part: float) -> FloatArray:
-        """Return points with closed loops at one part of pieces, from near points; NaN where Newton's method fails."""
+        """Return points with closed loops at a fraction of pieces, from near points; NaN if Newton's method fails."""
         problem, z = self._numbers.problem, near.copy()
         z[:, problem.of_path] = problem.path_points(self._cover, pieces, part)
         return self._numbers.closed(z)
 
     def _values_at(self, z: FloatArray) -> FloatArray:
-        """Return values (B, K) at points with closed loops; NaN where they are not closed."""
+        """Return values (B, K) at points with closed loops; NaN for open loops."""
         found, known = np.full((len(z), self._numbers.count), np.nan), np.isfinite(z).all(axis=1)
         found[known] = self._numbers.values(z[known])
         return found
 
     def first(self, k: int, least: float, worst: Place | None) -> tuple[Place, float] | None:
-        """Return the first known place at which a quantity is less than its limit, and its value; None without one.
+        """Return the first known place at which a quantity is below its limit, and the value; None without a place.
 
         Args:
             k: index of the quantity.
             least: the limit.
-            worst: known place with a violation, possibly between two samples; None without one.
+            worst: known place with a violation, possibly between two samples; None without a known place.
         """
         beyond = [(row, self._parts[sample]) for row, sample in np.argwhere(self._values[:, :, k] < least)[:1].tolist()]
         begin, end = (int(self._pieces[row, 0]) for row in (0, -1))
@@ -116,7 +116,7 @@ class _Sampled:
         if not beyond:
             return None
         row, high = min(beyond)
-        # The last sample before, without a violation.
+        # The last sample without a violation before this one.
         sample = max(int(np.searchsorted(self._parts, high)) - 1, 0)
         low = min(self._parts[sample], high)
         beside = [self._points[each][row : row + 1] for each in (min(sample + 1, len(self._parts) - 1), sample)]

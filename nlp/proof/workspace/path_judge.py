@@ -1,7 +1,7 @@
 """Judgement of a robot along a tool path.
 
-The claims are the same as over a box of poses. Boxes cover pieces of the path, which are bisected, and values are taken
-at points of the path. With a joint-centre tolerance, the claims cover every robot within the tolerance.
+The claims are the same as over a box of poses. Boxes cover pieces of the path; these pieces are bisected. Values are
+computed at points of the path. With a joint-centre tolerance, the claims cover every robot within the tolerance.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import casadi as ca
 
 from ...case.case import Case
 from ...case.checks import check_determined_joints
-from ...case.motors import MotorNumber
+from ...case.motors import ActuatorQuantity
 from ...case.workspace import Workspace
 from ...errors import UncoveredError
 from ...interruption import one_call, within
@@ -46,10 +46,10 @@ from .verdict import Fault, Verdict, not_judged
 
 #: Default time limit of a judgement, in seconds.
 TIME_LIMIT = 600.0
-#: Largest part of the time left for one search, and relative gap of a quantity without a limit.
+#: Largest fraction of the remaining time for one search; and relative gap of a quantity without a limit.
 _PART, GAP = 0.5, 1e-3
 #: Reason for quantities with an operation without an interval rule.
-_NO_RULE = "no interval rule for one of its operations"
+_NO_RULE = "one of its operations has no interval rule"
 
 
 @one_call
@@ -72,14 +72,14 @@ def judge_path(
         gap: largest relative gap of a quantity without a limit.
         time_limit: seconds for all searches together; None for no limit.
         sampling: rule for the knots of the path; None for no knots.
-        limits_only: If true, leave out quantities of actuators without a limit.
+        limits_only: If true, omit quantities of actuators without a limit.
         progress: function that is called with the name of the next step.
         record: record of the searches for a proof.
 
     Raises:
         CaseError: a dimension of the robot is free, or limits need a motion that neither the case nor the path states.
-        InputError: rotations of the path are not covered, there is no C kernel, or there are too many knots; or knots
-            are requested for a robot whose actuator positions are not known.
+        InputError: rotations of the path are not supported, there is no C kernel, or there are too many knots. Or
+            knots are requested for a robot whose actuator positions are not known.
     """
     cover, box, workspace = covered(path, robot_length(case))
     case = replace(case, workspace=workspace)
@@ -119,14 +119,14 @@ class _AlongPath(Judging):
     Args:
         case: the case, with a motion.
         workspace: box that contains the path.
-        robots: robots within the tolerance; None if they are not judged.
+        robots: robots within the tolerance; None if these robots are not judged.
         cover: boxes of the path.
         search: gap, threads and record of the searches.
 
     Attributes:
         is_timed: whether the path states times.
         with_all: whether quantities of actuators without a limit are judged too.
-        reason: reason for a robot that is not judged; else empty.
+        reason: reason why the robot is not judged; otherwise empty.
         report: function that is called with the name of the next step.
     """
 
@@ -204,7 +204,7 @@ class _AlongPath(Judging):
         if not self.is_timed:
             yield from self._motors(subject)
             return
-        # A path with times defines the motion for powers, whether or not the case states another one.
+        # A path with times defines the motion for powers, even if the case states another motion.
         speeds, case = speeds_on_path(self._robots, self._cover, self.search.gap, self.search.record), subject.case
         yield from speeds.verdicts
         moving = in_path_motion(case)
@@ -215,7 +215,9 @@ class _AlongPath(Judging):
             subject = replace(subject, case=replace(moving, loading=moving.loading._replace(motion=None)))
         yield from self._motors(subject, {each.motor.actuator: each.bound for each in speeds.verdicts if each.motor})
         if speeds.number is None:
-            powers = [each for each in motor_claims(moving) if each.motor and each.motor.number is MotorNumber.POWER]
+            powers = [
+                each for each in motor_claims(moving) if each.motor and each.motor.number is ActuatorQuantity.POWER
+            ]
             reason = speeds.verdicts[0].reason
             yield from (verdict_of(each, Minimum(reason=reason)) for each in powers if each.limit is not None)
 

@@ -1,4 +1,4 @@
-"""Knots of a tool path: at equal steps, or so close that linear actuator motion keeps a given distance from the path.
+"""Knots of a tool path: at equal steps, or so close that linear actuator motion stays within a distance of the path.
 
 Pieces of the path are divided until the bounds of :mod:`.path_tubes` are within the distance. A bound falls with the
 square of a piece's length, which gives the number of parts.
@@ -36,15 +36,16 @@ from .robot.posed_robot import NotJudgedError, Problem, build_problem
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Margin of the box of all poses about the path, in parts of the size of positions, or as an angle.
+#: Margin of the box of all poses about the path, relative to the position, or as an angle.
 _ROOM = 0.01
-#: Errors of tabulated coordinates, in parts of the robot's length, or radians; loops are closed to 1e-10.
+#: Errors of tabulated coordinates, relative to the robot's length, or in radians; loops are closed to 1e-10.
 _NOISE = 1e-9
 #: Factor of the margin of the box about a piece over the first estimate.
 _WIDER = 1.1
-#: Largest number of parts of a piece at once, factor of this number, and least length of a piece in its parameter.
+#: Largest number of parts into which a piece is divided at once, factor of the estimated number, and least length of a
+#: piece in its parameter.
 _PARTS, _MORE, _LEAST = 4, 1.02, 2.0**-30
-#: Number of pieces that are examined at once: all pieces, and pieces without a bound; and largest number of knots.
+#: Number of pieces examined at once: of all pieces, and of pieces without a bound; and largest number of knots.
 _BLOCK, _FEW, _MOST = 2048, 128, 5_000_000
 #: Number of knots whose joints are computed at once.
 _JOINTS = 2**16
@@ -60,13 +61,13 @@ class Knots(NamedTuple):
     Attributes:
         segments: (K,) segment that ends at, or contains, each place.
         parameters: (K,) parameter of each place on its segment.
-        coordinates: (K, a) actuator coordinates, radians or length, without jumps of a turn; NaN where the robot does
-            not reach the pose.
+        coordinates: (K, a) actuator coordinates, radians or length, without jumps by full turns; NaN where the robot
+            does not reach the pose.
         actuators, measures: (a,) names of the actuators, and names of their coordinates' quantities.
-        within: largest requested distance of the platform's origin from the path; None without one.
+        within: requested largest distance of the platform's origin from the path; None without a request.
         deviation: proved largest distance of the platform's origin from the path while actuators move linearly between
             the knots; None if no distance is requested or proved.
-        reason: reason for a distance that is not proved; else empty.
+        reason: reason why the distance is not proved; otherwise empty.
     """
 
     segments: NDArray[np.intp]
@@ -85,7 +86,7 @@ class Knots(NamedTuple):
 
 
 class Sampling(NamedTuple):
-    """Rule for knots: a step or a distance; with neither, the step is a thousandth of the path.
+    """Rule for knots: a step or a distance; without both, the step is a thousandth of the path.
 
     Attributes:
         step: largest path length of the position between two knots; the angles change by at most one degree each.
@@ -178,7 +179,7 @@ def knots_within(case: Case, path: ProgrammedPath, cover: PathCover, workspace: 
     if pieces is None or reason:
         return knots._replace(reason=reason)
     if not division.has_joints(pieces, knots):
-        return knots._replace(reason="not proved: joint positions at the knots belong to the motion between them")
+        return knots._replace(reason="not proved: the joint positions at the knots belong to the motion between knots")
     return knots._replace(deviation=float(pieces.far.max()))
 
 
@@ -209,7 +210,7 @@ def _robot_about(case: Case, cover: PathCover, workspace: Workspace) -> tuple[Pr
     if coordinates.numel() != len(problem.independent):
         freedoms = len(problem.independent)
         raise NotJudgedError(
-            f"it has {coordinates.numel()} actuators for {freedoms} degrees of freedom; both numbers must agree"
+            f"it has {coordinates.numel()} actuators for {freedoms} degrees of freedom; both numbers must be equal"
         )
     return problem, coordinates
 
@@ -225,8 +226,8 @@ class _Pieces(NamedTuple):
     Attributes:
         along: (B, 3) segment of each piece, and both ends of the parameter.
         near: (B, n) points with closed loops near the pieces.
-        lower, upper: (B, k) box in which the loops close at exactly one point for each pose; NaN if none is known.
-        far: (B,) proved distance of the platform from the path; infinite without one.
+        lower, upper: (B, k) box in which the loops close at exactly one point for each pose; NaN if no box is known.
+        far: (B,) proved distance of the platform from the path; infinite without a proof.
     """
 
     along: FloatArray
@@ -237,14 +238,14 @@ class _Pieces(NamedTuple):
 
 
 class _Proved(NamedTuple):
-    """Proved pieces, with their indices among the examined ones."""
+    """Proved pieces, with their indices among the examined pieces."""
 
     which: NDArray[np.intp]
     pieces: _Pieces
 
 
 class _Division:
-    """Division of a path into pieces until the platform provably stays within a distance of all of them.
+    """Division of a path into pieces on which the platform provably stays within a distance of the path.
 
     Args:
         problem: the robot near the path.
@@ -275,7 +276,7 @@ class _Division:
         return _Pieces(along, near, unknown, unknown, np.full(len(along), np.inf))
 
     def run(self) -> tuple[_Pieces, str]:
-        """Return all pieces in order, and the reason for unproved pieces; empty without any."""
+        """Return all pieces in order, and the reason for unproved pieces; the reason is empty without such pieces."""
         waiting, found, reason = [self._start], [some(self._start, np.arange(0))], ""
         while waiting and not reason:
             pieces, *rest = _cut(waiting.pop(), _BLOCK)
@@ -291,7 +292,7 @@ class _Division:
             elif lengths.min(initial=1.0) < _LEAST:
                 k, s = along[int(np.argmin(lengths)), :2].tolist()
                 where = f"in line {self._lines[int(k)]}, {s:.7g} of its segment"
-                reason = f"it cannot be proved {where} with any distance between knots"
+                reason = f"the distance from the path cannot be proved {where}, however close the knots are"
             elif sum(len(each.far) for each in (*found, *waiting)) > _MOST:
                 reason = f"more than {_MOST:,} knots are needed"
         every = joined([*found, *waiting])
@@ -349,7 +350,7 @@ class _Division:
         return _Proved(kept, _Pieces(along[kept], boxes.near[kept], lower, upper, far[good]))
 
     def _divided(self, along: FloatArray, near: FloatArray, count: NDArray[np.intp]) -> _Pieces:
-        """Return equal parts of each piece, a given number of each."""
+        """Return equal parts of pieces; ``count`` has the number of parts of each piece."""
         which = np.repeat(np.arange(len(along)), count)
         place = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
         k, low, high = along[which].T
@@ -382,7 +383,7 @@ class _Division:
 
 
 def _cut(pieces: _Pieces, count: int) -> list[_Pieces]:
-    """Return the first pieces, a given number, and the other pieces if there are any."""
+    """Return a given number of first pieces, and the other pieces if there are any."""
     every = np.arange(len(pieces.far))
     return [some(pieces, each) for each in (every[:count], every[count:]) if len(each)]
 
@@ -393,5 +394,5 @@ def _both(place: NDArray[np.intp], count: NDArray[np.intp]) -> list[tuple[NDArra
 
 
 def _distance(moved: FloatArray) -> FloatArray:
-    """Return the distances (B,) that the platform's origin moves; it is the first three of coordinates (B, n)."""
+    """Return the displacements (B,) of the platform's origin, the first three of the coordinates (B, n)."""
     return np.asarray(np.sqrt((moved[:, :3] ** 2).sum(axis=1)) * (1 + ROUNDING))

@@ -35,7 +35,7 @@ class SpeedsOnPath(NamedTuple):
     Attributes:
         claims: claims about the speeds.
         verdicts: verdict on each claim.
-        number: the speeds as searched; None if they are not known.
+        number: the speeds as quantities of the search; None if the speeds are not known.
     """
 
     claims: Sequence[Claim]
@@ -76,7 +76,7 @@ def speeds_on_path(
 
 
 def _wider(number: PathSpeeds, cover: PathCover) -> FloatArray:
-    """Return by how much bounds over all robots within the tolerance exceed values of the design at one place, (K,).
+    """Return the excess (K,) of bounds over all robots within the tolerance over values of the design at one place.
 
     Smaller boxes do not reduce this difference.
     """

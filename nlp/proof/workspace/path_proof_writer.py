@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from .judgement import Judgement
     from .proof_record import Key, ProofRecord
 
-#: Reasons for claims without a proof: their kind has no record, or the singular pose is only computed.
+#: Reasons for claims without a proof: claims of this kind have no proof record, or the singular pose is only computed.
 _NO_RECORD = "claims of this kind along a path have no proof record"
 _COMPUTED = "a pose that is only computed in floating point has no proof"
 
@@ -54,7 +54,7 @@ class _Writer:
         record: record of the searches.
 
     Attributes:
-        ranks, numbers: verdicts by label; the first one of two with one label.
+        ranks, numbers: verdicts by label; of two verdicts with the same label, the first one is kept.
         proved: claims with a proof so far, by label.
     """
 
@@ -65,7 +65,7 @@ class _Writer:
         self.proved: dict[Key, ProofClaim] = {}
 
     def proof(self, each: Claim) -> ProofClaim:
-        """Return a claim with its proof; a claim that depends on others comes after them.
+        """Return a claim with its proof; a claim must come after the claims on which it depends.
 
         Raises:
             ProofError: the claim has no proof; the message is the reason.
@@ -76,7 +76,7 @@ class _Writer:
             raise ProofError(NOT_JUDGED)
         found = self.numbers[each.label]
         if each.kind is ClaimKind.EXPRESSION:
-            # A bound counts even if its gap is too wide: other claims depend on leg lengths.
+            # A bound counts even if its gap is too wide, because other claims depend on leg lengths.
             is_bounded = found.limit is None and found.outcome is not Outcome.REFUTED
             if found.outcome is not Outcome.PROVED and not is_bounded:
                 raise ProofError(words_of(found))
@@ -94,7 +94,7 @@ class _Writer:
         return ProofClaim(*each.label, "boxes", bound_on_record(each, found), tree=tree)
 
     def _rank(self, name: str) -> ProofClaim:
-        """Return the claim that J, or the constraint wrenches, keep their rank; or that they lose it."""
+        """Return the claim that J, or the constraint wrenches, keep their rank or lose rank."""
         found = self.ranks.get((name, ""))
         if found is None:
             raise ProofError(NOT_JUDGED)

@@ -22,10 +22,10 @@ from .robot.posed_model import RankMatrix
 from .robot.posed_robot import Problem
 from .verdict import EVERYWHERE, Outcome, Verdict, not_judged
 
-#: Relative singular value that counts as 0 at a point of a path; number of steps of the search for it, and powers of
-#: two of a piece's width at which the search begins.
+#: Relative singular value that counts as 0 at a point of a path; number of steps of the search for such a point; and
+#: fractions of a piece's width, as powers of two, at which the search starts.
 _SINGULAR, _STEPS, _FAR = 1e-9, 80, 16
-#: Number of parts between two places on each of which the rows must be defined.
+#: Number of parts between two places; the rows must be defined on each part.
 _PARTS = 64
 #: Parameters of each segment at which signs of the determinant are compared.
 _SAMPLES = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -45,7 +45,7 @@ def rank_along(
         with one_search():
             rule = RankRule(problem, matrix, recorder, lambda *_: None)
             search = rule.search(Order.NEWEST)
-            # One piece that is too small to bisect leaves the claim open or refutes it: the search can stop.
+            # If one piece is too small to bisect, the claim stays open or is refuted, so the search can stop.
             reason = effort.run(search, lambda: TOO_SMALL if search.state.small else None)
     except UncoveredError as error:
         return replace(not_judged(name, str(error)), seconds=effort.seconds)

@@ -1,7 +1,7 @@
 """Quantities of a robot at sampled points of a tool path, for pictures; they prove nothing.
 
-With a joint-centre tolerance the design is shown. Limits on strokes concern the whole path and have no value at a
-point.
+With a joint-centre tolerance, the nominal design is shown. Limits on strokes concern the whole path and have no value
+at a point.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 from ....models import FloatArray, axis_angle_from_matrix
 from ....models.joints.model.closedform import ClosedForm
 from ...case.case import Case
-from ...case.motors import Motor, MotorNumber
+from ...case.motors import ActuatorQuantity, Motor
 from ...case.task import Sense
 from ...case.workspace import TurnKind
 from ...errors import InputError, UncoveredError
@@ -75,10 +75,10 @@ class PathSamples:
         joints: positions of all joints; None if the positions of the actuators are not known.
         speeds: (P, a) speeds of the actuators, radians or length per second; NaN where the path has no time.
         numbers: quantities of all claims with limits at a pose, and of actuators.
-        left_out: keys of limits that have no values at single points.
+        left_out: keys of limits without values at single points.
         keys: keys of the K limits that have values.
-        margins: (K, P) smallest margin of each of these limits, relative to the distance between the two limits of a
-            quantity, or to the limit if there is one; negative for a violation.
+        margins: (K, P) smallest margin of each of these limits; negative for a violation. It is relative to the
+            distance between the two limits of a quantity, or to a single limit.
     """
 
     points: Points
@@ -97,7 +97,7 @@ class PathSamples:
 
     @property
     def nearest(self) -> NDArray[np.intp]:
-        """Indices (P,) of the limits with the smallest margins; -1 where none is known."""
+        """Indices (P,) of the limits with the smallest margins; -1 where no margin is known."""
         if not len(self.keys):
             return np.full(len(self._none), -1)
         found = np.argmin(np.where(np.isfinite(self.margins), self.margins, np.inf), axis=0)
@@ -111,7 +111,7 @@ class PathSamples:
 
     @property
     def is_apart(self) -> NDArray[np.bool_]:
-        """Whether the joints are not known at each point (P,): it is out of reach, or the loops could not be closed."""
+        """Whether the joints are unknown at each point (P,): out of reach, or with loops that cannot be closed."""
         return np.zeros(len(self._none), dtype=bool) if self.joints is None else ~self.joints.closed
 
     @property
@@ -124,7 +124,7 @@ def samples_of(judged: Judgement, most: int = MOST_POINTS) -> PathSamples:
 
     Args:
         judged: the verdicts along the path.
-        most: number of points that are spread over the path.
+        most: number of points to spread over the path.
     """
     path, case = judged.path, replace(judged.case, joint_centre_tolerance=None)
     case = in_motion(case) if path.is_timed else case
@@ -160,9 +160,9 @@ def _numbers(
     """Return the quantities of claims at poses, and the keys of limits without values."""
     case, closed = judged.case, closed_form_along(judged.case, judged.path)
     motors, lost = list(motor_claims(case)), list[Claim]()
-    if judged.path.is_timed:  # the path defines speeds then, and powers from [motion] are not shown
-        lost = [each for each in motors if each.motor and each.motor.number is MotorNumber.POWER]
-        motors = [each for each in motors if each.motor and each.motor.number is MotorNumber.FORCE]
+    if judged.path.is_timed:  # a path with times defines speeds; powers from [motion] are not shown
+        lost = [each for each in motors if each.motor and each.motor.number is ActuatorQuantity.POWER]
+        motors = [each for each in motors if each.motor and each.motor.number is ActuatorQuantity.FORCE]
     claims = [*searched_claims(case), *motors]
     keys = [each.key for each in (*claims, *lost) if each.limit is not None]
     if joints is None and closed.model.unknowns:
@@ -254,11 +254,11 @@ def _margins(numbers: Sequence[SampledNumber], count: int) -> tuple[tuple[str, .
 _OTHER = {Sense.MIN: Sense.MAX, Sense.MAX: Sense.MIN}
 
 
-def motor_numbers(numbers: Sequence[SampledNumber], kind: MotorNumber) -> dict[str, list[SampledNumber]]:
+def motor_numbers(numbers: Sequence[SampledNumber], kind: ActuatorQuantity) -> dict[str, list[SampledNumber]]:
     """Return the actuator quantities of a kind, by load; the load of a speed is empty."""
     found: dict[str, list[SampledNumber]] = {}
     for each in numbers:
-        motor = each.claim.motor or Motor(MotorNumber.COORDINATE)
+        motor = each.claim.motor or Motor(ActuatorQuantity.COORDINATE)
         if motor.number is kind:
             found.setdefault(motor.load, []).append(each)
     return found

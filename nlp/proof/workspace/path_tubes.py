@@ -102,7 +102,7 @@ class Tubes:
         return _middles(found)
 
     def moved(self, boxes: LoopBoxes, middle: FloatArray, half: FloatArray) -> FloatArray:
-        """Return the largest motions (B, n) of the coordinates for changes of the actuator coordinates.
+        """Return the largest displacements (B, n) of the coordinates for changes of the actuator coordinates.
 
         Args:
             boxes: boxes in which the coordinates move.

@@ -21,7 +21,7 @@ from .verdict import slack_of
 Key = tuple[str, str]
 #: Relative outward shift of the bound of a quantity that is the same at every pose.
 _FOLDED = 1e-12
-#: Outward shift of the bound of a search of boxes: part of its gap, and part of the bound.
+#: Outward shift of the bound of a search of boxes: as a fraction of its gap, and of the bound.
 _ROOM, _OUTWARDS = 0.25, 1e-6
 
 
@@ -32,7 +32,7 @@ class ProofRecord:
     Attributes:
         programs: bounds of quantities that the search of ``certify`` proved, with their trees.
         boxes: trees of searches of boxes, by name of the claim.
-        firsts: bounds of the first-order pose error, for leg-length errors of one unit, by name.
+        firsts: bounds of the first-order pose error for leg-length errors of one unit, by name of the claim.
         rests: bounds of the second-order terms of quantities of all robots within the tolerance.
         directions: fixed directions of a leg, by the name of the leg lengths of one robot at two poses.
         pieces: (M, 3) first pieces of the searches along a path; None for a box of poses.
@@ -84,7 +84,7 @@ class ProofRecord:
         self.programs.setdefault(key, ProofClaim(*key, "boxes", bound, tree=self.nodes(tree)))
 
     def _keep(self, claim: Claim, nlp: Nlp, bound: float, tree: bytes) -> None:
-        """Keep the best bound of a program. Of two programs with one name the first is kept, as in the checker."""
+        """Keep the best bound of a nonlinear program; of two programs with the same name, keep the first one."""
         found = ProofClaim(claim.name, claim.sense.value, "program", bound, fingerprint(nlp), tree)
         before = self.programs.setdefault((found.name, found.sense), found)
         if before.graph == found.graph and bound <= (before.bound or 0.0):

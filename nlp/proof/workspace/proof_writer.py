@@ -8,19 +8,21 @@ from typing import Protocol
 
 import numpy as np
 
-from ..checker.proof_file import Premises, Proof, ProofClaim, ProofError, Unproved, set_numbers, workspace_numbers
-from ..checker.workspace.statement import expected_claims, legs_numbers, robot_claims
+from ..checker.proof_file import Premises, Proof, ProofClaim, ProofError, Unproved, set_premise, workspace_premise
+from ..checker.workspace.statement import expected_claims, legs_premise, robot_claims
 from ..statement.claims import ERRORS, REACH, REGULAR, Claim, ClaimKind, one_robot_name
-from ..statement.machine import INSIDE, legs_of, workspace_of_case
+from ..statement.fixed_robot import INSIDE, legs_of, workspace_of_case
 from ..statement.tolerance import second_order_name
 from .judgement import Judgement
 from .proof_record import Key, ProofRecord
 from .robot.pose_box import PoseNumbers, pose_box
 from .verdict import Outcome, Verdict
 
-#: Relative outward shift of the bound of a first-order pose error: the check of boxes at the worst pose needs it.
+#: Relative outward shift of the bound of a first-order pose error; the check of boxes at the worst pose needs this
+#: margin.
 _OUTWARDS = 1e-6
-#: Outward shift of the bound of an actuator quantity, in parts of the gap: first-order forms need it on these boxes.
+#: Outward shift of the bound of an actuator quantity, relative to the gap; first-order forms need this margin on the
+#: same boxes.
 _ROOM = 0.25
 #: Reason for claims about robots within the tolerance if errors cannot be modelled.
 _AS_BUILT = "the robot cannot be assembled with joint-centre errors"
@@ -28,11 +30,11 @@ _AS_BUILT = "the robot cannot be assembled with joint-centre errors"
 _BY_BOXES = "proved by one search of boxes for all robots within the tolerance, which proof files do not support"
 #: Reason for claims of kinds that the checker does not know.
 _NO_RULES = "proof files do not support claims of this kind"
-NOT_JUDGED = "it was not judged"
-_NO_BOUND = "its search has no bound"
+NOT_JUDGED = "the claim was not judged"
+_NO_BOUND = "the search has no bound"
 _ONE_ASSEMBLY = "proved for the home assembly mode; proof files support only claims about all assembly modes"
-_NO_REACH = "it requires the reach of all limbs, which has no proof"
-NO_LENGTHS = "it requires leg lengths, which have no proof"
+_NO_REACH = "the claim requires that all limbs reach every pose, which has no proof"
+NO_LENGTHS = "the claim requires bounds of leg lengths, which have no proof"
 
 
 def proof_of(
@@ -57,22 +59,22 @@ def proof_of(
             unproved.append(Unproved(*other.label, f"the {missing[0].name} has no proof"))
     workspace = workspace_of_case(judged.case)
     premises = Premises(
-        workspace=workspace_numbers(workspace),
-        legs=legs_numbers(legs_of(judged.case)),
+        workspace=workspace_premise(workspace),
+        legs=legs_premise(legs_of(judged.case)),
         quantities=tuple(quantities),
         leg_error=leg_error,
         joint_centre=judged.case.joint_centre_tolerance or 0.0,
-        position_set=set_numbers(workspace),
+        position_set=set_premise(workspace),
     )
     claims, lemmas = tuple(writer.proved.values()), tuple(writer.lemmas())
     return Proof(text, judged.case.name, premises, claims, lemmas, tuple(unproved))
 
 
 class ClaimWriter(Protocol):
-    """Writer of the proofs of claims.
+    """Interface of classes that build the proofs of claims.
 
     Attributes:
-        proved: claims with a proof so far, by label.
+        proved: claims that have a proof so far, by label.
     """
 
     proved: dict[Key, ProofClaim]
@@ -105,7 +107,7 @@ def write_each(writer: ClaimWriter, expected: Sequence[Claim], judged: Iterable[
 
 
 class _Writer:
-    """Writer of the proofs of claims.
+    """Builder of one proof for each claim that the records of the searches prove.
 
     Args:
         judged: the verdicts.
@@ -113,8 +115,8 @@ class _Writer:
 
     Attributes:
         robot: the robot as the checker models it, with the symbols of the searches.
-        extremes: verdicts on quantities by label; the first one of two with one label.
-        proved: claims with a proof so far, by label.
+        extremes: verdicts on quantities by label; of two verdicts with the same label, the first.
+        proved: claims that have a proof so far, by label.
     """
 
     def __init__(self, judged: Judgement, record: ProofRecord) -> None:
@@ -147,7 +149,7 @@ class _Writer:
         return self._boxes(each, found)
 
     def _rank(self, name: str) -> ProofClaim:
-        """Return the claim that J, or the constraint wrenches, keep their rank; or that they lose it."""
+        """Return the claim that J, or the constraint wrenches, keep their rank or lose rank."""
         found = self._judged.regularity if name == REGULAR else self._judged.constraints
         if found is None:
             raise ProofError(NOT_JUDGED)
@@ -164,7 +166,7 @@ class _Writer:
         robots = self.robot.within_tolerance
         if robots is None or found.reason:
             raise ProofError(f"{words_of(found)}; a pose that is only computed in floating point has no proof")
-        # With the largest errors in these directions the determinant keeps the other sign, and is farther from 0.
+        # With the largest errors in these directions, the determinant keeps the opposite sign and is farther from 0.
         if found.errors is None:
             raise ProofError(words_of(found))
         errors = found.errors.vectors.copy()
@@ -234,8 +236,9 @@ class _Writer:
 def bound_on_record(claim: Claim, found: Verdict) -> float:
     """Return the bound that a proof states for a quantity that is not a single expression.
 
-    It is the limit, if there is one: the bound of the search is often just inside the limit and takes longer to check.
-    For an actuator it is the bound of the search, which tells the required motor.
+    For a quantity with a limit, the stated bound is the limit, because the bound of the search is often just inside
+    the limit and takes longer to check. For an actuator, it is the bound of the search, from which a motor can be
+    chosen.
 
     Raises:
         ProofError: there is no bound.

@@ -18,12 +18,12 @@ class RangeStop(JsonObject):
         outcome: outcome of the claim: refuted at the pose, or open on the motion to it.
         key: dotted key, below ``limits``, of the limit in the case; absent for a rank.
         unit: unit of the limit, empty for a plain number; absent for a rank.
-        sense: kind of the limit, a smallest or a largest value; absent for a rank.
+        sense: whether the limit is a smallest or a largest value; absent for a rank.
         limit: the limit; absent for a rank.
         value: value of the limited quantity at the pose; null if it is not known, and for a rank.
         pose: the pose; null if none is known.
         reason: reason for an open outcome, or how a singular pose was computed; absent without a reason.
-        dimension: dimension of the limited quantity, in radians for an angle.
+        dimension: length, angle, or another dimension of the limited quantity; angles are in radians.
     """
 
     name: str
@@ -48,9 +48,10 @@ class RangeEnd(JsonObject):
 
     Attributes:
         value: end of the range; all claims are proved up to this value.
-        failed: smallest known value beyond the end at which a claim is not proved; absent at the end of the largest range.
+        failed: smallest known value beyond the end at which a claim is not proved; absent at the end of the largest
+            requested range.
         stop: claim that is not proved at ``failed``; absent without ``failed``.
-        dimension: dimension of the coordinate, in radians for an angle.
+        dimension: length or angle; angles are in radians.
     """
 
     value: Shown
@@ -68,7 +69,7 @@ class AxisRange(JsonObject):
         at: value of the coordinate at the pose.
         lower: the lower end of the proved range about the pose.
         upper: the upper end of the range.
-        dimension: dimension of the coordinate, in radians for an angle.
+        dimension: length or angle; angles are in radians.
     """
 
     axis: str

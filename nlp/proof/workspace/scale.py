@@ -11,7 +11,7 @@ from ...case.positionsets import KEY, PositionSet
 from ...case.workspace import LARGEST_TURN, Workspace
 from ...errors import CaseError
 from ...interruption import is_requested, one_call, seconds_left, why_stopped, within
-from ..statement.machine import workspace_of_case
+from ..statement.fixed_robot import workspace_of_case
 from .judge import judge_workspace
 from .judgement import Judgement
 from .robot.pose_box import PoseNumbers, scaled
@@ -21,7 +21,7 @@ from .verdict import Outcome
 ACCURACY, ACCURACY_OF_RADIUS = 0.01, 5e-4
 #: Largest and smallest factor. The smallest is judged first.
 _MOST, _LEAST = 64.0, 2.0**-10
-#: Time for one box, in times of the longest proved box, if an even share of the time is less.
+#: Time for one box, as a multiple of the longest time of a proved box, if an even share of the time is less.
 _LONGER = 8.0
 
 
@@ -31,11 +31,11 @@ class Scale:
 
     Attributes:
         factor: scale factor of the largest proved box; None if no box was proved.
-        failed: smallest known scale factor of a box that is not proved; infinite without one.
-        refuted: whether a claim is refuted in the failed box, and not only open.
-        claim: claim that fails in the failed box; empty without one.
-        pose: pose of the failed claim; None without one.
-        reason: reason for a search that ended before the factor was known to its accuracy; else empty.
+        failed: smallest known scale factor of a box that is not proved; infinite without such a box.
+        refuted: whether a claim about the failed box is refuted, and not only open.
+        claim: claim that fails in the failed box; empty without a failed box.
+        pose: pose at which the claim fails; None without a pose.
+        reason: reason why the search ended before the factor was known to its accuracy; otherwise empty.
         positions: largest proved set of positions; None without a set with a radius, or if none was proved.
     """
 
@@ -134,7 +134,7 @@ def _next(proved: float, failed: float, most: float, accuracy: float) -> float |
 def _trials(proved: float, failed: float, accuracy: float) -> int:
     """Return the largest number of boxes until the factor is known, by bisection of its logarithm.
 
-    Without a proved box it is 1: no box is smaller than the first.
+    Without a proved box this number is 1, because no box is smaller than the first.
     """
     return 1 if proved == 0 else 1 + math.ceil(math.log2(max(math.log(failed / proved) / accuracy, 1.0)))
 

@@ -12,7 +12,7 @@ from ...case.motors import Motor
 from ...case.task import Sense
 from ...evidence.singularities import SingularityKind
 from ..statement.claims import RANKS, Claim, ClaimKind
-from ..statement.machine import JointErrors
+from ..statement.fixed_robot import JointErrors
 from .robot.path_cover import Place
 from .robot.pose_box import PoseNumbers
 
@@ -53,18 +53,19 @@ class Verdict:
         outcome: outcome for the rank or the limit; for a quantity without a limit, whether the gap was reached.
         bound: proved bound of the quantity over all poses. Radians for angles; infinite if nothing is proved; NaN for a
             rank.
-        reached: smallest or largest known value of the quantity; NaN for a rank, or if no value is known.
-        pose: pose with this value. For a rank: a singular pose, or the centre of the widest open box. None without one.
-        reason: reason for an open outcome, or how a singular pose was computed; else empty.
+        reached: smallest or largest known value of the quantity; NaN for a rank, and if no value is known.
+        pose: pose with this value. For a rank: a singular pose, or the centre of the widest open box. None without a
+            known pose.
+        reason: reason for an open outcome, or method that computed a singular pose; otherwise empty.
         boxes: number of examined boxes.
         open: number of open boxes at the end.
         share: fraction of the domain's volume that is in open boxes, for a rank.
         seconds: wall time.
         place: place of the pose on a path; None over a box of poses.
         errors: joint-centre errors of the robot with this value, or of the singular robot; None for the design.
-        sides: proof of a refuted rank: (2, 6) coordinates of two poses, or (2, 1) places of a path (segment plus
-            parameter), at which the determinant has proved opposite signs; else None.
-        fault: first known point of a path that refutes the limit; None if it is not before ``place``.
+        sides: proof of a refuted rank: two poses (2, 6), or two places on a path (2, 1) (segment plus parameter), at
+            which the determinant provably has opposite signs. None without such a proof.
+        fault: first known point of a path that refutes the limit; None if no such point precedes ``place``.
     """
 
     claim: Claim
@@ -109,7 +110,7 @@ class Verdict:
 
     @property
     def motor(self) -> Motor | None:
-        """Actuator and its quantity, for a claim about an actuator; else None."""
+        """Actuator and its quantity, for a claim about an actuator; None for other claims."""
         return self.claim.motor
 
     @property
@@ -134,7 +135,7 @@ class Verdict:
 def slack_of(limit: float) -> float:
     """Return the violation of a limit that counts as rounding.
 
-    It is relative to the limit, not to the value: a value far from the limit needs no slack.
+    The slack is relative to the limit, not to the value, because a value far from the limit needs no slack.
     """
     return _ON_LIMIT * abs(limit)
 

@@ -1,4 +1,4 @@
-// Links of limbs by what they have in common: limb, colouring row and kind.
+// Groups of links with the same limb, kind, and row of the Jacobian that gives the colour.
 const groupedLinks = (links) => {
   const found = new Map();
   for (const link of links) {
@@ -10,7 +10,7 @@ const groupedLinks = (links) => {
   return [...found.values()];
 };
 
-// Marks of joints, as in picture files: shape by kind, dark where an actuator drives the joint, strokes for axes.
+// Symbols of joints, as in picture files: shape by kind, dark if actuated, strokes for axes.
 const LOOKS = { R: ["circle", 5], P: ["square", 7], H: ["cross", 6], C: ["square", 7], U: ["diamond", 6], S: ["circle", 7], Pa: ["circle", 3] };
 const jointTraces = (view, frame, ink) => {
   const dots = (name, places, marker, more = {}) => ({

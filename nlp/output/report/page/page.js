@@ -1,6 +1,6 @@
 (() => {
   const data = JSON.parse(byId("data").textContent);
-  // Where nothing resists a motion, what is left of its rates is rounding: it is shown as none.
+  // The rates of a free motion are rounding errors, and shown as 0.
   for (const frame of data.views.flatMap((each) => each.frames)) {
     frame.rates = frame.rates.map((rate) => (Math.abs(rate) > frame.noise ? rate : 0));
     if (frame.rates.every((rate) => rate === 0)) frame.F = 0;
@@ -11,10 +11,10 @@
   let view = data.views[0] || null;
   let index = view ? view.zero : 0;
   let layout = null;
-  // Until the platform is moved, the box is no larger than the posture found needs.
+  // Until the platform is moved, the box encloses only the posture of the design.
   let isMoved = false;
 
-  // Colours and bars have the scale of the position shown, as in picture files.
+  // Colours and bars have the scale of the shown pose, as in picture files.
   const largest = () => Math.max(...view.frames[index].rates.map(Math.abs)) || 1;
 
   function colour(rate) {
@@ -62,7 +62,7 @@
     view.free.forEach((each) => found.push(lines("free motion", [each.line], { color: FREE, width: 5, dash: "dash" })));
     for (const own of groupedLinks(view.links)) {
       const { limb, row, kind } = own[0];
-      // Points along the limb, so that it answers wherever it is pointed at.
+      // Points along the limb, so that its whole length shows the tooltip.
       const parts = own.map(({ ends: [a, b] }) => Array.from({ length: 13 }, (_, n) => plus(points[a], plus(points[b], points[a], -1), n / 12)));
       const text = limbText(frame, limb);
       found.push(lines(`limb ${limb}`, parts, { color: row === null ? MUTED : colour(frame.rates[row]), width: kind === "rod" ? 7 : 12 }, {
@@ -89,7 +89,7 @@
       found.push(lines(`couple ${row.limb}`, [[start, tip]], { color: colour(frame.rates[k]), width: 6 }));
       found.push(heads(`couple heads ${row.limb}`, [tip, plus(tip, way, -0.06 * size)], [way, way], 0.07 * size, colour(frame.rates[k])));
     });
-    // Forces belong to the pose found: elsewhere they are others.
+    // Forces are computed for the pose of the design only.
     if (index === view.zero) found.push(...forceTraces(view, INK));
     if (view.rows.length) {
       const top = largest();
@@ -102,7 +102,7 @@
     return found;
   }
 
-  // Length of an arrow for a velocity of 1; none where nothing moves.
+  // Length of an arrow for a velocity of 1; 0 without motion.
   function speedScale() {
     const fastest = Math.max(0, ...view.frames[view.zero].velocities.map(norm));
     return fastest > 1e-9 * view.size ? (0.42 * view.size) / fastest : 0;
@@ -110,7 +110,7 @@
 
   function ranges() {
     const shownFrames = isMoved ? view.frames : [view.frames[view.zero]], every = shownFrames.flatMap((frame) => frame.points);
-    // What stands outside of the box is not drawn, so arrows count too.
+    // Plotly does not draw outside of the box, so it must enclose the arrows too.
     const factor = speedScale();
     for (const frame of shownFrames) {
       frame.velocities.forEach((velocity, k) => every.push(plus(frame.points[view.corners[k]], velocity, factor)));
@@ -129,7 +129,7 @@
 
   const newLayout = () => sceneLayout(ranges(), view.unit, camera());
 
-  // From the side that shows most, as near as the whole box with its ticks is seen.
+  // Clearest view, as near as the box with its ticks stays visible.
   const camera = () => fittedCamera(ranges(), view.eye, { width: byId("view").clientWidth, height: byId("view").clientHeight });
 
   function draw() {
@@ -139,7 +139,7 @@
     return window.Plotly.react(byId("view"), traces(view.frames[index]), layout, CONFIG);
   }
 
-  // The copy for printers follows when the picture has been at rest for a while.
+  // The copy for printing is updated when the picture has not changed for a while.
   let later = 0;
   function keep() {
     clearTimeout(later);
@@ -171,12 +171,12 @@
     });
   }
 
-  // Views stand in order of tasks, and of poses within a task.
+  // Views are in order of tasks, and of poses within a task.
   const task = () => (byId("task") ? Number(byId("task").value) : data.views[0].task);
   const worst = () => (data.views.find((each) => each.task === task() && each.is_worst) || view).pose + 1;
 
   function tellPose() {
-    const words = view.is_worst ? `${view.pose_words}, the worst` : view.pose_words;
+    const words = view.is_worst ? `${view.pose_words}, worst pose` : view.pose_words;
     byId("posed").textContent = words;
     byId("pose").setAttribute("aria-valuetext", words);
     byId("worst").disabled = view.is_worst;
@@ -242,11 +242,11 @@
     try {
       await navigator.clipboard.writeText(text);
     } catch {
-      // Without leave for the clipboard, the old way through a selection is tried.
+      // Without permission for the clipboard, try the older command for the selection.
       getSelection().selectAllChildren(byId("case-text"));
       done = document.execCommand("copy");
     }
-    byId("copied").textContent = done ? "Copied." : "Not copied: it is selected now, copy it by keyboard.";
+    byId("copied").textContent = done ? "Copied." : "Not copied: the text is selected, copy it with the keyboard.";
   }
 
   byId("copy").addEventListener("click", copy);

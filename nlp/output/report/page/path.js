@@ -1,11 +1,11 @@
 (() => {
   const view = JSON.parse(byId("data").textContent).view, RED = "#a3250f", NONE = "#68747f", BEYOND = -2, MOST = 6;
   document.documentElement.classList.add("scripted");
-  // Colours of margins, from 0 to the largest that has a colour of its own.
+  // Colours of margins, from 0 to the margin above which the colour is constant.
   const MARGINS = [RED, "#e08a3c", "#9aa3ab", "#08519c"].map((each, k) => [k / 3, each]);
   let index = view.first, layout = null;
 
-  // The path with the colour of its nearest limit, each piece up to the next point, or with that of its margin.
+  // Path coloured by the nearest limit, each piece up to the next point, or by the smallest margin.
   function pathTraces() {
     const { path, nearest, margins } = view, text = nearest.map((k, n) => `${margins[n] === null ? "" : `margin ${shown(margins[n], 3)} %`}${k < 0 ? "" : `, ${plain(view.limits[k].words)}`}`);
     const hover = { hoverinfo: "text", hoverlabel: { align: "left", bgcolor: "#fff", bordercolor: INK, font: { color: INK, size: 13 } } };
@@ -40,7 +40,7 @@
     return found;
   }
 
-  // The lines of the first faults, each once.
+  // Lines of the first violations, each line once.
   const faultNames = () => [...new Map(view.marks.map(({ words, position }) => [words.split(":")[0], position]).reverse())].reverse().slice(0, MOST)
     .map(([text, [x, y, z]]) => ({ x, y, z, text: plain(text), showarrow: false, yshift: 16, bgcolor: "rgba(255,255,255,0.82)", borderpad: 1, font: { color: RED, size: 12 } }));
 
@@ -53,7 +53,7 @@
     return window.Plotly.react(byId("view"), traces(view.frames[index]), layout, CONFIG);
   }
 
-  // The copy for printers follows when the picture has been at rest for a while.
+  // The copy for printing is updated when the picture has not changed for a while.
   let later = 0;
   function keep() {
     clearTimeout(later);
@@ -85,7 +85,7 @@
     requestAnimationFrame(() => { waiting = false; draw(); });
   }
 
-  // The whole path takes so many milliseconds, however slowly the pictures come.
+  // Duration of the whole path in milliseconds, independent of the frame rate.
   const LAP = 15000;
   let playing = 0;
   function play() {

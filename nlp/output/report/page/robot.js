@@ -1,9 +1,9 @@
-// The robot in three dimensions, for every page that shows one: bodies, names of limbs, axes, and the eye.
+// 3-D view of a robot, for all pages: bodies, names of limbs, axes, and camera.
 const INK = "#17212b", MUTED = "#55616c", FACES = { base: "#c3ccd5", platform: "#a9c6de" };
 const FONT = "Arial, 'DejaVu Sans', sans-serif";
 const CONFIG = { displaylogo: false, displayModeBar: false, responsive: true, scrollZoom: false };
 
-// Lines given as lists of points, with a gap between them.
+// Polylines from lists of points, separated by gaps.
 const lines = (name, parts, style, more = {}) => {
   const axes = [[], [], []];
   for (const part of parts) {
@@ -33,17 +33,17 @@ const bodyTraces = (view, points) => {
   return found;
 };
 
-// Names of limbs, each on its longest link.
+// Name of each limb on its longest link.
 const limbNames = (view, points, isNarrow) => {
   const found = new Map();
   for (const { limb, kind, ends: [a, b] } of view.links) {
     if (limb === null || kind === "rail") continue;
     const way = plus(points[b], points[a], -1), long = norm(way);
-    // Rods of several limbs come together at the platform: a name is on a bar where there is one.
+    // Rods of several limbs meet at the platform: prefer a bar for the name.
     const size = long + (kind === "bar" ? 100 * view.size : 0);
     if (!found.has(limb) || found.get(limb).size < size) found.set(limb, { size, start: points[a], way });
   }
-  // Each at another height, so that names of limbs side by side do not meet.
+  // Different heights, so that names of neighbouring limbs do not overlap.
   return [...found].map(([limb, { start, way }], k) => {
     const [x, y, z] = plus(start, way, 0.22 + (0.56 * ((k * 2.5) % found.size)) / found.size);
     return { x, y, z, text: (isNarrow ? "" : "limb ") + plain(limb), showarrow: false, xanchor: "center", bgcolor: "rgba(255,255,255,0.82)", borderpad: 1, font: { color: INK, size: 11 } };
@@ -72,7 +72,7 @@ const turnedCamera = (from, key) => {
   return { ...from, eye: { x: center.x + distance * Math.cos(up) * Math.cos(round), y: center.y + distance * Math.cos(up) * Math.sin(round), z: center.z + distance * Math.sin(up) } };
 };
 
-// Plotly is half of a second's work: it waits until words and tables are painted. Without it or WebGL a page is flat.
+// Plotly takes half a second: it starts after text and tables are painted. Without it or WebGL, the drawing is fixed.
 const afterPaint = (draw, giveUp, end = () => {}) => requestAnimationFrame(() => setTimeout(async () => {
   try {
     const library = document.createElement("script");

@@ -1,7 +1,7 @@
 "use strict";
-// Where the eye stands so that a box fills its frame: Plotly's camera, whose unit makes the product of the sides 1.
+// Plotly's camera for a box that fills its frame, in units that make the product of the sides 1.
 const fittedCamera = (ranges, eye, frame) => {
-  // Half of the angle of Plotly's perspective is an eighth of a half turn; ticks and titles need room, in pixels.
+  // Half of the angle of Plotly's perspective is 22.5 deg; ticks and titles need room, in pixels.
   const HALF = Math.tan(Math.PI / 8), SIDE = 72;
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   const across = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -9,16 +9,16 @@ const fittedCamera = (ranges, eye, frame) => {
   const sides = ranges.map(([low, high]) => high - low), mean = Math.cbrt(sides[0] * sides[1] * sides[2]);
   const half = sides.map((each) => each / mean / 2);
   const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((n) => half.map((each, k) => ((n >> k) & 1 ? each : -each)));
-  // From above, the title of an axis stands beyond the far edge.
+  // Seen from above, the title of an axis is beyond the far edge.
   const TOP = eye[2] > 0.9 * Math.hypot(...eye) ? 64 : 36;
   const towards = unit(eye), right = unit(across([0, 0, 1], towards)), up = across(towards, right);
   const wide = Math.max(0.2, 1 - (2 * SIDE) / frame.width), high = Math.max(0.2, 1 - (2 * TOP) / frame.height);
   const shape = frame.width / frame.height;
   let centre = [0, 0, 0], far = 10;
-  // Middle and distance depend on each other in perspective: a few rounds settle both.
+  // In perspective, centre and distance depend on each other: iterate.
   for (let round = 0; round < 12; round += 1) {
     const from = corners.map((corner) => corner.map((each, k) => each - centre[k]));
-    // The eye must be so far that every corner is within the frame.
+    // The distance must bring every corner into the frame.
     far = Math.max(...from.map((each) => dot(each, towards) + Math.max(Math.abs(dot(each, right)) / (HALF * shape * wide), Math.abs(dot(each, up)) / (HALF * high))));
     const seen = from.map((each) => [right, up].map((way) => dot(each, way) / (far - dot(each, towards))));
     const middle = [0, 1].map((k) => (Math.min(...seen.map((each) => each[k])) + Math.max(...seen.map((each) => each[k]))) / 2);
@@ -28,7 +28,7 @@ const fittedCamera = (ranges, eye, frame) => {
   return { eye: point(centre.map((each, k) => each + far * towards[k])), up: point([0, 0, 1]), center: point(centre), projection: { type: "perspective" } };
 };
 
-// Text of a case must not become markup in a hover label, which knows some tags.
+// Text of a case must not become markup in a tooltip, which interprets some tags.
 const byId = (id) => document.getElementById(id);
 const plain = (text) => String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
 const shown = (value, digits = 6, signed = false) => {
@@ -39,7 +39,7 @@ const plus = (a, b, factor = 1) => a.map((each, k) => each + factor * b[k]);
 const norm = (a) => Math.hypot(...a);
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 
-// Heads of arrows as one mesh of cones: tips, unit directions, and one length.
+// Arrow heads as one mesh of cones, from tips, unit directions, and a common length.
 function heads(name, tips, directions, length, fill) {
   const x = [], y = [], z = [], i = [], j = [], k = [], sides = 10;
   const add = (point) => { x.push(point[0]); y.push(point[1]); z.push(point[2]); return x.length - 1; };
@@ -61,7 +61,7 @@ function heads(name, tips, directions, length, fill) {
   return { type: "mesh3d", name, x, y, z, i, j, k, color: fill, hoverinfo: "skip", flatshading: true, showlegend: false, lighting: { ambient: 0.85, diffuse: 0.4, specular: 0 } };
 }
 
-// A text from its compressed bytes in base 64; a browser that cannot do so shows what needs no library.
+// Text from compressed bytes in base64; a browser without this function shows the page without the library.
 const unpacked = (text) => {
   const bytes = Uint8Array.from(atob(text), (sign) => sign.charCodeAt(0));
   return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).text();

@@ -34,7 +34,7 @@ class OwnBoxes:
 
     Attributes:
         lower, upper: (d, N) ends of the boxes of all lists, one list after the other.
-        of: (N,) index of the shared box of each own box, ascending.
+        of: (N,) index, for each box of own variables, of its shared box; ascending.
         count: number B of shared boxes.
     """
 
@@ -74,7 +74,7 @@ class OwnBoxes:
         return np.asarray(np.bincount(self.of, (self.upper - self.lower).sum(axis=0), minlength=self.count))
 
     def bisect(self, which: NDArray[np.bool_], along: NDArray[np.intp]) -> OwnBoxes:
-        """Return the lists with some boxes (N,) bisected along one variable (N,) each."""
+        """Return the lists after the bisection of some boxes (N,), each along one variable (N,)."""
         places = np.repeat(np.arange(self.of.size), 1 + which)
         lower, upper = self.lower[:, places].copy(), self.upper[:, places].copy()
         second = np.flatnonzero(np.diff(places, prepend=-1) == 0)
@@ -98,7 +98,7 @@ class Tilt(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LimbBound:
-    """Bounds of one limb with d own variables over B boxes of shared variables and N boxes of own variables.
+    """Bounds of one limb with d own variables, over B boxes of shared variables and N boxes of own variables.
 
     Attributes:
         own: boxes of the own variables.
@@ -139,7 +139,8 @@ def bound_limb(
 ) -> LimbBound:
     """Return bounds of a limb, with a tilt for each shared box.
 
-    An own box is dropped if the limb is nowhere as good in it as at the good point: no optimum lies in it.
+    A box of own variables is dropped if the limb's value at the good point exceeds its values in the whole box: then
+    no optimum lies in the box.
 
     Args:
         own: boxes of the own variables.
@@ -163,7 +164,7 @@ def bound_limb(
     bounds = np.where(models.defined, rest.bound(), np.inf)
     # The bound of the limb, and the bound of its negative tilt.
     apart = np.abs(tilt.g).sum(axis=0) + 0.5 * np.abs(tilt.Q).sum(axis=(0, 1))
-    # The two may cancel: rounding is relative to their absolute values.
+    # The two bounds may cancel, so rounding is relative to their absolute values.
     other = models.bound + apart[own.of] + (np.abs(models.bound) + apart[own.of]) * (64 * ULP) + TINY
     bounds = np.fmin(bounds, other)
     is_possible = models.is_possible & ~(bounds < reached[own.of])

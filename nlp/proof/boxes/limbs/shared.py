@@ -35,7 +35,8 @@ if TYPE_CHECKING:
 Result = TypeVar("Result")
 #: Weight of a model's linear part relative to its curved part in the choice of a variable, as in the kernel.
 _LINEAR = 0.3
-#: Own boxes are bisected if their bound is nearer to the best bound than this part of the limb's spread.
+#: Boxes of own variables are bisected if the distance of their bound from the best bound is below this fraction of the
+#: limb's spread.
 _NEAR = 0.5
 #: Smallest relative reduction of a side that makes a contraction of a box worthwhile.
 _WORTH = 0.1
@@ -45,9 +46,9 @@ _SUM = 1e-13
 _BLOCK = 256
 #: Length of a list of own boxes above which the shared box is bisected instead.
 _LONGEST = 512
-#: Part of the largest spread above which a limb's list is refined too.
+#: Fraction of the largest spread above which a limb's list is refined too.
 _SPREAD = 0.25
-#: Part of the gap between the bound at which a recorded search closes a box and the bound of the proof.
+#: Margin, as a fraction of the gap, between the bound at which a recorded search closes a box and the proved bound.
 _RESERVE = 0.5
 #: Factor by which the expected gain of the limbs' lists must exceed that of the shared box.
 _PATIENCE = 1.0
@@ -55,13 +56,16 @@ _PATIENCE = 1.0
 
 @dataclass(frozen=True, eq=False)
 class SharedSums:
-    """Bounds of B shared boxes.
+    """Bounds of the form over B shared boxes: boxes of the variables that several limbs share.
+
+    The common part of the form depends only on shared variables. The tilt of a limb is a quadratic function of shared
+    variables that is moved from the limb to the common part.
 
     Attributes:
         limbs: bounds of each limb.
-        common: models of the common part with all tilts and best values, and the contracted boxes.
+        common: models of the common part plus the tilts and best values of all limbs, and the contracted boxes.
         sums: (B,) upper bounds from these models: the limbs' best values plus the maximum of the common part.
-        bound: (B,) upper bounds: the smaller of ``sums`` and of the boxes' earlier bounds.
+        bound: (B,) upper bounds: minimum of ``sums`` and of the earlier bounds of the boxes.
         is_possible: (B,) whether the common conditions may be satisfied and every limb has an open box.
     """
 
@@ -73,13 +77,13 @@ class SharedSums:
 
 
 class LeftOwn(NamedTuple):
-    """Remaining own boxes of a limb.
+    """Remaining boxes of a limb's own variables.
 
     Attributes:
         own: the boxes; a list may be empty.
         spread: (B,) possible change of the bound of the best box of each list along its own variables.
         good: (d, B) best known point of the own variables.
-        is_near: (N,) whether a box is bisected if its list is refined.
+        is_near: (N,) whether a refinement of the list bisects the box.
         along: (N,) index of the variable to bisect.
     """
 
@@ -130,8 +134,8 @@ class SharedRule(Rule[SharedColumns]):
         separation: limbs of the form.
         incumbent: best known point, which the search improves.
         jobs: number of threads, which share the limbs.
-        recorder: recorder of the search for a proof. The search then neither contracts shared boxes nor drops own boxes
-            because of other limbs, as proofs have no rules for this.
+        recorder: recorder of the search for a proof. A recorded search neither contracts shared boxes nor drops boxes
+            of own variables because of other limbs, as proofs have no rules for these steps.
     """
 
     block = _BLOCK
@@ -151,7 +155,8 @@ class SharedRule(Rule[SharedColumns]):
         self._m, self._turn = len(separation.shared), 0
         # Threads share whole limbs, as a large part of a limb's work is in NumPy and cannot be divided.
         self._threads = Threads(jobs)
-        # Engines of long limbs take seconds to set up; each is one step, so that the search can end in between.
+        # Engines of long limbs take seconds to set up. Each set-up is one step, so that the search can stop after any
+        # of them.
         self._engines, self._opposites = list[Engine](), list[Engine]()
         self._recorder = recorder
         if recorder is not None:
@@ -178,12 +183,15 @@ class SharedRule(Rule[SharedColumns]):
             sums = self._sums(boxes, below)
             self._improve(boxes, sums)
             left, alive, emptied = self._branch(boxes, sums, below)
-        # Points that were excluded by contraction, or with own boxes, may have values up to the threshold.
+        # Points that contraction or dropped boxes exclude may have values up to the threshold.
         examined, reasons = sum(own.of.size + own.count for own in boxes.more.own), (sums, alive, emptied)
         return BoxResults(left, self.target, examined, is_better=self._incumbent.value > before, reasons=reasons)
 
     def record(self, boxes: Boxes[SharedColumns], found: BoxResults[SharedColumns], split: NDArray[np.intp]) -> None:
-        """Record bisections and leaves; limbs and common part share the margin up to the target."""
+        """Record bisections and leaves.
+
+        In a leaf, the difference between target and bound is divided equally among the limbs and the common part.
+        """
         if self._recorder is None or found.reasons is None:
             return
         sums, alive, emptied = found.reasons
@@ -206,7 +214,7 @@ class SharedRule(Rule[SharedColumns]):
         return self._threads.map(quiet, range(len(self._engines)))
 
     def _sums(self, boxes: Boxes[SharedColumns], below: float) -> SharedSums:
-        """Return bounds of shared boxes, and the parts in which the sum can exceed a value."""
+        """Return bounds of shared boxes, and the sub-boxes in which the sum can exceed a value."""
         limbs = self._of_limbs(lambda k: self._bound_limb(k, boxes))
         common = self._common.limb_models(boxes.lower.T, boxes.upper.T, tilts=tilts_of(limbs), threshold=below)
         bound, best = common.L.bound(), np.array([limb.best for limb in limbs])
@@ -254,12 +262,12 @@ class SharedRule(Rule[SharedColumns]):
         """Drop and contract boxes, and refine the lists of boxes that are not bisected.
 
         Returns:
-            The remaining parts, a mask (B,) of their boxes, and whether each limb (K, B) has no open box; in a recorded
-            search only its conditions can cause this.
+            The remaining sub-boxes; a mask (B,) of their boxes; and whether each limb has no open box, (K, B). In a
+            recorded search, only the conditions of a limb can close all of its boxes.
         """
         bounded = sums.bound <= self.target
         if self._recorder is not None:
-            # The proof needs the values of this box, not an inherited bound; and the checker, with other arithmetic,
+            # The proof needs the values of this box, not an inherited bound. The checker has another arithmetic and
             # needs a margin up to the threshold.
             room = max(self.target - self._incumbent.value, 0.0)
             bounded = sums.sums <= (self.target - _RESERVE * room if math.isfinite(room) else self.target)
@@ -277,7 +285,7 @@ class SharedRule(Rule[SharedColumns]):
         wider = (spread.sum(axis=0) > _PATIENCE * change.sum(axis=0)) & finite & (sizes.max(axis=0) < _LONGEST)
         refine = alive & (spread > 0).any(axis=0) & (wider | ~can_cut)
         cut = alive & ~refine & can_cut
-        # A box is examined again if it, or a box of its lists, was moved or collapsed.
+        # A shared box is examined again if this box, or a box in one of its lists, was moved or collapsed.
         moved = ((lower != boxes.lower.T) | (upper != boxes.upper.T)).any(axis=0)
         for before, each in zip(boxes.more.own, lists, strict=True):
             moved |= each.own.width < before.width
@@ -293,7 +301,7 @@ class SharedRule(Rule[SharedColumns]):
     def _shared_change(
         self, boxes: Boxes[SharedColumns], sums: SharedSums, lower: FloatArray, upper: FloatArray
     ) -> FloatArray:
-        """Return the possible change (m, B) of the bound along each shared variable of the remaining part."""
+        """Return the possible change (m, B) of the bound along each shared variable of the remaining sub-box."""
         m, M = self._m, sums.common.L
         change = _LINEAR * np.abs(M.b) + np.abs(M.H).sum(axis=0) + M.w
         for limb in sums.limbs:
@@ -321,7 +329,7 @@ def _leaf(sums: SharedSums, k: int, emptied: NDArray[np.bool_], target: float) -
 def contracted(
     form: StandardForm, boxes: Boxes[SharedColumns], sums: SharedSums
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Return the remaining parts of B shared boxes, as ends (m, B), and whether each is not empty (B,).
+    """Return bounds (m, B) of the remaining sub-boxes of B shared boxes, and whether each is nonempty (B,).
 
     Only the part remains where the common conditions may be satisfied and the sum can exceed the threshold. If the sum
     increases along a variable, the box collapses to a face of the whole box, or is dropped. As in the search of whole
@@ -350,17 +358,17 @@ def contracted(
 
 
 def cut_own(limb: LimbBound, sums: FloatArray, threshold: float) -> LeftOwn:
-    """Return the own boxes of a limb that can exceed a threshold together with the best values of all other parts.
+    """Return the boxes of a limb's own variables for which the sum of all limbs can exceed a threshold.
 
     Args:
         limb: bounds of the limb.
         sums: (B,) upper bounds of the shared boxes: sums of the limbs' best values and of the common part. Smaller
-            bounds from other sources are not valid here, as they do not bound the other limbs.
+            bounds from other sources must not be used here, as these do not bound the other limbs.
         threshold: largest bound of a box that is closed.
     """
     own, L, found = limb.own, limb.L, limb.models
     m = len(L.b) - len(own.lower)
-    # The other parts give at most ``sums - best``, so this limb must give the rest.
+    # The other limbs and the common part contribute at most ``sums - best``, so this limb must contribute the rest.
     level = threshold - (sums - limb.best)
     level = level - _SUM * (abs(threshold) + np.abs(sums) + np.abs(limb.best))
     level = np.fmax(np.where(np.isfinite(level), level, -np.inf), limb.reached)

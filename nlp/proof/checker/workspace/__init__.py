@@ -1,4 +1,4 @@
-"""Checker of proofs about workspaces and paths, which uses nothing of the search.
+"""Checker of proofs about workspaces and paths; it uses no code of the search.
 
 The modules import each other in this order: ``pose_boxes`` (box of pose coordinates, and claims on pieces of it),
 ``path_poses`` (poses along a path) and ``path_root`` (claims on pieces of it), ``forms`` (arithmetic),

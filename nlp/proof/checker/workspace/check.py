@@ -25,7 +25,7 @@ from ....errors import InputError, UncoveredError
 from ....path.path import ProgrammedPath
 from ....program.layout import Layout
 from ...statement.claims import ERRORS, REACH, Claim, ClaimKind
-from ...statement.machine import Legs, check_leg_error, workspace_of_case
+from ...statement.fixed_robot import Legs, check_leg_error, workspace_of_case
 from ...statement.motors import actuator_coordinates, in_path_motion
 from ...statement.posed_layout import extreme_program
 from ...statement.tolerance import Directions, length_of_one_robot, second_order_name
@@ -61,9 +61,10 @@ from .statement import (
     robot_claims,
 )
 
-#: Relative amount by which a root, or a sum of two lengths, is moved outwards: more than its rounding.
+#: Relative amount by which a root, or a sum of two lengths, is moved outwards: more than the rounding error.
 _ROUNDING = 1e-15
-#: Part of a limit by which a bound may exceed it and still counts as equal: rounding, as in the search.
+#: Fraction of a limit by which a bound may exceed the limit and still count as equal, because of rounding in the
+#: search.
 _ON_LIMIT = 1e-9
 #: Names of the pose errors; a proof states bounds of their first-order parts.
 _FIRSTS = tuple(each.name for each in ERRORS)
@@ -71,6 +72,8 @@ _FIRSTS = tuple(each.name for each in ERRORS)
 _ALONG_PATH = ("regular", "singular", "boxes", "lengths")
 #: A tree with a single leaf.
 _WHOLE = bytes([Node.BOUNDED])
+#: Message about a proof with displaced joint centres of a claim about the nominal robot.
+_WITHOUT_TOLERANCE = "the proof of this claim needs a tolerance, and the claim is about the robot without one"
 
 
 @dataclass(frozen=True)
@@ -80,10 +83,10 @@ class CheckedClaim:
     Attributes:
         name, sense: name and sense of the claim.
         bound: proven bound of the quantity as shown in results, radians for angles; None without a quantity.
-        limit: limit of the case that the quantity satisfies, in the same terms; None without one.
-        is_refuted: whether the opposite is proved: a singular pose.
-        by_machine: whether the singular pose is that of another robot within the tolerance.
-        dimension: dimension of the quantity.
+        limit: limit of the case that the quantity satisfies, in the unit of ``bound``; None without a limit.
+        is_refuted: whether the opposite of the claim is proved: a singular pose.
+        by_machine: whether the singular pose belongs to another robot within the tolerance, not to the nominal design.
+        dimension: length, angle, or another dimension of the quantity.
     """
 
     name: str
@@ -92,7 +95,7 @@ class CheckedClaim:
     bound: float | None = None
     limit: float | None = None
     is_refuted: bool = False
-    by_machine: bool = False
+    is_within_tolerance: bool = False
 
 
 @dataclass(frozen=True)
@@ -101,9 +104,9 @@ class VerifiedWorkspace:
 
     Attributes:
         claims: proved claims.
-        numbers_at: assembly modes that claims about quantities cover; ranks, and actuators under loads, are about the
-            home assembly mode. Empty for a robot without loops.
-        workspace: poses, or a box about a path, with the dependent coordinates of the robot.
+        numbers_at: assembly modes that claims about quantities cover. Claims about ranks, and about actuators under
+            loads, cover the home assembly mode. Empty for a robot without loops.
+        workspace: workspace of the proof, or a box about its path, with the dependent coordinates of the robot.
         leaves: number of claims about boxes.
         pieces: number of boxes evaluated for their proof.
     """
@@ -126,7 +129,7 @@ def check_workspace_proof(proof: Proof, case: Case, *, leg_error: float = 0.0) -
     Raises:
         ProofError: the proof is for another case, or a claim could not be proved; the message names the claim.
         CaseError: the case has no workspace, or a free dimension.
-        InputError: the leg error is negative, or the robot has not six straight legs.
+        InputError: the leg error is negative, or the robot does not have six straight legs.
     """
     check_leg_error(case, leg_error)
     return _check(proof, lambda: _Checker(proof, case, leg_error))
@@ -136,7 +139,7 @@ def check_path_proof(proof: Proof, case: Case, path: ProgrammedPath) -> Verified
     """Check a proof of a path, by proving each of its claims again.
 
     Args:
-        proof: proof whose path premises were compared with the path, see :func:`.path_premises.hold_path`.
+        proof: proof whose path premises were compared with the path, see :func:`.path_premises.check_path_premises`.
         case: case of the proof.
         path: the path.
 
@@ -149,9 +152,9 @@ def check_path_proof(proof: Proof, case: Case, path: ProgrammedPath) -> Verified
 
 
 def _check(proof: Proof, begun: Callable[[], _Checker]) -> VerifiedWorkspace:
-    """Check a proof by its checker."""
+    """Check a proof with a checker."""
     if not proof.claims:
-        raise ProofError("the proof claims nothing")
+        raise ProofError("the proof has no claims")
     checker = begun()
     given = {(each.name, each.sense): each for each in proof.claims}
     expected = {each.label: each for each in checker.expected}
@@ -172,7 +175,7 @@ def _check(proof: Proof, begun: Callable[[], _Checker]) -> VerifiedWorkspace:
 
 
 class _Checker:
-    """Check of claims one after another; later claims use the bounds of earlier ones."""
+    """Check of claims one after another; later claims use the bounds of earlier claims."""
 
     def __init__(self, proof: Proof, case: Case, leg_error: float) -> None:
         workspace, premises = workspace_of_case(case), proof.premises
@@ -217,13 +220,13 @@ class _Checker:
         if each.kind is ClaimKind.RANK and given.reason in ("regular", "singular"):
             return self._rank(each, given)
         if (each.kind, given.reason) not in rules:
-            raise ProofError(f"'{given.reason}' is no reason of this claim")
+            raise ProofError(f"'{given.reason}' is not a valid reason for this claim")
         _stated(given)
         bound, limit, read = rules[each.kind, given.reason](each, given), each.limit, each.reading.from_value
         if limit is not None:
             beyond = bound - limit if each.sense is Sense.MAX else limit - bound
             if not beyond <= _ON_LIMIT * max(abs(limit), abs(bound)):
-                raise ProofError(f"the bound {bound:.10g} does not keep the case's limit {limit:.10g}")
+                raise ProofError(f"the bound {bound:.10g} does not satisfy the case's limit {limit:.10g}")
         self._bounds[each.label] = bound
         kept = None if limit is None else read(limit)
         return CheckedClaim(*each.label, each.reading.dimension, read(bound), kept)
@@ -237,12 +240,12 @@ class _Checker:
     def _rank(self, each: Claim, given: ProofClaim) -> CheckedClaim:
         """Check that J, or the constraint wrenches, keep their rank, or that J is singular between two points."""
         is_refuted, robots = given.reason == "singular", self.robot.within_tolerance
-        by_machine = is_refuted and any(len(side) > self._root.coordinates for side in given.sides)
-        if by_machine and robots is None:
-            raise ProofError("the claim is about the exact robot")
-        tolerance = self._tolerance if by_machine or not is_refuted else 0.0
+        is_within_tolerance = is_refuted and any(len(side) > self._root.coordinates for side in given.sides)
+        if is_within_tolerance and robots is None:
+            raise ProofError(_WITHOUT_TOLERANCE)
+        tolerance = self._tolerance if is_within_tolerance or not is_refuted else 0.0
         # For six straight legs, bounds of the changes of rows prove larger boxes than error coordinates do.
-        has_errors = by_machine or self.robot.legs is None
+        has_errors = is_within_tolerance or self.robot.legs is None
         built = robots.symbols.built if robots is not None and tolerance and has_errors else None
         claim = rank_claim(self._case, self.robot.model, self._root, each.name, tolerance, built)
         if is_refuted:
@@ -250,7 +253,7 @@ class _Checker:
         else:
             self._show(claim, given.unpacked())
             claim.finish()
-        return CheckedClaim(*each.label, is_refuted=is_refuted, by_machine=by_machine)
+        return CheckedClaim(*each.label, is_refuted=is_refuted, is_within_tolerance=is_within_tolerance)
 
     def _program(self, expression: SX, sense: Sense, given: ProofClaim, layout: Layout) -> float:
         """Return the bound of an expression in the symbols of a layout, from a tree of ``certify``."""
@@ -262,21 +265,21 @@ class _Checker:
         return -nlp.sign * checked.bound
 
     def _number(self, claim: Claim, given: ProofClaim) -> float:
-        """Return the bound of a quantity from a tree of ``certify``, and from a lemma for a tolerance."""
+        """Return the bound of a quantity from a tree of ``certify`` and, within a tolerance, from a lemma."""
         layout = self.robot.place if claim.key == REACH else self.robot.layout
         if self.robot.dependent:
-            raise ProofError("a quantity with dependent coordinates of the pose needs a tree of boxes")
+            raise ProofError("the proof has no tree of boxes, which a quantity with dependent pose coordinates needs")
         if self.robot.within_tolerance is None:
             return self._program(claim.expression, claim.sense, given, layout)
         if claim.key != REACH and any(reach.label not in self._bounds for reach in self.robot.reaches):
-            raise ProofError("the claims about the reach of limbs within the tolerance have no proof")
+            raise ProofError("the proof does not prove that all limbs reach every pose within the tolerance")
         return self._within_tolerance(self.robot.within_tolerance, claim, given)
 
     def _followed(self, claim: Claim, given: ProofClaim) -> float:
         """Return the bound of a quantity from a tree of boxes in which the loops are followed."""
         symbols = self.robot.followed
         if symbols is None:
-            raise ProofError("'boxes' is no reason of this claim")
+            raise ProofError("'boxes' is not a valid reason for this claim")
         bound, loops = _stated(given), self._loops
         expression = symbols.of(claim.expression, loops.robot.of_errors, loops.robot.varying)
         number = NumberClaim(loops, expression, claim.sense, bound)
@@ -294,7 +297,7 @@ class _Checker:
         try:
             self._show(SecondOrderClaim(robots, claim.expression, rest), _WHOLE)
         except UncoveredError as error:
-            raise ProofError(f"the check has no rule for {error}") from None
+            raise ProofError(f"the checker has no rule for {error}") from None
         except ProofError as error:
             raise ProofError(f"{lemma.name}: {error}") from None
         return bound
@@ -326,16 +329,17 @@ class _Checker:
         if given.reason == "lengths":
             lengths = [self._length(self._case.model.legs[leg].name, sense) for sense in senses]
         else:
-            # Lengths of one robot at two poses, without the parts of its errors along c_b and c_p.
+            # Leg lengths of one robot at two poses, without the components of the joint-centre errors along c_b and
+            # c_p.
             about = [np.array(side, dtype=float) for side in given.sides]
             if robots is None:
-                raise ProofError("the claim is about the exact robot")
+                raise ProofError(_WITHOUT_TOLERANCE)
             if len(about) != 2 or any(side.shape != (3,) or not np.isfinite(side).all() for side in about):
-                raise ProofError("the claim has no two directions")
+                raise ProofError("the claim does not have two directions")
             directions = Directions(each.name, *about)
             claims = [length_of_one_robot(robots.symbols, leg, sense, directions) for sense in senses]
             lengths = [self._within_tolerance(robots, one, self._lemma(one.name, one.sense)) for one in claims]
-            # This part is the same at both poses, so that it counts with the sum of the weights.
+            # These components are the same at both poses, so they count with the sum of the weights.
             left = abs(sum(each.weights)) * self._tolerance * sum(float(np.linalg.norm(side)) for side in about)
         parts = [weight * length for weight, length in zip(each.weights, lengths, strict=True)]
         off = left + 16 * _ROUNDING * (abs(parts[0]) + abs(parts[1]) + left)
@@ -361,9 +365,9 @@ class _Checker:
         return bound
 
     def _error(self, each: Claim, given: ProofClaim) -> float:
-        """Return the bound of a pose error: the first-order parts by trees, the whole error from both parts."""
+        """Return the bound of a pose error; trees prove the first-order parts, and these bound the whole error."""
         if len(self._firsts) < len(_FIRSTS):
-            raise ProofError("the other of the two pose errors has no proof")
+            raise ProofError("the proof has only one of the two pose errors")
         position, rotation = (self._firsts[name] for name in _FIRSTS)
         is_rotation = each.reading is not LENGTH
         self._show(ErrorClaim(self._posed, self._firsts[each.name], is_rotation=is_rotation), given.unpacked())
@@ -373,13 +377,16 @@ class _Checker:
         reach = float(np.linalg.norm(legs.platform, axis=1).max()) * (1 + _ROUNDING)
         whole = whole_errors(position, rotation, self._eps * (1 + _ROUNDING), shortest, reach)[is_rotation]
         if not math.isfinite(whole):
-            raise ProofError("the errors are too large: their second-order part has no bound")
+            raise ProofError("the errors are too large: the second-order part of the pose error has no bound")
         return whole
 
     def _motor(self, each: Claim, given: ProofClaim) -> float:
         """Return the bound of an actuator quantity; quantities with one tree are proved together."""
         if rate_relations(self.robot.model.actuators).shape[0]:
-            raise ProofError("the loops constrain the actuator rates; forces and speeds have no proof then")
+            raise ProofError(
+                "the robot's loops impose relations between actuator rates: forces and speeds of such a "
+                "robot have no proof"
+            )
         if each.label not in self._shown:
             # Quantities of an actuator under one load share the tree of one search.
             motors = ((one, one.motor) for one in self.expected if one.label in self._given)
@@ -433,7 +440,7 @@ class _PathChecker(_Checker):
     def check(self, each: Claim, given: ProofClaim) -> CheckedClaim:
         """Check one claim; trees of ``certify`` are refused, as their boxes do not cover the whole path."""
         if given.reason not in _ALONG_PATH:
-            raise ProofError(f"'{given.reason}' is no reason of a claim about a path")
+            raise ProofError(f"'{given.reason}' is no known kind of proof for a claim about a path")
         return super().check(each, given)
 
     def _coordinate(self, motor: Motor | None) -> SX | None:

@@ -1,15 +1,17 @@
-"""Closed loops over boxes: existence and uniqueness of the assembly mode over all independent coordinates.
+"""Proof that loops over a box close at exactly one point for all values of the independent coordinates.
 
-Over a box with coordinates ``e_I`` and ``e_D`` from -1 to 1, independent and dependent, the loop equations are
-``0 = g + A_I e_I + A_D e_D + [-r, r]``. For a matrix Y near the inverse of A_D, a closed point of the box has
+Over a box, let ``e_I`` be the independent and ``e_D`` the dependent coordinates, scaled to -1 to 1. The loop equations
+are ``0 = g + A_I e_I + A_D e_D + [-r, r]``. For a matrix Y near the inverse of A_D, a closed point of the box has
 
     e_D = off - T e_I + [-rho, rho],      off = -Y g,    T = Y A_I,    rho >= |I - Y A_D| 1 + |Y| r.
 
-If the right side lies inside of the box for every e_I, the map ``e_D - Y g`` has a fixed point there (Brouwer): a
-closed point. If moreover ``|I - Y J_D|`` has a spectral radius below 1 for the derivatives over the box, the point is
-unique, as ``Y (g(z) - g(z'))`` is not 0 for two points with the same e_I. It is a continuous function of e_I.
+If the right side lies inside the box for every e_I, the map ``e_D - Y g`` has a fixed point in the box (Brouwer), and
+this is a closed point. If moreover ``|I - Y J_D|`` has a spectral radius below 1 for the derivatives over the box, the
+point is unique, as ``Y (g(z) - g(z'))`` is not 0 for two points with the same e_I. The closed point is then a
+continuous function of e_I.
 
-Newton's method computes closed points, and a small box about each of them proves it. Source: R. Krawczyk,
+Newton's method computes approximate closed points; the criterion above on a small box about each one proves the exact
+point. Source: R. Krawczyk,
 *Newton-Algorithmen zur Bestimmung von Nullstellen mit Fehlerschranken*, Computing 4 (1969).
 """
 
@@ -32,32 +34,34 @@ from .forms import PRODUCT, UP, AffineMatrix, Forms, inverses, off_identity
 from .motion_matrix import PosedRobot
 from .pose_boxes import box_words
 
-#: Largest residual of a closed loop; equations are of order 1, and Newton's method ends at rounding.
+#: Largest residual of a closed loop. Equations are scaled to values of about 1, and Newton's method ends at rounding
+#: errors.
 _CLOSED = 1e-10
-#: Largest residual of further equations of a loop: in another assembly mode it is of order 0.1.
+#: Largest residual of the other equations of a loop; in another assembly mode their residual is about 0.1.
 _OTHER = 1e-6
 #: Largest number of Newton steps, steps on a path between closed points, and steps from home to another pose.
 _STEPS, _WAY, _FROM_HOME = 12, 8, 40
-#: Singular values below this part of the largest are zero.
+#: Fraction of the largest singular value below which singular values count as zero.
 _ZERO = 1e-9
-#: Number of points about the start for the search of dependent equations, and their distance in parts of the workspace.
+#: Number of points about the start at which dependent equations are identified, and distance of these points relative
+#: to the workspace.
 _POINTS, _SPREAD, _SEED = 4, 0.5, 1
 #: Factor by which widths of dependent coordinates grow, and number of attempts.
 _WIDER, _ATTEMPTS = 1.2, 4
-#: Smallest and largest half width of a dependent coordinate, in parts of its size.
+#: Smallest and largest half width of a dependent coordinate, relative to the scale of the coordinate.
 _LEAST, _MOST = 1e-9, 1.0
-#: Number of pairs of boxes that are compared at once, and number of ends in a search for touching boxes.
+#: Number of pairs of boxes that are compared at once, and number of box bounds in a search for touching boxes.
 _BLOCK, _ENDS = 512, 2**22
 
 
 class LoopPoints:
-    """Points at which selected equations (k, 1) of a robot's loops hold."""
+    """Points that satisfy selected loop equations (k, 1) of a robot."""
 
     def __init__(self, robot: PosedRobot, equations: SX) -> None:
         self._size, self._values, self._slopes = robot.size, robot.function(equations), robot.slopes(equations)
 
     def at(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return left sides (B, k) and their derivatives (B, k, n) at points (B, n), for coordinates of size 1."""
+        """Return left sides (B, k) at points (B, n), and derivatives (B, k, n) with respect to scaled coordinates."""
         (g,) = self._values(z)
         return g[:, :, 0], self._slopes(z) * self._size
 
@@ -70,14 +74,15 @@ class LoopPoints:
         steps: int = 1,
         zero: float | None = None,
     ) -> FloatArray:
-        """Return closed points (B, n) at the ends of paths along which left sides fall to 0; NaN where a path fails.
+        """Return closed points (B, n) at the ends of paths along which the left sides decrease to 0.
 
-        Args:
+        The result is NaN where a path fails. Args:
             z: (B, n) points where the paths begin.
-            moving: coordinates that Newton's method computes from the others.
-            to: (B, f) final values of the other coordinates; None to keep their values.
+            moving: indices of the coordinates that Newton's method computes from the other coordinates.
+            to: (B, f) final values of the other coordinates; None keeps the values of these coordinates.
             steps: number of steps of the path.
-            zero: threshold of slopes, see :func:`.forms.inverses`; None if the equations determine ``moving``.
+            zero: threshold for zero singular values, see :func:`.forms.inverses`; None if the equations determine
+                ``moving``.
         """
         z, others = z.copy(), [k for k in range(z.shape[1]) if k not in moving]
         to = z[:, others] if to is None else to
@@ -92,7 +97,7 @@ class LoopPoints:
                 if not np.nanmax(np.abs(g), initial=0.0) > 1e-3 * _CLOSED:
                     break
                 z[:, moving] -= self._size[moving] * (inverses(J[:, :, moving], zero) @ g[:, :, None])[:, :, 0]
-            # The left sides cannot fall further beyond a fold: steps from there may end in any assembly mode.
+            # At a fold the left sides cannot decrease further: steps beyond it may end in any assembly mode.
             off = np.abs(self.at(z)[0] - left * first).max(axis=1, initial=0.0)
             z[(size > _CLOSED) & ~(off <= size / steps)] = np.nan
         z[~(np.abs(self.at(z)[0]).max(axis=1, initial=0.0) <= _CLOSED)] = np.nan
@@ -100,10 +105,13 @@ class LoopPoints:
 
 
 def start_of(robot: PosedRobot) -> FloatArray:
-    """Return closed loops (n,) in the home assembly mode at or near the workspace centre, or refuse the proof."""
+    """Return a closed point (n,) in the home assembly mode at or near the workspace centre.
+
+    The proof is refused without a closed point.
+    """
     points, centre, n = LoopPoints(robot, robot.equations), robot.centre[None], len(robot.centre)
     unknowns = list(range(len(robot.free), n))
-    # Slopes of dependent equations are rounding, and must not cause a step.
+    # Derivatives of dependent equations are rounding errors and must not cause a step.
     is_closed = np.abs(points.at(centre)[0]).max(initial=0.0) <= _CLOSED
     # Pose coordinates move only if the unknowns cannot close the loops.
     for moving in [unknowns] * bool(unknowns) + [list(range(n))]:
@@ -114,13 +122,13 @@ def start_of(robot: PosedRobot) -> FloatArray:
 
 
 def is_home(robot: PosedRobot, z: FloatArray) -> bool:
-    """Return whether a closed point (n,) satisfies all loop equations in home's working mode; false for NaN."""
+    """Return whether a closed point (n,) satisfies all loop equations in the home working mode; False for NaN."""
     loops, signs = robot.function(robot.loops, robot.signs)(z[None])
     return bool(np.isfinite(z).all() and (np.abs(loops) <= _OTHER).all() and (signs > 0).all())
 
 
 def needed_equations(robot: PosedRobot, start: FloatArray) -> list[int]:
-    """Return the independent equations, by their rank at a few closed points."""
+    """Return the indices of independent equations, chosen by rank at a few closed points."""
     if not robot.equations.numel():
         return []
     points, count, n = LoopPoints(robot, robot.equations), len(robot.free), len(start)
@@ -137,11 +145,11 @@ class Enclosed:
     """Closed points over B boxes.
 
     Attributes:
-        lower, upper: (B, n) ends of all coordinates; NaN where nothing is known.
-        off, T, rho: (B, k), (B, k, f) and (B, k) coefficients of the relation for the dependent coordinates.
+        lower, upper: (B, n) bounds of all coordinates; NaN without a proved closed point.
+        off, T, rho: (B, k), (B, k, f) and (B, k) coefficients of the dependent coordinates, see the module's head.
         near: (B, n) computed closed points at the centres.
-        shares: (B, f) influence of each independent coordinate on the others.
-        is_known: (B,) whether there is exactly one closed point for all values of the independent coordinates.
+        shares: (B, f) influence of each independent coordinate on the dependent coordinates.
+        is_known: (B,) whether each value of the independent coordinates provably has exactly one closed point.
     """
 
     lower: FloatArray
@@ -158,15 +166,15 @@ class Enclosed:
         return Enclosed(*(each[which] for each in vars(self).values()))
 
     def boxes(self, which: NDArray[np.bool_]) -> ClosedBoxes:
-        """Return some of the boxes, with the points that show whether they belong to one assembly mode."""
+        """Return some of the boxes, with closed points that tell whether these boxes belong to one assembly mode."""
         return ClosedBoxes(self.lower[which], self.upper[which], self.near[which])
 
 
 class ClosedBoxes(NamedTuple):
-    """B boxes with one closed point at each value of the independent coordinates.
+    """B boxes that contain exactly one closed point for each value of the independent coordinates.
 
     Attributes:
-        lower, upper: (B, n) ends of all coordinates.
+        lower, upper: (B, n) bounds of all coordinates.
         near: (B, n) computed closed points at the centres.
     """
 
@@ -176,7 +184,7 @@ class ClosedBoxes(NamedTuple):
 
 
 class Assembly:
-    """Closed loops of a robot that change continuously from those at a start (n,), by k independent equations.
+    """Closed points of a robot that k independent equations connect continuously with a start point (n,).
 
     Raises:
         UncoveredError: an equation has an operation without a rule.
@@ -188,14 +196,14 @@ class Assembly:
         self.points = LoopPoints(robot, equations)
         self.dependent = self._determined(start) if self._count else []
         self.independent = [k for k in range(len(start)) if k not in self.dependent]
-        # Dependent pose coordinates of the start may lie outside of a narrow box.
+        # The dependent pose coordinates of the start may lie outside a narrow box.
         (middle,) = self.moved(start[None], robot.centre[None][:, self.independent])
         self.start = middle if is_home(robot, middle) else start
         columns = ca.jacobian(equations, robot.z)[:, self.dependent]
         self._arithmetic = robot.forms(ca.vertcat(SX(0, 1), equations, ca.vec(ca.densify(columns))))
 
     def _determined(self, start: FloatArray) -> list[int]:
-        """Return the dependent coordinates: dependent ones of the pose, and all unknowns."""
+        """Return the indices of the dependent coordinates: dependent coordinates of the pose, and all unknowns."""
         poses, count = len(self._robot.free), self._count
         unknowns = list(range(poses, len(start) - self._robot.errors))
         if count < len(unknowns):
@@ -203,7 +211,7 @@ class Assembly:
         J, chosen = self.points.at(start[None])[1][0], [*self._robot.dependent, *unknowns]
         values = np.linalg.svd(J[:, chosen], compute_uv=False) if len(chosen) == count else np.zeros(1)
         if not values.min(initial=1.0) > _ZERO * values.max(initial=0.0):
-            raise ProofError("the loops are singular in the middle of the workspace")
+            raise ProofError("the loops are singular at the workspace centre")
         return chosen
 
     def moved(self, z: FloatArray, to: FloatArray) -> FloatArray:
@@ -215,7 +223,7 @@ class Assembly:
         return self.moved(np.broadcast_to(self.start, (len(to), len(self.start))), to)
 
     def followed(self, forms: Forms, closed: Enclosed) -> Forms:
-        """Return forms of all coordinates as forms of the independent ones, along closed points."""
+        """Return forms of all coordinates in terms of the independent coordinates, along closed points."""
         dependent, slopes = forms.a[:, :, self.dependent], forms.a[:, :, self.independent]
         size, most = np.abs(dependent), np.abs(closed.off) + np.abs(closed.T).sum(axis=2)
         terms = np.abs(forms.c) + np.abs(slopes).sum(axis=2) + (size @ most[:, :, None])[:, :, 0]
@@ -227,7 +235,7 @@ class Assembly:
     def enclosed(self, lower: FloatArray, upper: FloatArray, near: FloatArray | None = None) -> Enclosed:
         """Return the closed points over boxes of independent coordinates (B, f).
 
-        Closed points at the centres (B, n) are computed from the start if ``near`` is left out.
+        If ``near`` is left out, closed points (B, n) at the centres are computed from the start.
         """
         if near is None:
             near = self.near(middles(lower, upper)[0])
@@ -254,7 +262,7 @@ class Assembly:
         return found
 
     def _show(self, found: Enclosed, rows: NDArray[np.int64]) -> FloatArray:
-        """Store the proved closed points over some boxes, and return widths (N, k) that may succeed for the others."""
+        """Store the proved closed points over some boxes; return widths (N, k) to try for the remaining boxes."""
         free, D, k = self.independent, self.dependent, self._count
         low, high = found.lower[rows], found.upper[rows]
         values = self._arithmetic(low, high)
@@ -272,7 +280,7 @@ class Assembly:
         )
         J = 0.5 * (least + most)
         single, _, _ = AffineMatrix(J, np.zeros((len(J), 0, k, k)), 0.5 * (most - least)).contracted(Y)
-        # By rounding, one end may be nearer to the centre than the other.
+        # Because of rounding, one bound may be nearer to the centre than the other bound.
         room = np.nextafter(np.minimum(high[:, D] - centre, centre - low[:, D]), 0.0)
         good = np.asarray((reach * radius * UP < room).all(axis=1) & single & np.isfinite(reach).all(axis=1))
         kept = rows[good]
@@ -284,7 +292,8 @@ class Assembly:
         """Return whether boxes contain a closed point (N, n), by a proof in a small box about it."""
         D, at = self.dependent, near[:, self.independent]
         small = self.enclosed(at, at, near)
-        # The relation gives a narrower place: for a constant coordinate, the boxes are not wider than the small one.
+        # The affine relation gives a narrower range: for a constant coordinate, the boxes are not wider than the small
+        # box.
         centre, radius = (each[:, D] for each in middles(small.lower, small.upper))
         off, rest = radius * small.off, radius * (np.abs(small.T).sum(axis=2) + small.rho) * UP
         rest += PRODUCT * (np.abs(centre) + np.abs(off) + rest)
@@ -295,9 +304,9 @@ class Assembly:
     def refuse_apart(self, boxes: ClosedBoxes) -> None:
         """Refuse boxes whose closed loops are not proved to belong to the assembly mode of the start.
 
-        Over each box the closed point changes continuously. A small box that provably contains a closed point ties two
-        boxes with a common value of the independent coordinates, if it lies between the ends of both: their closed
-        points there are the same. Every box must be reached in this way from the box of the start.
+        Over each box the closed point changes continuously. Two boxes with a common value of the independent
+        coordinates are tied if a small box with a proved closed point lies inside both: both then have the same closed
+        point there. A chain of such ties must connect every box with the box of the start.
         """
         lower, upper = boxes.lower[:, self.independent], boxes.upper[:, self.independent]
         start = np.broadcast_to(self.start, boxes.near.shape)
@@ -315,13 +324,16 @@ class Assembly:
         if not is_reached.all():
             box = box_words(lower[~is_reached][0], upper[~is_reached][0])
             raise ProofError(
-                f"the loops closed in the box {box} are not shown to be of the same assembly mode as the others"
+                f"the loops closed in the box {box} are not proved to belong to the assembly mode of the start"
             )
 
     def _reach(
         self, boxes: ClosedBoxes, is_reached: NDArray[np.bool_], border: NDArray[np.intp], pairs: NDArray[np.intp]
     ) -> None:
-        """Mark boxes tied to touching boxes of the border, by pairs of indices: one on the border, another one."""
+        """Mark boxes that are tied to a touching box of the border.
+
+        Pairs of indices name the border box and the other box.
+        """
         lower, upper = boxes.lower[:, self.independent], boxes.upper[:, self.independent]
         for begin in range(0, len(pairs), _BLOCK):
             block = pairs[begin : begin + _BLOCK]

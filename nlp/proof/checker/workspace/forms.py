@@ -23,14 +23,15 @@ from ..polynomials import UNIT, Polynomial, places
 UP = 1 + 1024 * UNIT
 #: Rounding of a product of matrices with fewer than 400 terms, relative to the product of absolute values.
 PRODUCT = 512 * UNIT
-#: Relative enlargement of the solution of a system that makes it a bound: its rounding is far below.
+#: Relative enlargement that turns the computed solution of a linear system into a bound: rounding errors are far
+#: smaller.
 ENLARGED = 1e-6
-#: Steps of the power method, and part of the largest singular value below which others are zero.
+#: Number of steps of the power method; and fraction of the largest singular value below which singular values are zero.
 _STEPS, _FLAT = 12, 1e-14
 
 
 class AffineMatrix(NamedTuple):
-    """Matrices over B boxes: in ``M + sum_k A_k e_k + [-E, E]``, with (B, m, c), (B, n, m, c) and (B, m, c)."""
+    """Matrices over B boxes, enclosed by ``M + sum_k A_k e_k + [-E, E]``: (B, m, c), (B, n, m, c) and (B, m, c)."""
 
     M: FloatArray
     A: FloatArray
@@ -68,7 +69,7 @@ class AffineMatrix(NamedTuple):
     def contracted(
         self, C: FloatArray, moved: FloatArray | None = None
     ) -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
-        """Return where C (B, c, m) times the matrices is invertible, bounds of ``|I - C M|``, and shares (B, n) of CA.
+        """Return where C (B, c, m) times M is invertible, bounds of ``|I - C M|``, and shares (B, n) of ``C A``.
 
         ``moved`` (B, k, c, c) has bounds of the terms of ``C A`` in another grouping; None to bound each term.
         """
@@ -79,7 +80,7 @@ class AffineMatrix(NamedTuple):
 
 
 class Forms(NamedTuple):
-    """Expressions over B boxes: in ``c + sum_i a_i e_i + [-r, r]``, (B, R), (B, R, n) and (B, R), NaN if undefined."""
+    """Expressions over B boxes, in ``c + sum_i a_i e_i + [-r, r]``: (B, R), (B, R, n) and (B, R); NaN if undefined."""
 
     c: FloatArray
     a: FloatArray
@@ -95,7 +96,7 @@ class Forms(NamedTuple):
 
 
 class Values(NamedTuple):
-    """Polynomials of R expressions over boxes with ends of a shape (B, n)."""
+    """Polynomials of R expressions over boxes with bounds (B, n)."""
 
     polynomials: list[Polynomial]
     shape: tuple[int, int]
@@ -168,14 +169,14 @@ class FormArithmetic:
         self._arithmetic = PolynomialArithmetic(self.function)
 
     def __call__(self, lower: FloatArray, upper: FloatArray) -> Values:
-        """Return the expressions over boxes with ends (B, n)."""
+        """Return enclosures of the expressions over boxes with ends (B, n)."""
         given = () if self._given is None else self._given(lower, upper)
         return Values(self._arithmetic(lower.T, upper.T, given), lower.shape)
 
 
 @np.errstate(all="ignore")
 def contraction(B: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:
-    """Return which nonnegative matrices (B, k, k) have a spectral radius below 1, and v with ``B v < v`` for these."""
+    """Return which nonnegative matrices (B, k, k) have a spectral radius below 1, and v with ``B v < v`` for them."""
     B = np.where(np.isfinite(B), B, np.inf)
     v, holds = np.ones(B.shape[:2]), np.zeros(len(B), dtype=bool)
     for _ in range(_STEPS):
@@ -191,7 +192,7 @@ def contraction(B: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:
 def inverses(matrices: FloatArray, zero: float | None = None) -> FloatArray:
     """Return approximate left inverses (B, c, m) of matrices (B, m, c); NaN where none exists.
 
-    Singular values below the part ``zero`` of the largest count as 0; None for the rounding threshold.
+    Singular values below the fraction ``zero`` of the largest count as 0; None sets the rounding threshold.
     """
     good = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
     found = np.full_like(np.swapaxes(matrices, 1, 2), np.nan)
@@ -210,7 +211,7 @@ def off_identity(C: FloatArray, M: FloatArray) -> FloatArray:
 
 @np.errstate(all="ignore")
 def solved(A: AffineMatrix, D: AffineMatrix) -> tuple[AffineMatrix, NDArray[np.bool_], FloatArray]:
-    """Return the solutions (B, c, k) of ``A Y = D``, where they are known (B,), and shares (B, n) in the remainder.
+    """Return the solutions (B, c, k) of ``A Y = D``, whether each is known (B,), and shares (B, n) in the remainder.
 
     A (B, m, c) may have more rows than columns. With C near a left inverse of A in the middle of a box, ``Y_0 = C D_0``
     and ``B >= |I - C A|``,
@@ -231,7 +232,7 @@ def solved(A: AffineMatrix, D: AffineMatrix) -> tuple[AffineMatrix, NDArray[np.b
     right = bound @ Q * UP
     wider = bound * (1 + ENLARGED)
     X = np.linalg.solve(np.eye(bound.shape[1]) - wider, right)
-    # Small entries have the rounding of the largest one before these steps.
+    # Before these steps, small entries have the rounding errors of the largest entry.
     for _ in range(2):
         X = right + wider @ np.maximum(X, 0.0)
     X *= 1 + ENLARGED

@@ -26,13 +26,13 @@ from .path_loops import PathAssembly
 from .path_root import PathRoot
 from .pose_boxes import Attempt, PoseRoot
 
-#: Test of omitted equations and screws at random errors: size of the errors in parts of the robot's length, part of the
-#: workspace about its middle with the poses, number of tests, and largest residual of a closed loop.
+#: Test of omitted equations and screws at random joint-centre errors: errors relative to the robot's length, fraction
+#: of the workspace about its centre that contains the poses, number of tests, and largest residual of a closed loop.
 _OFF, _SPREAD, _TESTS, _CLOSED, _SEED = 1e-2, 0.5, 4, 1e-9, 2
-#: Singular values below this part of the largest are zero.
+#: Fraction of the largest singular value below which singular values count as zero.
 _ZERO = 1e-9
-#: Test of omitted equations by moving a pose coordinate: step in parts of a length, or radians; largest change of the
-#: left sides; and number of position coordinates.
+#: Test of omitted equations by a motion of a pose coordinate: step relative to a length, or in radians; largest change
+#: of the left sides; and number of position coordinates.
 _SHORT, _ROUNDING, _POSITION = 1e-3, 1e-12, 3
 #: Largest number of coordinates of boxes with closed loops that are stored for a claim.
 _MOST_KEPT = 2**24
@@ -43,9 +43,9 @@ class PosedLoops(NamedTuple):
 
     Attributes:
         robot: expressions of the robot.
-        start: (n,) closed loops near the middle of the workspace, or at the first point.
-        assembly: loops that change continuously from the start.
-        tolerance: largest error of each joint centre; 0 for the exact robot.
+        start: (n,) closed point near the workspace centre, or at the first point of the path.
+        assembly: closed loops connected continuously with the start.
+        tolerance: largest error of each joint centre; 0 for the nominal design.
         needed: indices of the independent loop equations.
     """
 
@@ -61,18 +61,18 @@ def posed_loops(
 ) -> PosedLoops:
     """Return a robot with closed loops.
 
-    Loop equations that hold at all closed points anyway are left out, by their ranks at a few points. If this is wrong,
-    claims cover more points than the closed ones, and are only stronger.
+    Loop equations that follow from the others are omitted, by their ranks at a few points. If an equation is omitted
+    by mistake, claims cover more than the closed points, and are only stronger.
 
     Args:
         case: case with fixed dimensions.
         model: model of its robot without the unknowns in closed form.
         root: box of coordinates.
-        tolerance: largest error of each joint centre; 0 for the exact robot.
+        tolerance: largest error of each joint centre; 0 for the nominal design.
         built: model with joint-centre errors as coordinates; None for the nominal design.
 
     Raises:
-        ProofError: the loops cannot be closed in the middle of the workspace, are singular there or leave a joint free;
+        ProofError: the loops cannot be closed at the workspace centre, are singular there or leave a joint free;
             an expression has an operation without a rule; or joint-centre errors remove degrees of freedom.
     """
     if isinstance(root, PathRoot):
@@ -86,7 +86,7 @@ def posed_loops(
     try:
         assembly = Assembly(robot, robot.equations[needed] if needed else SX(0, 1), start)
     except UncoveredError as error:
-        raise ProofError(f"the check has no rule for {error}") from None
+        raise ProofError(f"the checker has no rule for {error}") from None
     if built is not None:
         _refuse_other_mobility(robot, assembly)
     if len(needed) < robot.equations.numel():
@@ -95,19 +95,19 @@ def posed_loops(
 
 
 def _along_path(case: Case, model: Model, root: PathRoot, about: PosedLoops, built: BuiltModel | None) -> PosedLoops:
-    """Return a robot with closed loops along a path, from those in a box about it; see :func:`posed_loops`."""
+    """Return a robot with closed loops along a path, from the closed loops in a box about the path."""
     robot, poses = PosedRobot(case, model if built is None else built.model, root), len(about.robot.free)
     following = [about.robot.free.index(k) for k in root.box.dependent]
     start = np.concatenate([[0.0], about.start[following], about.start[poses:]])
     try:
         assembly = PathAssembly(robot, robot.equations[about.needed, :], start, len(root.poses))
     except UncoveredError as error:
-        raise ProofError(f"the check has no rule for {error}") from None
+        raise ProofError(f"the checker has no rule for {error}") from None
     return PosedLoops(robot, assembly.start, assembly, about.tolerance, about.needed)
 
 
 def _refuse_narrow(robot: PosedRobot, assembly: Assembly, root: PoseRoot) -> None:
-    """Refuse an omitted equation that holds only because a pose coordinate has a narrow range."""
+    """Refuse an omitted equation that seems redundant only because a pose coordinate has a narrow range."""
     equations = ca.vertcat(robot.equations, robot.loops)
     # Constants of a robot that should be 0 may be rounding errors.
     first = robot.at(equations, assembly.start)
@@ -120,11 +120,11 @@ def _refuse_narrow(robot: PosedRobot, assembly: Assembly, root: PoseRoot) -> Non
             (z,) = assembly.moved(assembly.start[None], to[:, assembly.independent])
             off = np.abs(robot.at(equations, z) - first)
             if np.isfinite(z).all() and not off.max(initial=0.0) <= _ROUNDING:
-                raise ProofError("the loops cannot be closed everywhere in the workspace")
+                raise ProofError("the loops do not close everywhere in the workspace")
 
 
 def _refuse_other_mobility(robot: PosedRobot, assembly: Assembly) -> None:
-    """Refuse a tolerance if, at random errors, omitted equations or screws do not follow from the others."""
+    """Refuse a tolerance if, for random errors, omitted equations or screws do not follow from the kept ones."""
     rng, n = np.random.default_rng(_SEED), len(assembly.start) - robot.errors
     poses = [j for j in assembly.independent if j < n]
     for _ in range(_TESTS):
@@ -134,7 +134,7 @@ def _refuse_other_mobility(robot: PosedRobot, assembly: Assembly) -> None:
         (z,) = assembly.moved(assembly.start[None], to[:, assembly.independent])
         every = robot.at(ca.vertcat(robot.equations, robot.loops), z)
         if not (np.isfinite(z).all() and np.abs(every).max(initial=0.0) <= _CLOSED):
-            raise ProofError("with joint-centre errors the robot cannot take the poses of the workspace")
+            raise ProofError("with joint-centre errors the robot cannot reach the poses of the workspace")
         for each in (one for one in robot.members if one.rank < one.screws.shape[1]):
             columns = scaled_twists(each.screws, each.centre, SX(robot.length), each.size)
             sizes = np.linalg.svd(robot.at(columns, z), compute_uv=False)
@@ -158,7 +158,7 @@ class LoopClaim(ABC):
         try:
             self._entries = robot.forms(expressions)
         except UncoveredError as error:
-            raise ProofError(f"the check has no rule for {error}") from None
+            raise ProofError(f"the checker has no rule for {error}") from None
 
     @np.errstate(all="ignore")
     def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
@@ -192,10 +192,13 @@ class LoopClaim(ABC):
         self._kept += sum(each.size for each in boxes)
         if self._kept > _MOST_KEPT:
             most = _MOST_KEPT // sum(each.shape[1] for each in boxes)
-            raise ProofError(f"the claim takes more than {most:,} boxes with closed loops, and no more are kept")
+            raise ProofError(
+                f"the claim needs more than {most:,} boxes with closed loops, the largest number that the "
+                f"checker stores"
+            )
 
     def closed(self, lower: FloatArray, upper: FloatArray) -> Enclosed:
-        """Return the closed loops over boxes (B, c) for all errors, or over boxes (B, c + e) of poses and errors."""
+        """Return the closed loops over boxes (B, c) for all errors, or over boxes (B, c + e) with errors."""
         if lower.shape[1] == self.coordinates:
             errors = np.full((len(lower), self.errors), self.tolerance)
             lower, upper = np.hstack([lower, -errors]), np.hstack([upper, errors])

@@ -1,4 +1,4 @@
-"""Matrices of motion conditions, as expressions of the pose; their null space has the unresisted motions.
+"""Matrices of motion conditions as expressions of the pose. Their null space consists of the unresisted motions.
 
 They are built for the check from the model and the case only. A motion consists of the velocity v of the platform's
 origin and its angular velocity, here ``x = (v, length omega)``, and of joint rates. Each row is a condition:
@@ -9,15 +9,15 @@ origin and its angular velocity, here ``x = (v, length omega)``, and of joint ra
 
 With free actuators, x minus the motion ``sum_k u_k A_k`` of the actuators that move a member replaces x in its
 conditions; relations ``B u = 0`` between actuator rates are conditions too. With locked actuators the matrix has full
-column rank where J has full rank and the passive screws of each member are independent. With free ones its null space
-has as many dimensions as the robot has degrees of freedom and idle rates ``u``, and more only where the constraint
-wrenches or the passive screws lose rank.
+column rank where J has full rank and the passive screws of each member are independent. With free actuators, the
+dimension of the null space is the number of degrees of freedom plus the number of idle rates ``u``. It is larger only
+where the constraint wrenches or the passive screws lose rank.
 
-The loops of members with nested loops are solved, with their rank at almost all poses. A separate block claims that
-each loop keeps its rank: as many of its conditions as the rank are its columns.
+The loops of members with nested loops are solved, with the rank that they have at almost all poses. A separate block
+claims that each loop keeps this rank: its columns are independent conditions of the loop.
 
 A rotation is a polynomial matrix over a positive number. Rows of limbs that are linear in the rotation are multiplied
-by that number, so that they are polynomials.
+by that number and so become polynomials.
 """
 
 from __future__ import annotations
@@ -39,13 +39,13 @@ from .....models.rows import independent_rows
 from ....case.case import Case
 from ....case.pose import Free
 from ....case.workspace import TurnKind
-from ...statement.machine import has_straight_legs
+from ...statement.fixed_robot import has_straight_legs
 from ..proof_file import ProofError
 from .forms import FormArithmetic
 from .path_root import PathRoot
 from .pose_boxes import PoseRoot
 
-#: Singular values below this part of the largest are zero at the middle of the workspace.
+#: Fraction of the largest singular value, at the workspace centre, below which singular values count as zero.
 _ZERO = 1e-9
 #: Poses of a workspace, or of a path.
 Root: TypeAlias = "PoseRoot | PathRoot"
@@ -56,32 +56,32 @@ class PosedRobot:
 
     Args:
         case: case with fixed dimensions.
-        model: model of its robot, possibly without some of its unknowns; parameters beyond those of the case are
-            components of joint-centre errors, and come last.
+        model: model of the robot, possibly without some unknowns. Components of joint-centre errors may follow the
+            parameters of the case.
         root: box of coordinates.
 
     Attributes:
         z: (n, 1) symbols: varying coordinates of the pose, then unknowns, then errors.
         errors: number of components of errors.
         coordinates: number of coordinates of boxes.
-        free: indices of the varying coordinates among those of boxes.
-        dependent: positions of the dependent coordinates among these.
+        free: indices of the varying coordinates among the coordinates of boxes.
+        dependent: indices of the dependent coordinates in ``free``.
         given: (g, 1) symbols whose values follow from the coordinates of boxes; see :class:`.pose_boxes.PoseSymbols`.
         varying: (v, 1) symbols of the pose, and of the unknowns.
-        of_errors: (e, 1) symbols of the errors.
-        centre: (n,) middle of the workspace, or first point of a path, with unknowns and errors of 0.
-        size: (n,) sizes that make coordinates comparable: half ranges, sizes of the unknowns, and the tolerance.
+        of_errors: (e, 1) symbols of the joint-centre errors.
+        centre: (n,) workspace centre, or first point of a path, with unknowns and errors of 0.
+        size: (n,) scales that make coordinates comparable: half ranges, scales of the unknowns, and the tolerance.
         length: characteristic size of the robot, factor of the angular velocities.
         position: (3, 1) origin of the platform frame, length.
         rotation: (3, 3) platform to world coordinates.
-        scale: (1, 1) factor of rows that are linear in the rotation; at least 1.
+        scale: (1, 1) factor, at least 1, of rows that are linear in the rotation.
         rows: rows of limbs, one wrench each, with moments about the platform's origin.
         members, actuators: members and actuators of the robot.
         legs: base joint (3, 1) of each straight leg, and its platform joint a in the world, ``scale R a``.
         nested: (m, k) each, conditions of nested loops on rates of a member's passive joints.
-        equations: (k, 1) loop equations of order 1, 0 where the loops are closed.
-        loops: (l, 1) further equations of the same loops, which other assembly modes do not satisfy.
-        signs: (s, 1) expressions that are positive in home's working mode.
+        equations: (k, 1) loop equations, 0 where the loops are closed, scaled to values of about 1.
+        loops: (l, 1) further equations of the same loops; other assembly modes violate these.
+        signs: (s, 1) expressions that are positive in the home working mode.
     """
 
     def __init__(self, case: Case, model: Model, root: Root) -> None:
@@ -167,7 +167,7 @@ class PosedRobot:
         return self._root.values_at(z[:, :1])
 
     def slopes(self, expressions: SX) -> Callable[[FloatArray], FloatArray]:
-        """Return a function that gives the derivatives (P, k, n) of expressions (k, 1) at points (P, n)."""
+        """Return a function for the derivatives (P, k, n) of expressions (k, 1) at points (P, n)."""
         own, through = (ca.jacobian(expressions, each) for each in (self.z, self.given))
         values, root = self.function(own, through), self._root
 
@@ -181,13 +181,13 @@ class PosedRobot:
 
 
 def turned_rotation(root: Root, turn: list[SX]) -> tuple[SX, SX]:
-    """Return the rotation (3, 3) times a positive number, and this number: polynomials of the rotation coordinates.
+    """Return the rotation (3, 3) times a positive number, and this number, as polynomials of the coordinates.
 
-    Four coordinates are a quaternion of any size except zero.
+    Four coordinates are a quaternion of any nonzero norm.
     """
 
     def of_quaternion(r: SX, w: SX | int = 1) -> tuple[SX, SX]:
-        """Return the rotation of the quaternion (w, r), times its squared size."""
+        """Return the rotation of the quaternion (w, r), times its squared norm."""
         square = ca.sumsqr(r)
         return (w * w - square) * SX.eye(3) + 2 * r @ r.T + 2 * w * ca.skew(r), w * w + square
 
@@ -202,7 +202,7 @@ def turned_rotation(root: Root, turn: list[SX]) -> tuple[SX, SX]:
 def motion_matrix(robot: PosedRobot, start: FloatArray, *, is_locked: bool) -> tuple[SX, int]:
     """Return the matrix (m, c), and the claimed dimension of its null space: degrees of freedom and idle rates.
 
-    With locked actuators the dimension is 0. With free ones, the matrix of a robot given by rows has its couples only.
+    With locked actuators the dimension is 0. With free actuators, the matrix of a robot given by rows has only couples.
 
     Args:
         robot: expressions of the robot.
@@ -222,7 +222,7 @@ def motion_matrix(robot: PosedRobot, start: FloatArray, *, is_locked: bool) -> t
     if generic is not None:
         mobility, idle = 6 - generic.constraints, generic.idle
     else:
-        # If all poses are closed, the rank is that at almost all poses.
+        # If the loops close at all poses, the rank is the rank at almost all poses.
         away = np.random.default_rng(0).uniform(-0.5, 0.5, (4, len(start))) * robot.size * (not robot.model.unknowns)
         spectra = np.linalg.svd(np.hsplit(robot.at(matrix, (start + away).T), len(away)), compute_uv=False)
         mobility, idle = matrix.shape[1] - max(int(np.count_nonzero(each > _ZERO * each[0])) for each in spectra), 0
@@ -260,7 +260,7 @@ def _whole_matrix(robot: PosedRobot, start: FloatArray, actuators: Sequence[Actu
 def _motion_rows(robot: PosedRobot, start: FloatArray, actuators: Sequence[Actuator]) -> SX:
     """Return the conditions (m, c) of limbs, with columns of the platform, of passive joints and of actuators.
 
-    For each member, as many screws are taken as its rank: where these are independent, they span all screws.
+    For each member, the number of kept screws is its rank. Where the kept screws are independent, they span all screws.
     """
     # For each limb: the label by which actuators move it, its conditions on the motion, and its passive motions.
     limbs = [(row.label.member, _work(robot, row), SX(6, 0)) for row in robot.rows]
@@ -284,15 +284,15 @@ def _motion_rows(robot: PosedRobot, start: FloatArray, actuators: Sequence[Actua
 
 
 def _independent(rows: FloatArray, rank: int, whose: str) -> list[int]:
-    """Return as many independent rows as the rank; rows of joints that loops lock are rounding errors."""
+    """Return independent rows, as many as the rank. Rows of joints that loops lock are only rounding errors."""
     chosen = sorted(independent_rows([rows])) if rank else []
     if len(chosen) != rank:
-        raise ProofError(f"{whose} are singular in the middle of the workspace")
+        raise ProofError(f"{whose} are singular at the workspace centre")
     return chosen
 
 
 def _work(robot: PosedRobot, row: Wrench) -> SX:
-    """Return the work (1, 6) of a limb's row per unit of each motion component."""
+    """Return the work (1, 6) of a limb's row for a unit of each motion component."""
     return ca.horzcat(row.force.T, row.moment.T / robot.length)
 
 

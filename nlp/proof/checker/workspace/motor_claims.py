@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from .....models import FloatArray, WrenchKind
 from ....case.case import Case
 from ....case.loads import Motion
-from ....case.motors import Motor, MotorNumber
+from ....case.motors import ActuatorQuantity, Motor
 from ....case.task import Sense
 from .closed_loops import Enclosed
 from .forms import PRODUCT, UP, AffineMatrix, SparseMatrices, solved
@@ -37,21 +37,21 @@ from .loop_claims import LoopClaim, PosedLoops
 from .motion_matrix import Root, driven_matrices
 from .pose_boxes import COORDINATES, Attempt
 
-#: Relative excess over a bound by which the value at a pose refutes a claim: far more than rounding.
+#: Relative excess over a bound from which the value at a pose refutes a claim: far more than rounding.
 _WRONG = 1e-6
-#: Relative amount by which a unit vector may be too long.
+#: Largest relative excess of a unit vector's length over 1.
 _UNIT = 1e-12
 
 
 class _Sum(NamedTuple):
-    """A quantity over boxes: an affine function (B, 1, 1), and norms of affine vectors (B, 3, 1) with factors."""
+    """A quantity over boxes: an affine function (B, 1, 1), plus factors times norms of affine vectors (B, 3, 1)."""
 
     affine: AffineMatrix
     sizes: Sequence[tuple[float, AffineMatrix]] = ()
 
 
 class _Number(NamedTuple):
-    """Product of a signed force and, for None, the speed; and the largest allowed value."""
+    """Product of a signed force and the speed (None stands for the speed), and the largest allowed value."""
 
     parts: tuple[float | None, ...]
     most: float
@@ -59,9 +59,9 @@ class _Number(NamedTuple):
 
 def _number_of(motor: Motor, sense: Sense, bound: float) -> _Number:
     """Return the product for the claim that a bound is the largest, or the smallest, value of a quantity."""
-    if motor.number is MotorNumber.SPEED:
+    if motor.number is ActuatorQuantity.SPEED:
         return _Number((None,), bound)
-    if motor.number is MotorNumber.POWER:
+    if motor.number is ActuatorQuantity.POWER:
         return _Number((-1.0 if motor.is_backwards else 1.0, None), bound)
     return _Number((float(sense.sign),), sense.sign * bound)
 
@@ -71,11 +71,11 @@ class MotorClaims(LoopClaim):
 
     Args:
         case: case with its loads and motions.
-        loops: robot whose loops do not constrain the actuator rates.
+        loops: robot; its loops must not impose relations between actuator rates.
         root: box of poses, or the path.
         claims: quantities with their bounds.
-        coordinate: (1, 1) actuator coordinate as an expression of the robot's coordinates, whose rate along the path
-            is the speed; None for the speed in any motion of the case.
+        coordinate: (1, 1) actuator coordinate as an expression of the robot's coordinates; its rate along the path is
+            the speed. None if the case's motions define the speed.
     """
 
     def __init__(
@@ -150,7 +150,7 @@ class MotorClaims(LoopClaim):
         return _Sum(AffineMatrix(-sign * M, -sign * A, E), sizes)
 
     def _speed(self, x: AffineMatrix, moment: AffineMatrix) -> tuple[_Sum, NDArray[np.bool_]]:
-        """Return the largest speed, and where it is known, from motions (B, 6, a) for unit rates of all actuators."""
+        """Return the largest speed, and whether it is known, from motions (B, 6, a) for unit rates of all actuators."""
         (linear, angular), B = self._fastest, len(x.M)
         fixed = AffineMatrix(*(np.zeros((*each.shape[:-2], 1, 1)) for each in x))
         if self._is_six_legs:
@@ -190,7 +190,7 @@ class MotorClaims(LoopClaim):
         return np.asarray(upper + (rest + PRODUCT * terms) * UP), middle
 
     def _inside(self, slopes: FloatArray, turn: AffineMatrix) -> FloatArray:
-        """Return multiples (B, corners) of a term that is at least 0 wherever rotations lie in the ball."""
+        """Return multiples (B, corners) of a term that is not negative where rotations lie in the ball."""
         p = len(self.free)
         r = turn.M[:, 0]
         size = np.sqrt((r * r).sum(axis=1))
@@ -208,15 +208,15 @@ class MotorClaims(LoopClaim):
         return np.asarray(best * room)
 
     def _of_errors(self, vector: AffineMatrix) -> FloatArray:
-        """Return the largest change (B,) of a column by joint-centre errors, each a vector of at most unit length."""
+        """Return the largest change (B,) of a column due to joint-centre errors with norms of at most 1."""
         own = vector.A[:, len(self.free) :].reshape(len(vector.A), -1, 3, vector.A.shape[2])
         return np.asarray(np.sqrt((own**2).sum(axis=(2, 3))).sum(axis=1) * UP)
 
 
 def _rates(loops: PosedLoops, coordinate: SX | None) -> list[SX]:
-    """Return derivatives of loop equations, and of a coordinate: by dependent coordinates, and by time along the path.
+    """Return derivatives of loop equations and of a coordinate, with respect to dependent coordinates and to time.
 
-    The list is empty without a coordinate.
+    The time runs along the path. The list is empty without a coordinate.
     """
     robot, (D, k) = loops.robot, (loops.assembly.dependent, len(loops.needed))
     if coordinate is None:
@@ -231,7 +231,7 @@ def _rates(loops: PosedLoops, coordinate: SX | None) -> list[SX]:
 def _along_path(
     L_u: AffineMatrix, L_t: AffineMatrix, q_u: AffineMatrix, q_t: AffineMatrix
 ) -> tuple[_Sum, NDArray[np.bool_]]:
-    """Return the absolute value of a coordinate's rate along the path, and where it is known."""
+    """Return the absolute value of a coordinate's rate along the path, and whether it is known."""
     known, rate = np.ones(len(q_t.M), dtype=bool), q_t
     if L_u.M.shape[1]:
         following, known, _ = solved(L_u, L_t)

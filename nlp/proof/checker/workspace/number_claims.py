@@ -1,4 +1,4 @@
-"""Claims about quantities that are no single expression: second-order terms, and quantities of six straight legs.
+"""Claims about second-order terms, and about quantities of six straight legs that are not single expressions.
 
 For six straight legs, with A their rows, F the diagonal matrix of their force norms, and J = F^-1 A with unit rows, the
 columns of ``P = A^-1 F`` are the platform's motions for unit changes of the leg lengths, affine up to a remainder
@@ -10,8 +10,8 @@ columns of ``P = A^-1 F`` are the platform's motions for unit changes of the leg
 * Two legs, as segments between their joints, have at least the distance of the least ``n.(x - y) / |n|`` over their
   ends x and y, for any vector n.
 
-A joint-centre tolerance changes every singular value by at most a known number; so larger smallest, and smaller largest
-values of the design are claimed.
+A joint-centre tolerance changes every singular value by at most a known number; so the claims about the design have
+margins: a larger smallest value, and a smaller largest value.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from .....models import FloatArray
 from ....case.pose import Free
 from ....case.task import Sense
 from ....errors import UncoveredError
-from ...statement.machine import Legs
+from ...statement.fixed_robot import Legs
 from ...statement.tolerance import is_smooth
 from ..polynomials import UNIT
 from .closed_loops import Enclosed
@@ -48,7 +48,7 @@ _DIAGONAL = np.stack([np.arange(6)] * 2)
 _ERRORS = np.array(list(itertools.product((-1.0, 1.0), repeat=6)))[:32].T
 #: Rows and columns of the entries of matrices (6, 6) and (3, 4).
 _DENSE, _ENDS = (np.indices(shape, dtype=np.intp).reshape(2, -1) for shape in ((6, 6), (3, 4)))
-#: Part of the trace that is subtracted before Cholesky's factorisation: many times the bound of its rounding for
+#: Fraction of the trace that is subtracted before Cholesky's factorisation: many times the bound of its rounding for
 #: matrices (6, 6), which is 8 roundings. A completed factorisation proves the matrix positive definite (S. M. Rump,
 #: *Verification of positive definiteness*, BIT 46 (2006)).
 _CHOLESKY = 1e-13
@@ -57,7 +57,7 @@ _STEPS, _NEAREST = 200, 12
 
 
 class NumberClaim(LoopClaim):
-    """Claim that a quantity (1, 1) of a robot is at most, or at least, a bound at its closed loops.
+    """Claim that a quantity (1, 1) of a robot with closed loops is at most, or at least, a bound.
 
     Args:
         loops: robot with closed loops.
@@ -98,7 +98,7 @@ class SecondOrderClaim:
             raise UncoveredError("a quantity whose derivatives jump")
         second = ca.hessian(number, errors)[0]
         rows, columns = (np.array(each, dtype=int) for each in second.sparsity().get_triplet())
-        # Errors that do not occur in the second derivatives are no variables of the forms.
+        # Errors that do not occur in the second derivatives are not variables of the forms.
         entries = ca.vertcat(SX(0, 1), second.nz[:])
         own = [k for k in range(errors.numel()) if ca.depends_on(entries, errors[k])]
         _, self._block = np.unique(rows // 3 * errors.numel() + columns // 3, return_inverse=True)
@@ -128,7 +128,7 @@ def are_positive(matrices: FloatArray) -> NDArray[np.bool_]:
 
 
 def _size_at_centre(matrices: AffineMatrix) -> FloatArray:
-    """Return the spectral norms (B,) at the centres, computed in doubles; 0 where they are not known."""
+    """Return the spectral norms (B,) at the centres, computed in doubles; 0 where a norm is not known."""
     return np.asarray(np.linalg.norm(np.where(np.isfinite(matrices.M), matrices.M, 0.0), 2, axis=(1, 2)))
 
 
@@ -137,7 +137,7 @@ def _size_is_at_most(matrices: AffineMatrix, most: FloatArray) -> NDArray[np.boo
     room = most * (1 - 8 * UNIT) - np.sqrt((matrices.rest**2).sum(axis=(1, 2))) * UP
     corners = matrices.corners()
     square = corners @ corners.transpose(0, 1, 3, 2)
-    # The rounding of the product is a part of the squared Frobenius norm.
+    # The rounding of the product is bounded by a fraction of the squared Frobenius norm.
     free = (room * room * (1 - 8 * UNIT))[:, None] - PRODUCT * np.trace(square, axis1=2, axis2=3)
     return np.asarray((room > 0) & are_positive(free[..., None, None] * np.eye(6) - square).all(axis=1))
 
@@ -145,7 +145,7 @@ def _size_is_at_most(matrices: AffineMatrix, most: FloatArray) -> NDArray[np.boo
 class LegInverse:
     """Inverse P of J of six straight legs over boxes of poses.
 
-    A length divides moments, and multiplies rotations. If ``is_unit``, J with unit rows is enclosed too.
+    A length divides moments and multiplies rotations. If ``is_unit`` is true, J with unit rows is enclosed too.
     """
 
     def __init__(self, robot: PosedRobot, length: float, *, is_unit: bool = False) -> None:
@@ -158,7 +158,7 @@ class LegInverse:
     def inverse(
         self, lower: FloatArray, upper: FloatArray
     ) -> tuple[AffineMatrix, NDArray[np.bool_], FloatArray, AffineMatrix]:
-        """Return P over boxes (B, 6), where it is known, shares (B, n) of coordinates in its remainder, and J or A."""
+        """Return P over boxes (B, 6), whether P is known, shares (B, n) of coordinates in the remainder, and J or A."""
         values = self._forms(lower[:, self.free], upper[:, self.free])
         sizes, matrix = values.forms(slice(0, 6)), values.forms(slice(6, 42)).matrix(_DENSE, (6, 6))
         inverse, known, shares = solved(matrix, sizes.matrix(_DIAGONAL, (6, 6)))
@@ -167,7 +167,7 @@ class LegInverse:
 
 
 class SingularClaim(LegInverse):
-    """Claim that the smallest singular value of J is at least a bound, or its condition number at most.
+    """Claim that the smallest singular value of J is at least a bound, or that its condition number is at most a bound.
 
     A length divides moments. Within the tolerance singular values change by at most ``change``.
     """
@@ -185,7 +185,7 @@ class SingularClaim(LegInverse):
         low, high = 1 / _size_at_centre(inverse), _size_at_centre(J)
         shares = np.abs(inverse.A).sum(axis=(2, 3)) + shares * inverse.E.sum(axis=(1, 2))[:, None]
         if self._is_condition:
-            # The smallest singular value varies more: most of the room between both bounds is for it.
+            # The smallest singular value varies more, so it gets most of the room between both bounds.
             least = (high + self._change) / self._bound
             t = least * np.sqrt(np.sqrt((low - self._change) / least))
             flat = _size_is_at_most(J, (t * self._bound * (1 - 4 * UNIT) - self._change) * (1 - 4 * UNIT))
@@ -201,7 +201,7 @@ class SingularClaim(LegInverse):
 class ErrorClaim(LegInverse):
     """Bound on the first-order pose error: ``|P d|`` over a box of poses for all leg errors ``|d_i| <= 1``.
 
-    The error is that of the rotation, or of the position of the platform's origin.
+    The pose error is the rotation error, or the position error of the platform's origin.
     """
 
     def __init__(self, robot: PosedRobot, most: float, *, is_rotation: bool) -> None:
@@ -273,7 +273,7 @@ class ClearanceClaim:
         self.free, self._least = robot.free, least
         (foot, arm), (other_foot, other_arm) = (robot.legs[k] for k in pair)
         self._feet = np.array(ca.DM(foot - other_foot)).ravel()
-        # Differences of the ends of the two legs, times the scale: from foot to tip, tip to foot, and tip to tip.
+        # Vectors between the ends of the two legs, times the scale: from foot to tip, tip to foot, and tip to tip.
         spans = robot.scale * (robot.position - foot), robot.scale * (robot.position - other_foot)
         ends = -spans[0] - other_arm, spans[1] + arm, arm - other_arm
         self._forms = robot.forms(ca.vertcat(*[ca.vertcat(end, robot.scale) for end in ends]))
@@ -296,7 +296,7 @@ class ClearanceClaim:
 
 
 def _between(feet: FloatArray, foot_to_tip: FloatArray, tip_to_foot: FloatArray) -> FloatArray:
-    """Return vectors (B, 3) between the nearest points of two legs, to that of the first, from those of their ends.
+    """Return vectors (B, 3) between the nearest points of two legs, towards the first leg, from the legs' end points.
 
     Any vector is valid, but a good one proves larger boxes: a joint Newton step, then one step for each leg.
     """

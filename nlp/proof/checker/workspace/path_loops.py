@@ -1,4 +1,4 @@
-"""Closed loops along a path, from those at its first point: pieces are tied in their order.
+"""Closed loops along a path, followed from its first point; successive pieces are tied to each other.
 
 A pose that a path visits twice may have two assembly modes, for example if joints turn through full revolutions. The
 box of each piece must therefore contain the closed point at which it meets the preceding piece; other ties do not
@@ -38,7 +38,9 @@ class PathAssembly(Assembly):
     def __init__(self, robot: PosedRobot, equations: SX, start: FloatArray, segments: int) -> None:
         super().__init__(robot, equations, start)
         if not is_home(robot, self.start):
-            raise ProofError("no solution of the loop equations at the first point of the path")
+            raise ProofError(
+                "no solution of the loop equations in the home assembly mode at the first point of the path"
+            )
         self._known, self._left = dict[bytes, Enclosed](), _MOST_KNOWN
         self._knots: FloatArray = np.tile(self.start, (segments + 1, 1))
         self._knots[:, 0] = np.arange(segments + 1)
@@ -47,7 +49,7 @@ class PathAssembly(Assembly):
             self._knots[k + 1] = self.points.closed(self._knots[k : k + 1], self.dependent, to=to, steps=_STEPS)[0]
 
     def near(self, to: FloatArray) -> FloatArray:
-        """Return closed points (B, n) at independent coordinates (B, f), from those at the knot before each."""
+        """Return closed points (B, n) at independent coordinates (B, f), followed from the preceding knots."""
         k = np.clip(np.floor(to[:, 0]), 0, len(self._knots) - 1).astype(np.intp)
         return self.moved(self._knots[k], to)
 
@@ -67,7 +69,7 @@ class PathAssembly(Assembly):
             tied = meets & self.holds(boxes, first, near) & self.holds(boxes, first + 1, near)
             good = good and bool(tied.all())
         if not good:
-            raise ProofError("the loops closed along the path are not shown to be of one assembly mode")
+            raise ProofError("the loops closed along the path are not proved to stay in one assembly mode")
 
     def enclosed(self, lower: FloatArray, upper: FloatArray, near: FloatArray | None = None) -> Enclosed:
         """Return the closed points over pieces; results for the same pieces from other claims are reused."""

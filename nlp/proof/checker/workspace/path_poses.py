@@ -125,7 +125,7 @@ class PathPoses:
         return first, last, half[None], np.concatenate([rest, off_half[None]])
 
     def _pose(self, plane: int, s: SX, numbers: SX) -> tuple[SX, SX]:
-        """Return the pose (c, 1) of a segment in the world, and gaps (2, 1) of an arc to the knots at its ends.
+        """Return the pose (c, 1) of a segment in the world, and gaps (2, 1) between the arc and the knots at its ends.
 
         Args:
             plane: index of the arc's plane; -1 for a line.
@@ -177,7 +177,7 @@ class PathPoses:
         return _product_of_angles(angles, self._path.order)
 
     def _function(self, plane: int) -> ca.Function:
-        """Return the function of parameter and data with the varying coordinates, their derivatives, and gaps."""
+        """Return the function from parameter and data to the varying coordinates, their derivatives, and gaps."""
         if plane not in self._functions:
             s, numbers = SX.sym("s"), SX.sym("numbers", len(self._numbers[0]))
             pose, gaps = self._pose(plane, s, numbers)
@@ -227,25 +227,28 @@ class PathPoses:
         return every[:count], every[count:]
 
     def _off(self, coordinate: int) -> float:
-        """Return the error of a coordinate besides its expression: from the series of quaternions."""
+        """Return the error of a coordinate that its expression does not contain: that of the series for quaternions."""
         return _SERIES if self._is_slerp and coordinate >= POSITION else 0.0
 
     def segments(self, lower: FloatArray, upper: FloatArray) -> NDArray[np.intp]:
         """Return the segments (B,) of pieces, by their middles; a knot belongs to the segment that begins there.
 
-        NaN, the place of loops that cannot be closed, belongs to the first segment.
+        NaN stands for loops that cannot be closed, and belongs to the first segment.
         """
         return np.clip(np.floor(np.nan_to_num(0.5 * lower + 0.5 * upper)), 0, len(self) - 1).astype(np.intp)
 
     def inverse_seconds(self, segments: NDArray[np.intp]) -> Polynomial:
-        """Return 1 over the times of segments (B,); 0, as for a platform at rest, where no time is known."""
+        """Return the inverse durations of segments (B,).
+
+        A segment without a known time has 0, like a platform at rest.
+        """
         seconds = self._path.durations[segments]
         known = np.isfinite(seconds)
         inverse = np.where(known, 1 / np.where(known, seconds, 1.0), 0.0)
         return _number(inverse, np.spacing(inverse) * known)
 
     def at(self, along: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return varying coordinates (P, v) at places (P,), and their derivatives by the parameter, in doubles."""
+        """Return varying coordinates (P, v), and derivatives with respect to the parameter, at places (P,)."""
         k, count = self.segments(along, along), len(self.varying)
         found = np.zeros((len(along), 2 * count))
         for plane in np.unique(self._plane[k]).tolist():

@@ -7,9 +7,9 @@ from ....errors import CaseError, InputError
 from ....path.options import Between, PathOptions
 from ....path.path import ProgrammedPath
 from ....path.reader import in_place_of_case, is_table, path_of_text
-from ...statement.machine import legs_of
+from ...statement.fixed_robot import legs_of
 from ..proof_file import LARGEST_CASE, PathPremises, ProofError
-from .statement import legs_numbers
+from .statement import legs_premise
 
 #: Command options by the name of the premise that they set.
 _OPTIONS = {
@@ -31,8 +31,8 @@ def premises_of(
         file: name of the path's file.
         text: text of the file.
         options: options of reading that the file leaves open.
-        of_case: If true, the path belongs to the case, at its place.
-        with_angles: whether closed forms replace joint angles.
+        of_case: If true, the path is that of the case.
+        with_angles: If true, closed forms replace joint angles.
 
     Raises:
         ProofError: the text is longer than a checker accepts.
@@ -48,7 +48,7 @@ def premises_of(
         unit=options.unit,
         start=None if options.start is None else tuple(map(float, options.start)),
         offsets={name: tuple(map(float, origin)) for name, origin in options.offsets.items()},
-        legs=legs_numbers(legs_of(case)),
+        legs=legs_premise(legs_of(case)),
         joint_centre=case.joint_centre_tolerance or 0.0,
         with_angles=with_angles,
     )
@@ -69,15 +69,15 @@ def carried_path(case: Case, given: PathPremises) -> ProgrammedPath:
     if not given.of_case:
         return path
     if case.path is None:
-        raise ProofError("the proof is for the path of its case, but this case has none")
+        raise ProofError("the proof is for the path of its case, but this case has no path")
     try:
         return in_place_of_case(path, case)
     except CaseError as error:
         raise ProofError(str(error)) from None
 
 
-def hold_path(given: PathPremises, own: PathPremises) -> None:
-    """Refuse a proof about another path, or with other reading options, than the given ones."""
+def check_path_premises(given: PathPremises, own: PathPremises) -> None:
+    """Refuse a proof about another path, or with other reading options, than given."""
     if given.of_case != own.of_case:
         whose = "the path of its case" if given.of_case else "a path that was given in addition to the case"
         raise ProofError(f"the proof is for {whose}: see --along")

@@ -1,6 +1,6 @@
-"""Poses of a path as coordinates of boxes: the place along the path, and the dependent coordinates of the pose.
+"""Boxes along a tool path: their coordinates are the place along the path and the dependent coordinates of the pose.
 
-A tree of a path has one tree for each segment, in their order, whose nodes bisect the place.
+The tree of a path consists of one tree for each segment, in order. The nodes of these trees bisect the place.
 """
 
 from __future__ import annotations
@@ -28,9 +28,10 @@ from ..tree import Node, TreeReader, ahead, blocks_of
 from .path_poses import PathPoses
 from .pose_boxes import POSITION, BoxClaim, PoseRoot, PoseSymbols
 
-#: Relative widening, or absolute below 1, of the range of a coordinate beyond its range along the path.
+#: Widening of the range of a coordinate beyond its range along the path; relative for values above 1, otherwise
+#: absolute.
 _ROOM = 1e-9
-#: Parts of a robot's size, or angle, below which the motion of a coordinate is rounding.
+#: Motion of a coordinate, relative to the robot's size or in radians, below which it counts as rounding.
 _STILL = 1e-9
 
 
@@ -43,11 +44,11 @@ class PathRoot:
 
     Attributes:
         poses: coordinates along the path.
-        box: a box about all poses, with the first pose as its start.
-        workspace: the box as a workspace with dependent coordinates; these are constant, and have no range.
-        stated: (v,) indices of the varying coordinates of the pose that are not dependent.
+        box: a box that contains all poses and starts at the first pose.
+        workspace: the box as a workspace; its dependent coordinates are constant and have no range.
+        stated: (v,) indices of the varying independent coordinates of the pose.
         coordinates: number of coordinates of a piece: the place along the path.
-        lower, upper, middle, dependent: ends and middle of the place, and dependent coordinates; see
+        lower, upper, middle, dependent: bounds and centre of the place, and dependent coordinates; see
             :class:`.pose_boxes.PoseRoot`.
 
     Raises:
@@ -86,7 +87,10 @@ class PathRoot:
         self._columns = [varying.index(k) for k in self.stated]
 
     def symbols(self) -> PoseSymbols:
-        """Return the coordinates as symbols; given are those of a place, and their rates for a path with times."""
+        """Return the coordinates as symbols.
+
+        The place determines the given coordinates and, for a path with times, their rates.
+        """
         pose = list(self.box.symbols().pose)
         following = [pose[k] for k in self.box.dependent]
         stated = ca.vertcat(SX(0, 1), *[pose[k] for k in self.stated])
@@ -96,7 +100,7 @@ class PathRoot:
         return PoseSymbols(free, [SX.sym("along"), *following], ca.vertcat(stated, rates), pose, varying)
 
     def given(self, lower: FloatArray, upper: FloatArray) -> Sequence[Polynomial]:
-        """Return the stated coordinates over pieces (B, n), and their rates by seconds for a path with times."""
+        """Return the stated coordinates over pieces (B, n) and, for a path with times, their rates per second."""
         low, high = lower[:, 0], upper[:, 0]
         values, slopes = ([each[k] for k in self._columns] for each in self.poses.over(low, high))
         if not self._is_timed:
@@ -105,7 +109,7 @@ class PathRoot:
         return [*values, *(each * inverse for each in slopes)]
 
     def values_at(self, along: FloatArray) -> FloatArray:
-        """Return these values (P, g) at places (P, 1), computed in doubles."""
+        """Return the values (P, g) of the given symbols at places (P, 1), computed in doubles."""
         place = np.clip(along[:, 0], 0.0, len(self.poses))
         values, slopes = (each[:, self._columns] for each in self.poses.at(place))
         if not self._is_timed:
@@ -114,7 +118,10 @@ class PathRoot:
         return np.hstack([values, slopes * inverse[:, None]])
 
     def slopes_at(self, along: FloatArray) -> FloatArray:
-        """Return derivatives (P, g) of the coordinates by the place at places (P, 1), in doubles; 0 for rates."""
+        """Return derivatives (P, g) of the coordinates with respect to the place, at places (P, 1), in doubles.
+
+        The derivatives of rates are 0.
+        """
         slopes = self.poses.at(np.clip(along[:, 0], 0.0, len(self.poses)))[1][:, self._columns]
         return np.hstack([slopes, np.zeros((len(slopes), slopes.shape[1] * self._is_timed))])
 
@@ -161,14 +168,14 @@ class _PieceRule:
         return Shown(found.holds, np.ones_like(lower), lower, upper, found.is_wrong)
 
     def sentence(self, claim: int) -> str:
-        """Return the sentence that a claim could not be shown."""
+        """Return the message for a claim that could not be proved."""
         k = int(np.floor(0.5 * self.lower[0, claim] + 0.5 * self.upper[0, claim]))
         low, high = (each[0, claim] - k for each in (self.lower, self.upper))
-        return f"the claim could not be shown for segment {k + 1} from {low:.6g} to {high:.6g} of it"
+        return f"the claim could not be proved on segment {k + 1} between its parameters {low:.6g} and {high:.6g}"
 
 
 def _workspace(case: Case, low: FloatArray, high: FloatArray, *, is_tangents: bool) -> Workspace:
-    """Return a workspace about a path with these ends (c,) of coordinates, of which dependent ones are constant.
+    """Return a workspace about a path, from the bounds (c,) of its coordinates; dependent coordinates are constant.
 
     Raises:
         ProofError: the path moves a dependent coordinate.

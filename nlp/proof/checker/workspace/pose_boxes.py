@@ -1,8 +1,9 @@
 """Boxes of poses: the box of a workspace's coordinates, the leaves of its tree, and the proof of claims on pieces.
 
-The coordinates are three of position and three of rotation, tangents of half angles. Ends of the box are fractions;
-rotations about any axis are a ball in it, and positions may be a set (:mod:`.position_conditions`). Nodes of a tree are
-``cut``, ``bounded`` and ``outside`` of :mod:`..tree`.
+A pose has three position coordinates and three rotation coordinates, tangents of half angles. The bounds of the box
+are fractions; rotations about any axis form a ball in the box, and positions may
+form a set (:mod:`.position_conditions`). Nodes of a tree are ``cut``, ``bounded`` and
+``outside`` of :mod:`..tree`.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ class PoseSymbols(NamedTuple):
     Attributes:
         free: indices of the box coordinates that vary.
         head: symbols of these coordinates.
-        given: (g, 1) further symbols, whose values follow from the box coordinates.
+        given: (g, 1) further symbols; the box coordinates determine their values.
         pose: coordinates of the pose, symbols or numbers.
         varying: coordinates of the pose that are symbols.
     """
@@ -63,13 +64,14 @@ class PoseRoot:
     Attributes:
         kind: kind of the rotation coordinates.
         axis: (3,) axis of rotations about one axis.
-        values: (6,) ends of each varying coordinate; value of a constant one, or its angle.
-        lower, upper: (6,) ends of a box that contains every pose of the workspace.
-        inner: (6,) pairs of ends within which every pose belongs to the workspace; for a fixed angle its box ends.
+        values: (6,) bounds of each varying coordinate; value, or angle, of each constant coordinate.
+        lower, upper: (6,) bounds of a box that contains every pose of the workspace.
+        inner: (6,) pairs of bounds within which every pose belongs to the workspace; for a fixed angle, its bounds in
+            the box.
         ball, inner_ball: outer and inner bound of the squared norm of a Cayley vector; infinite without a ball.
-        dependent: indices of the dependent coordinates: their ends exclude no pose, and the ball is one of the other
+        dependent: indices of the dependent coordinates. Their bounds exclude no pose, and the ball has only the other
             components.
-        at: (6,) pose at which closed loops begin; None for the middle.
+        at: (6,) pose from which closed loops are followed; None for the centre.
         positions: set of positions; None for all positions of the box.
     """
 
@@ -92,7 +94,7 @@ class PoseRoot:
 
     @property
     def middle(self) -> FloatArray:
-        """The pose (6,) at which closed loops begin."""
+        """The pose (6,) from which closed loops are followed."""
         return 0.5 * self.lower + 0.5 * self.upper if self.at is None else self.at
 
     def symbols(self) -> PoseSymbols:
@@ -103,11 +105,11 @@ class PoseRoot:
         return PoseSymbols(free, own, SX(0, 1), pose, own)
 
     def given(self, lower: FloatArray, upper: FloatArray) -> Sequence[Polynomial]:  # noqa: ARG002 - used by paths
-        """Return the values that follow from coordinates of boxes (B, n): none."""
+        """Return the values of further symbols over boxes (B, n): a box of poses has none."""
         return ()
 
     def values_at(self, along: FloatArray) -> FloatArray:
-        """Return these values (P, 0) at points."""
+        """Return the values (P, 0) of further symbols at points: a box of poses has none."""
         return np.zeros((len(along), 0))
 
     slopes_at = values_at
@@ -147,7 +149,7 @@ class PoseRoot:
         return leaves, pieces
 
     def contracted(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-        """Return boxes (B, 6) with their ends moved to the sets, never past a pose, and which (B,) may have poses."""
+        """Return boxes (B, 6) contracted to the sets without loss of a pose, and which (B,) may contain poses."""
         some = np.ones(len(lower), dtype=bool)
         if self.positions is not None:
             *ends, some = self.positions.contracted(lower[:, :POSITION], upper[:, :POSITION])
@@ -160,7 +162,7 @@ class PoseRoot:
         least = np.maximum(np.maximum(lower[:, turns], -upper[:, turns]), 0.0)
         squares = least * least
         whole = squares.sum(axis=1, keepdims=True)
-        # Sums and differences of three squares have a relative rounding below 8 parts in 2^53.
+        # Sums and differences of three squares have a relative rounding error below 8 / 2^53.
         room = np.maximum(self.ball - (whole - squares) + 2.0**-50 * (self.ball + whole), 0.0)
         most = np.sqrt(room) * (1 + 2.0**-50)
         low, high = lower.copy(), upper.copy()
@@ -262,7 +264,7 @@ class Attempt(NamedTuple):
 
 
 class BoxClaim(Protocol):
-    """A claim about boxes of poses; ``free`` has the indices of the six coordinates that vary in it."""
+    """A claim about boxes of poses; ``free`` has the indices of the pose coordinates that vary."""
 
     free: list[int]
 
@@ -271,7 +273,7 @@ class BoxClaim(Protocol):
 
 
 def _read_boxes(root: PoseRoot, tree: bytes) -> Iterator[tuple[int, FloatArray]]:
-    """Yield the leaves of a tree of a workspace in blocks: their number, and ends (2, 6, L) of those with poses."""
+    """Yield blocks of leaves of a workspace tree: number of leaves, and bounds (2, 6, L) of leaves with poses."""
     reader = TreeReader(tree)
     for block in blocks_of(reader.walk(root.lower, root.upper, frozenset({Node.CUT})), 2 * COORDINATES):
         count, boxes = 0, list[tuple[FloatArray, FloatArray]]()
@@ -282,7 +284,7 @@ def _read_boxes(root: PoseRoot, tree: bytes) -> Iterator[tuple[int, FloatArray]]
             elif kind != Node.OUTSIDE:
                 raise ProofError(f"the tree has {kind} where a box must be proved or cut")
             elif not root.is_outside(low, high):
-                raise ProofError(f"the box {box_words(low, high)} is not outside of the workspace")
+                raise ProofError(f"the box {box_words(low, high)} is not outside the workspace")
         yield count, np.array(boxes).reshape(-1, 2, COORDINATES).transpose(1, 2, 0)
     reader.finish()
 
@@ -306,13 +308,13 @@ class _PoseRule:
             holds[at], shares[at[:, None], self._claim.free] = found.holds, found.shares
             if found.is_wrong is not None:
                 at = at[found.is_wrong]
-                # A claim about a box is only wrong at a pose of the workspace.
+                # Only a pose of the workspace can refute a claim about a box.
                 is_wrong[at] = [self._root.holds(y) for y in 0.5 * low[at] + 0.5 * high[at]]
         return Shown(holds, shares.T, low.T, high.T, is_wrong)
 
     def sentence(self, claim: int) -> str:
-        """Return the sentence that a claim could not be shown."""
-        return f"the claim could not be shown for the box {box_words(self.lower[:, claim], self.upper[:, claim])}"
+        """Return the message for a claim that could not be proved."""
+        return f"the claim could not be proved for the box {box_words(self.lower[:, claim], self.upper[:, claim])}"
 
 
 def box_words(lower: FloatArray, upper: FloatArray) -> str:

@@ -5,8 +5,8 @@ dependent coordinates, and C near a pseudo-inverse of M_0, every ``C M`` is inve
 
     |I - C M_0| + sum_k |C A_k| + |C| E     has a spectral radius below 1.
 
-M then has full column rank. To a matrix with d degrees of freedom, d rows are added first, a basis of the null space of
-M_0: full column rank then proves that there are no more degrees of freedom anywhere in the box.
+M then has full column rank. If the matrix has d degrees of freedom, d rows are added first: a basis of the null space
+of M_0. Full column rank then proves that there are no further degrees of freedom anywhere in the box.
 
 For six straight legs with joint-centre errors e and f of a leg in the world frame, the row
 ``(s (p - b) + u, u x (p - b))`` changes by ``(s (f - e), s f x (p - b) - u x e - s f x e)``. A component of a vector
@@ -35,9 +35,9 @@ from .loop_claims import LoopClaim, PosedLoops, posed_loops
 from .motion_matrix import Root, motion_matrix
 from .pose_boxes import Attempt
 
-#: Relative error of the entries of a row: numbers of a robot that should be 0 are rounding errors.
+#: Relative error of the entries of a row: a constant of a robot that should be 0 may be a rounding error.
 _CONSTANTS = 1e-13
-#: Numbers of parts of the path between two poses that are tried.
+#: Numbers of parts, tried in turn, into which the path between two poses is divided.
 _PARTS = (1, 16, 256, 4096)
 #: Indices after and before a component of a vector.
 _AFTER, _BEFORE = [1, 2, 0], [2, 0, 1]
@@ -53,11 +53,11 @@ def rank_claim(
         model: model of its robot without the unknowns in closed form.
         root: box of coordinates.
         name: name of the claim: ``regular``, or ``constraints regular``.
-        tolerance: largest error of each joint centre; 0 for the exact robot.
+        tolerance: largest error of each joint centre; 0 for the nominal design.
         built: model with joint-centre errors; None for six straight legs, and for the nominal design.
 
     Raises:
-        ProofError: the loops cannot be closed in the middle of the workspace, are singular there or leave a joint free;
+        ProofError: the loops cannot be closed at the workspace centre, are singular there or leave a joint free;
             an expression has an operation without a rule; or joint-centre errors remove degrees of freedom.
     """
     loops = posed_loops(case, model, root, tolerance, built)
@@ -65,9 +65,10 @@ def rank_claim(
 
 
 class RankClaim(LoopClaim):
-    """Claim that a sparse matrix of motion conditions (m, c) has no more degrees of freedom than claimed.
+    """Claim that the nullity of a sparse matrix of motion conditions (m, c) is at most a stated number.
 
-    Joint-centre errors are changes of the rows of six straight legs, or coordinates of the robot.
+    Within a tolerance, joint-centre errors of six straight legs change the rows. For other robots, the errors are
+    further coordinates of the box.
     """
 
     def __init__(self, loops: PosedLoops, matrix: SX, nullity: int) -> None:
@@ -91,19 +92,19 @@ class RankClaim(LoopClaim):
         The entries are defined along the whole line between them, and poses and errors are convex in their coordinates:
         the determinant changes continuously, and is 0 at some point.
         """
-        # The matrix must be J itself, with rows that are neither normalised nor zero, over poses without loops.
+        # The matrix must be J itself, with rows that are neither normalised nor zero, for a robot without loops.
         if self._shape != (6, 6) or self._nullity or self.assembly.dependent:
             raise ProofError("singular poses can be proved only for robots with six rows and without loops")
         if not root.is_convex:
             raise ProofError("singular poses can be proved only in sets that contain the line between two poses")
         points, poses = [np.array(each, dtype=float) for each in sides], self.coordinates
         if len(points) != 2 or any(y.shape != (poses + self.errors,) for y in points):
-            raise ProofError("the claim has no two poses")
+            raise ProofError("the claim does not have two poses")
         if not all(np.isfinite(y).all() and root.holds(y[:poses]) for y in points):
-            raise ProofError("a pose is not one of the workspace")
+            raise ProofError("a pose is outside the workspace")
         for error in np.concatenate([y[poses:] for y in points]).reshape(-1, 3).tolist():
             if sum(Fraction(each) ** 2 for each in error) > Fraction(self.tolerance) ** 2:
-                raise ProofError("a joint centre of the robot is off by more than the tolerance")
+                raise ProofError("the error of a joint centre exceeds the tolerance")
         signs = self._signs_at(np.stack(points))
         if signs[0] * signs[1] >= 0:
             raise ProofError("the determinants at the two poses do not have opposite signs")
@@ -113,13 +114,14 @@ class RankClaim(LoopClaim):
             matrices = self._matrices(self.closed(np.minimum(way[:-1], way[1:]), np.maximum(way[:-1], way[1:])))
             if all(np.isfinite(each).all() for each in matrices) and all(root.holds(y[:poses]) for y in way):
                 return
-        raise ProofError("the determinant is not shown to change continuously between the two poses")
+        raise ProofError("the determinant is not proved to change continuously between the two poses")
 
     @np.errstate(all="ignore")
     def _signs_at(self, y: FloatArray) -> list[int]:
         """Return the signs of the determinant at points (K, 6 + e); 0 where a sign is not proved.
 
-        If ``C M`` is near I, its determinant is positive: M has the sign of the determinant of C, in fractions.
+        C is an approximate inverse of the matrix M. If ``C M`` is proved near I, its determinant is positive, and det M
+        has the sign of det C, which is computed exactly in fractions.
         """
         matrices = self._matrices(self.closed(y, y))
         C = inverses(matrices.M)
@@ -162,7 +164,7 @@ class RankClaim(LoopClaim):
 def change_of_rows(
     scale: FloatArray, span: FloatArray, arm: FloatArray, tolerance: float, length: float = 1.0
 ) -> FloatArray:
-    """Return bounds (B, 6, 6) of the change of the rows of six legs, entry by entry, by errors within a tolerance.
+    """Return bounds (B, 6, 6) of the changes of all entries of six leg rows due to errors within a tolerance.
 
     Args:
         scale: (B,) largest values of s.

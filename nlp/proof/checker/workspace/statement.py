@@ -1,4 +1,4 @@
-"""Claims that a proof of a workspace must contain, one by one, and comparison of a proof with its case."""
+"""Claims that a workspace proof must contain, and comparison of a proof with its case."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .....models.joints.model.closedform import closed_form
 from ....case.case import Case
 from ....case.checks import check_determined_joints
 from ....case.limits.legs import LegLength
-from ....case.motors import MotorNumber
+from ....case.motors import ActuatorQuantity
 from ....case.task import Sense
 from ....case.workspace import Workspace
 from ....errors import InputError
@@ -37,7 +37,7 @@ from ...statement.claims import (
     one_robot_name,
     searched_claims,
 )
-from ...statement.machine import Legs, legs_of
+from ...statement.fixed_robot import Legs, legs_of
 from ...statement.motors import in_motion, in_path_motion, motor_claims, speed_claims
 from ...statement.posed_layout import closed_layout, posed_layout, reach_claims
 from ...statement.tolerance import (
@@ -50,25 +50,25 @@ from ...statement.tolerance import (
     tolerance_layout,
 )
 from ..premises import exact
-from ..proof_file import PathPremises, Premises, ProofClaim, ProofError, set_numbers, workspace_numbers
+from ..proof_file import PathPremises, Premises, ProofClaim, ProofError, set_premise, workspace_premise
 from .motion_matrix import Root, turned_rotation
 from .path_root import PathRoot
 from .pose_boxes import pose_root
 
-#: Part of the largest coordinate by which joint centres may differ: other computers give other last digits.
+#: Fraction of the largest coordinate by which joint centres may differ: the last digits depend on the computer.
 _SAME = 1e-9
 
 
 class RobotsWithinTolerance:
     """All robots within a joint-centre tolerance, as the check states them.
 
-    With the derivatives g_j of a quantity g by the error of centre j, and the blocks H_jk of its second derivatives, a
-    robot within the tolerance t differs from the nominal design in this quantity by at most
+    Let g_j be the derivative of a quantity g with respect to the error of centre j, and H_jk the blocks of the second
+    derivatives of g. A robot within the tolerance t differs from the nominal design in this quantity by at most
 
         t sum_j |g_j| + t^2 / 2 sum_jk |H_jk|
 
-    at each pose. The first sum is an expression of the pose. The second is proved to be at most the bound in the proof,
-    over all poses and errors (:class:`~.number_claims.SecondOrderClaim`).
+    at each pose. The first sum is an expression of the pose. The second sum is proved to be at most the bound in the
+    proof, over all poses and errors (:class:`~.number_claims.SecondOrderClaim`).
 
     Attributes:
         model: model of a case with fixed dimensions, without the unknowns in closed form.
@@ -88,18 +88,23 @@ class RobotsWithinTolerance:
 
     @cached_property
     def design(self) -> Layout:
-        """Nominal design as symbols of the pose; an error for a robot with dependent coordinates."""
+        """Nominal design as expressions of the pose; raises an error for a robot with dependent coordinates."""
         if self.model.unknowns:
-            raise ProofError("within a tolerance, loops without a closed form need a tree of boxes")
+            raise ProofError(
+                "the proof has no tree of boxes, which loops without a closed form need within a tolerance"
+            )
         return design_layout(self._case, self.model, self._at)
 
     def varies(self, claim: Claim) -> bool:
-        """Return whether a quantity changes with the errors."""
+        """Return whether a quantity depends on the joint-centre errors."""
         errors = self.symbols.errors
         return bool(errors.numel()) and any(ca.which_depends(claim.expression, errors, 1, True))
 
     def number(self, claim: Claim, rest: float) -> SX:
-        """Return a bound (1, 1) of a quantity over all robots, in the symbols of the design, from the rest's bound."""
+        """Return a bound (1, 1) of a quantity over all robots as an expression.
+
+        ``rest`` bounds the second-order terms.
+        """
         errors, pose = self.symbols.errors, self.design.table.variables_vector
         slopes, sign = ca.densify(ca.gradient(claim.expression, errors)), claim.sense.sign
         squares = [ca.sumsqr(slopes[k : k + 3]) for k in range(0, errors.numel(), 3)]
@@ -115,18 +120,18 @@ class RobotClaims:
 
     Attributes:
         legs: joint centres of six straight legs; None for another robot.
-        layout: case as symbols of the pose for bounds of quantities: without the unknowns in closed form, if all limbs
-            reach every pose.
-        place: case as symbols of the pose for claims about reach.
-        model: model without these unknowns, for claims about ranks.
+        layout: case as expressions of the pose, for bounds of quantities. If all limbs reach every pose, unknowns with
+            a closed form are replaced.
+        place: case as expressions of the pose, for claims about reach.
+        model: model without the unknowns that have a closed form, for claims about ranks.
         reaches: claims that limbs reach every pose.
-        numbers_at: assembly modes that claims about quantities cover, in words, except for actuators under loads; empty
-            for a robot without unknowns.
-        within_tolerance: robots within the tolerance, whose symbols then replace those of quantities and ``reaches``;
-            None for the nominal design, or where robots cannot be assembled.
+        numbers_at: assembly modes that claims about quantities cover, in words; claims about actuators under loads are
+            excepted. Empty for a robot without unknowns.
+        within_tolerance: robots within the tolerance, whose symbols replace those of quantities and ``reaches``. None
+            for the nominal design, or if robots with errors cannot be assembled.
         dependent: claims about dependent coordinates of the pose.
-        followed: symbols of quantities of a robot whose loops are followed in the home assembly mode, for dependent
-            coordinates, a set of positions, and within a tolerance; else None.
+        followed: symbols of quantities of a robot whose loops are followed in the home assembly mode: a robot with
+            dependent coordinates, a set of positions, or a tolerance. None for other robots.
     """
 
     legs: Legs | None
@@ -141,7 +146,10 @@ class RobotClaims:
 
 
 def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> RobotClaims:
-    """Return the robot of a case with fixed dimensions, with claims about its reach, some of which are proved."""
+    """Return the robot of a case with fixed dimensions and the claims about its reach.
+
+    ``reached`` names the proved claims.
+    """
     legs, closed, is_open = legs_of(case), closed_form(case.model), bool(case.model.unknowns)
     if case.joint_centre_tolerance:
         try:
@@ -158,7 +166,7 @@ def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> 
     layout = posed_layout(case, workspace)
     place, every = reach_claims(case, closed, workspace) if closed.reaches else (layout, ())
     if every and all(each.name in reached for each in every):
-        partly = "every assembly mode in which limbs in closed form are as at home"
+        partly = "every assembly mode in which limbs with a closed form have the home working mode"
         numbers_at = partly if closed.model.unknowns else "the home assembly mode"
         return RobotClaims(legs, closed_layout(case, closed, workspace), closed.model, place, every, numbers_at)
     numbers_at = "every assembly mode" if is_open else ""
@@ -188,7 +196,7 @@ def robot_along_path(case: Case, root: PathRoot, *, with_angles: bool) -> RobotC
     Args:
         case: the case.
         root: poses of the path.
-        with_angles: whether closed forms replace joint angles; these forms jump if a joint turns all the way round.
+        with_angles: If true, closed forms replace joint angles. These forms jump if a joint makes a full turn.
 
     Raises:
         ProofError: the robot cannot be assembled with joint-centre errors.
@@ -225,7 +233,7 @@ def _followed(
 
 
 def coordinates_of(root: Root) -> PoseCoordinates:
-    """Return the coordinates of a box in the terms of a layout."""
+    """Return the coordinates of a box as symbols of a layout."""
 
     def rotation(turn: SX) -> SX:
         """Return the rotation (3, 3) with coordinates (3, 1)."""
@@ -256,7 +264,10 @@ def expected_claims(case: Case, robot: RobotClaims, quantities: Sequence[str], l
 
 
 def expected_along_path(case: Case, robot: RobotClaims, *, is_timed: bool) -> list[Claim]:
-    """Return the claims about a case along a path; with times, they include speeds and powers of its motion."""
+    """Return the claims about a case along a path.
+
+    A path with times also has claims about the speeds and powers of its motion.
+    """
     ranks = [REGULAR, *([CONSTRAINTS] if _has_constraints(robot.model) else [])]
     names = [each.name for each in case.model.quantities if each.name in (*ACTUATED, LegLength.key)]
     every = [
@@ -269,13 +280,13 @@ def expected_along_path(case: Case, robot: RobotClaims, *, is_timed: bool) -> li
     ]
     if is_timed:
         of_loads = (each for each in motor_claims(in_path_motion(case)) if each.motor)
-        every += [*speed_claims(case), *(each for each in of_loads if _number_of(each) is not MotorNumber.SPEED)]
+        every += [*speed_claims(case), *(each for each in of_loads if _number_of(each) is not ActuatorQuantity.SPEED)]
     else:
         every += motor_claims(case)
     return [each for each in every if robot.legs is not None or each.kind is not ClaimKind.SPECTRUM]
 
 
-def _number_of(claim: Claim) -> MotorNumber | None:
+def _number_of(claim: Claim) -> ActuatorQuantity | None:
     """Return the actuator quantity of a claim; None for another claim."""
     return None if claim.motor is None else claim.motor.number
 
@@ -298,11 +309,11 @@ def _has_constraints(model: Model) -> bool:
 
 
 def leg_error_of(case: Case, leg_error: float) -> float:
-    """Return the largest error of a leg's length from its own error and from its joint centres."""
+    """Return the largest error of a leg's length: leg-length error plus the effect of joint-centre errors."""
     return leg_error + 2 * (case.joint_centre_tolerance or 0.0)
 
 
-def legs_numbers(legs: Legs | None) -> tuple[tuple[float, ...], ...]:
+def legs_premise(legs: Legs | None) -> tuple[tuple[float, ...], ...]:
     """Return joint centres (12, 3), base before platform; empty for a robot without six straight legs."""
     return () if legs is None else tuple(map(tuple, [*legs.base.tolist(), *legs.platform.tolist()]))
 
@@ -310,8 +321,8 @@ def legs_numbers(legs: Legs | None) -> tuple[tuple[float, ...], ...]:
 def refuse_other_premises(
     case: Case, workspace: Workspace, legs: Legs | None, leg_error: float, given: Premises
 ) -> None:
-    """Refuse a proof whose file has other premises than the case; the check itself does not use them."""
-    if workspace_numbers(workspace) != given.workspace or set_numbers(workspace) != given.position_set:
+    """Refuse a proof whose file states other premises than the case; the check itself does not use these premises."""
+    if workspace_premise(workspace) != given.workspace or set_premise(workspace) != given.position_set:
         raise ProofError("the proof is for another workspace than this case's")
     if given.leg_error != leg_error:
         stated = f"the proof is for leg errors of at most {exact(given.leg_error)} {case.units.length}"
@@ -321,7 +332,7 @@ def refuse_other_premises(
 
 def refuse_other_robot(case: Case, legs: Legs | None, given: Premises | PathPremises) -> None:
     """Refuse a proof whose file names other joint centres, or another joint-centre tolerance, than the case has."""
-    numbers = legs_numbers(legs)
+    numbers = legs_premise(legs)
     same = list(map(len, numbers)) == list(map(len, given.legs))
     if not same or not np.allclose(given.legs, numbers, rtol=0.0, atol=_SAME * np.abs(numbers).max(initial=0.0)):
         raise ProofError("the proof is for other joint centres than this case's")

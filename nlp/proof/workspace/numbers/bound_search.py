@@ -1,8 +1,8 @@
 """Branch and bound for the smallest values of quantities of a robot over a workspace.
 
-A :class:`Number` has lower bounds over boxes, and values at points. Values at points only tell where to search; proofs
-use the bounds. For one quantity, boxes with the smallest bounds are bisected first. Several quantities with limits
-share one cover of boxes, as closing the loops over boxes takes longer than bounding quantities.
+A :class:`Number` has lower bounds over boxes, and values at points. Values at points only guide the search; proofs use
+the bounds. For one quantity, boxes with the smallest bounds are bisected first. Several quantities with limits share
+one cover of boxes, as closing the loops over boxes takes longer than bounding quantities.
 """
 
 from __future__ import annotations
@@ -40,9 +40,10 @@ if TYPE_CHECKING:
 
 #: Number of boxes examined at once, and number of boxes with the smallest bounds at which values are computed.
 _BLOCK, _TRIED = 256, 8
-#: Part of the largest known absolute value below which gaps are relative to this part.
+#: Fraction of the largest known absolute value; for smaller values, gaps are relative to this fraction.
 _NEAR_ZERO = 1e-6
-#: Number of random points at the start of the search for small values, of steps from the best one, and points per step.
+#: Search for small values: number of random points at the start, number of steps from the best point, and number of
+#: points per step.
 _POINTS, _STEPS, _AROUND = 256, 24, 32
 #: Factor of the step size from one step to the next.
 _SHRINK = 0.7
@@ -73,8 +74,8 @@ class Number(ABC):
 
     Attributes:
         problem, entries, count: the arguments.
-        unknown: (K,) bounds over a box without a known bound.
-        levels: (K,) bounds above which a quantity does not influence the bisection.
+        unknown: (K,) values that stand for unknown bounds over a box.
+        levels: (K,) levels; a quantity with a larger bound does not influence the bisection.
     """
 
     def __init__(self, problem: Problem, entries: SX, count: int = 1) -> None:
@@ -87,8 +88,8 @@ class Number(ABC):
 
         Args:
             forms: forms of the entries.
-            count: number f of independent coordinates, whose terms come first. Products of two coordinates follow, then
-                joint-centre errors.
+            count: number f of independent coordinates. Their terms come first, followed by products of two coordinates
+                and by joint-centre errors.
         """
 
     @abstractmethod
@@ -97,7 +98,7 @@ class Number(ABC):
 
     @cached_property
     def examiner(self) -> Examiner:
-        """Examiner of boxes; ``smallest`` of its results are the bounds of the quantities.
+        """Examiner of boxes; its results have the bounds of the quantities in ``smallest``.
 
         Raises:
             UncoveredError: an expression has an operation without an interval rule.
@@ -130,13 +131,13 @@ class Minimum(NamedTuple):
     """Smallest value of a quantity over a workspace.
 
     Attributes:
-        bound: proved lower bound over all poses and all robots within the tolerance; -inf without one.
-        value: smallest known value; infinite without one.
+        bound: proved lower bound over all poses and all robots within the tolerance; -inf without a proof.
+        value: smallest known value; infinite if no value is known.
         at: coordinates of the point with this value.
         boxes, open: number of examined boxes, and of open boxes at the end.
         seconds: wall time.
-        reason: reason for a search that stopped before the gap was reached; else empty.
-        place: place on a path of the point with this value; None for a box of poses.
+        reason: reason why the search stopped before the gap was reached; otherwise empty.
+        place: place of the point on a path; None for a box of poses.
     """
 
     bound: float = -math.inf
@@ -154,8 +155,9 @@ class Goal(NamedTuple):
 
     Attributes:
         gap: allowed absolute difference between the smallest known value and the bound.
-        part: allowed relative difference, which is added.
-        limit: lower limit of the quantity; the bound must reach it unless a smaller value is known. None without one.
+        part: allowed relative difference, in addition to ``gap``.
+        limit: lower limit of the quantity; None without a limit. The bound must reach the limit unless a smaller value
+            is known.
         slack: violation of the limit that counts as rounding.
         is_enough: If true, a bound that reaches the limit is sufficient, whatever its gap.
     """
@@ -171,7 +173,7 @@ class Goal(NamedTuple):
 
         Args:
             value: smallest known value.
-            size: largest known size of the quantity.
+            size: largest known absolute value of the quantity.
         """
         met = value - self.gap - self.part * max(abs(value), _NEAR_ZERO * size) if math.isfinite(value) else math.inf
         if self.limit is None or value < self.limit - self.slack:
@@ -185,7 +187,7 @@ class _Best(NamedTuple):
     """Best known values.
 
     Attributes:
-        value: (K,) smallest known values; infinite without one.
+        value: (K,) smallest known values; infinite if no value is known.
         at: (K, n) points with these values.
         where: (K, 2) places of the points on a path.
     """
@@ -196,7 +198,7 @@ class _Best(NamedTuple):
 
 
 class SmallestValues(LoopRule):
-    """Rule of branch and bound for the smallest values of quantities; boxes carry their bounds.
+    """Rule of branch and bound for the smallest values of quantities; boxes store their bounds.
 
     Args:
         number: the quantities.
@@ -221,7 +223,7 @@ class SmallestValues(LoopRule):
             self._start_from_poses()
 
     def _levels(self) -> FloatArray:
-        """Return the bounds (K,) at which boxes are closed; of several quantities each must reach its level."""
+        """Return the levels (K,) at which boxes are closed; every quantity must reach its level."""
         known = self._best.value.tolist(), self._sizes.tolist()
         pairs = [goal.levels(*each) for goal, *each in zip(self._goals, *known, strict=True)]
         return np.array(pairs)[:, 1 if len(pairs) > 1 else 0]
@@ -239,7 +241,7 @@ class SmallestValues(LoopRule):
         left = some(found, np.flatnonzero(~done))
         width = self.widths(left.boxes)
         widest = width.max(axis=1, keepdims=True, initial=0.0)
-        # Bounds over long and narrow boxes are weak, most of all for loops. The box of a dwell has no width.
+        # Bounds over long and narrow boxes are weak, especially with loops. The box of a dwell has width 0.
         split = coordinates_to_split(left.shares * np.sqrt(width / np.where(widest > 0, widest, 1.0)), width)
         parts = self.boxes_of(left, (-left.smallest).max(axis=1), split, left.smallest)
         return BoxResults(parts, -float(found.smallest[done].min(initial=np.inf)), len(done))
@@ -339,7 +341,7 @@ class SmallestValues(LoopRule):
         if self._problem.cover is None and np.isfinite(bounds).any() and not self.is_one_assembly():
             reason, bounds = APART, np.full(len(bounds), -np.inf)
         elif until < (math.inf, 0.0):
-            # Boxes beyond may be in another assembly mode, with other values.
+            # Boxes beyond this place may be in another assembly mode, with other values.
             reason, bounds = reason or APART, np.full(len(bounds), -np.inf)
             is_beyond = [tuple(where) > until for where in self._best.where.tolist()]
             values = np.where(is_beyond, np.inf, values)
@@ -359,8 +361,8 @@ def smallest_values(number: Number, goals: Sequence[Goal], recorder: TreeRecord 
     Args:
         number: K quantities.
         goals: goal of each quantity.
-        recorder: recorder of the boxes for a proof, without dependent coordinates. The bound of every leaf is at least
-            the bound of the result.
+        recorder: recorder of the boxes for a proof, for robots without dependent coordinates. The bound of every leaf
+            is at least the bound of the result.
 
     Raises:
         UncoveredError: an expression has an operation without an interval rule.

@@ -19,21 +19,21 @@ from casadi import SX
 
 from .....models.arrays import FloatArray, values_at
 from ...enclosure.forms import Forms
-from ...statement.machine import Legs
+from ...statement.fixed_robot import Legs
 from ..robot.pose_box import polynomial_rotation
 from ..robot.posed_robot import Problem, steepest
 from .bound_search import Bounds, Number
 
 #: Outward shift of a bound, relative to the sum of the absolute values of all terms, for rounding.
 _ROUNDING = 1e-13
-#: Relative size below which lines count as parallel; the computed distance is then slightly too large.
+#: Threshold below which lines count as parallel; the computed distance is then slightly too large.
 _PARALLEL = 1e-12
 
 
 class Clearance(Number):
     """Distance between two straight legs.
 
-    The entries are 13: the ends of the first leg, then of the second, times the scale s of a rotation, and s.
+    There are 13 entries: the ends of the first leg and of the second leg, times the scale s of a rotation; and s.
 
     Args:
         problem: the robot.
@@ -61,7 +61,7 @@ class Clearance(Number):
         return _between(values_at(self._ends, z[:, : len(self.problem.free)])[0][:, :, 0])
 
     def worst(self, y: FloatArray) -> FloatArray | None:
-        """Return the errors (m, 3) with which the legs are nearest at a pose (6,); None for the design."""
+        """Return the joint-centre errors (m, 3) for which the legs are nearest at a pose (6,); None for the design."""
         if not self._nearer:
             return None
         between = self.between(y[None, list(self.problem.free)])
@@ -69,7 +69,7 @@ class Clearance(Number):
         signs[list(self._places)] = -1.0, 1.0
         both = np.concatenate([between, between @ self.problem.box.pose(y).rotation])
         errors = steepest(signs[:, None, None] * both, self._legs.tolerance).reshape(-1, 3)
-        # If the full errors would move the legs through each other, a part of the errors makes them touch.
+        # If the full errors would move the legs through each other, smaller errors make the legs touch.
         return min(1.0, float(np.linalg.norm(between)) / self._nearer) * errors
 
     def over(self, forms: Forms, count: int) -> Bounds:

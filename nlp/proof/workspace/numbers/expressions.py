@@ -1,12 +1,12 @@
 """Lower bounds of expressions over poses, for the design or for all robots within the tolerance.
 
 Over a box of poses, an expression has a form ``g + a e_I + b e_D + d e_E + [-r, r]`` with errors ``e_E`` of joint
-centres. With the dependent coordinates replaced by their relation, its values are at least
+centres. If the relation replaces the dependent coordinates, the values of the expression are at least
 
     (g + b off) - sum |a - b T| - sum_j |(d - b E)_j| - (r + |b| rho),
 
-where the errors of joint centre j count as one vector. Only poses are bisected, never errors. Values are taken with
-errors along the gradient, at the corner of a box. Loops are followed in the home assembly mode.
+where the errors of joint centre j count as one vector. Only poses are bisected, never errors. Values are computed at a
+corner of the box, with joint-centre errors along the gradient. Loops are followed in the home assembly mode.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def ranges(forms: Forms, errors: int = 0) -> tuple[FloatArray, FloatArray]:
 
     Args:
         forms: forms of the expressions over boxes.
-        errors: number of the last terms, which are joint-centre errors.
+        errors: number of joint-centre errors, which are the last terms.
     """
     c, a, r = forms
     t = a.shape[2] - errors
@@ -60,7 +60,8 @@ class Expressions(Number):
 
     def over(self, forms: Forms, count: int) -> Bounds:
         """Return lower bounds over boxes; see :meth:`.bound_search.Number.over`."""
-        # Each coordinate gets a part of the remainder, so that flat ones are bisected once the steep ones are narrow.
+        # Each coordinate gets a share of the remainder, so that coordinates with small slopes are bisected once the
+        # others are narrow.
         shares = np.abs(forms.a[:, :, :count]) + forms.r[:, :, None] / max(count, 1)
         return Bounds(ranges(forms, len(self.problem.of_errors))[0], shares)
 
@@ -69,7 +70,7 @@ class Expressions(Number):
         return values_at(self._values, z)[0][:, :, 0]
 
     def slopes(self, z: FloatArray, which: NDArray[np.intp]) -> FloatArray:
-        """Return derivatives (P, n) of one expression at each point; those by dependent coordinates are 0."""
+        """Return the derivatives (P, n) of one expression at each point; 0 with respect to dependent coordinates."""
         found: FloatArray = values_at(self._slopes, z)[0][np.arange(len(z)), which]
         D, size = list(self.problem.dependent), self.problem.size
         if D:
@@ -89,7 +90,7 @@ class Expressions(Number):
         return np.stack([self.closed(each) for each in (z, moved)])
 
     def worst(self, z: FloatArray, slopes: FloatArray) -> FloatArray:
-        """Return points (P, n) with the errors that make values smallest to first order, from slopes of the design."""
+        """Return points (P, n) with the joint-centre errors that minimise the values to first order."""
         parts = slopes[:, self.problem.of_errors].reshape(len(z), -1, 3)
         sizes = np.linalg.norm(parts, axis=2, keepdims=True)
         return self.problem.with_errors(z, np.where(sizes > _FLAT * _sizes(sizes), -parts, 0.0))

@@ -22,7 +22,7 @@ from ...boxes.tree import TreeRecord
 from ...certificate.branch_and_bound import certify_program
 from ...certificate.certificate import Certificate, CertificateStatus
 from ...statement.claims import Claim
-from ...statement.machine import JointErrors
+from ...statement.fixed_robot import JointErrors
 from ...statement.posed_layout import extreme_program, varies
 from ..robot.pose_box import PoseNumbers
 from ..verdict import Outcome, Verdict, slack_of
@@ -35,14 +35,16 @@ if TYPE_CHECKING:
 WorstRobot = Callable[[PoseNumbers], tuple[JointErrors, float]]
 #: Default of the largest relative gap of a bound.
 GAP = 1e-3
-#: Smallest gap for a limit between a bound and the best known value, near rounding.
+#: Smallest gap, near rounding, for a limit that lies between the bound and the best known value.
 _FINEST = 1e-10
-#: Part of the distance from a value to its limit that a smaller gap may take: the best known value changes in a search.
+#: Largest reduced gap as a fraction of the distance from a value to its limit, because the best known value changes in
+#: a search.
 _SHARE = 0.9
-#: Part of an expression's scale below which gaps are relative to this part, as in the search of certificates.
+#: Fraction of an expression's scale; for smaller values, gaps are relative to this fraction, as in the search of
+#: certificates.
 _NEAR_ZERO = 1e-6
 #: Reason for a limit that stays open between a bound and a value although the search ended.
-CLOSE = "the limit is too close to the best known value: bounds cannot separate them"
+CLOSE = "the limit is too close to the best known value: no bound separates the two"
 
 
 @dataclass(frozen=True)
@@ -71,9 +73,9 @@ def verdict_of(
 
     Args:
         claim: claim about the quantity, with its limit.
-        found: result of the search; without a reason if the gap was reached.
+        found: result of the search; its reason is empty if the gap was reached.
         pose: pose of the best known value.
-        errors: joint-centre errors of the robot with this value, as in :class:`.Verdict`.
+        errors: joint-centre errors of the robot with this value, see :class:`.Verdict`.
     """
     sign, read, limit = claim.sense.sign, claim.reading.from_value, claim.limit
     is_bounded, is_reached, reason = math.isfinite(found.bound), math.isfinite(found.value), found.reason
@@ -153,7 +155,7 @@ def prove_extreme(
 
 
 def _searched(nlp: Nlp, claim: Claim, search: NumberSearch) -> tuple[Minimum, FloatArray | None]:
-    """Return the bound of an expression, with the gap that its limit requires, and the point of its best value.
+    """Return the bound of an expression with the gap that the limit requires, and the point of the best value.
 
     Raises:
         UncoveredError: the expression has an operation without an interval rule.
@@ -171,7 +173,7 @@ def _searched(nlp: Nlp, claim: Claim, search: NumberSearch) -> tuple[Minimum, Fl
         else:
             found = replace(more, bound=found.bound, bound_of_tree=found.bound_of_tree)
     if found.status is CertificateStatus.INFEASIBLE:
-        return Minimum(boxes=boxes, seconds=seconds, reason="the robot has no pose there"), None
+        return Minimum(boxes=boxes, seconds=seconds, reason="the robot reaches no pose of the workspace"), None
     if search.record is not None and writer is not None:
         search.record.program(claim, found, writer)
     # A search that ends early may still have reached the requested gap.

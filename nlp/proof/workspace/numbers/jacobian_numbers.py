@@ -1,8 +1,8 @@
-"""Bounds of quantities of J over boxes of poses, from left inverses: singular values, first-order pose error.
+"""Bounds of singular values and of the first-order pose error over boxes of poses, from left inverses of J.
 
-J has rows A divided by norms l; :class:`.ScaledRows` scales them so that A is nearly a polynomial of the coordinates.
-Let C be a pseudo-inverse of A at the middle of a box, where l is 1. Then ``(C A)^-1 C diag(l)`` is a left inverse of J,
-and with ``C A = I + E`` and ``|E| <= B``, entry by entry,
+The rows of J are rows of A divided by norms l; :class:`.ScaledRows` scales the rows so that A is nearly a polynomial
+of the coordinates. Let C be a pseudo-inverse of A at the middle of a box, where l is 1. Then ``(C A)^-1 C diag(l)`` is
+a left inverse of J, and with ``C A = I + E`` and ``|E| <= B``, entry by entry,
 
     (I + E)^-1 C = C - E C + ...,    where the terms of higher order are at most  B^2 (I - B)^-1 |C|.
 
@@ -35,7 +35,7 @@ from casadi import SX
 from .....models.arrays import FloatArray, values_at
 from ....evidence.closed_loops import inverses
 from ...enclosure.forms import Forms
-from ...statement.machine import LEGS, Legs
+from ...statement.fixed_robot import LEGS, Legs
 from ..ranks.krawczyk import bounds_of_inverses, by_centres
 from ..robot.posed_robot import Problem
 from .bound_search import Bounds, Number
@@ -57,10 +57,11 @@ class _Rows(NamedTuple):
 
     Attributes:
         A: (B, m, 6) middles.
-        terms: (B, t, m, 6) coefficients of ``|e| <= 1``: f coordinates, then products of two, then joint-centre errors.
+        terms: (B, t, m, 6) coefficients of terms e with ``|e| <= 1``: f coordinates, then products of two coordinates,
+            then joint-centre errors.
         rest: (B, m, 6) remainders.
-        bend, slack: (B, t, m) coefficients, and (B, m) remainders, of norms.
-        coordinates, errors: number f of coordinates, and number of the terms that are errors.
+        bend, slack: (B, t, m) coefficients and (B, m) remainders of the norms.
+        coordinates, errors: number f of coordinates, and number of terms that are joint-centre errors.
     """
 
     A: FloatArray
@@ -72,7 +73,10 @@ class _Rows(NamedTuple):
     errors: int
 
     def spread(self, linear: FloatArray) -> FloatArray:
-        """Return the largest absolute values (B, ...) of linear parts (B, t, ...); errors of a centre are a vector."""
+        """Return the largest absolute values (B, ...) of linear parts (B, t, ...).
+
+        The three errors of a joint centre are one vector.
+        """
         t = linear.shape[1] - self.errors
         return np.asarray(np.abs(linear[:, :t]).sum(axis=1) + by_centres(np.moveaxis(linear[:, t:], 1, -1)))
 
@@ -83,7 +87,7 @@ class _RowsNumber(Number):
     Args:
         problem: the design, or all robots within the tolerance.
         length: length that divides moments about the platform's origin.
-        family: robots for the values; if None, the robots of the problem.
+        family: robots for which values are computed; if None, the robots of the problem.
     """
 
     def __init__(self, problem: Problem, length: float, family: Problem | None = None) -> None:
@@ -97,7 +101,10 @@ class _RowsNumber(Number):
         return np.asarray(values_at(self._jacobian, z)[0] * self._scale)
 
     def rows(self, forms: Forms, count: int) -> _Rows:
-        """Return the rows over boxes from forms of the rows, column by column, and of their norms, in this order."""
+        """Return the rows over boxes.
+
+        The forms are those of the rows, column by column, followed by those of their norms.
+        """
         m = self.problem.posed.scaled.rows.shape[0]
         c, a, r = forms.part(slice(0, 7 * m))
         (B, _, t), sizes = a.shape, c[:, 6 * m :]
@@ -115,13 +122,14 @@ class SingularValues(_RowsNumber):
     """Smallest singular value of J, or its negative condition number.
 
     With joint-centre errors, values are taken with the errors that are worst to first order at each point: a singular
-    value with vectors u and v is ``u . J v``, with derivatives by the errors from the entries of J.
+    value with singular vectors u and v is ``u . J v``; the entries of J give its derivatives with respect to the
+    errors.
 
     Args:
-        problem: the design, or all robots within the tolerance with errors in each entry.
+        problem: the design, or all robots within the tolerance, with errors as coordinates of each entry.
         length: length that divides moments about the platform's origin.
-        is_condition: If true, the negative condition number; else the smallest singular value.
-        family: all robots within the tolerance, if the problem is only the design.
+        is_condition: If true, bound the negative condition number; otherwise the smallest singular value.
+        family: all robots within the tolerance, if the problem covers only the design.
         change: largest change of a singular value within the tolerance.
     """
 
@@ -142,7 +150,7 @@ class SingularValues(_RowsNumber):
 
     @cached_property
     def _slopes(self) -> ca.Function:
-        """Derivatives of ``u . J v`` by joint-centre errors."""
+        """Derivatives of ``u . J v`` with respect to joint-centre errors."""
         of = self._family or self.problem
         J = of.posed.scaled.jacobian * ca.repmat(SX(self._scale.tolist()).T, of.posed.scaled.rows.shape[0], 1)
         u, v = SX.sym("u", J.shape[0]), SX.sym("v", J.shape[1])
@@ -203,7 +211,7 @@ class SingularValues(_RowsNumber):
 
 
 def change_of_rows(legs: Legs, length: float, shortest: float) -> float:
-    """Return a bound of the Frobenius norm of the change of J by joint-centre errors within the tolerance.
+    """Return a bound of the Frobenius norm of the change of J due to joint-centre errors within the tolerance.
 
     Args:
         legs: joint centres, with the tolerance.
@@ -224,11 +232,11 @@ def change_of_rows(legs: Legs, length: float, shortest: float) -> float:
 
 
 class WorstError(_RowsNumber):
-    """Negative largest first-order pose error for leg-length errors of at most 1.
+    """Largest first-order pose error for leg-length errors of at most 1, negated.
 
     Args:
         problem: robot with six straight legs.
-        is_rotation: If true, the rotation error; else the position error of the platform's origin.
+        is_rotation: If true, bound the rotation error; otherwise the position error of the platform's origin.
     """
 
     def __init__(self, problem: Problem, *, is_rotation: bool) -> None:
@@ -262,8 +270,8 @@ def _left_inverses(rows: _Rows) -> tuple[FloatArray, FloatArray, FloatArray, Flo
 
     Returns:
         (B, 6, m) fixed: position, then rotation times a length, for unit values of the rows; (B, f, 6, m) linear:
-        change over half of the box by each coordinate; (B, 6, m) rest, infinite where no bound is known; (B, 1, f)
-        shares of coordinates in the width.
+        change with each coordinate over half of the box; (B, 6, m) rest: remainder, infinite without a bound;
+        (B, 1, f) shares of the coordinates in the width.
     """
     known = np.asarray(np.isfinite(rows.A).all(axis=(1, 2)) & np.isfinite(rows.terms).all(axis=(1, 2, 3)))
     A = np.where(known[:, None, None], rows.A, np.eye(rows.A.shape[1], 6))

@@ -1,10 +1,10 @@
 """Force, speed and power of an actuator over boxes of poses, for every load case.
 
-With ``A y = D u`` for the rates u of the actuators, the platform's motion by a unit rate of actuator k is ``x_k`` in
-the solution of ``A y_k = D_k``, and the actuator holds a load W with the force ``-(W . x_k)``, by virtual work. For a
-robot without given actuators, A has the rows of J times their norms, and D the norms of the rows of legs. Else y has
-the platform's motion and the rates of passive joints, and D the screws of the actuators. Second-order forms of the
-solution are kept; the remainder is of third order in the widths of a box.
+With ``A y = D u`` for the rates u of the actuators, a unit rate of actuator k moves the platform by ``x_k``, a part of
+the solution of ``A y_k = D_k``. By virtual work, the actuator holds a load W with the force ``-(W . x_k)``. For a
+robot without given actuators, A has the rows of J times their norms, and D the norms of the rows of legs. For other
+robots, y has the platform's motion and the rates of passive joints, and D the screws of the actuators. Second-order
+forms of the solution are kept; the remainder is of third order in the widths of a box.
 
 Loads of any direction add the norm of a velocity. All quantities are bounded from above; a smallest force is negated.
 Rotations about any axis lie in a ball, ``|r|^2 <= b``, so a multiple of ``b - |r|^2`` may be added to a bound.
@@ -23,10 +23,10 @@ from casadi import SX
 
 from .....models import FloatArray, rate_relations
 from .....models.arrays import values_at
-from .....models.statics import freedoms_of
+from .....models.statics import degrees_of_freedom
 from ....case.case import Case
 from ....case.loads import Motion
-from ....case.motors import Motor, MotorNumber
+from ....case.motors import ActuatorQuantity, Motor
 from ....case.task import Sense
 from ....case.workspace import TurnKind
 from ....program.layout import robot_length
@@ -42,7 +42,7 @@ _TINY = 1e-290
 
 
 class _Part(NamedTuple):
-    """Factor of a quantity: a force in one direction under a load, or the speed.
+    """Factor of an actuator quantity: a force in one direction under a load, or the speed.
 
     Attributes:
         sense: ``MAX`` for the largest force, ``MIN`` for the smallest force; None for the speed.
@@ -68,9 +68,11 @@ class Motors(Number):
     def __init__(self, problem: Problem, case: Case, claims: Sequence[Claim]) -> None:
         posed, self._loading = problem.posed, case.loading
         if rate_relations(case.model.actuators).shape[0]:
-            raise NotJudgedError("relations between actuator rates, which the robot's loops impose, are not supported")
+            raise NotJudgedError(
+                "the robot's loops impose relations between actuator rates; such robots are not supported"
+            )
         motor, R = claims[0].motor or Motor(), posed.turned[0]
-        self._actuator, self._length, self._is_six = motor.place, problem.length, freedoms_of(case.model) == 6
+        self._actuator, self._length, self._is_six = motor.place, problem.length, degrees_of_freedom(case.model) == 6
         self._size = robot_length(case)
         self._numbers = [_parts_of(case, claim) for claim in claims]
         self._parts = list(dict.fromkeys(itertools.chain(*self._numbers)))
@@ -104,7 +106,8 @@ class Motors(Number):
     def products(self, z: FloatArray) -> FloatArray:
         """Return products (P, K) of the norms of loads and motions at points (P, n) with closed loops.
 
-        They are typical sizes of the quantities, which may be 0 for single directions of a load or a motion.
+        These products are typical magnitudes of the quantities. A quantity itself may be 0 for single directions of a
+        load or a motion.
         """
         motion = self._loading.motion or Motion()
         with np.errstate(all="ignore"):
@@ -149,7 +152,7 @@ class Motors(Number):
         return np.asarray(np.stack(columns, axis=1))
 
     def _upper(self, of: Quadratics, turn: Quadratics) -> FloatArray:
-        """Return upper bounds (B,) of a quantity; rotations, if they are given, lie in the ball."""
+        """Return upper bounds (B,) of a quantity; if rotations are given, they lie in the ball."""
         upper, ball = of.upper()[0, 0], self.problem.box.ball
         which = np.flatnonzero((turn.size**2).sum(axis=(0, 1)) > ball)
         if not (which.size and of.q.shape[2] and turn.c.size):
@@ -157,7 +160,7 @@ class Motors(Number):
         of, turn = of[..., which], turn[..., which]
         inside = turn.by(turn).sums(1).times(-1.0)
         inside = replace(inside, c=inside.c + ball, r=inside.r + ROUNDING * ball)
-        # The multiple that makes the derivative along r zero in the middle.
+        # The multiple for which the derivative with respect to r is zero at the centre of the box.
         r, half = turn.c[0], turn.a[0]
         slopes = (of.a[0, 0] * half / np.maximum((half**2).sum(axis=0), _TINY)).sum(axis=1)
         factor = (slopes * r).sum(axis=0) / np.maximum(2 * (r**2).sum(axis=0), _TINY)
@@ -175,7 +178,7 @@ class Motors(Number):
         ]
 
     def _bounded(self, matrices: Sequence[Quadratics]) -> tuple[list[Quadratics], FloatArray]:
-        """Return the factors (1, 1) that are bounded from above, and shares (t, B) of coordinates in remainders."""
+        """Return the factors (1, 1) to be bounded from above, and shares (t, B) of coordinates in remainders."""
         A, D, row, twist, arms, wrenches, _ = matrices
         every, k = solved(A, D)[:6], self._column
         x = every[:, k : k + 1]
@@ -189,7 +192,7 @@ class Motors(Number):
         return found, (A.a**2).sum(axis=(0, 1))
 
     def _spread(self, case: int, x: Quadratics, arms: Quadratics) -> Quadratics:
-        """Return the largest change (1, 1) of the force by loads of any direction in a load case."""
+        """Return the largest change (1, 1) of the force due to loads of any direction in a load case."""
         found, turned = x[:1].times(0.0), x[3:]
         for load, _ in self._loading.cases[case].parts:
             k = self._loading.loads.index(load)
@@ -204,7 +207,7 @@ class Motors(Number):
         """Return the largest speed (1, 1) in the motions of the case, or in the motion of the path.
 
         Args:
-            x: motions of the platform by all actuators.
+            x: motions of the platform for unit rates of all actuators.
             row: (6, 1) row of the leg; (6, 0) for other actuators.
             twist: (6, 1) twist of the platform in the motion of a path; (6, 0) for the motions of the case.
         """
@@ -233,13 +236,13 @@ class Motors(Number):
 def _parts_of(case: Case, claim: Claim) -> list[_Part]:
     """Return the factors of the quantity of a claim."""
     motor, cases = claim.motor or Motor(), case.loading.cases
-    if motor.number is MotorNumber.SPEED:
+    if motor.number is ActuatorQuantity.SPEED:
         return [_Part()]
     load = next(k for k, each in enumerate(cases) if each.name == motor.load)
     sense = Sense.MIN if motor.is_backwards else claim.sense
     if not any(each.is_fixed for each, _ in cases[load].parts):
         sense = Sense.MAX  # loads of any direction give the same force in both directions
-    return [_Part(sense, load), *([_Part()] if motor.number is MotorNumber.POWER else [])]
+    return [_Part(sense, load), *([_Part()] if motor.number is ActuatorQuantity.POWER else [])]
 
 
 def path_twist(problem: Problem) -> SX:
@@ -249,7 +252,9 @@ def path_twist(problem: Problem) -> SX:
         NotJudgedError: a coordinate of the pose is dependent.
     """
     if problem.box.dependent:
-        raise NotJudgedError("the platform's twist along the path has dependent components")
+        raise NotJudgedError(
+            "the path does not determine the platform's twist, because some pose coordinates are dependent"
+        )
     rates = SX(6, 1)
     rates[problem.rated] = problem.z[list(problem.rates), :]
     if problem.box.kind is not TurnKind.ROLL_PITCH_YAW:

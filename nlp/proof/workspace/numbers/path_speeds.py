@@ -94,7 +94,7 @@ class PathSpeeds(Number):
             if L_u.c.size:
                 speeds = speeds.plus(q_u.matmul(solved(L_u, L_t).times(-1.0)))
             upper = np.maximum(speeds.upper(), speeds.times(-1.0).upper())[:, 0].T
-            # Only the path is bisected: each coordinate counts for it.
+            # Only the place along the path is bisected, so the shares of all coordinates count for it.
             shares = np.abs(speeds.a[:, 0, :count]).transpose(2, 0, 1) + speeds.r[:, 0].T[:, :, None] / max(count, 1)
         shares[:, :, [k for k, j in enumerate(self.problem.independent) if j in self.problem.rates]] = 0.0
         return Bounds(np.where(np.isfinite(upper), -upper, -np.inf), shares)
@@ -110,7 +110,7 @@ def pose_rates(problem: Problem) -> SX:
     velocity, turn, w = rates[:3], y[3:], rates[3:]
     if problem.box.kind is TurnKind.ROLL_PITCH_YAW:
         turned = 0.5 * (1 + turn * turn) * w
-    elif turn.numel() > 3:  # a quaternion of any size, which may change along itself
+    elif turn.numel() > 3:  # a quaternion of any norm, which may change along itself
         turned = 0.5 * ca.vertcat(-ca.dot(w, turn[1:]), turn[0] * w + ca.cross(w, turn[1:]))
     else:
         turned = 0.5 * (w + ca.cross(w, turn) + ca.dot(w, turn) * turn)

@@ -26,7 +26,7 @@ from casadi import SX
 from .....models import Dimension, FloatArray
 from ....evidence.closed_loops import Loops
 from ...statement.claims import ERRORS
-from ...statement.machine import Legs
+from ...statement.fixed_robot import Legs
 from ..robot.pose_box import PoseNumbers, cayley_rotation
 from ..verdict import Verdict
 from .bound_search import Goal, Minimum, smallest_values
@@ -41,14 +41,14 @@ if TYPE_CHECKING:
 _ROUNDING = 1e-10
 #: Largest number of steps in the iteration for the smallest r.
 _STEPS = 200
-#: Gap of a pose error relative to its value at the middle of the workspace: a smaller gap takes many more boxes.
+#: Gap of a pose error relative to its value at the workspace centre; a smaller gap takes many more boxes.
 _GAP = 0.1
 #: Reason for errors without a proved bound.
 _TOO_LARGE = "the errors are too large for a bound of their second-order terms"
 
 
 def pose_errors(subject: Subject, leg_error: float, record: ProofRecord | None = None) -> Iterator[Verdict]:
-    """Yield the verdicts on the largest errors of the platform's position and rotation; none without tolerances.
+    """Yield the verdicts on the platform's largest position and rotation errors; none without tolerances.
 
     Args:
         subject: robot with six straight legs.
@@ -71,7 +71,7 @@ def pose_errors(subject: Subject, leg_error: float, record: ProofRecord | None =
             record.firsts[claim.name] = -found.bound
     first = PoseErrors(*(-eps * found.bound for _, found in searches))
     reach = float(np.linalg.norm(legs.platform, axis=1).max())
-    # Legs of the design may be longer than legs of robots within the tolerance.
+    # Legs of the design may be longer than the legs of a robot within the tolerance.
     exact = shortest + 2 * legs.tolerance if shortest > 0 else -math.inf
     whole = with_rest(first, eps, exact, reach)
     for k, (claim, (number, found)) in enumerate(zip(ERRORS, searches, strict=True)):

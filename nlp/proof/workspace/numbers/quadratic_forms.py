@@ -40,9 +40,10 @@ class Quadratics:
     Attributes:
         c: (n, m, B) values at the centres.
         a: (n, m, t, B) linear parts.
-        q: (n, m, p, B) factors of products of two of f coordinates, ``e_i e_j`` with i <= j, row by row; or p is 0.
+        q: (n, m, p, B) coefficients of the products ``e_i e_j``, i <= j, of f coordinates, row by row; p is 0 for
+            first-order forms.
         r: (n, m, B) bounds of the remainder; infinite where no form is known.
-        errors: number of the last linear terms that are joint-centre errors.
+        errors: number of joint-centre errors, which are the last linear terms.
     """
 
     c: FloatArray
@@ -57,8 +58,8 @@ class Quadratics:
 
         Args:
             forms: forms of the entries.
-            count: number f of coordinates; their terms come first.
-            errors: number of the last terms that are joint-centre errors.
+            count: number f of coordinates, whose terms come first.
+            errors: number of joint-centre errors, which are the last terms.
             shape: shape of the matrix.
         """
         c, a, r = forms.c.T, forms.a.transpose(1, 2, 0), forms.r.T
@@ -111,7 +112,7 @@ class Quadratics:
         return self.made(each.swapaxes(0, 1) for each in self.parts)
 
     def sums(self, axis: int) -> Quadratics:
-        """Return the sums along an axis, 0 or 1, which stays with length 1."""
+        """Return the sums along axis 0 or 1; this axis keeps the length 1."""
         found = self.made(each.sum(axis=axis, keepdims=True) for each in self.parts)
         return replace(found, r=found.r + ROUNDING * self.size.sum(axis=axis, keepdims=True))
 
@@ -153,7 +154,7 @@ class Quadratics:
         return Quadratics(_product(c, d), new, square, rest, self.errors)
 
     def lengths(self) -> Quadratics:
-        """Return forms (1, m) with upper ends that bound the norms of the columns.
+        """Return forms (1, m) whose upper bounds are at least the norms of the columns.
 
         A norm is at most ``(g / t + t) / 2``, with its square g and any t > 0, here the largest norm.
         """
@@ -189,7 +190,7 @@ def _add_products(square: FloatArray, a: FloatArray, b: FloatArray) -> None:
 
 
 def _contracted(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Return products of matrices of terms (n, k, t, B) and (k, m, t, B); one of them has t = 1."""
+    """Return products of matrices of terms (n, k, t, B) and (k, m, t, B), one of which has t = 1."""
     return np.asarray(sum(one[:, k, None] * other[None, k] for k in range(one.shape[1])))
 
 

@@ -12,13 +12,13 @@ import numpy as np
 
 from .....models import FloatArray, Model
 from ....case.case import Case
-from ....case.motors import Motor, MotorNumber
+from ....case.motors import ActuatorQuantity, Motor
 from ....case.task import Sense
 from ....errors import UncoveredError
 from ....interruption import seconds_left, within
 from ...boxes.tree import TreeRecord
 from ...statement.claims import Claim, ClaimKind, searched_claims
-from ...statement.machine import JointErrors, Legs, has_straight_legs, joint_centres
+from ...statement.fixed_robot import JointErrors, Legs, has_straight_legs, joint_centres
 from ...statement.motors import motor_claims
 from ..proof_record import ProofRecord
 from ..robot.path_cover import PathCover
@@ -30,14 +30,14 @@ from .extremes import NumberSearch, goal_of, verdict_of
 from .jacobian_numbers import SingularValues, change_of_rows
 from .motors import Motors
 
-#: Singular value, and clearance in parts of the robot's size, below which gaps are relative to this value.
+#: Singular value, and clearance relative to the robot's size, below which gaps are relative to this value.
 _NEAR_ZERO = {ClaimKind.SPECTRUM: 0.1, ClaimKind.CLEARANCE: 0.01}
 #: Reason for a measure without a bound over all robots within the tolerance.
-_TOO_LARGE = "the joint-centre errors are too large for a bound of the change of J"
+_TOO_LARGE = "the joint-centre errors are too large: the change of J has no bound"
 #: Gap of an actuator quantity, relative to its largest absolute value.
 MOTOR_GAP = 0.01
-#: Lower bound of this value in parts of load times motion: some quantities are 0 at every pose, such as moments on a
-#: platform that cannot turn.
+#: Lower bound of this value, relative to load times motion. Some quantities are 0 at every pose, such as moments on a
+#: platform that cannot rotate.
 _SMALL = 0.01
 #: Relative rounding error of a product of two bounds, rounded up.
 _ROUNDING = 1e-15
@@ -52,8 +52,8 @@ class Subject:
     Attributes:
         case: case with fixed dimensions.
         model: robot of the case, with closed forms in place of unknowns.
-        family: the design, or all robots within the tolerance, over the workspace; None if they are not judged.
-        reason: reason for a robot that is not judged; else empty.
+        family: the design, or all robots within the tolerance, over the workspace; None if these robots are not judged.
+        reason: reason why the robot is not judged; otherwise empty.
         shortest: lower bound of all leg lengths over the workspace, length.
     """
 
@@ -64,7 +64,7 @@ class Subject:
     shortest: float = 0.0
 
     def errors(self, vectors: FloatArray | None, *, of_legs: bool = False) -> JointErrors | None:
-        """Return joint-centre errors (m, 3) with names; ``of_legs`` states errors of legs only. None for the design."""
+        """Return joint-centre errors (m, 3) with names; with ``of_legs``, only errors of legs. None for the design."""
         if vectors is None or self.family is None:
             return None
         names, found = self.family.names, np.zeros((len(self.family.names), 3))
@@ -92,7 +92,7 @@ class Subject:
         """Return the quantity of a claim about a clearance or a singular value, negated for a largest value."""
         if claim.kind is ClaimKind.CLEARANCE:
             if self.legs.tolerance and self.problem.has_following:
-                raise NotJudgedError("dependent coordinates of the pose differ between robots within the tolerance")
+                raise NotJudgedError("dependent pose coordinates differ between robots within the tolerance")
             return Clearance(self.problem, self.legs, claim.legs)
         return self.spectrum(claim.length, is_condition=claim.sense is Sense.MAX)
 
@@ -119,7 +119,7 @@ def searched_extremes(subject: Subject, names: Sequence[str], search: NumberSear
 
 
 def _answer(subject: Subject, claim: Claim, search: NumberSearch) -> Verdict:
-    """Return the verdict on a quantity; the search of a limit ends as soon as it is decided."""
+    """Return the verdict on a quantity; the search ends as soon as the limit is decided."""
     if subject.model.rank < 6 and claim.limit is None and claim.kind is not ClaimKind.CLEARANCE:
         return verdict_of(claim, Minimum(reason=EVERYWHERE))
     try:
@@ -151,25 +151,25 @@ def motor_extremes(
 ) -> Iterator[Verdict]:
     """Yield the verdicts on :func:`~.motors.motor_claims`, for each actuator and load.
 
-    Each actuator gets an equal share of the time left, and so does the work after them.
+    Each actuator gets an equal share of the remaining time, and so does the work after all actuators.
 
     Args:
         subject: the robot.
-        with_all: If false, leave out quantities without limits.
+        with_all: If false, omit quantities without limits.
         speeds: proved bounds of actuator speeds, by name of the actuator; None if speeds are searched too.
         record: record of the searches for a proof.
     """
     claims = [each for each in motor_claims(subject.case) if with_all or each.limit is not None]
     known = dict(speeds or {})
     if speeds is not None:
-        claims = [each for each in claims if each.motor and each.motor.number is not MotorNumber.SPEED]
+        claims = [each for each in claims if each.motor and each.motor.number is not ActuatorQuantity.SPEED]
     alike = itertools.groupby(claims, lambda claim: claim.motor and claim.motor.whose)
     groups = [list(group) for _, group in alike]
     for left, group in zip(range(len(groups), 0, -1), groups, strict=True):
         actuator = group[0].motor.actuator if group[0].motor else ""
         with within(seconds_left() / (left + 1)):
             found = list(_motor_answers(subject, group, known.get(actuator, math.inf), record))
-        if group[0].motor and group[0].motor.number is MotorNumber.SPEED:
+        if group[0].motor and group[0].motor.number is ActuatorQuantity.SPEED:
             known[actuator] = found[0].bound
         yield from found
 
@@ -223,9 +223,9 @@ def _at_most_products(claims: Sequence[Claim], every: Sequence[Minimum], speed: 
     motors, forces, found = [claim.motor or Motor() for claim in claims], dict[Sense, float](), []
     for claim, motor, own in zip(claims, motors, every, strict=True):
         bound = own.bound
-        if motor.number is MotorNumber.FORCE:
+        if motor.number is ActuatorQuantity.FORCE:
             forces[claim.sense] = max(-bound, 0.0)
-        elif motor.number is MotorNumber.POWER:
+        elif motor.number is ActuatorQuantity.POWER:
             force = forces.get(Sense.MIN if motor.is_backwards else Sense.MAX, math.inf)
             most = force * speed * (1 + _ROUNDING) if math.isfinite(force) and math.isfinite(speed) else math.inf
             bound = max(bound, -most)
@@ -236,8 +236,8 @@ def _at_most_products(claims: Sequence[Claim], every: Sequence[Minimum], speed: 
 def _asked_gap(subject: Subject, number: SingularValues | Clearance, gap: float) -> float:
     """Return the gap of a quantity without a limit, enlarged by the width of the bound at single poses.
 
-    A bound of the change of J exceeds its change in any single robot, and smaller boxes do not reduce this difference.
-    Its largest value at a few poses is added to the gap.
+    A bound of the change of J exceeds the change in any single robot. Smaller boxes do not reduce this difference, so
+    its largest value at a few poses is added to the gap.
     """
     problem = number.problem
     allowed = gap * (abs(float(number.values(problem.start[None])[0, 0])) or 1.0)

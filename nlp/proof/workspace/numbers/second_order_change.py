@@ -1,6 +1,6 @@
-"""Bounds of the second-order change of quantities by joint-centre errors, over a whole workspace.
+"""Bounds of the second-order change of quantities due to joint-centre errors, over a whole workspace.
 
-For a quantity g with second derivatives H by the errors e, at some errors between 0 and e,
+For a quantity g with second derivatives H with respect to the errors e, evaluated at some errors between 0 and e,
 
     |g(e) - g(0) - g'(0) e| <= 1/2 sum_jk |H_jk| |e_j| |e_k|,
 
@@ -30,14 +30,14 @@ if TYPE_CHECKING:
 
 #: Number of boxes examined at once, and largest number of boxes.
 _BLOCK, _MOST = 128, 4096
-#: The search ends if the bound is at most this part of the first-order change, or this factor of a known value.
+#: The search ends if the bound is at most this fraction of the first-order change, or this multiple of a known value.
 _SHARE, _NEAR = 0.02, 1.2
 #: Outward factor of a bound, for rounding and for the check of a proof.
 _OUTWARDS = 1.02
 
 
 def second_order_change(family: Problem, expression: SX, first: float) -> float:
-    """Return a bound of the change of an expression beyond first order; infinite if none is found.
+    """Return a bound of the change of an expression beyond first order; infinite without a bound.
 
     Args:
         family: robots within the tolerance, without dependent coordinates.
@@ -77,12 +77,14 @@ def _change(rule: _ChangeRule, enough: float) -> float:
 
 
 class _ChangeRule(Rule[FloatArray]):
-    """Rule of branch and bound for the change by errors of some centres; boxes carry the change at their middles.
+    """Rule of branch and bound for the change due to errors of some joint centres.
+
+    Boxes store the change at their centres.
 
     Args:
         family: robots within the tolerance.
-        H: (3 m, 3 m) second derivatives by all errors.
-        centres: indices of the k centres; their second derivatives depend on no other errors.
+        H: (3 m, 3 m) second derivatives with respect to all errors.
+        centres: indices of the k centres; the second derivatives of these depend on no other errors.
 
     Attributes:
         whole: the workspace.

@@ -11,7 +11,7 @@ import numpy as np
 from .....models import FloatArray
 from ....case.task import Sense
 from ...statement.claims import Claim, length_claims
-from ...statement.machine import JointErrors
+from ...statement.fixed_robot import JointErrors
 from ...statement.tolerance import Directions
 from ..robot.pose_box import PoseNumbers
 from ..robot.posed_robot import steepest
@@ -20,22 +20,22 @@ from .bound_search import Minimum
 from .extremes import verdict_of
 from .searched import Subject
 
-#: Smallest relative gap of a length, near rounding; and part of the margin to a limit that the gap may take.
+#: Smallest relative gap of a length, near rounding; and largest gap as a fraction of the margin to a limit.
 _FINEST, _SHARE = 1e-11, 0.9
 
-#: Gaps of lengths with which a limit is tried that the triangle inequality leaves open.
+#: Gaps of lengths that are tried in turn for a limit that the triangle inequality leaves open.
 _GAPS = (1e-4, 1e-6)
 
-#: Proves the smallest or largest length of a leg, by its index, to a finer gap; with directions, the length less the
-#: part of its errors that is the same at every pose. None where it cannot.
+#: Function that proves the smallest or largest length of a leg, by its index, to a smaller gap. With directions, the
+#: length is without the part of the errors that is the same at every pose. None without a proof.
 Refine = Callable[[int, Sense, float, Directions | None], Verdict | None]
 
 
 def stroke_verdicts(subject: Subject, lengths: Iterable[Verdict], refine: Refine) -> Iterator[Verdict]:
     """Yield the verdicts on the case's limits on telescoping legs.
 
-    A stroke is the longest minus the shortest length over all poses of the workspace. If a limit lies between the bound
-    and the known value, the two lengths are proved with a smaller gap, and yielded again before it.
+    A stroke is the longest minus the shortest length over all poses of the workspace. If a limit lies between the
+    bound and the known value, the two lengths are proved with a smaller gap, and yielded again before the stroke.
 
     Args:
         subject: the robot.
@@ -75,7 +75,7 @@ class _Combined:
                 break
             ends = [_better(one, other) for one, other in zip(ends, finer, strict=True)]
             before, extreme = extreme, self.extreme(ends)
-            # The bound may stop improving before a value near it is known.
+            # The bound may stop improving before a value near the bound is known.
             tighter, nearer = before.bound - extreme.bound, extreme.reached - before.reached
             if not (self._sign * tighter > 0 or self._sign * nearer > 0):
                 break

@@ -1,12 +1,13 @@
 """Claims about every robot within the joint-centre tolerance, for robots of any type.
 
-With the derivatives g_j by the error of centre j, a quantity g of a robot within the tolerance t is at most
+Let g_j be the derivative of a quantity g with respect to the error of centre j. For a robot within the tolerance t,
+the quantity is at most
 
     g + t sum_j |g_j| + rest
 
 at each pose, and at least ``g - t sum_j |g_j| - rest``. The rest bounds second-order terms over the workspace. So the
-worst value within the tolerance is an expression of the pose, which the search of ``certify`` bounds. Robots with
-dependent coordinates, and quantities with kinks, are bounded by a search of boxes of poses instead.
+worst value within the tolerance is an expression of the pose; the search of ``certify`` bounds this expression. Robots
+with dependent coordinates, and quantities with kinks, are bounded by a search of boxes of poses instead.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from ....program.layout import Layout
 from ...boxes.tree import TreeRecord
 from ...enclosure.tape import compile_tape
 from ...statement.claims import Claim
-from ...statement.machine import JointErrors
+from ...statement.fixed_robot import JointErrors
 from ...statement.tolerance import (
     BuiltModel,
     ToleranceLayout,
@@ -53,9 +54,10 @@ from .second_order_change import second_order_change
 
 #: Outward factor of the bound of a change, for rounding.
 _OUTWARDS = 1 + 1e-12
-#: Length, in parts of the robot's size, or angle, that counts as small.
+#: Length (relative to the robot's size) or angle that counts as small.
 _SMALL = 0.01
-#: The same for a dependent rotation of the platform. It is often 0 at all poses, and a small gap takes many boxes then.
+#: The same for a dependent rotation of the platform. This rotation is often 0 at all poses, and a small gap would then
+#: take many boxes.
 _SMALL_TURN = 0.03
 #: Number of random poses at which the first-order change is sampled, to compare with second-order terms.
 _POSES, _SEED = 32, 0
@@ -118,7 +120,9 @@ class RobotsWithinTolerance:
             return verdict_of(claim, Minimum(reason=str(error)))
 
     def followed(self, claims: Sequence[Claim], gap: float) -> Iterator[Verdict]:
-        """Yield the verdicts on the limits with interval rules, by one search that ends when the limits are decided.
+        """Yield the verdicts on limits whose operations have interval rules.
+
+        One search ends when all of these limits are decided.
 
         Args:
             claims: claims with limits, in the symbols of ``symbols``.
@@ -130,7 +134,7 @@ class RobotsWithinTolerance:
                 yield from self._by_search(covered, gap, is_enough=True)
 
     def searched(self, claims: Sequence[Claim], search: NumberSearch, *, is_enough: bool = True) -> list[Verdict]:
-        """Return the verdicts on quantities with interval rules, all by one search.
+        """Return the verdicts on quantities whose operations have interval rules; one search bounds all of them.
 
         Args:
             claims: claims about the quantities, in the symbols of ``symbols``.
@@ -153,7 +157,9 @@ class RobotsWithinTolerance:
         return -claim.sense.sign * self.symbols.of(claim.expression, self.family.errors, self.family.problem.z)
 
     def _by_first_order(self, claim: Claim, number: SX, search: NumberSearch) -> Verdict | None:
-        """Return the verdict on a quantity with its change, as an expression of the pose; None if it has no bound.
+        """Return the verdict on a quantity from its first-order change, an expression of the pose.
+
+        The result is None if the second-order terms have no bound.
 
         Raises:
             UncoveredError: the expression has an operation without an interval rule.
@@ -177,7 +183,7 @@ class RobotsWithinTolerance:
         return replace(prove_extreme(design, of_design, search, worst=worst), claim=claim)
 
     def _worst(self, values: Expressions, sign: float, pose: PoseNumbers) -> tuple[JointErrors, float]:
-        """Return the joint-centre errors that are worst at a pose to first order, and the quantity with them."""
+        """Return the joint-centre errors that are worst at a pose to first order, and the resulting quantity."""
         problem = self.family.problem
         z = self.family.exact(problem.box.coordinates(pose)[list(problem.free)])[None]
         z = values.worst(z, values.slopes(z, np.zeros(1, dtype=np.intp)))
@@ -213,9 +219,9 @@ class RobotsWithinTolerance:
             claims: claims about the quantities, in the symbols of ``symbols``.
             gap: largest relative gap.
             is_enough: If true, a bound within its limit is sufficient, whatever its gap.
-            small: value, in parts of the robot's size or as an angle, below which the gap is relative to this value:
-                quantities may be 0 at home.
-            record: record of the search for a proof; along a path also of a stopped search.
+            small: length (relative to the robot's size) or angle below which the gap is relative to this value,
+                because quantities may be 0 at home.
+            record: proof record of the search; along a path, stopped searches are recorded too.
 
         Raises:
             UncoveredError: an expression has an operation without an interval rule.

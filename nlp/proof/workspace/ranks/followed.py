@@ -11,8 +11,8 @@ from ....evidence.closed_loops import inverses
 from ..robot.path_cover import PathCover
 from ..robot.posed_robot import Problem
 
-#: Largest relative correction of extrapolated joint positions that does not count as a jump; and shortest part of a
-#: piece for one extrapolation.
+#: Largest relative correction of extrapolated joint positions that does not count as a jump; and smallest fraction of
+#: a piece for one extrapolation.
 _JUMP, _SHORTEST = 0.1, 2.0**-10
 
 
@@ -39,7 +39,7 @@ def _followed(problem: Problem, cover: PathCover) -> FloatArray:
     parts = (0.0, 0.5, 1.0)
     z, points = problem.start.copy(), [problem.path_points(cover, cover.pieces, part) for part in parts]
     for k, ways in enumerate(zip(*points, strict=True)):
-        # With another reference of rotations, the same pose has other coordinates.
+        # For another reference of rotations, the same pose has different coordinates.
         z[stated] = ways[0]
         for j in (1, 2):
             moved = _extrapolated(problem, z, ways[j])
@@ -52,7 +52,8 @@ def _followed(problem: Problem, cover: PathCover) -> FloatArray:
 def _extrapolated(problem: Problem, z: FloatArray, point: FloatArray) -> FloatArray | None:
     """Return the point (n,) with closed loops at another pose (f,), from extrapolated joint positions.
 
-    None if Newton's method corrects them by more than ``_JUMP``: it may have reached another assembly mode.
+    The result is None if Newton's method corrects them by more than ``_JUMP``: it may have reached another assembly
+    mode.
     """
     D, own, size, loops = list(problem.dependent), problem.stated, problem.size, problem.loops
     guess = z.copy()

@@ -1,13 +1,14 @@
 """Krawczyk's operator for loop equations: dependent coordinates over a box, as a linear relation with a remainder.
 
-With forms ``g + A e + [-r, r]`` of the equations over a box, and Y close to the inverse of the columns of the dependent
-coordinates D, every point of the box with closed loops has
+With forms ``g + A e + [-r, r]`` of the equations over a box, let Y be close to the inverse of the columns of the
+dependent coordinates D. Every point of the box with closed loops then satisfies
 
     e_D = off - T e_I + [-rho, rho],    off = -Y g,   T = Y A_I,   rho = |Y| r + |Y A_D - I|  (+ rounding).
 
 Joint-centre errors are additional columns E, ``- Y A_E e_E``; errors of one centre are a vector of norm at most 1. If
-the right side is inside of the box for all ``|e_I| <= 1``, Brouwer's theorem gives a point with closed loops for each
-value of the independent coordinates; if also the derivatives by D are regular over the box, it is the only one [1].
+the right side is inside the box for all ``|e_I| <= 1``, Brouwer's theorem gives a point with closed loops for each
+value of the independent coordinates. The point is unique if the derivatives with respect to D are also regular over
+the box [1].
 
 Source: 1. R. Krawczyk, *Newton-Algorithmen zur Bestimmung von Nullstellen mit Fehlerschranken*, Computing 4 (1969); the
 form with parameters is in A. Neumaier, *Interval Methods for Systems of Equations*, 1990, Section 5.6.
@@ -38,7 +39,7 @@ _TINY = 1e-300
 
 
 class Coordinates(NamedTuple):
-    """Indices of the independent coordinates, of the dependent ones, and of joint-centre errors."""
+    """Indices of the independent coordinates, of the dependent coordinates, and of the joint-centre errors."""
 
     independent: list[int]
     dependent: list[int]
@@ -49,10 +50,10 @@ class Relation(NamedTuple):
     """Dependent coordinates over B boxes, relative to their half widths.
 
     Attributes:
-        off: (B, k) values at the middle of the independent coordinates.
-        T: (B, k, f) negative slopes by the independent coordinates.
+        off: (B, k) values at the centre of the independent coordinates.
+        T: (B, k, f) negative derivatives with respect to the independent coordinates.
         rho: (B, k) remainder; infinite where no relation is known.
-        E: (B, k, 3 m) negative slopes by errors of m joint centres.
+        E: (B, k, 3 m) negative derivatives with respect to the errors of m joint centres.
     """
 
     off: FloatArray
@@ -62,7 +63,7 @@ class Relation(NamedTuple):
 
     @property
     def of_errors(self) -> FloatArray:
-        """Largest absolute values (B, k) of the part of the joint-centre errors."""
+        """Largest absolute contributions (B, k) of the joint-centre errors."""
         return by_centres(self.E)
 
     @property
@@ -78,7 +79,7 @@ def by_centres(slopes: FloatArray) -> FloatArray:
 
 
 def bounds_of_inverses(E: FloatArray, right: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Return X (B, n, k) with ``(I - E) X >= right`` for nonnegative E (B, n, n), and whether it is proved (B,).
+    """Return X (B, n, k) with ``(I - E) X >= right`` for nonnegative E (B, n, n), and whether this is proved (B,).
 
     If every row of ``right`` has a positive sum, a nonnegative X proves that ``I - E`` is an M-matrix. Then X is at
     least ``(I - E)^-1 right``.
@@ -93,13 +94,13 @@ def bounds_of_inverses(E: FloatArray, right: FloatArray) -> tuple[FloatArray, ND
 
 
 def no_relation(count: int, of: Coordinates) -> Relation:
-    """Return the unknown relation over boxes, with infinite remainders."""
+    """Return a relation with infinite remainders, for boxes without a known relation."""
     f, k, e = map(len, of)
     return Relation(np.zeros((count, k)), np.zeros((count, k, f)), np.full((count, k), np.inf), np.zeros((count, k, e)))
 
 
 def relation_of(equations: Forms, of: Coordinates) -> Relation:
-    """Return the relation that the forms of k equations over boxes give."""
+    """Return the relation of the dependent coordinates, from the forms of k equations over boxes."""
     A = equations.a[:, :, of.dependent]
     other, own = equations.a[:, :, of.independent], equations.a[:, :, of.errors]
     Y = inverses(A)
@@ -116,7 +117,7 @@ def relation_of(equations: Forms, of: Coordinates) -> Relation:
 
 
 def with_relation(forms: Forms, relation: Relation, of: Coordinates) -> Forms:
-    """Return forms in the independent coordinates and errors, with the relation in place of dependent coordinates."""
+    """Return forms in the independent coordinates and errors; the relation replaces the dependent coordinates."""
     own, others = forms.a[:, :, of.dependent], forms.a[:, :, [*of.independent, *of.errors]]
     size = np.abs(own)
     with np.errstate(all="ignore"):

@@ -1,8 +1,8 @@
-"""Boxes of a search with dependent coordinates that follow from independent ones, in one assembly mode.
+"""Boxes of a search in which the independent coordinates determine the dependent coordinates, in one assembly mode.
 
-Each pose of a box has exactly one point with closed loops between the ends of its dependent coordinates, which moves
-continuously with the pose. Two boxes with a common pose are in the same assembly mode if they have the same point
-there. All boxes are in one assembly mode if each is connected with the first.
+Each pose of a box has exactly one point with closed loops within the bounds of the dependent coordinates. This point
+moves continuously with the pose. Two boxes with a common pose are in the same assembly mode if both have the same
+point at this pose. All boxes are in one assembly mode if a chain of such pairs connects each box with the first box.
 """
 
 from __future__ import annotations
@@ -45,21 +45,23 @@ _ATTEMPTS = 8
 _LEAST = 1e-10
 #: Largest relative half width of a dependent coordinate; a wider box is bisected first.
 _MOST = 1.0
-#: Relative outward shift of an end of a dependent coordinate, for rounding.
+#: Relative outward shift of a bound of a dependent coordinate, for rounding.
 _ROUNDING = 1e-14
 #: Outward factor of a sum, for rounding.
 _UP = 1 + 1e-12
 #: Relative width of a coordinate along a path (absolute for small rotations) that counts as 0.
 _FIXED = 1e-11
-#: Part of their widths by which computed dependent coordinates may exceed their ends, for rounding of Newton's method.
+#: Fraction of their width by which computed dependent coordinates may exceed their bounds, for rounding of Newton's
+#: method.
 _CLOSE = 1e-9
-#: Number of contractions of the point at the common face of two boxes; each one squares its width.
+#: Number of contractions of the box about the point on the common face of two boxes; each contraction squares its
+#: width.
 _CONTRACTIONS = 3
-#: Reason for an open claim although every box is closed.
-APART = "not proved: two neighbouring boxes have the same assembly mode"
+#: Reason why a claim stays open although every box is closed.
+APART = "neighbouring boxes are not proved to have the same assembly mode"
 #: Largest number of independent coordinates with second-order forms: poses of a path, and their rates.
 _MOST_SECOND = 14
-#: Number of boxes beyond which not all pairs are compared, and number of pairs that are compared at once.
+#: Number of boxes above which not all pairs are compared, and number of pairs that are compared at once.
 _MANY, _PAIRS = 6000, 512
 
 
@@ -67,9 +69,10 @@ class LoopBoxes(NamedTuple):
     """B boxes.
 
     Attributes:
-        lower, upper: (B, n) ends of all coordinates; NaN for dependent coordinates until they are known.
+        lower, upper: (B, n) bounds of all coordinates; NaN for dependent coordinates that are not known yet.
         near: (B, n) point with closed loops in or near the box.
-        is_known: (B,) whether each pose of the box provably has exactly one point with closed loops between the ends.
+        is_known: (B,) whether each pose of the box provably has exactly one point with closed loops within these
+            bounds.
     """
 
     lower: FloatArray
@@ -87,10 +90,11 @@ class Examined(NamedTuple):
     """Results for B boxes.
 
     Attributes:
-        boxes: the boxes, with dependent coordinates where known.
-        relation: relation of the dependent coordinates; its remainder is infinite where they are not known.
-        is_regular, shares, smallest, signs: fields of :class:`~.rank_rule.Tested`; an infinite ``smallest`` is unknown.
-            For K quantities it holds their lower bounds (B, K).
+        boxes: the boxes, with their dependent coordinates if known.
+        relation: relation of the dependent coordinates; its remainder is infinite for boxes with unknown dependent
+            coordinates.
+        is_regular, shares, smallest, signs: fields of :class:`~.rank_rule.Tested`; an infinite ``smallest`` is
+        unknown. For K quantities, ``smallest`` has their lower bounds (B, K).
         along: pieces of a path, as in :class:`Followed`.
     """
 
@@ -157,7 +161,10 @@ class Examiner:
 
     @cached_property
     def _single(self) -> RankTest:
-        """Test of derivatives of the loop equations; if passed, no pose has two points with closed loops in a box."""
+        """Rank test of the derivatives of the loop equations.
+
+        If passed, no pose has two points with closed loops in a box.
+        """
         problem, D = self.problem, self.of.dependent
         # Powers of two make scaling exact.
         sizes = ca.diag(ca.DM(2.0 ** np.round(np.log2(problem.size[D]))))
@@ -166,7 +173,7 @@ class Examiner:
 
     @cached_property
     def _encloser(self) -> Encloser:
-        """First-order forms of the equations, of their derivatives by dependent coordinates, and of the entries."""
+        """First-order forms: equations, their derivatives with respect to dependent coordinates, and entries."""
         # The last entry is not used; it keeps the vector nonconstant.
         entries = self.problem.equations, self._single.entries, self._test.entries, self.problem.z[0]
         return Encloser(self.problem.z, ca.vertcat(*entries))
@@ -214,7 +221,10 @@ class Examiner:
         return Examined(LoopBoxes(lower, upper, near, known), relation, *tested)
 
     def _guess(self, rows: NDArray[np.int64], lower: FloatArray, upper: FloatArray, near: FloatArray) -> FloatArray:
-        """Set ends of dependent coordinates about joint positions at the middle of boxes; return shares (rows, f)."""
+        """Set bounds of dependent coordinates about joint positions at the centres of boxes.
+
+        Also return shares (rows, f) of the independent coordinates.
+        """
         (own, D, errors), size = self.of, self.problem.size
         z = near[rows].copy()
         middle, half = 0.5 * (lower[rows] + upper[rows])[:, own], 0.5 * (upper[rows] - lower[rows])[:, own]
@@ -237,7 +247,7 @@ class Examiner:
     def _set_widths(
         self, rows: NDArray[np.int64], middle: FloatArray, half: FloatArray, lower: FloatArray, upper: FloatArray
     ) -> None:
-        """Set ends of dependent coordinates from relative middles and half widths (rows, k)."""
+        """Set bounds of dependent coordinates from relative centres and half widths (rows, k)."""
         D, half = self.of.dependent, np.maximum(half, _LEAST)
         width = np.where(half <= _MOST, half, np.nan) * self.problem.size[D]
         lower[rows[:, None], D], upper[rows[:, None], D] = middle - width, middle + width
@@ -250,7 +260,7 @@ class Examiner:
         self._set_widths(rows, 0.5 * (low + high), half * np.maximum(_AGAIN * reach, 0.5), lower, upper)
 
     def tied(self, one: LoopBoxes, other: LoopBoxes) -> NDArray[np.bool_]:
-        """Return whether neighbours have the same point with closed loops somewhere on their common face.
+        """Return whether neighbouring boxes have the same point with closed loops somewhere on their common face.
 
         Args:
             one: (B,) boxes with known dependent coordinates.
@@ -263,10 +273,10 @@ class Examiner:
         return self.leads(one._replace(lower=lower, upper=upper), other)
 
     def leads(self, part: LoopBoxes, other: LoopBoxes) -> NDArray[np.bool_]:
-        """Return whether points with closed loops in parts of boxes are provably between the ends of other boxes.
+        """Return whether the points with closed loops in sub-boxes are provably inside other boxes.
 
         Args:
-            part: (B,) boxes with known dependent coordinates, with smaller ranges of independent ones.
+            part: (B,) sub-boxes: known dependent coordinates, and reduced ranges of the independent coordinates.
             other: (B,) boxes with known dependent coordinates.
         """
         D, (lower, upper) = self.of.dependent, (part.lower.copy(), part.upper.copy())
@@ -277,10 +287,10 @@ class Examiner:
         return np.asarray(((lower >= other.lower) & (upper <= other.upper))[:, D].all(axis=1))
 
     def narrowed(self, boxes: LoopBoxes, relation: Relation, sides: FloatArray) -> LoopBoxes:
-        """Return parts of boxes with the ends of their dependent coordinates.
+        """Return sub-boxes with bounds of their dependent coordinates.
 
         Args:
-            boxes: parts (B,) of boxes, with the dependent coordinates of the whole boxes.
+            boxes: (B,) sub-boxes that still have the dependent coordinates of the whole boxes.
             relation: relation of the whole boxes.
             sides: (B, f) -1 or 1 for the lower or upper half of an independent coordinate, 0 for its whole range.
         """
@@ -303,7 +313,7 @@ class Examiner:
 def _parts(
     lower: FloatArray, upper: FloatArray, centre: FloatArray, reach: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return sub-ranges from relative centres and half widths, with ends moved outwards."""
+    """Return sub-ranges from relative centres and half widths, with bounds moved outwards."""
     middle, half = 0.5 * lower + 0.5 * upper, 0.5 * (upper - lower) * (1 + _ROUNDING)
     slack = _ROUNDING * np.abs(middle)
     with np.errstate(all="ignore"):
@@ -313,7 +323,7 @@ def _parts(
 
 
 def are_between(z: FloatArray, boxes: LoopBoxes, dependent: Sequence[int]) -> NDArray[np.bool_]:
-    """Return whether points (B, n) with closed loops lie in boxes; otherwise they may be in another assembly mode."""
+    """Return whether points (B, n) with closed loops lie in boxes; a point outside may be in another assembly mode."""
     lower, upper, own = boxes.lower[:, dependent], boxes.upper[:, dependent], z[:, dependent]
     room = _CLOSE * (upper - lower)
     return np.asarray(((own >= lower - room) & (own <= upper + room)).all(axis=1))
@@ -343,7 +353,7 @@ def _whole_path(problem: Problem, cover: PathCover) -> LoopBoxes:
 
 
 def contracted_boxes(problem: Problem, boxes: LoopBoxes) -> tuple[LoopBoxes, NDArray[np.bool_]]:
-    """Return boxes contracted to the workspace, and whether each contains poses of it, (B,).
+    """Return boxes contracted to the workspace, and whether each box contains poses of the workspace, (B,).
 
     Limits on dependent coordinates of the pose exclude no box.
     """
@@ -374,7 +384,7 @@ def coordinates_to_split(shares: FloatArray, width: FloatArray) -> NDArray[np.in
 
 
 class Followed(NamedTuple):
-    """Data that boxes of a robot carry.
+    """Data stored with the boxes of a robot.
 
     Attributes:
         near, is_known: fields of :class:`LoopBoxes`.
@@ -422,7 +432,7 @@ class LoopRule(Rule[Followed]):
             size[turns] = np.maximum(size[turns], 1.0)
             self._fixed = np.nan_to_num(_FIXED * size)
             self.whole[~(self.whole > self._fixed)] = 0.0
-        # The boxes in which dependent coordinates became known; their sub-boxes are in the same assembly mode.
+        # Boxes in which dependent coordinates became known. All sub-boxes of such a box are in its assembly mode.
         self._roots: list[LoopBoxes] = []
         self._root_pieces: list[FloatArray] = []
 
@@ -493,7 +503,10 @@ class LoopRule(Rule[Followed]):
         return found if kept.all() else some(found, kept)
 
     def _poses(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return boxes by the ends of all six coordinates (B, 6); dependent coordinates have their whole range."""
+        """Return the bounds (B, 6) of all six pose coordinates of boxes.
+
+        Dependent coordinates have their whole range.
+        """
         box, free = self._problem.box, self._problem.free
         low, high = (np.broadcast_to(each, (len(lower), 6)).copy() for each in (box.lower, box.upper))
         for j in self._independent:
@@ -504,7 +517,7 @@ class LoopRule(Rule[Followed]):
     def boxes_of(
         self, found: Examined, bound: FloatArray, split: NDArray[np.intp], more: FloatArray
     ) -> Boxes[Followed]:
-        """Return examined boxes with bounds (B,), indices (B,) of the coordinates to bisect, and arrays of the rule."""
+        """Return examined boxes with bounds (B,), indices (B,) of the coordinates to bisect, and the rule's arrays."""
         lower, upper, near, is_known = found.boxes
         columns = np.array(self._independent)[split]
         if self._problem.cover is not None:
@@ -538,7 +551,10 @@ class LoopRule(Rule[Followed]):
         return bool(one_assembly(self._examiner, roots, pairs.T, np.arange(count) == 0).all())
 
     def assembled_until(self) -> tuple[float, float]:
-        """Return the place of a path up to which boxes are provably in its first assembly mode; infinite for all."""
+        """Return the place on a path up to which all boxes are provably in the assembly mode of its start.
+
+        The place is infinite if this holds for the whole path.
+        """
         cover, start = self._problem.cover, self._problem.start
         if cover is None or not self._roots:
             return math.inf, 0.0
@@ -559,7 +575,7 @@ class LoopRule(Rule[Followed]):
     def _are_tied(
         self, cover: PathCover, boxes: Sequence[LoopBoxes], pieces: Sequence[FloatArray]
     ) -> NDArray[np.bool_]:
-        """Return whether each box of a path has the same point with closed loops as the next box at their common pose.
+        """Return whether each box of a path has the same point with closed loops as the next box, at their common pose.
 
         Args:
             cover: boxes of the path.
@@ -578,7 +594,7 @@ class LoopRule(Rule[Followed]):
         return np.asarray(meet & (self._examiner.leads(parts[0], other) | self._examiner.leads(parts[1], one)))
 
     def _at(self, cover: PathCover, boxes: LoopBoxes, points: FloatArray, pieces: FloatArray) -> LoopBoxes:
-        """Return boxes (B,) of pieces (B, 3) of a path, reduced to points, which are pieces without a length."""
+        """Return boxes (B,) of pieces (B, 3) of a path, reduced to points: pieces of length 0."""
         own = [j for j in self._independent if j < len(self._problem.free)]
         low, high = (each[:, [self._problem.free[j] for j in own]] for each in cover.boxes(points, pieces))
         lower, upper = boxes.lower.copy(), boxes.upper.copy()
@@ -594,17 +610,17 @@ def loop_boxes_of(boxes: Boxes[Followed]) -> LoopBoxes:
 def one_assembly(
     examiner: Examiner, boxes: LoopBoxes, pairs: NDArray[np.intp], is_reached: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Return whether each box (B,) is provably in the assembly mode of some given boxes.
+    """Return whether each box (B,) is provably in the assembly mode of the given boxes.
 
     Args:
         examiner: examiner of the robot's boxes.
-        boxes: (B,) boxes; boxes in pairs have known dependent coordinates.
+        boxes: (B,) boxes. Boxes that occur in ``pairs`` have known dependent coordinates.
         pairs: (P, 2) indices of neighbouring boxes.
         is_reached: (B,) whether a box is one of the given boxes.
     """
     is_reached, tried = is_reached.copy(), np.zeros(len(pairs), dtype=bool)
     while True:
-        # Pairs with exactly one reached box; for each other box the first untested pair is tested.
+        # Pairs with exactly one reached box. For each box that is not reached, the first untested pair is tested.
         which = np.flatnonzero((is_reached[pairs[:, 0]] != is_reached[pairs[:, 1]]) & ~tried)
         if not which.size:
             return is_reached

@@ -1,4 +1,4 @@
-"""Test of a sparse matrix over boxes for full column rank at every point with closed loops.
+"""Test whether a sparse matrix has full column rank at every point with closed loops of a box.
 
 With forms of the entries, in which the dependent coordinates are replaced by their relation to the independent ones,
 ``M = M0 + sum_v M_v e_v + [-R, R]``; second-order forms also have products of two coordinates. For any matrix C, here a
@@ -9,13 +9,13 @@ left inverse of M0,
 with the three errors of each joint centre bounded as one vector of norm at most 1. If the right side has a spectral
 radius below 1, C M is regular, and M has full column rank.
 
-A matrix with a null space of d dimensions at almost all poses gets d additional rows, a basis of the null space at the
-middle of the box. Full column rank then means that the null space has d dimensions everywhere in the box.
+If a matrix has a null space of dimension d at almost all poses, d rows are added: a basis of the null space at the
+centre of the box. Full column rank then means that the null space has d dimensions everywhere in the box.
 
-Joint-centre errors change polynomial entries, such as entries of rows of straight legs, one by one: with g_j the
-derivative of an entry by the error of centre j, and H its second derivatives by all errors, the entry of a robot within
-the tolerance t differs from the entry of the design by at most ``t sum_j |g_j| + t^2 / 2 sum |H|``. First derivatives
-are bounded over each box, second derivatives once over the workspace and all errors.
+Joint-centre errors change polynomial entries, such as entries of rows of straight legs, one by one: let g_j be the
+derivative of an entry with respect to the error of centre j, and H its second derivatives with respect to all errors.
+The entry of a robot within the tolerance t differs from the entry of the design by at most ``t sum_j |g_j| + t^2 / 2
+sum |H|``. First derivatives are bounded over each box, second derivatives once over the workspace and all errors.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 _CONSTANTS = 1e-13
 #: Outward factor of the bound of a change, for rounding.
 _OUTWARDS = 1 + 1e-12
-#: Operations of polynomials.
+#: Operations that keep an expression a polynomial.
 _POLYNOMIAL = (
     *(ca.OP_CONST, ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_PARAMETER, ca.OP_ASSIGN),
     *(ca.OP_ADD, ca.OP_SUB, ca.OP_NEG, ca.OP_MUL, ca.OP_SQ, ca.OP_TWICE),
@@ -53,9 +53,10 @@ class Tested(NamedTuple):
     Attributes:
         is_regular: (B,) whether full rank is proved.
         shares: (B, f) share of each independent coordinate in the bound.
-        smallest: (B,) computed smallest singular value at the middle, relative to the largest; infinite if unknown.
-        signs: (B,) computed sign of the determinant of a square matrix at the middle; 0 for other matrices. With proved
-            full rank, it is the sign at every pose of the box.
+        smallest: (B,) computed smallest singular value at the centre of the box, relative to the largest; infinite if
+            unknown.
+        signs: (B,) computed sign of the determinant of a square matrix at the centre of the box; 0 for other matrices.
+            If full rank is proved, the sign is the same at every pose of the box.
     """
 
     is_regular: NDArray[np.bool_]
@@ -171,7 +172,7 @@ def is_polynomial(entries: SX, coordinates: SX) -> bool:
 
 
 class EntryChange:
-    """Largest changes of entries by joint-centre errors, over boxes of poses.
+    """Largest changes of matrix entries due to joint-centre errors, over boxes of poses.
 
     Args:
         family: robots within the tolerance, without dependent coordinates.
@@ -211,7 +212,7 @@ class EntryChange:
 
 
 def _slopes(expressions: SX, errors: SX) -> tuple[SX, NDArray[np.int64], NDArray[np.int64]]:
-    """Return the derivatives by errors that are not 0, with the indices of the expression and of the error of each."""
+    """Return the nonzero derivatives with respect to joint-centre errors, and the indices of expressions and errors."""
     found = ca.jacobian(expressions, errors)
     rows, columns = (np.array(each, dtype=np.int64) for each in found.sparsity().get_triplet())
     return ca.vertcat(SX(0, 1), *[found.nz[k] for k in range(found.nnz())]), rows, columns

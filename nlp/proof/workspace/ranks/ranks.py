@@ -41,11 +41,11 @@ def prove_ranks(
     progress: RankProgress | None = None,
     record: ProofRecord | None = None,
 ) -> tuple[Verdict, ...]:
-    """Prove that J and the constraint wrenches keep their ranks at every pose of a box, or find a pose.
+    """Prove that J and the constraint wrenches keep their ranks at every pose of a box, or find a singular pose.
 
     Args:
         problem: the design, or all robots within the tolerance.
-        is_singular: function that tests single poses in the home assembly mode; only these refute a claim.
+        is_singular: function that tests a single pose in the home assembly mode; only such poses refute a claim.
         rank: rank of J at almost all dimensions and poses.
         progress: function that is called during the searches.
         record: record of the searches for a proof.
@@ -77,7 +77,7 @@ def prove_ranks(
 
 
 def _refuted(verdict: Verdict, problem: Problem, at: Singular | None) -> Verdict:
-    """Return the verdict with a singular pose that refutes it; the same verdict without a pose."""
+    """Return the verdict refuted by a singular pose; without a pose, the verdict stays the same."""
     if at is None:
         return verdict
     pose = problem.box.pose(at.y)
@@ -155,7 +155,7 @@ class RankRule(LoopRule):
         problem, matrix, recorder, look: arguments of :func:`prove_rank`.
 
     Attributes:
-        singular: singular pose; None while none is known.
+        singular: singular pose; None if no singular pose is known yet.
     """
 
     block = _BLOCK

@@ -2,7 +2,7 @@
 
 A pose is singular if ``M(z) v = 0`` for a unit vector v, with closed loops. Newton's method with least-squares steps
 solves these equations in z and v. It converges quickly where the determinant changes its sign, and slowly where it
-touches 0. Its result is computed, not proved: J at the pose, with unit rows and moments divided by a length, has a
+touches 0. The result is computed, not proved: J at the pose, with unit rows and moments divided by a length, has a
 singular value of at most 1e-10 times the largest.
 
 The workspace is convex in its coordinates. If the determinant of six rows is positive at one pose and negative at
@@ -32,7 +32,7 @@ from .....models.arrays import first_largest, values_at
 from .....models.newton import Linear, newton
 from ....evidence.closed_loops import inverses
 from ...enclosure.forms import Encloser
-from ...statement.machine import JointErrors
+from ...statement.fixed_robot import JointErrors
 from ..robot.posed_model import RankMatrix
 from ..robot.posed_robot import Problem
 from ..verdict import EVERYWHERE
@@ -50,9 +50,10 @@ BY_NEWTON = "found singular to 1e-10 by Newton's method"
 BY_SIGNS = "the determinant changes its sign at the pose, on the line between two poses"
 #: Largest number of Newton steps: where a determinant touches 0, each step halves the distance.
 _STEPS = 60
-#: Number of steps in which the smallest singular value must decrease by a tenth; at the edge of a workspace it may not.
+#: Number of steps in which the smallest singular value must decrease by a tenth. At the boundary of a workspace it may
+#: not decrease.
 _PATIENCE = 8
-#: Relative singular value of M below which J is tested.
+#: Relative singular value of M below which J is tested too.
 _NEAR = 1e-6
 #: Largest relative step of a coordinate.
 _STEP = 0.25
@@ -60,7 +61,7 @@ _STEP = 0.25
 _CLOSED = 1e-9
 #: Relative singular value that counts as zero in a step.
 _DEPENDENT = 1e-12
-#: Smallest share of the platform's motion in the null vector; below, only passive joints move.
+#: Smallest share of the platform's motion in the null vector; below this share, only passive joints move.
 _MOVES = 1e-3
 #: Largest relative singular value at the start of Newton's method, and largest number of attempts.
 _SMALL, _MOST = 0.1, 24
@@ -89,8 +90,8 @@ class Singular(NamedTuple):
 
     Attributes:
         y: (6,) coordinates of the pose.
-        reason: how the pose was computed, if it is not proved; else empty.
-        sides: (2, 6) two poses at which the determinant has proved opposite signs; None without them.
+        reason: method that computed the pose, if its singularity is not proved; otherwise empty.
+        sides: (2, 6) two poses at which the determinant provably has opposite signs; None without such poses.
         errors: joint-centre errors of the singular robot; None for the design.
     """
 
@@ -137,7 +138,7 @@ class SingularPose:
 
         Args:
             z: start of the search.
-            moving: number of coordinates that may move, the first ones; all if left out.
+            moving: number of first coordinates that may move; all coordinates if left out.
         """
         decomposed = self.decomposed(z)
         if decomposed is None:
@@ -156,9 +157,10 @@ class SingularPose:
         return M, values, right
 
     def slopes(self, z: FloatArray) -> FloatArray | None:
-        """Return derivatives (n,) of the smallest singular value at a point (n,) with closed loops; None without any.
+        """Return derivatives (n,) of the smallest singular value at a point (n,) with closed loops; None if undefined.
 
-        To first order it is ``u . M v`` with singular vectors u and v; dependent coordinates follow from the others.
+        To first order the singular value is ``u . M v`` with singular vectors u and v. The independent coordinates
+        determine the dependent coordinates.
         """
         M = self._values(z).full()
         if not np.isfinite(M).all():
@@ -197,7 +199,7 @@ class _NullVector:
 
     Args:
         pose: the matrix.
-        moving: number of coordinates that may move, the first ones; all for None.
+        moving: number of first coordinates that may move; None for all coordinates.
     """
 
     def __init__(self, pose: SingularPose, moving: int | None) -> None:
@@ -276,7 +278,8 @@ class DeterminantSigns:
     def change(self, one: FloatArray, other: FloatArray) -> FloatArray | None:
         """Return a point (n,) near the change of sign between two points, with the sign of the second point.
 
-        None if opposite signs are not proved, or if the rows are not provably defined between the two points.
+        The result is None if opposite signs are not proved, or if the rows are not provably defined between the two
+        points.
         """
         values = self.computed(one + np.linspace(0, 1, _ON_WAY)[:, None] * (other - one))
         if not (values.all() and values[0] * values[-1] < 0 and self.proved(one) * self.proved(other) < 0):
@@ -457,7 +460,7 @@ class SingularSearch:
             shown = self._shown(near, BY_NEWTON)
             if shown is not None:
                 return shown
-            # A singular pose in another assembly mode is no hint for the home assembly mode.
+            # A singular pose in another assembly mode tells nothing about the home assembly mode.
             self._last = _SMALLER * value if near is None else self._last
         return None
 

@@ -53,8 +53,8 @@ if TYPE_CHECKING:
 #: Largest angle from the reference (the tangent of its half grows without bound), and its cosine, the least scalar.
 _LARGEST = math.radians(149)
 _LEAST = math.cos(_LARGEST / 2)
-#: Largest sum of the changes of three angles over a part of a segment with one divisor. In the middle the divisor is at
-#: least 1/2 (120 degrees), and up to the ends the rotation turns by half of this sum.
+#: Largest sum of the changes of three angles over a part of a segment with one divisor. At the centre of the part the
+#: divisor is at least 1/2 (120 degrees); up to its ends, the rotation turns by half of this sum.
 _PART = 0.75
 #: Largest number of parts of a path.
 _MOST = 5_000_000
@@ -63,8 +63,9 @@ _NEAR = math.sqrt(0.5)
 #: Number of steps in the search of the mean rotation, largest number of rotations for it, and largest component of the
 #: reference.
 _STEPS, _SAMPLES, _ROUND = 100, 8192, 8
-#: Largest pitch at which roll and yaw are computed from a rotation, and bound of their errors. A matrix has an error of
-#: 110 roundings (2^-53), yaw 160 divided by the pitch's cosine, 0.17, and roll both divided by this cosine: 7000.
+#: Largest pitch at which roll and yaw are computed from a rotation, and bound of their errors. A matrix has an error
+#: of 110 roundings (2^-53). Yaw has 160 divided by the cosine of the pitch, 0.17. Roll has both divided by this
+#: cosine: 7000.
 _STEEP, _OFF_HELD = math.radians(80), 2.0**-39
 #: References of the four divisors.
 _UNITS: tuple[Reference, ...] = (UNTURNED, (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))
@@ -149,7 +150,7 @@ def turns_of_path(path: ProgrammedPath) -> PathTurns:
     if is_slerp:
         quaternions = in_world(quaternions_from_angles(angles, order), frame)
         axes, width = shortest_turns(quaternions[:-1], quaternions[1:])
-        # A rotation has two quaternions; the one nearer to the quaternion before is taken.
+        # A rotation has two quaternions; the one nearer to the preceding quaternion is taken.
         flips = (quaternions[:-1] * quaternions[1:]).sum(axis=1) < 0
         quaternions[1:] *= np.where(np.cumsum(flips) % 2, -1.0, 1.0)[:, None]
         off = (1 if frame is None else 2) * ROUNDED + PER_RADIAN * np.abs(angles).sum(axis=1)
@@ -163,7 +164,9 @@ def turns_of_path(path: ProgrammedPath) -> PathTurns:
         if np.ceil(width / CHORD).sum() > _MOST + len(path):
             line = path.lines[int(np.argmax(width))]
             fault = f"angles change by {math.degrees(float(width.sum())):.4g} degrees in all, most of them here"
-            raise InputError(f"{path.source}: line {line}: {fault}; at most {math.degrees(_MOST * CHORD):.4g} are read")
+            raise InputError(
+                f"{path.source}: line {line}: {fault}; at most {math.degrees(_MOST * CHORD):.4g} are allowed"
+            )
         rows, parts = divided(np.tile([0.0, 1.0], (len(path), 1)), np.ceil(width / CHORD))
         points = np.append(angles[rows] + parts[:, :1] * change[rows], angles[-1:], 0)
         every = in_world(quaternions_from_angles(points, order), frame)
@@ -196,7 +199,7 @@ def _held(angles: FloatArray, order: Order, frame: PathFrame) -> Tangents | None
         frame: frame of the path.
 
     Returns:
-        The rotation; None if it is not constant, or if roll, pitch and yaw are large or not well determined.
+        The rotation. None if the rotation is not constant, or if roll, pitch and yaw are large or badly determined.
     """
     if np.ptp(angles, axis=0).any():
         return None
@@ -213,7 +216,7 @@ def _reference(quaternions: FloatArray) -> Reference:
     """Return a reference near all rotations of a path: no rotation if possible, else a quaternion of small integers.
 
     Args:
-        quaternions: (n, 4) quaternions along the path, each near the one before.
+        quaternions: (n, 4) quaternions along the path, each near the preceding one.
     """
     if np.abs(quaternions[:, 0]).min() >= _NEAR and np.ptp(np.sign(quaternions[:, 0])) == 0:
         return UNTURNED

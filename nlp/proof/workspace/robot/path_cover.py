@@ -58,8 +58,8 @@ class _CircleRows(NamedTuple):
         rise: (A,) derivative of the coordinate with respect to the height.
         height: (A,) height at the start, along the normal of the arc's plane.
         change: (A,) change of the height along the arc.
-        off: (A,) sum of the magnitudes from which centre and height are computed, for bounds of rounding.
-        off_change: (A,) the same sum for the change of the height.
+        off: (A,) sum of the magnitudes from which centre and height are computed; it bounds rounding errors.
+        off_change: (A,) sum of the magnitudes from which the change of the height is computed.
     """
 
     axis: int
@@ -83,7 +83,7 @@ class PathCover:
         arcs: (N, 6) centre, radius, growth of the radius, angle and sweep of arcs in the path's frame; NaN for lines.
         axes: (N, 3) indices of the two axes of an arc's plane, and of its normal.
         turns: rotations along the path.
-        seconds: (N,) durations of the segments; infinite, which means standstill, where none is known.
+        seconds: (N,) durations of the segments; infinite (standstill) for segments without a known duration.
         frame: frame of the path in the world; None if it is the world frame.
     """
 
@@ -146,7 +146,7 @@ class PathCover:
         return np.hstack([low, turns[0]]), np.hstack([high, turns[1]])
 
     def _in_world(self, knots: NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
-        """Return positions (B, 3) of knots in the world, and bounds of their rounding errors by the frame."""
+        """Return positions (B, 3) of knots in the world frame, and bounds of the rounding errors of the conversion."""
         points = self.knots[knots]
         if self.frame is None:
             return points, np.zeros_like(points)
@@ -185,9 +185,10 @@ class PathCover:
             )
 
     def derivatives(self, pieces: FloatArray, order: int = 1) -> tuple[FloatArray, FloatArray]:
-        """Return the ends (B, 6) of derivatives of the pose by the parameter, over pieces (B, 3).
+        """Return bounds (B, 6) of the derivatives of the pose with respect to the parameter, over pieces (B, 3).
 
-        They are derivatives of positions, and of roll, pitch and yaw, or else angular velocities in the world frame.
+        The rows contain derivatives of positions, then derivatives of roll, pitch and yaw or angular velocities in the
+        world frame.
 
         Args:
             pieces: indices of segments, and both ends of the parameter.
@@ -225,7 +226,7 @@ class PathCover:
         return np.hstack([low, turns[0]]), np.hstack([high, turns[1]])
 
     def rates(self, pieces: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the ends (B, 6) of these derivatives by time in seconds, over pieces (B, 3)."""
+        """Return bounds (B, 6) of the derivatives of the pose with respect to time, per second, over pieces (B, 3)."""
         seconds = self.seconds[pieces[:, 0].astype(int), None]
         low, high = (each / seconds for each in self.derivatives(pieces))
         return low - _OUTWARDS * np.abs(low), high + _OUTWARDS * np.abs(high)

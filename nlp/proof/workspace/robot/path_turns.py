@@ -5,7 +5,7 @@ Roll, pitch and yaw that change linearly have monotone tangents of their halves.
 about a fixed axis moves the quaternion along a great circle, and r along a straight line. For angles in any convention
 the quaternion is a product of three; a bound of the second derivative bounds the distance of r from a chord. The
 rotation of the path's frame, one more factor on the left, does not change norms. If no reference is near the whole
-path, each piece has its reference; see :mod:`.long_turns`.
+path, each piece has a reference of its own; see :mod:`.long_turns`.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class PathTurns(Protocol):
 
     @property
     def reference(self) -> Reference:
-        """Rotation with the Cayley vector zero."""
+        """Rotation whose Cayley vector is zero."""
         ...
 
     @property
@@ -70,7 +70,7 @@ class PathTurns(Protocol):
         ...
 
     def derivatives(self, segments: NDArray[np.intp], ends: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the ends (B, 3) of derivatives by the parameter: roll, pitch and yaw rates, or angular velocities.
+        """Return bounds (B, 3) of roll, pitch and yaw rates, or of angular velocities, per unit of the parameter.
 
         Angular velocities are in the world frame.
         """
@@ -160,7 +160,7 @@ class ShortestTurns:
         return np.asarray(before * self.quaternions[segments] + after * self.quaternions[segments + 1])
 
     def _off(self, segments: NDArray[np.intp]) -> FloatArray:
-        """Return error bounds (B,) of these quaternions and velocities, from errors at both knots."""
+        """Return error bounds (B,) of quaternions and angular velocities over pieces, from errors at both knots."""
         return np.asarray(16 * np.maximum(self.off[segments], self.off[segments + 1]))
 
     def derivatives(self, segments: NDArray[np.intp], ends: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002

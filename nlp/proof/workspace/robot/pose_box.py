@@ -68,11 +68,12 @@ class PoseBox:
     Attributes:
         kind: coordinates of rotations.
         axis: (3,) unit axis of rotations about one axis.
-        lower, upper: (c,) ends of the coordinates: position, then rotation. There are six, or seven with quaternions.
+        lower, upper: (c,) bounds of the coordinates: position, then rotation. There are six coordinates, or seven with
+        quaternions.
         ball: largest squared norm of a Cayley vector, rounded up; infinite if rotations are not in a ball.
         reference: rotation with Cayley vector zero.
-        dependent: indices of the dependent coordinates: their ends only start a search, and exclude no pose. A ball
-            concerns the other components.
+        dependent: indices of the dependent coordinates. Their bounds only start a search, and exclude no pose. A ball
+            has only the other components.
         positions: set of positions; None for all positions of the box.
     """
 
@@ -100,7 +101,7 @@ class PoseBox:
         return tuple(np.flatnonzero(self.upper > self.lower).tolist())
 
     def symbols(self, z: SX) -> SX:
-        """Return the coordinates (c, 1); the first symbols of z (n, 1) stand for those that vary."""
+        """Return the coordinates (c, 1); the first symbols of z (n, 1) stand for the varying coordinates."""
         y = SX((0.5 * self.lower + 0.5 * self.upper).tolist())
         y[list(self.free)] = z[: len(self.free)]
         return y
@@ -109,7 +110,7 @@ class PoseBox:
     def _inner(self) -> tuple[FloatArray, FloatArray, float]:
         """Ends, and the largest squared norm of a Cayley vector, of poses that are provably in the workspace.
 
-        Ends of rotations were moved outwards by about 4 roundings, the squared radius of the ball by as many again.
+        Bounds of rotations were moved outwards by about 4 roundings, and the squared radius of the ball by another 4.
         """
         sizes = np.maximum(np.abs(self.lower), np.abs(self.upper)) * (np.arange(len(self.lower)) > 2)
         slack = np.where(self.upper > self.lower, 8 * _TANGENT * sizes, 0.0)
@@ -258,7 +259,7 @@ def pose_coordinates(box: PoseBox) -> PoseCoordinates:
 
 
 def scaled(workspace: Workspace, factor: float) -> Workspace:
-    """Return a workspace scaled about its centre, ranges of angles too; ranges of dependent coordinates are kept.
+    """Return a workspace scaled about its centre, including angles; ranges of dependent coordinates are kept.
 
     Only the radius of a set of positions is scaled.
     """

@@ -1,23 +1,24 @@
-"""Matrices with full column rank exactly where the limbs of a robot resist every motion of the platform.
+"""Matrices that have full column rank exactly where the limbs of a robot resist every motion of the platform.
 
-With actuators locked, a twist x of the platform is free only if each row ``L`` of a limb does no work in it, ``L.x =
-0``, and it is a motion of the passive joints of each member: ``x - sum_j w_j S_j = 0`` with rates ``w``. Together these
-are ``M (x, w) = 0``, with rows and screws as entries, neither normalised nor orthogonalised. J has full rank, and the
-passive screws of every member are independent, exactly where M has full column rank.
+With locked actuators, a platform twist x is possible only under two conditions. Each row ``L`` of a limb does no work
+in the twist: ``L.x = 0``. The passive joints of each member can follow the twist: ``x - sum_j w_j S_j = 0`` with rates
+``w``. Together these equations are ``M (x, w) = 0``. The entries of M are rows and screws, neither normalised nor
+orthogonalised. J has full rank, and the passive screws of every member are independent, exactly where M has full
+column rank.
 
-With free actuators of rates ``u``, ``x - A u`` replaces x for each row and member, with the screws ``A`` of the
-actuators that move the member; relations of rates from loops are additional rows. The null space of this matrix N has
-as many dimensions as the robot has degrees of freedom and rates of actuators without a motion; it has more only where
-the constraint wrenches, or the passive screws, lose their rank.
+With free actuators of rates ``u``, ``x - A u`` replaces x for each row and member. ``A`` has the screws of the
+actuators that move the member. Relations between actuator rates that loops impose are additional rows. The dimension
+of the null space of this matrix N is the number of degrees of freedom plus the number of idle actuator rates. The
+dimension is larger only where the constraint wrenches, or the passive screws, lose rank.
 
-The screws of members with nested loops follow from ``L q = 0`` with the generic rank of L. They do not show a pose at
-which L loses rank and the member resists less. So both matrices also contain as many rows of L as its rank, transposed,
-as separate blocks: full column rank means that L keeps its rank too.
+The screws of members with nested loops follow from ``L q = 0`` with the generic rank of L. These screws do not reveal
+a pose at which L loses rank and the member resists less. So both matrices also contain independent rows of L,
+transposed, as separate blocks: full column rank means that L keeps its rank too.
 
 Twists are ``(v, length omega)`` with the velocity v of the platform's origin.
 
-Rows that are linear in the rotation R, such as rows of straight legs, are multiplied by the s of ``R = (s R) / s``, to
-avoid the division: their forms over a box are then exact up to terms of third order.
+Rows that are linear in the rotation R, such as rows of straight legs, are multiplied by the scale s of ``R = (s R) /
+s``, to avoid the division. The forms of these rows over a box are then exact up to terms of third order.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ from .pose_box import PoseBox, polynomial_rotation, rotation_of
 
 @dataclass(frozen=True, eq=False)
 class RankMatrix:
-    """A matrix of expressions with its generic nullity.
+    """A matrix of expressions with the dimension of its null space at almost all poses.
 
     Attributes:
         matrix: (m, c) sparse matrix; the first six columns are the platform's twist.
@@ -75,11 +76,11 @@ class Limbs:
     length: float
 
     def reduced(self, columns: Sequence[Sequence[int]], rows: Sequence[Sequence[int]], length: float) -> Limbs:
-        """Return the limbs with some of the screws and loop equations of each member, and another length.
+        """Return the limbs with selected screws and loop equations of each member, and another length.
 
         Args:
-            columns: indices of the screws of each member that are kept.
-            rows: indices of the loop equations of each member that are kept.
+            columns: indices of the kept screws of each member.
+            rows: indices of the kept loop equations of each member.
             length: length that multiplies rotations.
         """
         members = [
@@ -94,12 +95,15 @@ class Limbs:
         return ca.horzcat(row.force.T, (row.moment - ca.cross(self.position, row.force)).T / self.length)
 
     def twists(self, screws: SX) -> SX:
-        """Return twists (6, k), angular velocity, then velocity at the world's origin, as ``(v, length omega)``."""
+        """Convert twists (6, k) from (angular velocity, velocity at the world's origin) to ``(v, length omega)``."""
         return scaled_twists(screws, self.position, SX(self.length), 6)
 
 
 def free_matrix(limbs: Limbs) -> SX:
-    """Return N, with the actuators free; for a robot given by rows only the couples, which are its constraints."""
+    """Return the matrix N with free actuators.
+
+    A robot given by its rows contributes only its couples, which are its constraints.
+    """
     if limbs.actuators:
         return _matrix(limbs, limbs.actuators)
     couples = [row for row in limbs.wrenches if row.kind is WrenchKind.COUPLE]
@@ -107,7 +111,7 @@ def free_matrix(limbs: Limbs) -> SX:
 
 
 def _matrix(limbs: Limbs, driven: Sequence[Actuator]) -> SX:
-    """Return the matrix (m, c), sparse, with one column for each driven joint at its end."""
+    """Return the sparse matrix (m, c); its last columns are those of the driven joints."""
     # For each row and member: the map of the platform's twist, and the map of the passive rates to subtract.
     parts = [(row.label.member, limbs.about_platform(row), SX(6, 0)) for row in limbs.wrenches]
     for member in limbs.members:
@@ -130,14 +134,15 @@ def _matrix(limbs: Limbs, driven: Sequence[Actuator]) -> SX:
 
 
 def _rate(limbs: Limbs, seen: SX, screw: SX | None) -> SX:
-    """Return the column (k, 1) of a driven joint; zeros if it does not move this row or member."""
+    """Return the column (k, 1) of a driven joint; zeros if the joint does not move this row or member."""
     return SX(seen.shape[0], 1) if screw is None else -seen @ limbs.twists(screw)
 
 
 class ScaledRows(NamedTuple):
     """J as rows divided by norms, with moments about the platform's origin divided by a length.
 
-    The row of a leg times its length is a polynomial of the pose, and so nearer to a linear function than the unit row.
+    The product of a leg's row and length is a polynomial of the pose, and so nearer to a linear function than the unit
+    row.
 
     Attributes:
         rows: (m, 6) rows of any norm.
@@ -160,7 +165,7 @@ class Chosen(NamedTuple):
         equations: indices of the kept loop equations.
         columns: indices of the kept screws of each member.
         rows: indices of the kept equations of each member's nested loops.
-        length: length that multiplies rotations, of the order of the robot's size.
+        length: length that multiplies rotations, similar to the robot's size.
     """
 
     equations: Sequence[int]
@@ -174,12 +179,12 @@ class PosedModel:
     """A model as expressions of the coordinates of a search, with values for its parameters.
 
     Attributes:
-        loops: loop equations, scaled to order 1.
-        free: indices of the pose coordinates that are the first coordinates of the search.
+        loops: loop equations, scaled to values of about 1.
+        free: indices of the varying pose coordinates; they are the first coordinates of the search.
         limbs: rows, members and actuators, with symbols for the rotation.
         characteristic_length: length that multiplies couples in J.
         rotation: (3, 3) symbols for the rotation R.
-        turned: R, ``s R`` and the polynomial ``s`` in the coordinates.
+        turned: R, ``s R`` and the polynomial ``s`` as expressions of the coordinates.
     """
 
     loops: Loops
@@ -195,11 +200,11 @@ class PosedModel:
         return self.loops.z
 
     def plain(self, expression: SX) -> SX:
-        """Return an expression of the limbs in the coordinates of the search."""
+        """Return an expression of the limbs as an expression of the search's coordinates."""
         return ca.substitute(expression, self.rotation, self.turned[0])
 
     def values(self, expression: SX, z: FloatArray) -> FloatArray:
-        """Return the value of a matrix of the limbs at a point (n,); at points (n, P) the values side by side."""
+        """Return the value of a matrix of the limbs at a point (n,); for points (n, P), the values side by side."""
         return np.asarray(ca.Function("values", [self.z], [ca.densify(self.plain(expression))])(z).full())
 
     def reduced(self, chosen: Chosen) -> PosedModel:
@@ -218,9 +223,10 @@ class PosedModel:
 
     @property
     def driven_rows(self) -> tuple[SX, SX]:
-        """A (m, n) and D (m, a) with ``A y = D u`` for the rates u of actuators, and the platform's twist first in y.
+        """Matrices A (m, n) and D (m, a) of the rate equations ``A y = D u``.
 
-        Without given actuators, the legs are the actuators; their rates belong to the rows of forces.
+        Here u has the rates of the actuators; y has the platform's twist, then any rates of passive joints. If the
+        robot states no actuators, the legs are the actuators: each force row has the rate of one leg.
         """
         limbs = self.limbs
         if limbs.actuators:
@@ -231,9 +237,9 @@ class PosedModel:
 
     @cached_property
     def scaled(self) -> ScaledRows:
-        """J with moments about the platform's origin divided by the length of the limbs."""
+        """J with moments about the platform's origin, divided by the length in :class:`Limbs`."""
         L, limbs = SX(self.characteristic_length), self.limbs
-        # Rows of forces and couples; the last column is 1, for the factor that makes them polynomials.
+        # Rows of forces and couples. The last column is 1, for the factor that turns the rows into polynomials.
         wrenches = [ca.horzcat(limbs.about_platform(row), 1) for row in limbs.wrenches]
         rows = ca.densify(self.polynomial(ca.vertcat(SX(0, 7), *wrenches)))
         factors = [L if row.kind is WrenchKind.COUPLE else SX(1) for row in limbs.wrenches]
@@ -244,9 +250,9 @@ class PosedModel:
         return ScaledRows(ca.vertcat(rows[:, :6], of_members), ca.vertcat(SX(0, 1), *sizes, ones))
 
     def polynomial(self, matrix: SX) -> SX:
-        """Return a matrix (m, c) of the limbs in the coordinates of the search.
+        """Return a matrix (m, c) of the limbs as expressions of the search's coordinates.
 
-        Rows that are linear in the rotation are multiplied by its scale, to avoid the division.
+        Rows that are linear in the rotation are multiplied by the scale of the rotation, to avoid the division.
         """
         (_, turned, scale), inverse, plain = self.turned, SX.sym("1 / s"), self.plain(matrix)
         whole = ca.substitute(matrix, self.rotation, inverse * turned)

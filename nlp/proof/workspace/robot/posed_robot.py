@@ -1,12 +1,13 @@
 """A robot with fixed dimensions over a workspace: loop equations and matrices in the coordinates of a search.
 
 The coordinates z are the varying coordinates of a :class:`~.pose_box.PoseBox`, then the robot's unknowns. Equations
-that follow from others in this workspace are left out. The other equations determine as many *dependent* coordinates:
-all unknowns, and some coordinates of the pose if the robot has fewer than six degrees of freedom.
+that follow from others in this workspace are left out. Each remaining equation determines one *dependent* coordinate.
+The dependent coordinates are all unknowns and, if the robot has fewer than six degrees of freedom, some coordinates of
+the pose.
 
 For all robots within the joint-centre tolerance, three errors of each centre are additional coordinates, with the
-design's choice of equations and screws. Errors are never bisected: a gradient g by the error of one centre changes an
-expression by at most ``|g|`` times the tolerance.
+design's choice of equations and screws. Errors are never bisected: with the gradient g with respect to the error of
+one joint centre, this error changes an expression by at most ``|g|`` times the tolerance.
 """
 
 from __future__ import annotations
@@ -25,29 +26,33 @@ from ....case.case import Case
 from ....case.workspace import TurnKind
 from ....evidence.closed_loops import DEPENDENT, Loops, closed_from_home
 from ....program.layout import robot_length
-from ...statement.machine import INSIDE, JointErrors
+from ...statement.fixed_robot import INSIDE, JointErrors
 from ...statement.tolerance import BuiltModel
 from .path_cover import PathCover
 from .pose_box import PoseBox
 from .posed_model import Chosen, PosedModel, RankMatrix, posed_model
 
-#: Number of points of the workspace, beside its middle, at which independent equations are chosen; and number of robots
-#: with joint-centre errors in which the other equations are tested.
+#: Number of points of the workspace, besides its centre, at which independent equations are chosen; and number of
+#: robots with joint-centre errors for which the omitted equations are tested.
 _POINTS = 4
-#: Part of the workspace, about its middle, with these points; and joint-centre errors relative to the robot's size.
+#: Fraction of the workspace, about its centre, that contains these points; and joint-centre errors relative to the
+#: robot's size.
 _SPREAD, _OFF = 0.5, 1e-2
-#: Largest residual of a dependent equation of order 1.
+#: Largest residual of a dependent equation; equations are scaled to values of about 1.
 _CLOSED = 1e-9
 #: Relative singular value that counts as zero.
 _ZERO = 1e-9
 _SEED = 0
-#: Largest change of a coordinate of the pose, in parts of a length or radians, in the test of an equation that was left
-#: out; and the largest change of its left side, several roundings.
+#: Largest change of a pose coordinate (relative to a length, or radians) in the test of an omitted equation; and
+#: largest change of the left side of this equation: several roundings.
 _NEAR, _ROUNDING = 1e-3, 1e-12
 
 
 class NotJudgedError(ValueError):
-    """The robot cannot be judged, for example because its loops are singular at the start; the message is a clause."""
+    """Error of a robot that cannot be judged, for example because its loops are singular at the start.
+
+    The message is a clause.
+    """
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,21 +61,21 @@ class Problem:
 
     Attributes:
         box: box of poses.
-        loops: k loop equations in the coordinates; joint-centre errors are the last coordinates.
-        free: indices of the pose coordinates, among those of the box, that are the first coordinates.
+        loops: k loop equations as expressions of the coordinates; joint-centre errors are the last coordinates.
+        free: indices, in the box, of the varying pose coordinates; they are the first coordinates of the problem.
         independent, dependent: indices of the independent and of the k dependent coordinates of the design.
         start: (n,) point of the design with closed loops, at or near the middle of the workspace.
         locked: matrix of rows and members with locked actuators.
         unactuated: matrix of rows and members with free actuators; None for a robot without constraints.
-        posed: limbs, with the loops of the design or of the robots within the tolerance.
+        posed: limbs and loop equations of the design, or of the robots within the tolerance.
         chosen: independent equations and screws of the model.
-        names: names of the m joint centres with errors as coordinates.
+        names: names of the m joint centres whose errors are coordinates.
         tolerance: largest norm of each joint-centre error, length.
-        design: the design, if this is a problem of all robots within the tolerance; else None.
-        cover: boxes of the path; None for the whole box.
-        rates: indices of the coordinates that are rates of the pose per second along the path, as in :attr:`rated`;
-            else empty.
-        resting: the design without rates, for a design with rates; else None.
+        design: the nominal design, if this problem covers all robots within the tolerance; None otherwise.
+        cover: boxes of the path; None for a box of poses.
+        rates: indices of the coordinates that are rates of the pose along the path, per second, see :attr:`rated`;
+            empty without rates.
+        resting: the design without rates, if this design has rates; None otherwise.
     """
 
     box: PoseBox
@@ -117,7 +122,7 @@ class Problem:
 
     @property
     def size(self) -> FloatArray:
-        """Scales (n,) of the coordinates, of the order of their ranges."""
+        """Scales (n,) of the coordinates: about the width of their ranges."""
         return self.loops.size
 
     @property
@@ -138,7 +143,7 @@ class Problem:
 
     @property
     def rated(self) -> list[int]:
-        """Indices of the rates that vary along a path, among those of :meth:`.path_cover.PathCover.rates`."""
+        """Indices, in :meth:`.path_cover.PathCover.rates`, of the rates that vary along a path."""
         stated = [self.free[j] for j in self.stated]
         turns = [k for k in stated if k >= 3]
         if turns and self.box.kind is not TurnKind.ROLL_PITCH_YAW:
@@ -173,7 +178,7 @@ class Problem:
         return y
 
     def exact(self, z: FloatArray) -> FloatArray:
-        """Return points (..., n) of this problem without errors, from points of the design."""
+        """Return points (..., n) of this problem with errors of 0, from points of the design."""
         return np.concatenate([z, np.zeros((*z.shape[:-1], len(self.of_errors)))], axis=-1)
 
     def errors_of(self, z: FloatArray) -> JointErrors:
@@ -182,7 +187,7 @@ class Problem:
         return JointErrors(self.names, frozen_array(own, own.shape))
 
     def with_errors(self, z: FloatArray, slopes: FloatArray) -> FloatArray:
-        """Return points (P, n) with errors as large as the tolerance along derivatives (P, 3 m)."""
+        """Return points (P, n) with joint-centre errors along derivatives (P, 3 m), with the tolerance as norm."""
         z = z.copy()
         z[:, self.of_errors] = steepest(slopes.reshape(len(z), -1, 3), self.tolerance).reshape(len(z), -1)
         return z
@@ -213,9 +218,9 @@ def build_problem(
         case: case with fixed dimensions.
         model: robot of the case; some unknowns may be replaced by closed forms.
         box: box of poses.
-        at: (c,) coordinates of the start pose, where the loops are closed; the middle of the workspace if left out.
-        near: function that returns the unknowns at the start pose in the home assembly mode, or None. It is called if
-            the straight motion from home does not reach the start pose.
+        at: (c,) coordinates of the start pose, where the loops are closed; the centre of the workspace if left out.
+        near: function that returns the unknowns at the start pose in the home assembly mode; None if they are not
+            known. The function is called if the straight motion from home does not reach the start pose.
 
     Raises:
         NotJudgedError: the loops do not close at the start pose, or leave a joint free.
@@ -257,9 +262,9 @@ def build_problem(
 
 
 def _check_left_out(loops: Loops, start: FloatArray, dependent: tuple[int, ...], box: PoseBox, length: float) -> None:
-    """Check that loop equations that were left out hold when coordinates of the pose move.
+    """Check that omitted loop equations stay satisfied when pose coordinates move.
 
-    An equation whose coordinate hardly changes in a narrow workspace looks dependent on others.
+    In a narrow workspace, an equation whose coordinate hardly changes looks as if it depended on other equations.
 
     Raises:
         NotJudgedError: an equation does not hold.
@@ -276,12 +281,13 @@ def _check_left_out(loops: Loops, start: FloatArray, dependent: tuple[int, ...],
     # Constants of a robot that should be 0 may be rounding errors.
     if (np.abs(loops.every_value(moved) - loops.every_value(start[:, None])) > _ROUNDING).any():
         raise NotJudgedError(
-            "its loops do not close all over the workspace: the robot does not control all coordinates with ranges"
+            "its loops do not close everywhere in the workspace: "
+            "the robot does not control all pose coordinates with ranges"
         )
 
 
 def family_of(case: Case, built: BuiltModel, design: Problem, tolerance: float) -> Problem:
-    """Return all robots within the joint-centre tolerance over a workspace; without errors the design only.
+    """Return all robots within the joint-centre tolerance over a workspace; only the design if no error is modelled.
 
     Args:
         case: case with fixed dimensions.
@@ -313,10 +319,10 @@ def family_of(case: Case, built: BuiltModel, design: Problem, tolerance: float) 
 
 
 def _check_freedoms(family: Problem, whole: PosedModel) -> None:
-    """Check that equations and screws that were left out still depend on the others with joint-centre errors.
+    """Check that omitted equations and screws also depend on the kept ones with joint-centre errors.
 
     Raises:
-        NotJudgedError: left-out equations or screws are independent at random errors.
+        NotJudgedError: omitted equations or screws are independent for random joint-centre errors.
     """
     loops, own, errors = family.loops, list(family.independent), family.of_errors
     members = [each for each in whole.limbs.members if each.rank < each.screws.shape[1]]
@@ -336,11 +342,11 @@ def _check_freedoms(family: Problem, whole: PosedModel) -> None:
             fault = "with joint-centre errors the robot does not reach the poses of the workspace exactly"
             raise NotJudgedError(f"{fault}: state ranges for its dependent coordinates")
         if any(_rank_of(values) != member.rank for member, values in zip(members, screws, strict=True)):
-            raise NotJudgedError("joint-centre errors remove degrees of freedom (overconstrained robot): limbs change")
+            raise NotJudgedError("joint-centre errors remove degrees of freedom from this overconstrained robot")
 
 
 def _needed(loops: Loops, start: FloatArray, count: int) -> tuple[int, ...]:
-    """Return the indices of independent equations in the workspace."""
+    """Return the indices of loop equations that are independent in the workspace."""
     if not loops.count:
         return ()
     rng = np.random.default_rng(_SEED)
@@ -357,10 +363,11 @@ def _needed(loops: Loops, start: FloatArray, count: int) -> tuple[int, ...]:
 
 
 def _dependent(loops: Loops, start: FloatArray, free: Sequence[int], box: PoseBox) -> tuple[int, ...]:
-    """Return the indices of the coordinates that the equations determine: dependent ones of the pose, all unknowns.
+    """Return the indices of the dependent coordinates: dependent coordinates of the pose, and all unknowns.
 
     Raises:
-        NotJudgedError: the equations leave an unknown free, or determine other coordinates of the pose.
+        NotJudgedError: the equations leave an unknown free, or determine a coordinate of the pose that has a stated
+            range.
     """
     count = len(free)
     unknowns, k = list(range(count, len(start))), loops.count
@@ -383,7 +390,7 @@ def _dependent(loops: Loops, start: FloatArray, free: Sequence[int], box: PoseBo
 
 
 def _chosen(posed: PosedModel, model: Model, start: FloatArray, needed: tuple[int, ...], otherwise: float) -> Chosen:
-    """Return the given equations with independent screws, independent nested equations, and a length.
+    """Return the given equations, independent screws, independent equations of nested loops, and a reference length.
 
     Screws of joints that loops hold still are only rounding errors.
 
@@ -449,13 +456,16 @@ def _unactuated(model: Model, posed: PosedModel, start: FloatArray) -> RankMatri
 
 
 def _rank_of(values: FloatArray) -> int:
-    """Return the rank of a matrix of numbers."""
+    """Return the rank of a matrix, computed in floating point."""
     sizes = np.linalg.svd(values, compute_uv=False)
     return int(np.count_nonzero(sizes > _ZERO * sizes[0]))
 
 
 def steepest(slopes: FloatArray, tolerance: float) -> FloatArray:
-    """Return errors (..., 3) with the norm of a tolerance along derivatives; zero for zero derivatives."""
+    """Return joint-centre errors (..., 3) along derivatives, with a tolerance as norm.
+
+    The errors are zero where the derivatives are zero.
+    """
     sizes = np.linalg.norm(slopes, axis=-1, keepdims=True)
     # Adding zero removes negative zeros.
     return np.asarray(INSIDE * tolerance * slopes / np.maximum(sizes, np.finfo(float).tiny) + 0.0)

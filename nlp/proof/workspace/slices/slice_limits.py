@@ -1,8 +1,8 @@
-"""Reach and limits over the boxes of a slice: satisfied, or violated, at every pose of a box, or open.
+"""Reach and limits over the boxes of a slice: satisfied at every pose of a box, violated at every pose, or open.
 
-Reach and limits on expressions are decided by ranges, clearances of legs by lower and upper bounds. A limit on singular
-values, or on an actuator quantity, is proved by a lower bound; it counts as violated if it is violated at the corners
-and at the middle of the box, which is not a proof.
+Reach and limits on expressions are decided by ranges, clearances of legs by lower and upper bounds. A limit on
+singular values, or on an actuator quantity, is proved by a lower bound. Such a limit counts as violated if the corners
+and the centre of the box violate it; this is not a proof.
 """
 
 from __future__ import annotations
@@ -140,7 +140,7 @@ class SliceLimits:
 
         Args:
             boxes: (B,) boxes; states of boxes with unknown dependent coordinates stay as they are.
-            relation: relation of the dependent coordinates, which is updated.
+            relation: relation of the dependent coordinates; it is updated in place.
             known: (B, K) states over larger boxes.
         """
         states, enclosed, k = known.copy(), len(self._leasts), len(self._of.dependent)
@@ -220,7 +220,8 @@ class _Other:
     def states(self, boxes: LoopBoxes) -> NDArray[np.int8]:
         """Return the states (B, K) over boxes with known dependent coordinates.
 
-        Without an upper bound, a limit counts as violated if it is violated at the corners and the middle of a box.
+        A limit on a quantity without an upper bound counts as violated if the corners and the centre of a box violate
+        it.
         """
         kept = self._examiner.examine(boxes).smallest >= self._leasts
         if isinstance(self._number, Clearance) and self.is_enclosed:
@@ -263,7 +264,7 @@ class FirstViolated:
     def of(
         self, states: NDArray[np.int8], lower: FloatArray, upper: FloatArray
     ) -> tuple[NDArray[np.int16], NDArray[np.bool_]]:
-        """Return the limit of each box (``KEPT``, ``UNDECIDED`` or an index), and whether it holds for the whole box.
+        """Return the limit of each box (``KEPT``, ``UNDECIDED`` or an index), and whether it concerns the whole box.
 
         Args:
             states: (M, B) states of the limits over the boxes.

@@ -1,6 +1,6 @@
 """Slices of a box of poses: regions of proved full rank, regions beyond singular poses, and violated limits.
 
-A slice has two coordinates of the box; the other coordinates stay at the middle, or are dependent on these two. Boxes
+A slice has two coordinates of the box. The other coordinates stay at the centre, or depend on these two. Boxes
 cover the slice, so its colours are proved only for poses of the slice. It is wider than the workspace, to show the
 surrounding poses. If several limits are violated, a box shows the first violated limit on the straight line from the
 middle. Loops without a closed form are followed from the middle.
@@ -23,7 +23,7 @@ from ....case.limits.legs import Actuator
 from ....case.workspace import TurnKind, Workspace
 from ....errors import CaseError, UncoveredError
 from ...boxes.search import Boxes, BoxResults, Order, Search, bisected, joined, some
-from ...statement.machine import workspace_of_case
+from ...statement.fixed_robot import workspace_of_case
 from ..ranks.loop_boxes import Examiner, Followed, LoopBoxes, LoopRule, loop_boxes_of, one_assembly
 from ..ranks.rank_rule import RankTest, is_polynomial
 from ..robot.pose_box import PoseBox, pose_box, scaled
@@ -48,13 +48,13 @@ _NAMES = {
 class Region(enum.Enum):
     """Verdict on a box of a slice."""
 
-    REGULAR = "proved regular"
-    BEYOND = "regular, beyond a singular pose"
-    OTHER_SIGN = "regular, with the other sign of the determinant"
+    REGULAR = "proved: full rank"
+    BEYOND = "full rank, but a singularity between here and the centre"
+    OTHER_SIGN = "full rank, opposite sign of the determinant"
     SINGULAR = "singular at every pose"
-    OPEN = "open: too close to a singular pose"
+    OPEN = "undecided: close to a singularity"
     UNREACHED = "out of reach (proved)"
-    UNKNOWN = "open: reach or loop closure is not proved"
+    UNKNOWN = "undecided: reach or loop closure"
 
 
 #: Order of the regions in arrays.
@@ -68,14 +68,14 @@ class Slice:
     Attributes:
         names: names of the two coordinates.
         are_angles: whether each coordinate is an angle, radians.
-        ball: largest angle, radians, of a workspace of rotations about any axis, if both coordinates are such angles:
-            an angle is then twice the arc tangent of a component of a Cayley vector. Else None.
+        ball: largest angle, radians, of a workspace of rotations about any axis. Both coordinates are then angles:
+            twice the arc tangents of components of a Cayley vector. None for other slices.
         workspace: (2, 2) lower and upper ends of the workspace in the slice.
         whole: (2, 2) lower and upper ends of the slice.
         boxes: (B, 4) lower ends, then upper ends of the boxes.
         regions: region of each box.
         limits: limits that the slice shows.
-        binding: (B,) index of the first violated limit of each box, ``KEPT`` or ``UNDECIDED``.
+        binding: (B,) index of the first violated limit of each box, or ``KEPT`` or ``UNDECIDED``.
         left_out: keys of limits that the slice does not show: limits over several poses, and limits without bounds.
         outside: (N, N) numbers on a grid over the slice, by its first and second coordinate: negative in the set of
             positions, positive outside; None without a set, or for rotations.
@@ -142,7 +142,7 @@ class _Robot:
         free: indices, among the six coordinates of a box, of the independent coordinates with a range.
 
     Raises:
-        CaseError: the loops are not closed in the middle of the workspace, or have an operation without a rule.
+        CaseError: the loops do not close at the workspace centre, or have an operation without a rule.
     """
 
     def __init__(self, case: Case, workspace: Workspace) -> None:
@@ -293,7 +293,7 @@ class _SliceRule(LoopRule):
         return boxes
 
     def _with_near(self, boxes: LoopBoxes, low: FloatArray, high: FloatArray) -> tuple[LoopBoxes, NDArray[np.bool_]]:
-        """Return boxes with joint positions from the nearest grid point, and whether each box is not bisected further.
+        """Return boxes with joint positions from the nearest grid point, and which boxes are not bisected further.
 
         Grid points are followed from the middle without a jump; the loops may be closed nowhere in a box.
         """

@@ -119,7 +119,7 @@ class Mobility:
         return 1.0 if joint.kind == "P" else self.size
 
     def _unit_screws(self, k: int) -> FloatArray:
-        """Return the screws of a joint for rates of order 1."""
+        """Return the screws of a joint for scaled rates."""
         return self._screws[k] * self._units[k]
 
     def scaled(self, twists: FloatArray) -> FloatArray:

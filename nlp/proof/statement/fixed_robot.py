@@ -1,4 +1,4 @@
-"""Robots with fixed dimensions: the checks of their cases, and joint centres of straight legs."""
+"""Robots with fixed dimensions: checks of cases, and joint centres of straight legs."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def workspace_of_case(case: Case) -> Workspace:
             :func:`~...evidence.dependent.with_dependent`.
     """
     if case.workspace is None:
-        raise CaseError("workspace", "is missing: it states the poses to be judged", source=case.source)
+        raise CaseError("workspace", "is missing: state the poses to be judged in [workspace]", source=case.source)
     case.fixed_parameters("a workspace is judged with fixed dimensions")
     case.require_motion()
     check_determined_joints(case.model, "workspace", case.source)
@@ -76,7 +76,9 @@ def check_leg_error(case: Case, leg_error: float) -> None:
     if not 0 <= leg_error < float("inf"):
         raise InputError(f"--leg-error {leg_error:g}: must be finite and not negative")
     if leg_error and not has_straight_legs(case.model):
-        raise InputError(f"--leg-error {leg_error:g}: is only for six straight legs, which {case.model.name!r} is not")
+        raise InputError(
+            f"--leg-error {leg_error:g}: needs a robot with six straight legs, which {case.model.name!r} is not"
+        )
 
 
 def has_straight_legs(model: Model) -> bool:
@@ -85,12 +87,12 @@ def has_straight_legs(model: Model) -> bool:
 
 
 def legs_of(case: Case) -> Legs | None:
-    """Return the legs of a robot with six straight legs, as :func:`joint_centres` does; None for other robots."""
+    """Return the :func:`joint_centres` of a robot with six straight legs; None for other robots."""
     return joint_centres(case) if has_straight_legs(case.model) else None
 
 
 def joint_centres(case: Case) -> Legs:
-    """Return the joint centres of the straight legs, if any, of a robot with fixed dimensions, with the tolerance."""
+    """Return the joint centres of a robot's straight legs (possibly none), with the tolerance."""
     model = case.model
     symbols = model.symbols
     parts = [value for name in case.parameters for value in case.components(name)]
