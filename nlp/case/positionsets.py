@@ -123,7 +123,7 @@ class PositionSet:
         r, low, high = self.radius, np.array(self.centre), np.array(self.centre)
         if self.kind in _AXIAL:
             low, high = np.minimum(self.centre, self.end), np.maximum(self.centre, self.end)
-            a = self.axis / np.linalg.norm(self.axis)
+            a = self.axis / (float(np.linalg.norm(self.axis)) or 1.0)
             across = r * np.sqrt(np.maximum(1 - a * a, 0.0))
             if self.kind is SetKind.CONE:
                 base = np.array(self.end)

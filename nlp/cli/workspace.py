@@ -121,14 +121,14 @@ def _judge_with_progress(
 
 def _free_travel(case: Case) -> Iterator[Line | TextTable]:
     """Yield the table of free travel from the stated pose of a robot with six degrees of freedom."""
-    from ...models.statics import freedoms_of
+    from ...models.statics import degrees_of_freedom
     from ..errors import InputError
     from ..proof.workspace.axis_ranges import axis_ranges
     from ..results.axisranges import axis_ranges_result
     from ..words.axisranges import axis_ranges_tables
     from ..words.text import in_part
 
-    if freedoms_of(case.model) < 6:
+    if degrees_of_freedom(case.model) < 6:
         return
     try:
         found = axis_ranges(case, with_pairs=False, time_limit=_TRAVEL_TIME)

@@ -1,9 +1,8 @@
 """Boxes of poses: the box of a workspace's coordinates, the leaves of its tree, and the proof of claims on pieces.
 
 A pose has three position coordinates and three rotation coordinates, tangents of half angles. The bounds of the box
-are fractions; rotations about any axis form a ball in the box, and positions may
-form a set (:mod:`.position_conditions`). Nodes of a tree are ``cut``, ``bounded`` and
-``outside`` of :mod:`..tree`.
+are fractions; rotations about any axis form a ball in the box, and positions may form a set
+(:mod:`.position_conditions`). Nodes of a tree are ``cut``, ``bounded`` and ``outside`` of :mod:`..tree`.
 """
 
 from __future__ import annotations
@@ -35,8 +34,8 @@ POSITION = 3
 #: Relative outward rounding of tangents that multiply an axis: its components have unit length up to rounding. The
 #: coordinate of a fixed angle is a rounded tangent too.
 _AXIS = Fraction(1, 2**50)
-#: Number of bisections after which a box that a tree calls outside of the workspace must be proved to be outside.
-_OUTSIDE = 8
+#: Numbers of bisections and of parts at which a box that a tree calls outside must be proved to be outside.
+_OUTSIDE, _MOST_PARTS = 30, 2048
 
 
 class PoseSymbols(NamedTuple):
@@ -176,6 +175,8 @@ class PoseRoot:
             low, high, kept = self.contracted(low, high)
             if not kept.any():
                 return True
+            if kept.sum() > _MOST_PARTS:
+                break
             low, high, every = low[kept], high[kept], np.arange(int(kept.sum()))
             along = (high - low)[:, :POSITION].argmax(axis=1)
             middle = 0.5 * low[every, along] + 0.5 * high[every, along]

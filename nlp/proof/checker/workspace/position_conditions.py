@@ -116,7 +116,7 @@ class _Rounded:
     def contracted(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
         """Return boxes (B, 3) with their ends moved to the condition, and which (B,) may have positions."""
         low, high = lower - self._origin - self._near, upper - self._origin + self._near
-        kept = self._least(low, high, -1) <= self._c + self._room
+        kept = np.maximum(self._least(low, high, -1), self._centred(low, high)) <= self._c + self._room
         lower, upper = lower.copy(), upper.copy()
         for k in range(3):
             rest = self._least(low, high, k) - self._c - self._room
@@ -128,6 +128,16 @@ class _Rounded:
             )
             upper[:, k] = np.where(is_more, np.minimum(upper[:, k], end + self._origin[k] + self._near[k]), upper[:, k])
         return lower, upper, np.asarray(kept)
+
+    def _centred(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        """Return lower bounds (B,) of the polynomial over boxes, from its value and derivatives at their centres."""
+        m, h = 0.5 * (low + high), 0.5 * (high - low)
+        across = np.abs(self._Q - np.diag(np.diag(self._Q)))
+        Qm = m @ self._Q
+        b = [np.abs(2 * Qm + each) for each in self._b]
+        at = (Qm * m).sum(axis=1) + np.minimum(m * self._b[0], m * self._b[1]).sum(axis=1)
+        bend = (h * h) @ np.minimum(np.diag(self._Q), 0.0) - ((h @ across) * h).sum(axis=1)
+        return np.asarray(at - (np.maximum(*b) * h).sum(axis=1) + bend)
 
     def _least(self, low: FloatArray, high: FloatArray, without: int) -> FloatArray:
         """Return lower bounds (B,) of the polynomial over boxes, without the terms of one coordinate; -1 for all."""
