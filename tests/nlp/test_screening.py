@@ -221,6 +221,6 @@ def test_wrong_arrays_are_refused_and_not_written_to() -> None:
     before = points.copy()
     with pytest.raises(ValueError, match="another size"):
         module.search_each(packed, found, np.zeros(1, dtype=np.intc), 2, 0, 2)
-    with pytest.raises(ValueError, match="belong together"):
+    with pytest.raises(ValueError, match="inconsistent sizes"):
         module.search_each(packed, found, np.zeros(1, dtype=np.intc), 2, 1, 3)
     np.testing.assert_array_equal(points, before)
