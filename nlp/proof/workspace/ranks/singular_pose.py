@@ -44,9 +44,8 @@ if TYPE_CHECKING:
 
 #: Relative singular value below which a pose counts as singular.
 SINGULAR = 1e-10
-#: Reason of a verdict with a singular pose of Newton's method.
+#: Reasons of verdicts: pose of Newton's method; change of sign where a set may not contain the line of two poses.
 BY_NEWTON = "found singular to 1e-10 by Newton's method"
-#: Reason of a verdict with a singular pose in a set that may not contain the line between the two poses.
 BY_SIGNS = "the determinant changes its sign at the pose, on the line between two poses"
 #: Largest number of Newton steps: where a determinant touches 0, each step halves the distance.
 _STEPS = 60
@@ -421,8 +420,7 @@ class SingularSearch:
         if self._is_sampled:
             return self._between(signs, found.boxes.centre, found.signs)
         self._is_sampled = True
-        points = signs.extremes()
-        values = signs.computed(points)
+        values = signs.computed(points := signs.extremes())
         between = self._between(signs, points, values)
         if between is not None or not self._problem.names:
             return between
@@ -438,13 +436,11 @@ class SingularSearch:
             new = points[np.sign(values) == sign][:_SIGNED]
             known[:] = [*new[problem.box.holds(problem.pose_of(new))], *known][:_SIGNED]
         for ends in itertools.product(*self._signed.values()):
-            change, positions = signs.change(*ends), problem.box.positions
-            if positions is not None and not positions.positions.is_convex:
-                is_held = change is not None and bool(problem.box.holds(problem.pose_of(change)))
-                shown = self._shown(change, BY_SIGNS) if is_held else None
-            else:
-                sides = frozen_array(problem.pose_of(np.stack(ends)), (2, 6))
-                shown = self._shown(change, "", sides)
+            change = signs.change(*ends)
+            sides = frozen_array(problem.pose_of(np.stack(ends)), (2, 6)) if problem.box.is_convex else None
+            if sides is None and change is not None and not problem.box.holds(problem.pose_of(change)):
+                continue
+            shown = self._shown(change, BY_SIGNS if sides is None else "", sides)
             if shown is not None:
                 return shown
         return None

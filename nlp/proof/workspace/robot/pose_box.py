@@ -96,6 +96,11 @@ class PoseBox:
         return y
 
     @property
+    def is_convex(self) -> bool:
+        """Whether the workspace contains the line between any two of its poses."""
+        return self.positions is None or self.positions.positions.is_convex
+
+    @property
     def free(self) -> tuple[int, ...]:
         """Indices of the coordinates that vary."""
         return tuple(np.flatnonzero(self.upper > self.lower).tolist())
