@@ -113,9 +113,9 @@ UNITS = st.sampled_from([1e-6, 1.0, 1e3])
 
 
 @st.composite
-def position_sets(draw: st.DrawFn) -> PositionSet:
-    """Random sets of positions of all shapes, with up to two half spaces, in several units."""
-    kind, unit = draw(st.sampled_from(list(SetKind))), draw(UNITS)
+def position_sets(draw: st.DrawFn, kind: SetKind) -> PositionSet:
+    """Random sets of positions of a shape, with up to two half spaces, in several units."""
+    unit = draw(UNITS)
     x, y, z = (unit * draw(st.floats(-2, 2)) for _ in range(3))
     radius, axis = unit * draw(st.floats(0.2, 2)), [unit * each for each in draw(AXES)]
     if draw(st.booleans()):
@@ -150,9 +150,13 @@ def position_sets(draw: st.DrawFn) -> PositionSet:
     return replace(given, half_spaces=tuple(halves))
 
 
-@settings(max_examples=25, deadline=None)
-@given(position_sets(), st.integers(0, 2**31))
-def test_boxes_are_contracted_to_the_set_and_never_past_a_position(positions: PositionSet, seed: int) -> None:
+@pytest.mark.parametrize("kind", SetKind)
+@settings(max_examples=4, deadline=None)
+@given(data=st.data(), seed=st.integers(0, 2**31))
+def test_boxes_are_contracted_to_the_set_and_never_past_a_position(
+    kind: SetKind, data: st.DataObject, seed: int
+) -> None:
+    positions = data.draw(position_sets(kind))
     rng, workspace = np.random.default_rng(seed), Workspace.within(positions)
     box, root = pose_box(workspace), pose_root(workspace)
     size = float((box.upper - box.lower)[:3].max())
@@ -195,9 +199,11 @@ def test_boxes_are_contracted_to_the_set_and_never_past_a_position(positions: Po
     assert not any(root.holds(np.append(p, [0, 0, 0])) for p in beyond)
 
 
-@settings(max_examples=20, deadline=None)
-@given(position_sets())
-def test_bisection_converges_to_the_set(positions: PositionSet) -> None:
+@pytest.mark.parametrize("kind", SetKind)
+@settings(max_examples=5, deadline=None)
+@given(data=st.data())
+def test_bisection_converges_to_the_set(kind: SetKind, data: st.DataObject) -> None:
+    positions = data.draw(position_sets(kind))
     workspace = Workspace.within(positions)
     size = float(max(each.upper - each.lower for each in positions.box if isinstance(each, Free)))
     for bounds in (pose_box(workspace), pose_root(workspace)):
@@ -217,9 +223,11 @@ def test_bisection_converges_to_the_set(positions: PositionSet) -> None:
         assert (excess(positions, centre) <= 6 * (1 + slope) ** 2 * half + 1e-9 * size).all()
 
 
-@settings(max_examples=25, deadline=None)
-@given(position_sets())
-def test_sets_in_a_case_file_and_back(positions: PositionSet) -> None:
+@pytest.mark.parametrize("kind", SetKind)
+@settings(max_examples=5, deadline=None)
+@given(data=st.data())
+def test_sets_in_a_case_file_and_back(kind: SetKind, data: st.DataObject) -> None:
+    positions = data.draw(position_sets(kind))
     case = case_from(shipped_tables("hexapod-linuxcnc"), "set")
     for about_pose in (False, True):
         workspace = Workspace.within(positions, about_pose=about_pose)
