@@ -11,7 +11,7 @@ from ..proof.statement.claims import CONSTRAINTS, REGULAR
 from ..proof.workspace.verdict import Outcome
 from ..results.claims import PosedClaim, refuted_claims
 from .motors import OUTCOME_WORDS, TONES
-from .numbers import number
+from .numbers import number, quantity_words
 from .text import Line
 from .verdicts import SHOWN
 
@@ -59,7 +59,7 @@ def claim_words(claim: PosedClaim) -> str:
     if length is not None:
         end = "shortest" if length.sense is Sense.MIN else "longest"
         where = f"; limb {each.name.partition(' limb ')[2]} at its {end} length"
-    return f"{each.name}:{value}{limit}{where}"
+    return f"{quantity_words(each.name)}:{value}{limit}{where}"
 
 
 def violation_lines(result: WorkspaceResult, command: Callable[[WorkspacePose], str]) -> Iterator[Line]:

@@ -11,7 +11,7 @@ from ..case.task import Sense
 from ..proof.workspace.verdict import Outcome
 from .claims import SINGULAR, rank_line
 from .motors import OUTCOME_WORDS, TONES
-from .numbers import number
+from .numbers import number, quantity_words
 from .text import Line, TextTable, Tone, in_part
 from .verdicts import (
     SHOWN,
@@ -199,7 +199,7 @@ def fault_words(each: PathVerdictData, fault: PathFaultData) -> str:
         return f"{where}: {SINGULAR[each.name]}"
     verb = "falls below" if each.sense is Sense.MIN else "exceeds"
     limit = f"{number(each.limit)} {each.unit}".rstrip()
-    return f"{where}: {each.name} {verb} {limit}"
+    return f"{where}: {quantity_words(each.name)} {verb} {limit}"
 
 
 def _along_words(parameter: float) -> str:

@@ -14,7 +14,7 @@ from ..proof.workspace.verdict import Outcome
 from ..results.rounding import ordered
 from .lines import counted, title_line
 from .motors import OUTCOME_WORDS, TONES
-from .numbers import number
+from .numbers import number, quantity_words
 from .poses import pose_words
 from .text import Line, TextTable, Tone
 
@@ -148,7 +148,7 @@ def tightest_table(
         seen.setdefault(f"{each.outcome} {key}", each)
     rows = [
         (
-            each.name,
+            quantity_words(each.name),
             _limit_words(each),
             "none" if each.bound is None else number(each.bound),
             "none" if each.reached is None else number(each.reached),
@@ -212,7 +212,9 @@ def open_lines(claims: Sequence[VerdictData]) -> Iterator[Line]:
     for k, each in enumerate(found):
         reason = f": {each.reason}" if each.reason else ""
         part = "undecided claims" if k >= SHOWN else ""
-        yield Line(f"{each.name} {_limit_words(each)}{reason}", label=OUTCOME_WORDS[Outcome.OPEN], part=part)
+        yield Line(
+            f"{quantity_words(each.name)} {_limit_words(each)}{reason}", label=OUTCOME_WORDS[Outcome.OPEN], part=part
+        )
 
 
 def _limit_words(each: VerdictData) -> str:
@@ -240,7 +242,7 @@ def verdict_table(
         values = [each.limit, each.bound, each.reached][0 if has_limits else 1 :]
         cells.append(
             (
-                each.name,
+                quantity_words(each.name),
                 each.unit or "",
                 "smallest" if each.sense is Sense.MIN else "largest",
                 *("" if value is None else number(value) for value in values),
