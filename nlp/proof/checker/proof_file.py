@@ -150,8 +150,8 @@ class PathPremises:
         file: name of the path's file; its ending distinguishes tables from G-code programs.
         text: text of the file.
         of_case: If true, the path is that of the case; otherwise it was given separately.
-        between, angles, unit, start, offsets: options of reading that the file leaves open, see
-            :class:`~screwsynth.nlp.path.options.PathOptions`; ``between`` by its value.
+        between, angles, unit, start, offsets, flavour, end_of_file, part, macros: options of reading that the file
+            leaves open, see :class:`~screwsynth.nlp.path.options.PathOptions`; ``between`` by its value.
         legs, joint_centre: joint centres and their largest error, see :class:`Premises`.
         with_angles: If true, closed forms replace joint angles. This is not a premise, but a help for the check.
     """
@@ -167,6 +167,10 @@ class PathPremises:
     legs: tuple[tuple[float, ...], ...]
     joint_centre: float
     with_angles: bool
+    flavour: str = "linuxcnc"
+    end_of_file: bool = False
+    part: int | None = None
+    macros: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         # The mapping of read offsets cannot be copied.

@@ -59,6 +59,7 @@ class LoopPoints:
 
     def __init__(self, robot: PosedRobot, equations: SX) -> None:
         self._size, self._values, self._slopes = robot.size, robot.function(equations), robot.slopes(equations)
+        self._count = int(equations.numel())
 
     def at(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return left sides (B, k) at points (B, n), and derivatives (B, k, n) with respect to scaled coordinates."""
@@ -86,6 +87,10 @@ class LoopPoints:
         """
         z, others = z.copy(), [k for k in range(z.shape[1]) if k not in moving]
         to = z[:, others] if to is None else to
+        if not self._count:
+            # Every point is closed.
+            z[:, others] = to
+            return z
         first, way = self.at(z)[0], to - z[:, others]
         size = np.abs(first).max(axis=1, initial=0.0)
         for k in range(1, steps + 1):

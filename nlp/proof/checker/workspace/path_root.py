@@ -156,7 +156,7 @@ class PathRoot:
 class _PieceRule:
     """Rule for a claim about pieces (1, L) of a path."""
 
-    block, most_pieces = 256, 5_000
+    block, most_pieces = 1024, 5_000
     width: FloatArray = np.ones(1)
 
     def __init__(self, claim: BoxClaim, lower: FloatArray, upper: FloatArray) -> None:

@@ -218,7 +218,8 @@ def build_problem(
         case: case with fixed dimensions.
         model: robot of the case; some unknowns may be replaced by closed forms.
         box: box of poses.
-        at: (c,) coordinates of the start pose, where the loops are closed; the centre of the workspace if left out.
+        at: (c,) coordinates of the start pose, where the loops are closed: the first pose of a path; the centre of the
+            workspace if left out.
         near: function that returns the unknowns at the start pose in the home assembly mode; None if they are not
             known. The function is called if the straight motion from home does not reach the start pose.
 
@@ -227,6 +228,7 @@ def build_problem(
     """
     posed = posed_model(case, model, box)
     loops, count = posed.loops, len(posed.free)
+    where = "workspace centre" if at is None else "first pose of the path"
     at = box.middle if at is None else at
     middle = np.concatenate([at[list(posed.free)], np.zeros(len(loops.size) - count)])
     start = closed_from_home(loops, middle, count)
@@ -235,7 +237,7 @@ def build_problem(
         start = loops.all_closed(middle[:, None], range(count, len(middle)), zero=DEPENDENT)[:, 0]
         start = start if loops.is_closed(start) else None
     if start is None:
-        raise NotJudgedError("no solution of the loop equations in the home assembly mode at the workspace centre")
+        raise NotJudgedError(f"no solution of the loop equations in the home assembly mode at the {where}")
     needed = _needed(loops, start, count)
     loops = loops.some(needed)
     dependent = _dependent(loops, start, posed.free, box)
