@@ -292,6 +292,13 @@ class Case(Whole, Shown):
         return {"": "", "workspace": "over the workspace", "path": "along the path"}[self.limits_over]
 
     @property
+    def uses_forces(self) -> bool:
+        """True if actuator forces under loads are limited or minimised."""
+        return any(each.needs_loads for each in self.limits) or any(
+            task.measure and MEASURES[task.measure][0] for task in self.tasks
+        )
+
+    @property
     def is_optimised_everywhere(self) -> bool:
         """True if the worst value over the workspace or path is optimised, not that at the stated poses only."""
         return bool(self.limits_over) and (bool(self.tasks[0].measure) or self.worst_everywhere)

@@ -102,7 +102,7 @@ def combine(
         x, status, value = combined.x[: nlps[0].n], combined.status, combined.nlp.evaluate(combined.x)[0]
     paired = with_pairs_at(nlps[0], [x])
     at = linearise(paired, x)
-    outside = np.flatnonzero(measured_slack(paired, x, at) < -FEASIBLE)
+    outside = np.flatnonzero(~(measured_slack(paired, x, at) >= -FEASIBLE))
     violated = tuple(dict.fromkeys(at.sides[j].name for j in outside))
     if violated and status.is_answer:
         status = Status.INFEASIBLE

@@ -48,6 +48,12 @@ from .status import Phase, PhaseProgress, Status, no_phase
 _BETTER = 1e-6
 #: Number of starting points of the search for the smallest relaxation.
 _ELASTIC_STARTS = 8
+#: Status of a search whose best point is stationary, but no optimum.
+_REFUSED = {
+    PointKind.SADDLE: Status.SADDLE,
+    PointKind.LIMB_SINGULAR: Status.LIMB_SINGULAR,
+    PointKind.SINGULAR: Status.SINGULAR,
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -323,9 +329,7 @@ def _status(nlp: Nlp, x: FloatArray, evidence: Evidence, converged: bool, better
     if evidence.kind is PointKind.INFEASIBLE:
         # A point that only a conservative estimate refuses shows that the program is feasible.
         return Status.INFEASIBLE if measured_violation(nlp, x) > FEASIBLE else Status.NOT_CONVERGED
-    if evidence.kind is PointKind.LIMB_SINGULAR:
-        return Status.LIMB_SINGULAR
-    return Status.SADDLE if evidence.kind is PointKind.SADDLE else Status.NOT_CONVERGED
+    return _REFUSED.get(evidence.kind, Status.NOT_CONVERGED)
 
 
 def closed_point(nlp: Nlp, search: Search) -> FloatArray:

@@ -69,6 +69,7 @@ class StartStatus(enum.Enum):
     UNDEFINED = "met a point where the robot's equations have no finite value"
     STALLED = "stopped before it was stationary"
     LIMB_SINGULAR = "ended where passive joints of a limb are dependent, so that F jumps"
+    SINGULAR = "ended where J is singular and forces are undetermined: add limits.smallest_singular_value"
     OPEN = "ended where loops of the robot are open: another way to assemble its joints"
 
 
@@ -76,6 +77,11 @@ _FAILURES = {
     StopReason.ITERATION_LIMIT: StartStatus.ITERATION_LIMIT,
     StopReason.INFEASIBLE: StartStatus.INFEASIBLE,
     StopReason.UNDEFINED: StartStatus.UNDEFINED,
+}
+#: Stationary points that are no optima, apart from saddles.
+_REFUSED = {
+    PointKind.LIMB_SINGULAR: StartStatus.LIMB_SINGULAR,
+    PointKind.SINGULAR: StartStatus.SINGULAR,
 }
 
 
@@ -277,7 +283,7 @@ def same_value(nlp: Nlp) -> float:
 def distinct_optima(nlp: Nlp, done: Sequence[Start], phase: PhaseProgress) -> tuple[list[Start], list[Optimum]]:
     """Group converged starts by F and point, and examine one point of each group, once.
 
-    Saddles and singular limbs are marked in the status of their starts; the other points are optima, best first.
+    Saddles and singular points are marked in the status of their starts; the other points are optima, best first.
 
     If an optimum is not isolated, all points with its F count as one set, which may have several pieces. Points in
     different working modes of a limb belong to different sets.
@@ -299,10 +305,7 @@ def distinct_optima(nlp: Nlp, done: Sequence[Start], phase: PhaseProgress) -> tu
         examined = [evidence, *(examine(nlp, group[0].x) for group in groups[1:])]
         for each, group in zip(examined, groups, strict=True):
             if not each.kind.is_optimum:
-                is_singular = each.kind is PointKind.LIMB_SINGULAR
-                refused |= dict.fromkeys(
-                    map(id, group), StartStatus.LIMB_SINGULAR if is_singular else StartStatus.SADDLE
-                )
+                refused |= dict.fromkeys(map(id, group), _REFUSED.get(each.kind, StartStatus.SADDLE))
                 continue
             x = np.array([start.x for start in group])
             spread = float(np.max(np.ptp(x, axis=0) / (2 * nlp.scale)))

@@ -33,6 +33,10 @@ _DIGITS = 6
 _UNCHANGED = 1e-9
 #: Rank of J of a robot that is not singular.
 FULL_RANK = 6
+#: Share of searches that converged, of which there are many, up to which the result has a caution.
+_FEW, _MANY = 0.125, 8
+#: Smallest over largest singular value of J, below which a regular robot has a caution.
+_NEAR = 1e-3
 #: Distance of optimal points, as a fraction of the variable ranges: more distant points are a set, not one optimum.
 SET = 1e-3
 
@@ -275,14 +279,21 @@ def violation_lines(sides: Sequence[ViolationData]) -> Iterator[Line]:
         yield Line(f"{len(sides)} limits are violated; the first {_VIOLATIONS}:", tone=Tone.FAULT)
     for side in sides[:_VIOLATIONS]:
         wanted = {"min": "at least", "max": "at most", "equal": "exactly"}[side.bound]
-        value, limit = (f"{each:.6g} {side.unit or ''}".rstrip() for each in (side.value, side.limit))
+        value, limit = (
+            f"{each:.6g} {side.unit or ''}".rstrip() if math.isfinite(each) else "undetermined"
+            for each in (side.value, side.limit)
+        )
         yield Line(f"violated: {quantity_words(side.name)} = {value}, must be {wanted} {limit}", tone=Tone.FAULT)
 
 
-def better_line(starts: StartsData) -> Line | None:
-    """Return the caution that an unconverged search reached a better point; None without such a search."""
-    if starts.better is None or not starts.optima:
+def starts_caution(starts: StartsData) -> Line | None:
+    """Return the caution that an unconverged search reached a better point, or that few searches converged."""
+    if not starts.optima:
         return None
+    if starts.better is None:
+        few = f"only {starts.converged} of {starts.run} searches converged: a better optimum may exist"
+        is_few = starts.run >= _MANY and starts.converged <= _FEW * starts.run
+        return Line(f"{few}; raise solve.starts", label="note", tone=Tone.CAUTION) if is_few else None
     reached = f"an unconverged search reached F = {number(starts.better)} within the limits"
     best = f"{starts.converged} of {starts.run} searches converged, the best at F = {number(starts.optima[0].F)}"
     return Line(f"{best}; {reached}: raise solve.max_iterations or solve.starts", label="note", tone=Tone.CAUTION)
@@ -322,7 +333,11 @@ def singularity_lines(robot: RobotData, units: Units) -> Iterator[Line]:
         yield from joint_lines(robot, robot.joints, units)
     yield from convention_lines(robot)
     if not robot.singular:
-        yield Line(f"{robot.rank}", label="rank of J")
+        values = robot.singular_values
+        words = f"{robot.rank}, nearly singular: the smallest singular value is {{:.2g}} of the largest"
+        is_near = values[-1] < _NEAR * values[0]
+        shown = Line(words.format(values[-1] / values[0]), label="rank of J", tone=Tone.CAUTION)
+        yield shown if is_near else Line(f"{robot.rank}", label="rank of J")
         return
     several = " combinations of" if len(robot.free_motions) > 1 else ""
     yield Line(f"{robot.rank}: singular; with all actuators locked nothing resists{several}", label="rank of J")

@@ -17,7 +17,6 @@ from ..units import objective_unit
 from .joints import limb_part_table
 from .lines import (
     active_limit_lines,
-    better_line,
     certificate_lines,
     check_lines,
     choice_lines,
@@ -30,6 +29,7 @@ from .lines import (
     objective_lines,
     optimality_line,
     singularity_lines,
+    starts_caution,
     starts_lines,
     task_lines,
     title_line,
@@ -76,7 +76,7 @@ def _task_summary(case: Case, result: SolveResult) -> Summary:
         yield from starts_lines(result.starts, robot)
         if case.limits_over == "workspace" and case.outside_workspace is not None:
             yield Line(case.outside_workspace.sentence, label="note")
-    elif (caution := better_line(result.starts)) is not None:
+    elif (caution := starts_caution(result.starts)) is not None:
         yield caution
     yield from _proof_lines(case, result)
     if result.optimality is not None:
@@ -152,7 +152,7 @@ def _combined_summary(case: Case, result: CombinedResult) -> Summary:
     yield from combined_lines(result)
     yield outcome_table(combined, result.tasks)
     yield from choice_lines(result.choice, result.rounding, is_answer=point is not None)
-    if combined.starts is not None and (caution := better_line(combined.starts)) is not None:
+    if combined.starts is not None and (caution := starts_caution(combined.starts)) is not None:
         yield caution
     yield from _proof_lines(case, result)
     yield from combined_value_lines(combined)
