@@ -126,6 +126,19 @@ class PathTable(Table):
         description="interpolation of rotations between two points: linear angles or slerp; the default depends on "
         "the file type",
     )
+    flavour: Literal["linuxcnc", "printer"] = Field(
+        default=PathFile.flavour, description="rules of reading the G-code: those of LinuxCNC or of 3D printers"
+    )
+    end_of_file: bool = Field(
+        default=False, description="true if the end of the file ends the G-code, which then needs no M2, M30 or %"
+    )
+    part: Annotated[int, Field(ge=1)] | None = Field(
+        default=None, description="part of a printer's G-code that is the path; the only part if left out"
+    )
+    macros: list[Annotated[str, Field(min_length=1)]] = Field(
+        default_factory=list,
+        description="names of a printer's macros that the G-code may call; their motions are not in the file",
+    )
     place: PlaceTable | None = Field(
         default=None, description="pose of the path's frame in the world frame; if left out, both frames are equal"
     )
@@ -138,7 +151,7 @@ class PathTable(Table):
             units: units of the file.
             has_limits: If true, a solve must satisfy the limits along the whole path.
         """
-        given, stated = dict(self), self.place
+        given, stated = dict(self) | {"macros": tuple(self.macros)}, self.place
         given["place"] = tuple(
             0.0 if stated is None else internal_value(getattr(stated, name), units, dimension)
             for name, dimension in PLACE.items()

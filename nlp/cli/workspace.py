@@ -141,5 +141,6 @@ def _worst(case: Case, result: WorkspaceResult, target: str | None) -> Figure:
 
     worst = worst_claim(result, case.tasks[0].sense)
     if worst is None:
-        raise InputError(f"--plot-pose {target}: no violation, and no worst value of a quantity, is known at a pose")
+        fault = "nothing to draw: no pose with a violation or with the worst value of a quantity is known"
+        raise InputError(f"--plot-pose {target}: {fault}")
     return contents.figure_of([contents.drawing_at(case, worst)])

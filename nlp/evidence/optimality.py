@@ -295,7 +295,7 @@ def _step_on_optimal_set(nlp: Nlp, at: Linearisation, direction: FloatArray) -> 
 
 
 def _independent_directions(directions: FloatArray) -> list[FloatArray]:
-    """Return a sparse basis of vectors (n,) of the span of directions (k, n), ordered by first components."""
+    """Return a sparse basis of vectors (n,) of the span of directions (k, n), sorted by their first nonzero index."""
     _, sizes, rows = np.linalg.svd(directions, full_matrices=False)
     basis = echelon_basis(rows[sizes > _INDEPENDENT * sizes[0]])
     return sorted(np.where(np.abs(basis) > _NEGLIGIBLE, basis, 0.0), key=lambda row: int(np.argmax(row != 0)))

@@ -242,5 +242,5 @@ def scale_data(found: "Scale", units: Units) -> ScaleData:
 def _fixed(value: object) -> float:
     """Return a fixed number."""
     if not isinstance(value, float):
-        raise TypeError("a verified robot has fixed dimensions")
+        raise TypeError(f"a robot to be verified must have fixed dimensions, got {value!r}")
     return value

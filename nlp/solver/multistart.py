@@ -61,19 +61,19 @@ class ProgramSolution(Whole):
     """Outcome of a search of one program.
 
     Attributes:
-        status: outcome of the search; only :attr:`Status.OPTIMAL` stands for the best known point.
+        status: outcome of the search; only with :attr:`Status.OPTIMAL` is ``x`` the best known point.
         nlp: the nonlinear program.
         x: (n,) the best point; the status says whether the point is optimal.
         state: state of the robot at ``x``; None if its loop equations have no solution.
         evidence: evidence of optimality at ``x``; None without free variables.
-        starts: every start, in order.
+        starts: result of the search from each starting point, in order.
         optima: distinct optima of converged starts, best first.
         seed: seed of the starting points.
         seconds: wall time.
         relaxation: smallest known relaxation of the limits that makes an infeasible program feasible; empty if none
             is known.
         better: objective of a feasible point that is better than every optimum, but at which no search converged; None
-            for none.
+            without such a point.
     """
 
     status: Status
@@ -213,8 +213,8 @@ def _search_within(
 ) -> ProgramSolution:
     """Search a program from the first points and from sampled points.
 
-    Of limits on many pairs, the program has those that the starting points violate. Limits that the results violate
-    are added, and the affected starts are repeated until no limit is violated.
+    Of limits on many pairs of values, the program has only the pairs that the starting points violate. Limits that the
+    results violate are added, and the affected starts are repeated until no limit is violated.
     """
     began = time.perf_counter()
     if nlp.is_fixed:
@@ -263,7 +263,7 @@ def _searched(
     solver: Solver,
     phase: PhaseProgress,
 ) -> tuple[Nlp, dict[int, Start]]:
-    """Return a program with its active pairs, and the pending searches from points (k, n).
+    """Return a program with constraints on its active pairs, and the pending searches from points (k, n).
 
     If interrupted, the searches end before the last point.
     """
@@ -289,7 +289,7 @@ def _searched(
 def _outcome(
     status: Status, nlp: Nlp, x: FloatArray, evidence: Evidence | None, search: Search, began: float
 ) -> ProgramSolution:
-    """Return the outcome of a search at its best point (n,), without starts."""
+    """Return the outcome of a search at its best point (n,), without the results of single starts."""
     state, own = state_or_none(nlp, x), frozen_array(x, (nlp.n,))
     return ProgramSolution(status, nlp, own, state, evidence, (), (), search.seed, time.perf_counter() - began)
 

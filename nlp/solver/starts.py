@@ -87,7 +87,7 @@ _REFUSED = {
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """The search from one starting point.
+    """Result of the search from one starting point.
 
     Attributes:
         status: outcome of the search.
@@ -111,7 +111,7 @@ class Start:
 def search_from(
     nlp: Nlp, points: FloatArray, search: Search, jobs: int | None = None, solver: Solver = ipopt
 ) -> Iterator[Start]:
-    """Search a program from each of several points.
+    """Search a program from each of several starting points.
 
     Args:
         nlp: the nonlinear program.
@@ -121,7 +121,7 @@ def search_from(
         solver: local solver.
 
     Yields:
-        One start for each point, in order; after a stop request, only the complete starts.
+        One result for each point, in order; after a stop request, only the results of complete searches.
 
     Raises:
         InputError: the objective cannot be compiled, although the search asks for it.
@@ -183,7 +183,7 @@ def known_optimum(nlp: Nlp, stopped: FloatArray, known: list[Start]) -> Start | 
 
 
 def judge(nlp: Nlp, found: SolverResult) -> Start:
-    """Return the last point of a local solver after Newton corrections, with its status by the conditions."""
+    """Correct the last point of a local solver by Newton's method; return it with its status by the conditions."""
     stopped = np.clip(found.x, nlp.lower, nlp.upper)
     raw = at = linearise(nlp, stopped)
     active = at.active()
@@ -230,7 +230,7 @@ def _likely_active(nlp: Nlp, at: Linearisation, found: SolverResult, share: floa
 
 
 def _independent(normals: FloatArray, order: NDArray[np.intp]) -> list[int]:
-    """Return the sides, in the given order, whose unit normals (n,) are independent of the preceding ones."""
+    """Return the sides, in the given order, whose unit normals (n,) are independent of the preceding normals."""
     kept = list[int]()
     basis = np.zeros((0, normals.shape[1]))
     for j in order:
@@ -255,9 +255,9 @@ class Optimum:
     Attributes:
         F: objective.
         count: number of starts that converged to the optimum.
-        x: (n,) one of its points.
-        spread: largest distance between its points along one variable, divided by the range of the variable: 0 for an
-            isolated optimum, up to 1 for a set of optima, which may have several pieces.
+        x: (n,) one of the points at which searches ended.
+        spread: largest distance between end points of these searches along one variable, divided by the range of the
+            variable: 0 for an isolated optimum, up to 1 for a set of optima, which may have several pieces.
         evidence: evidence of optimality at ``x``.
         nlp: nonlinear program of the optimum.
     """

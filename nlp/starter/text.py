@@ -12,10 +12,15 @@ import casadi as ca
 import numpy as np
 
 from ...models import Dimension, FloatArray, Model, Parameter, Screw, homogenised, model_names
+from ..case.case import Case
 from ..case.limits.clearance import squared_distance
+from ..case.pose import Free, Value
 from ..case.robots import model_options
 from ..case.settings import Search
+from ..case.task import Sense, Task
 from ..case.toml import option_text, plain_value, toml_key, toml_text
+from ..case.workspace import TURNS, TurnKind, Turns, Workspace
+from ..evidence.dependent import dependent_of
 from ..units import Units
 from .home import TURN, Home, free_widths, read_home, round_number, starter_values
 
@@ -53,6 +58,7 @@ def starter_case(model: Model, robot_file: str | None = None) -> str:
     lengths = [abs(value) for item in model.parameters if item.dimension is Dimension.LENGTH for value in item.typical]
     home = read_home(model, math.hypot(*model.home) or max(lengths, default=0.0) or _size(model) or 1 / 0.25)
     workspace = _workspace_lines(model, home, units)
+    torques = _torque_lines(model, home)
     lines = [
         f'title = "My {model.name}"',
         "",
@@ -73,6 +79,8 @@ def starter_case(model: Model, robot_file: str | None = None) -> str:
         _commented("[limits]", "limits of a buildable design; the documentation lists all"),
         *_limit_lines(model, home),
         "",
+        *(f"# {line}".rstrip() for line in torques),
+        *([""] if torques else []),
         *(f"# {line}" for line in workspace),
         *([""] if workspace else []),
         "[solve]",
@@ -226,6 +234,26 @@ def _singular_value_lines(model: Model, home: Home) -> list[str]:
     return [f"# {table}   # keeps the design away from singularities"]
 
 
+def _torque_lines(model: Model, home: Home) -> list[str]:
+    """Return another objective as comments, the torques of motors that turn cranks; nothing for other robots."""
+    if all(quantity.name != "actuator_angle" for quantity in model.quantities):
+        return []
+    is_rod = any(each.wrenches == 1 for each in model.structure)
+    subject = "the forces of the rods" if is_rod else "the limbs with their motors locked"
+    load = "force = [0, 0, -10]"
+    if home.motion is not None:
+        is_slide = math.isinf(home.motion.pitch)
+        load = f"force = {_vector(-10 * home.motion.axis)}" if is_slide else f"moment = {_vector(home.motion.axis)}"
+    return [
+        f"F is about {subject}. The torque of a motor also depends on its crank and on the load:",
+        _commented("[[load]]", "that the motors hold"),
+        'name = "load"',
+        _commented(load, "on the platform, along the axes of the world"),
+        _commented("[objective]", 'in the place of F; set sense = "min" in the task, or leave the task out'),
+        _commented('minimise = "actuator_force"', "the largest torque of a motor; or actuator_speed, actuator_power"),
+    ]
+
+
 def _actuator_lines(model: Model, home: Home) -> list[str]:
     """Return the lines of limits on straight legs, or on the actuators of other robots."""
     if not model.legs:
@@ -286,7 +314,8 @@ def _workspace_lines(model: Model, home: Home, units: Units) -> list[str]:
     """Return the lines of a workspace around home; none for robots with a single pose or free actuator coordinates."""
     if not _has_workspace(model, home):
         return []
-    position = _position_line(model, home, round_number(_BOX * home.reach))
+    reach = round_number(_BOX * home.reach)
+    position = _position_line(model, home, reach)
     turning = home.turning
     degrees = _BOX_TURN * round(turning.largest / TURN)
     angle = f"{{ min = {-degrees}, max = {degrees} }}"
@@ -296,7 +325,9 @@ def _workspace_lines(model: Model, home: Home, units: Units) -> list[str]:
         3: [f"rotation = {{ angle = {angle} }}"],
     }[turning.numbers]
     if turning.numbers == 3 and home.mobility < 6:
-        rotation = [f"rotation = {{ roll = {angle}, pitch = {angle}, yaw = {angle} }}"]
+        turn = math.radians(degrees)
+        parts = [f"{name} = {angle}" for name in _turning_about(model, home, reach, turn)]
+        rotation = [f"rotation = {{ {', '.join(parts)} }}"]
     fixed = ""
     if home.free is not None:
         item = model.parameters[home.free]
@@ -304,6 +335,29 @@ def _workspace_lines(model: Model, home: Home, units: Units) -> list[str]:
         fixed = f" --set {item.name}={','.join(value)}"
     question = f"screwsynth workspace{fixed} verifies all limits at all these poses"
     return [_commented("[workspace]", question), position, *rotation]
+
+
+def _turning_about(model: Model, home: Home, reach: float, turn: float) -> list[str]:
+    """Return those of roll, pitch and yaw that a robot changes over a workspace about home: the others stay 0.
+
+    Args:
+        model: the robot.
+        home: the robot at home.
+        reach: half range of the free components of the position, length.
+        turn: half range of the angles, radians.
+    """
+    parameters = {item.name: starter_values(item) for item in model.parameters}
+    case = Case(model, parameters, model.home, [Task.screw(Sense.MAX, axis=(0, 0, 1), pitch=math.inf)])
+    moves = zip(model.home, home.moves, strict=True)
+    position = [Free(value - reach, value + reach) if is_free else value for value, is_free in moves]
+    found = []
+    for k, name in enumerate(TURNS):
+        angles: list[Value] = [Free(-turn, turn)] * 3
+        angles[k] = 0.0
+        moved = dependent_of(case, Workspace(position, Turns(TurnKind.ROLL_PITCH_YAW, tuple(angles))))
+        if k + 3 in {*moved.held, *(each.index for each in moved.dependent)}:
+            found.append(name)
+    return found or list(TURNS)
 
 
 def _position_line(model: Model, home: Home, half: float) -> str:

@@ -9,6 +9,7 @@ import re
 from collections.abc import Iterable
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 
+from ..errors import load_words
 from ..results.rounding import NOISE, settled
 from .text import Figure
 
@@ -17,7 +18,7 @@ _RESIDUAL = 1e-12
 #: Significant digits of the result of a search; further digits are rounding error.
 _SOLVED = 9
 #: Sense of a force and its load in the name of a limited quantity, up to the pose.
-_LOADED = re.compile(r" (?:(backwards|smallest) )?load (.+?)(?= pose \d+$|$)")
+_LOADED = re.compile(r" (?:(backwards|smallest) )?load (.+?)(?=(?:, other sense)?(?: pose \d+)?$)")
 _SENSES = {None: "", "backwards": ", negative force", "smallest": ", smallest force"}
 
 
@@ -60,7 +61,7 @@ def quantity_words(name: str) -> str:
     ``actuator_force actuator 2- backwards load cutting`` becomes ``actuator_force actuator 2-, negative force, load
     "cutting"``: the name itself is that of results in JSON and of proof records.
     """
-    return _LOADED.sub(lambda found: f'{_SENSES[found[1]]}, load "{found[2]}"', name)
+    return _LOADED.sub(lambda found: f"{_SENSES[found[1]]}, {load_words(found[2])}", name)
 
 
 def residual(value: float) -> str:

@@ -65,7 +65,7 @@ def path_summary(
         yield from _other_faults(path, wrong)
         yield from open_lines(limited)
     yield from _knot_lines(path, case.units.length)
-    if path.time is not None or path.knots is not None:
+    if path.actuators and (path.time is not None or path.knots is not None):
         yield _actuator_table(path)
     yield from in_part("smallest margins", tightest_table(limited, TIGHTEST_ALONG))
     yield from in_part("all quantities", along_table(case, path.claims))
@@ -80,6 +80,8 @@ def _subject_lines(path: PathData) -> Iterator[Line]:
         words = ", ".join(f"{each.word} (line {each.line})" for each in path.idle[:_SHOWN])
         rest = len(path.idle) - _SHOWN
         yield Line(words + (f", and {rest} more" if rest > 0 else ""), label="ignored (no motion)")
+    for sentence in path.warnings or ():
+        yield Line(sentence, label="note", tone=Tone.CAUTION)
 
 
 def _other_faults(path: PathData, first: PathVerdictData | None) -> Iterator[Line]:

@@ -189,7 +189,7 @@ def _room(each: VerdictData) -> float:
 
 def violating_robot(case: Case, name: str, machine: JointErrorsData) -> TextTable:
     """Return the joint-centre errors of the robot within the tolerance that violates a claim."""
-    unit, title = case.units.length, f"robot within the tolerance that violates: {name}"
+    unit, title = case.units.length, f"robot within the tolerance that violates: {quantity_words(name)}"
     if machine.centres is not None:
         off = [(each.joint, ", ".join(f"{part:.6g}" for part in each.error)) for each in machine.centres]
         return TextTable(("joint", f"error\n{unit}"), tuple(off), name="machine", title=title)
@@ -220,11 +220,12 @@ def outcome_lines(claims: Sequence[VerdictData]) -> Iterator[Line]:
 
 def _limit_of(claim: VerdictData) -> str:
     """Return the name of the limit of a claim, without limb, joint or actuator."""
-    return claim.name.partition(" ")[0].partition(".")[0]
+    name = claim.name.partition(" ")[0]
+    return name if name.startswith("actuator.") else name.partition(".")[0]
 
 
 def open_lines(claims: Sequence[VerdictData]) -> Iterator[Line]:
-    """Yield the undecided claims with their reasons; the first of them belong to the answer."""
+    """Yield the undecided claims with their reasons; those after the first few are in the part "undecided claims"."""
     found = [each for each in claims if each.outcome is Outcome.OPEN]
     for k, each in enumerate(found):
         reason = f": {each.reason}" if each.reason else ""

@@ -52,7 +52,7 @@ def _objective_lines(extremes: Sequence[VerdictData]) -> Iterator[Line]:
             continue
         if low.name == high.name and low.name.partition(" ")[0] == "F":
             ends = f"{number(low.bound)} .. {number(high.bound)} {low.unit}".rstrip()
-            yield Line(ends, label=low.name, after=" over the workspace (proved)")
+            yield Line(ends, label=low.name, after=", over the workspace (proved)")
 
 
 def verdict_words(result: WorkspaceResult) -> str:
@@ -81,7 +81,7 @@ def _needs_line(case: Case, result: WorkspaceResult) -> Iterator[Line]:
     long = [each.bound for each in legs if each.sense is Sense.MAX and each.bound is not None]
     if short and long:
         words = f"{number(min(short))} .. {number(max(long))} {case.units.length}"
-        yield Line(words, label="leg lengths", after=" over the workspace (proved)")
+        yield Line(words, label="leg lengths", after=", over the workspace (proved)")
 
 
 def workspace_summary(

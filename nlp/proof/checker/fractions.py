@@ -28,7 +28,7 @@ def tangent_ends(angle: float) -> tuple[Fraction, Fraction]:
 def _partial_sums(first: Fraction, x: Fraction, order: int) -> tuple[Fraction, Fraction]:
     """Return a lower and an upper bound of sin x (first = x, order 1) or cos x (first = 1, order 0).
 
-    They are consecutive partial sums of the Taylor series.
+    The bounds are consecutive partial sums of the Taylor series.
     """
     term, total, before = first, first, first
     for k in range(_TERMS):

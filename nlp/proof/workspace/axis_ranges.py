@@ -62,7 +62,7 @@ class AxisRanges:
         case: the case, its dimensions fixed.
         start: (6,) the pose: position, length, and roll, pitch and yaw, radians.
         most: largest displacement of a coordinate: a length, and an angle in radians.
-        stops: claims that are not proved at the pose itself; if there are any, there are no ranges.
+        stops: claims that are not proved at the pose itself; without such claims empty, otherwise there are no ranges.
         axes: ranges of the independent coordinates.
         pairs: ranges of pairs of independent coordinates.
         others: names of the dependent coordinates.
@@ -80,7 +80,7 @@ class AxisRanges:
 
 
 class _Found(NamedTuple):
-    """Largest proved fraction of a range, smallest fraction that is not proved, and the claim that fails there."""
+    """Largest proved fraction of a range, smallest fraction that is not proved, and the claim that fails at it."""
 
     proved: float
     failed: float | None
@@ -167,7 +167,7 @@ def axis_ranges(
 
 
 def _until_requested(items: Iterable[_T]) -> Iterator[_T]:
-    """Yield items until the work is requested to stop."""
+    """Yield items until an interrupt or a time limit requests a stop."""
     return itertools.takewhile(lambda _: not is_requested(), items)
 
 
@@ -181,7 +181,8 @@ def _check(start: FloatArray, axes: Sequence[str]) -> None:
         raise InputError("the pose must be six finite numbers: x, y, z, roll, pitch, yaw")
     for name, value in zip(AXES[3:], start[3:].tolist(), strict=True):
         if abs(value) >= _WIDEST:
-            raise InputError(f"{name} = {math.degrees(value):g} deg: must be within {math.degrees(_WIDEST):g} degrees")
+            most = f"{math.degrees(_WIDEST):g}"
+            raise InputError(f"{name} = {math.degrees(value):g} deg: must be above -{most} and below {most} degrees")
     for name in axes:
         if name not in AXES:
             raise InputError(f"axis {name!r}: no such coordinate; {nearest(name, AXES)}")
@@ -362,5 +363,5 @@ def _failures(judged: Judgement) -> Iterator[_Failed]:
 
 
 def _is_over_poses(each: Verdict) -> bool:
-    """Return whether a limit concerns several poses together, such as a stroke."""
+    """Return whether the limit of a verdict concerns several poses together, such as a stroke."""
     return each.key.startswith(f"{Actuator.key}.")

@@ -71,7 +71,7 @@ def judge_workspace(
     Args:
         case: case with fixed dimensions.
         workspace: box of poses; the workspace of the case if left out.
-        quantities: names of measures of the robot whose smallest and largest values are requested.
+        quantities: names of quantities of the robot whose smallest and largest values are requested.
         gap: largest relative gap between the bound and the best known value.
         time_limit: seconds for all searches together; None for no limit. At the limit, searches stop with their present
             bounds. A search takes at most half of the time left; searches of actuators take equal shares of it.
@@ -83,12 +83,12 @@ def judge_workspace(
             ``with_objective`` is true, pose errors are bounded.
         rank_progress: function that is called during the search for singular poses.
         progress: function that is called before each quantity.
-        record: record of the searches for a proof.
+        record: recorder of the searches for a proof file.
 
     Raises:
         CaseError: the case has no workspace, or a free dimension.
-        InputError: the robot has no measure of a given name, the leg error is negative or does not apply to this robot,
-            or there is no C kernel.
+        InputError: the robot has no quantity of a given name, the leg error is negative or does not apply to this
+            robot, or there is no C kernel.
     """
     workspace = workspace_of_case(case if workspace is None else replace(case, workspace=workspace))
     kernel()  # fails at once if it is missing
@@ -102,7 +102,7 @@ def judge_workspace(
 
 
 class _OverBox(Judging):
-    """A judgement over a box of poses.
+    """Judgement of a robot over a box of poses, in progress.
 
     Attributes:
         with_objective, leg_error, progress, rank_progress: arguments of :func:`judge_workspace`.
@@ -152,7 +152,7 @@ class _OverBox(Judging):
         return Subject(self.case, self._closed.model, self._problem, self._reason, shortest)
 
     def actuators(self, subject: Subject) -> Iterator[Verdict]:
-        """Yield the verdicts on actuators, and on pose errors."""
+        """Yield the verdicts on actuator forces, speeds and powers, and on pose errors."""
         yield from motor_extremes(subject, with_all=self.with_objective, record=self.search.record)
         if has_straight_legs(self.case.model) and self.with_objective:
             yield from pose_errors(subject, self.leg_error, self.search.record)
@@ -177,7 +177,7 @@ class _OverBox(Judging):
             yield from self._proved(claims, robots.extreme)
 
     def _of_design(self) -> Iterator[Verdict]:
-        """Yield the verdicts on expressions of the design."""
+        """Yield the verdicts on expressions of the nominal robot."""
         case, closed, workspace = self.case, self._closed, self.workspace
         if closed.reaches:
             layout, reaches = reach_claims(case, closed, workspace)
@@ -193,7 +193,7 @@ class _OverBox(Judging):
         yield from self._proved(claims, partial(prove_extreme, layout), decided)
 
     def _followed(self, design: Problem | None) -> Iterator[Verdict]:
-        """Yield the verdicts on expressions of a design with dependent coordinates, in the home assembly mode.
+        """Yield the verdicts on expressions of a robot with dependent coordinates, in the home assembly mode.
 
         Only this search is restricted to poses that the robot can reach.
         """
@@ -214,7 +214,7 @@ class _OverBox(Judging):
         yield from self._proved(every, robots.extreme, decided)
 
     def _in_home(self, design: Problem, *, is_reached: bool) -> Iterator[Verdict]:
-        """Yield the verdicts on expressions of a design with loops, decided in the home assembly mode.
+        """Yield the verdicts on expressions of a robot with loops, decided in the home assembly mode.
 
         In a nonlinear program, loop equations as constraints admit every assembly mode, and F is unbounded if one of
         these modes is singular. This search follows the loops in the home assembly mode only.
@@ -230,9 +230,9 @@ class _OverBox(Judging):
     def _proved(
         self, claims: Sequence[Claim], prove: Callable[[Claim, NumberSearch], Verdict], decided: Iterable[Verdict] = ()
     ) -> Iterator[Verdict]:
-        """Yield the verdicts on claims. Decided claims are searched again only for the proof record."""
+        """Yield the verdicts on claims. Claims that are already decided are searched again only for a proof file."""
         self._prove = prove
-        # A proof for the design does not cover other robots within the tolerance.
+        # A proof for the nominal robot does not cover other robots within the tolerance.
         uncovered = self._reason if self.case.joint_centre_tolerance else ""
         known = {(each.name, each.sense, each.key): each for each in decided}
         for done, claim in enumerate(replace(each, uncovered=uncovered) for each in claims):

@@ -26,13 +26,13 @@ _LENGTH = "leg_length limb "
 
 
 class Judging(ABC):
-    """A judgement in progress, of a robot over a domain.
+    """Judgement of a robot over a domain (a box of poses or a tool path), in progress.
 
     Args:
         case: the case, its dimensions fixed.
         workspace: box that contains the domain's poses, with the dependent coordinates.
-        measures: names of measures of the robot whose smallest and largest values are requested.
-        search: gap, threads and record of the searches.
+        measures: names of quantities of the robot whose smallest and largest values are requested.
+        search: requested gap, threads, and recorder for a proof file.
         until_fault: If true, stop at the first claim about a rank or limit that is not proved.
 
     Attributes:
@@ -97,7 +97,7 @@ class Judging(ABC):
 
     @abstractmethod
     def expressions(self) -> Iterator[Verdict]:
-        """Yield the verdicts on expressions of the pose: reach, limits, leg lengths, measures, F of the tasks."""
+        """Yield the verdicts on expressions of the pose: reach, limits, leg lengths, requested quantities, F."""
 
     @abstractmethod
     def subject(self, shortest: float) -> Subject:

@@ -1,4 +1,4 @@
-"""Proof file of a judgement: the claims that the records of its searches prove."""
+"""Proof file of a judgement: the claims that the recorded searches prove."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ def proof_of(
 
     Args:
         judged: the verdicts.
-        record: record of the searches.
+        record: recorder of the searches.
         text: text of the case file.
-        quantities: names of the requested measures.
+        quantities: names of the requested quantities.
         leg_error: largest leg-length error, length.
     """
     writer = _Writer(judged, record)
@@ -105,11 +105,11 @@ def write_each(writer: ClaimWriter, expected: Sequence[Claim], judged: Iterable[
 
 
 class _Writer:
-    """Builder of one proof for each claim that the records of the searches prove.
+    """Builder of one proof for each claim that the recorded searches prove.
 
     Args:
         judged: the verdicts.
-        record: record of the searches.
+        record: recorder of the searches.
 
     Attributes:
         robot: the robot as the checker models it, with the symbols of the searches.
@@ -174,7 +174,7 @@ class _Writer:
         return ProofClaim(name, "", "singular", sides=tuple(tuple(side.tolist()) for side in sides))
 
     def _program(self, found: Verdict) -> ProofClaim:
-        """Return a claim with a tree of the search of ``certify``."""
+        """Return the proof of a claim by the recorded tree of the search of ``certify``."""
         # Closed forms require the reach of all limbs, in the search and in the proof file.
         is_reached = all(each.outcome is Outcome.PROVED for each in self._reaches) and not self.robot.dependent
         if found.key != REACH and is_reached and any((each.name, "min") not in self.proved for each in self._reaches):
@@ -198,7 +198,7 @@ class _Writer:
         return ProofClaim(found.name, found.sense.value, "one machine", found.bound, sides=sides)
 
     def _boxes(self, each: Claim, found: Verdict) -> ProofClaim:
-        """Return a claim with the tree of its search of boxes."""
+        """Return the proof of a claim by the recorded tree of its search of boxes."""
         if each.name not in self._record.boxes:
             raise ProofError(_ONE_ASSEMBLY)
         record = self._record.tree(each.name)
@@ -252,5 +252,5 @@ def bound_on_record(claim: Claim, found: Verdict) -> float:
 
 
 def words_of(found: Verdict) -> str:
-    """Return an outcome with its reason."""
+    """Return the outcome of a verdict and its reason as text."""
     return f"{found.outcome.value}: {found.reason}" if found.reason else found.outcome.value

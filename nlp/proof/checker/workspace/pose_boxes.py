@@ -36,7 +36,7 @@ _AXIS = Fraction(1, 2**50)
 
 
 class PoseSymbols(NamedTuple):
-    """A pose as symbols and numbers.
+    """Pose of the platform as symbols for varying and numbers for constant coordinates.
 
     Attributes:
         free: indices of the box coordinates that vary.
@@ -83,7 +83,7 @@ class PoseRoot:
 
     @property
     def coordinates(self) -> int:
-        """Number of coordinates."""
+        """Number of coordinates of a box."""
         return len(self.lower)
 
     @property
@@ -92,7 +92,7 @@ class PoseRoot:
         return 0.5 * self.lower + 0.5 * self.upper if self.at is None else self.at
 
     def symbols(self) -> PoseSymbols:
-        """Return the coordinates as symbols, or as numbers where they are constant."""
+        """Return the pose coordinates: symbols for varying coordinates, numbers for constant coordinates."""
         free: list[int] = np.flatnonzero(self.upper > self.lower).tolist()
         pose = [SX.sym(f"y{k}") if k in free else SX(float(each)) for k, each in enumerate(self.middle)]
         own = [pose[k] for k in free]
@@ -268,5 +268,5 @@ class _PoseRule:
 
 
 def box_words(lower: FloatArray, upper: FloatArray) -> str:
-    """Return a box as text."""
+    """Return the ranges of a box as text, for messages."""
     return ", ".join(f"[{low:.6g}, {high:.6g}]" for low, high in zip(lower, upper, strict=True))

@@ -53,8 +53,8 @@ def rank_claim(
         model: model of its robot without the unknowns in closed form.
         root: box of coordinates.
         name: name of the claim: ``regular``, or ``constraints regular``.
-        tolerance: largest error of each joint centre; 0 for the nominal design.
-        built: model with joint-centre errors; None for six straight legs, and for the nominal design.
+        tolerance: largest error of each joint centre; 0 for the nominal robot.
+        built: model with joint-centre errors; None for six straight legs, and for the nominal robot.
 
     Raises:
         ProofError: the loops cannot be closed at the workspace centre, are singular there or leave a joint free;
@@ -105,7 +105,9 @@ class RankClaim(LoopClaim):
                 raise ProofError("the error of a joint centre exceeds the tolerance")
         signs = self._signs_at(np.stack(points))
         if signs[0] * signs[1] >= 0:
-            raise ProofError("the determinants at the two poses do not have opposite signs")
+            raise ProofError(
+                "det J does not have opposite signs at the two poses, so they do not prove a singular pose between them"
+            )
         for count in _PARTS:
             way = points[0] + np.linspace(0, 1, count + 1)[:, None] * (points[1] - points[0])
             way[[0, -1]] = points

@@ -1,7 +1,7 @@
 """Slices of a box of poses: regions of proved full rank, regions beyond singular poses, and violated limits.
 
 A slice has two coordinates of the box. The other coordinates stay at the centre, or depend on these two. Boxes
-cover the slice, so its colours are proved only for poses of the slice. It is wider than the workspace, to show the
+cover the slice, so its colours are proved only for poses of the slice. A slice is wider than the workspace, to show the
 surrounding poses. If several limits are violated, a box shows the first violated limit on the straight line from the
 middle. Loops without a closed form are followed from the middle.
 """
@@ -120,7 +120,7 @@ def slices_of(case: Case) -> tuple[Slice, ...]:
 
 
 class _Robot:
-    """A robot with its ranks and limits for slices.
+    """Robot with the examiners of its ranks and limits over the boxes of slices.
 
     Args:
         case: case with fixed dimensions.
@@ -156,7 +156,7 @@ class _Robot:
 
 
 def _slice(robot: _Robot, wide: PoseBox, pair: tuple[int, int], over_poses: tuple[str, ...]) -> Slice:
-    """Return the slice along two coordinates."""
+    """Return the slice along a pair of coordinates, covered with boxes."""
     chosen, box = list(pair), robot.problem.box
     rule = _SliceRule(robot, chosen, wide.lower[chosen], wide.upper[chosen])
     parts, region, binding = rule.cover()
