@@ -214,7 +214,11 @@ def _premises(case: Case, checked: VerifiedWorkspace) -> Iterator[str]:
     about = f" {' '.join(map(exact, turns.axis))}" if turns.kind.value == "axis" else ""
     position = ", ".join(f"{name} {span(each, length)}" for name, each in zip("xyz", workspace.position, strict=True))
     rotation = ", ".join(span(each, angle) for each in turns.angles)
-    if workspace.dependent:
+    if workspace.position_set is not None and not workspace.dependent:
+        chosen = workspace.set_words(case.units, exact)
+        turned = f"rotation by {turns.kind.value}{about}: {rotation} {case.units.label(angle)}"
+        yield f"poses: every {chosen}; {turned}"
+    elif workspace.dependent:
         chosen, names = workspace.set_words(case.units, exact), workspace.names
         following = ", ".join(names[each.index] for each in workspace.dependent)
         yield f"poses: every {chosen}; dependent: {following}"

@@ -161,7 +161,7 @@ class PoseConstraints:
             if case.workspace is None:
                 raise TypeError("case.workspace: limits over a workspace need a workspace, got None")
             box = pose_box(case.workspace)
-            middle = box.pose(0.5 * (box.lower + box.upper))
+            middle = box.pose(box.middle)
         self._nlp, self._case, self._middle, self._frame = nlp, case, middle, frame
         self._closed = closed_form(case.model, extended=True)
         names = [item.name for item in case.model.unknowns]

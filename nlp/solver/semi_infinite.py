@@ -257,7 +257,12 @@ def _judged(case: Case, gap: float) -> Judgement:
     """Return the verdicts on a design over its workspace; only those on reach if a limb does not reach every pose."""
     closed, workspace = closed_form(case.model), workspace_of_case(case)
     # Poses that the robot cannot take are no evidence about the reach of its limbs.
-    if closed.reaches and not workspace.dependent:
+    if workspace.position_set is not None:
+        # Programs have the box of a set, so that sampled poses are tested first.
+        found_first = judge_workspace(case, gap=gap, jobs=1, with_objective=False, until_fault=True)
+        if found_first.is_refuted:
+            return found_first
+    elif closed.reaches and not workspace.dependent:
         layout, claims = reach_claims(case, closed, workspace)
         found = tuple(prove_extreme(layout, claim, NumberSearch(gap, 1)) for claim in claims)
         if any(each.outcome is not Outcome.PROVED for each in found):

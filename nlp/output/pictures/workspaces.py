@@ -230,7 +230,12 @@ def _frame(axes: Axes, case: Case, each: Slice) -> None:
     """Draw the outline of the workspace, and name the axes of a slice."""
     inner, outer = (_shown(case, each, end) for end in each.workspace)
     outline: dict[str, Any] = {"fill": False, "edgecolor": INK, "linewidth": 1.6, "gid": "workspace"}
-    if each.ball is None:
+    if each.outside is not None:
+        low, high = (_shown(case, each, end) for end in each.whole)
+        x, y = (np.linspace(*ends, len(each.outside)) for ends in zip(low, high, strict=True))
+        drawn = axes.contour(x, y, each.outside.T, [0.0], colors=[INK], linewidths=1.6)
+        drawn.set_gid("workspace")
+    elif each.ball is None:
         low, high = (_shown(case, each, end) for end in each.whole)
         axes.add_patch(Rectangle((inner[0], inner[1]), *(outer - inner), **outline))
     else:

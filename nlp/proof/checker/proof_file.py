@@ -131,6 +131,7 @@ class Premises:
         quantities: names of the requested quantities.
         leg_error: largest error of a leg's length.
         joint_centre: largest error of each joint centre in the claims; 0 for the nominal robot.
+        position_set: set of positions, from :func:`set_premise`; empty for all positions of the box.
     """
 
     workspace: Poses
@@ -138,6 +139,7 @@ class Premises:
     quantities: tuple[str, ...]
     leg_error: float
     joint_centre: float = 0.0
+    position_set: Poses = ()
 
 
 @dataclass(frozen=True)
@@ -227,6 +229,19 @@ def workspace_premise(workspace: Workspace) -> Poses:
     """Return a workspace as stored in proof files: ranges of the position, kind, ranges of the angles, axis."""
     position, angles = (tuple(map(ends_of, values)) for values in (workspace.position, workspace.turns.angles))
     return position, workspace.turns.kind.value, angles, tuple(workspace.turns.axis)
+
+
+def set_premise(workspace: Workspace) -> Poses:
+    """Return the set of positions of a workspace as text and numbers; empty for all positions of the box.
+
+    These are shape, radii, points, directions and displacement, then normal and point of each half space.
+    """
+    given = workspace.position_set
+    if given is None:
+        return ()
+    sizes = given.radius, given.inner
+    halves = ((*each.normal, *each.point) for each in given.half_spaces)
+    return (given.kind.value, sizes, given.centre, given.end, given.angles, given.shift, *halves)
 
 
 @dataclass(frozen=True)

@@ -112,6 +112,7 @@ def axis_ranges(
     *,
     axes: Sequence[str] = AXES,
     most: tuple[float, float] | None = None,
+    with_pairs: bool = True,
     time_limit: float | None = TIME_LIMIT,
     progress: Callable[[str], None] | None = None,
 ) -> AxisRanges:
@@ -123,6 +124,7 @@ def axis_ranges(
         axes: names of the requested coordinates; dependent coordinates are left out.
         most: largest displacement of a coordinate: a length, and an angle in radians; if left out, the size of the
             robot and 90 degrees.
+        with_pairs: If true, also prove the travel along pairs of coordinates.
         time_limit: seconds for all judgements together; None for no limit.
         progress: function that is called with the name of the next step.
 
@@ -158,8 +160,8 @@ def axis_ranges(
         for k in _until_requested(k for k in alone if AXES[k] in axes):
             report(AXES[k])
             found.append(_range(case, here, k, most[k // 3], has_whole=has_whole))
-        pairs, samples = [], _samples(case, here, found)
-        for one, other in _until_requested(itertools.combinations(found, 2)):
+        pairs, samples = [], _samples(case, here, found) if with_pairs else None
+        for one, other in _until_requested(itertools.combinations(found if with_pairs else (), 2)):
             report(f"{one.axis} and {other.axis}")
             pairs.append(_pair(case, here, samples, one, other))
         reason = why_stopped() if is_requested() else ""

@@ -10,19 +10,21 @@ from typing import TYPE_CHECKING
 from ...case.case import Case
 from ...case.task import Sense
 from ...interruption import is_requested
-from ..statement.claims import Claim
+from ..statement.claims import REGULAR, Claim
 from ..statement.tolerance import Directions
 from .judgement import Judgement
 from .numbers.extremes import DEFAULT, NumberSearch
 from .numbers.searched import Subject, searched_extremes
 from .numbers.strokes import stroke_verdicts
-from .verdict import Verdict
+from .verdict import Outcome, Verdict, not_judged
 
 if TYPE_CHECKING:
     from ...case.workspace import Workspace
 
 #: Beginning of the names of leg lengths.
 _LENGTH = "leg_length limb "
+#: Reason for ranks that are not judged.
+_SAMPLED = "a sampled pose violates a limit"
 
 
 class Judging(ABC):
@@ -57,6 +59,9 @@ class Judging(ABC):
 
     def judgement(self, *, with_numbers: bool = True) -> Judgement:
         """Return the judgement; with ``with_numbers`` false it has only the verdicts on ranks."""
+        sampled = self.sampled_fault() if with_numbers and self.until_fault else None
+        if sampled is not None and (fault := self.shown(sampled)).outcome is Outcome.REFUTED:
+            return Judgement(self.case, self.workspace, (not_judged(REGULAR, _SAMPLED), fault))
         for each in self.ranks():
             self.verdicts[each.claim] = each
         if with_numbers and self.has_numbers and not self._is_over():
@@ -90,6 +95,10 @@ class Judging(ABC):
             return None
         claim = next(each for each in claims if each.legs == (leg,) and each.sense is sense)
         return self.finer(claim, gap, about)
+
+    def sampled_fault(self) -> Verdict | None:
+        """Return a limit that a sampled pose violates; None if none is found, or without samples."""
+        return None
 
     @abstractmethod
     def ranks(self) -> Iterator[Verdict]:

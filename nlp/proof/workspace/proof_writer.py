@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..checker.proof_file import Premises, Proof, ProofClaim, ProofError, Unproved, workspace_premise
+from ..checker.proof_file import Premises, Proof, ProofClaim, ProofError, Unproved, set_premise, workspace_premise
 from ..checker.workspace.statement import expected_claims, legs_premise, robot_claims
 from ..statement.claims import ERRORS, REACH, REGULAR, Claim, ClaimKind, one_robot_name
 from ..statement.fixed_robot import INSIDE, legs_of, workspace_of_case
@@ -57,12 +57,14 @@ def proof_of(
     for other in ERRORS if len(missing) == 1 else ():
         if writer.proved.pop(other.label, None):
             unproved.append(Unproved(*other.label, f"the {missing[0].name} has no proof"))
+    workspace = workspace_of_case(judged.case)
     premises = Premises(
-        workspace=workspace_premise(workspace_of_case(judged.case)),
+        workspace=workspace_premise(workspace),
         legs=legs_premise(legs_of(judged.case)),
         quantities=tuple(quantities),
         leg_error=leg_error,
         joint_centre=judged.case.joint_centre_tolerance or 0.0,
+        position_set=set_premise(workspace),
     )
     claims, lemmas = tuple(writer.proved.values()), tuple(writer.lemmas())
     return Proof(text, judged.case.name, premises, claims, lemmas, tuple(unproved))

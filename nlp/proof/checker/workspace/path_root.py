@@ -56,7 +56,7 @@ class PathRoot:
     """
 
     coordinates = 1
-    is_ball, ball = False, math.inf
+    is_ball, ball, is_convex = False, math.inf, True
 
     def __init__(self, case: Case, path: ProgrammedPath) -> None:
         self.poses, self._is_timed = PathPoses(path), path.is_timed

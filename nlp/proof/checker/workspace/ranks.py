@@ -95,6 +95,8 @@ class RankClaim(LoopClaim):
         # The matrix must be J itself, with rows that are neither normalised nor zero, for a robot without loops.
         if self._shape != (6, 6) or self._nullity or self.assembly.dependent:
             raise ProofError("singular poses can be proved only for robots with six rows and without loops")
+        if not root.is_convex:
+            raise ProofError("singular poses can be proved only in sets that contain the line between two poses")
         points, poses = [np.array(each, dtype=float) for each in sides], self.coordinates
         if len(points) != 2 or any(y.shape != (poses + self.errors,) for y in points):
             raise ProofError("the claim does not have two poses")

@@ -50,7 +50,7 @@ from ...statement.tolerance import (
     tolerance_layout,
 )
 from ..premises import exact
-from ..proof_file import PathPremises, Premises, ProofClaim, ProofError, workspace_premise
+from ..proof_file import PathPremises, Premises, ProofClaim, ProofError, set_premise, workspace_premise
 from .motion_matrix import Root, turned_rotation
 from .path_root import PathRoot
 from .pose_boxes import pose_root
@@ -131,7 +131,7 @@ class RobotClaims:
             for the nominal robot, or if robots with errors cannot be assembled.
         dependent: claims about dependent coordinates of the pose.
         followed: symbols of quantities of a robot whose loops are followed in the home assembly mode: a robot with
-            dependent coordinates, or with a tolerance. None for other robots.
+            dependent coordinates, a set of positions, or a tolerance. None for other robots.
     """
 
     legs: Legs | None
@@ -158,7 +158,7 @@ def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> 
             pass
         else:
             return _followed(legs, closed.model, workspace, robots.symbols, is_open=is_open, within_tolerance=robots)
-    if workspace.dependent:
+    if workspace.dependent or workspace.position_set is not None:
         symbols = tolerance_layout(
             case, BuiltModel(closed.model, (), closed.reaches), 0.0, coordinates_of(pose_root(workspace))
         )
@@ -325,7 +325,7 @@ def refuse_other_premises(
 
     The check itself uses only the premises of the case.
     """
-    if workspace_premise(workspace) != given.workspace:
+    if workspace_premise(workspace) != given.workspace or set_premise(workspace) != given.position_set:
         raise ProofError("the proof is for another workspace than this case's")
     if given.leg_error != leg_error:
         stated = f"the proof is for leg errors of at most {exact(given.leg_error)} {case.units.length}"

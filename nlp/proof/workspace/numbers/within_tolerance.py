@@ -110,7 +110,9 @@ class RobotsWithinTolerance:
             return verdict_of(claim, Minimum(reason=why_stopped()))
         number, found = self.number(claim), None
         try:
-            if not self.family.problem.dependent and is_smooth(number):
+            # Programs have the box of a set of positions, not the set.
+            is_whole_box = self.family.problem.box.positions is None
+            if is_whole_box and not self.family.problem.dependent and is_smooth(number):
                 found = self._by_first_order(claim, number, search)
             small = _SMALL if claim.is_coordinate else 0.0
             return found or next(self._by_search([claim], search.gap, small=small, record=search.record))

@@ -44,8 +44,9 @@ if TYPE_CHECKING:
 
 #: Relative singular value below which a pose counts as singular.
 SINGULAR = 1e-10
-#: Reason of a verdict with a singular pose of Newton's method.
+#: Reasons of verdicts: pose of Newton's method; change of sign where a set may not contain the line of two poses.
 BY_NEWTON = "found singular to 1e-10 by Newton's method"
+BY_SIGNS = "the determinant changes its sign at the pose, on the line between two poses"
 #: Largest number of Newton steps: where a determinant touches 0, each step halves the distance.
 _STEPS = 60
 #: Number of steps in which the smallest singular value must decrease by a tenth. At the boundary of a workspace it may
@@ -419,8 +420,7 @@ class SingularSearch:
         if self._is_sampled:
             return self._between(signs, found.boxes.centre, found.signs)
         self._is_sampled = True
-        points = signs.extremes()
-        values = signs.computed(points)
+        values = signs.computed(points := signs.extremes())
         between = self._between(signs, points, values)
         if between is not None or not self._problem.names:
             return between
@@ -439,8 +439,11 @@ class SingularSearch:
             new = points[np.sign(values) == sign][:_SIGNED]
             known[:] = [*new[problem.box.holds(problem.pose_of(new))], *known][:_SIGNED]
         for ends in itertools.product(*self._signed.values()):
-            sides = frozen_array(problem.pose_of(np.stack(ends)), (2, 6))
-            shown = self._shown(signs.change(*ends), "", sides)
+            change = signs.change(*ends)
+            sides = frozen_array(problem.pose_of(np.stack(ends)), (2, 6)) if problem.box.is_convex else None
+            if sides is None and change is not None and not problem.box.holds(problem.pose_of(change)):
+                continue
+            shown = self._shown(change, BY_SIGNS if sides is None else "", sides)
             if shown is not None:
                 return shown
         return None

@@ -229,7 +229,7 @@ def build_problem(
     posed = posed_model(case, model, box)
     loops, count = posed.loops, len(posed.free)
     where = "workspace centre" if at is None else "first pose of the path"
-    at = 0.5 * (box.lower + box.upper) if at is None else at
+    at = box.middle if at is None else at
     middle = np.concatenate([at[list(posed.free)], np.zeros(len(loops.size) - count)])
     start = closed_from_home(loops, middle, count)
     if start is None and (unknowns := near()) is not None:
