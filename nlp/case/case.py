@@ -422,7 +422,8 @@ def _check_measure(case: Case, task: Task) -> None:
         fault = "must be one at most with objective.minimise, which does not optimise the F of tasks"
         raise CaseError("task", f"{fault}, got {len(case.tasks)}")
     if task.sense is not Sense.MIN:
-        raise CaseError("task[0].sense", "must be 'min' with objective.minimise; or remove the task", "max")
+        fault = 'objective.minimise needs no task: remove [[task]], or give it sense = "min"'
+        raise CaseError("task[0].sense", fault, "max")
     needs_loads, needs_motion = MEASURES[task.measure]
     if needs_loads and not case.loading.loads:
         raise CaseError(key, "needs a table [[load]] with a load on the platform", task.measure)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from ..case.task import Sense
@@ -42,6 +42,13 @@ def rank_line(name: str, outcome: Outcome, after: str = "") -> Line:
         Outcome.OPEN: "undecided",
     }
     return Line(words[outcome], label=_LABELS[name], tone=TONES[outcome], after=after)
+
+
+def unproved_ranks(ranks: Mapping[str, Outcome]) -> Iterator[str]:
+    """Yield the ranks that are not proved, with their outcomes, from the outcome of each rank by its claim."""
+    for name, outcome in ranks.items():
+        if outcome is not Outcome.PROVED:
+            yield f"{CLAIM_WORDS[name]} ({OUTCOME_WORDS[outcome]})"
 
 
 def claim_words(claim: PosedClaim) -> str:

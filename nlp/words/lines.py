@@ -31,6 +31,8 @@ _VIOLATIONS, _OPTIMA = 8, 5
 _DIGITS = 6
 #: Relative difference of the objective between two solves of one nonlinear program; below it, solver error.
 _UNCHANGED = 1e-9
+#: Rank of J of a robot that is not singular.
+FULL_RANK = 6
 #: Share of searches that converged, of which there are many, up to which the result has a caution.
 _FEW, _MANY = 0.125, 8
 #: Smallest over largest singular value of J, below which a regular robot has a caution.
@@ -125,7 +127,7 @@ def headline(result: SolveResult, case: Case) -> Line:
     elif result.optimality is not None and result.optimality.kind is PointKind.UNDECIDED:
         status = "stationary, not proven optimal"
     if robot is not None and robot.singular:
-        status += f", singular: rank {robot.rank}"
+        status = f"SINGULAR: rank {robot.rank}, {status}"
     tone = Tone.CAUTION if is_unasked_singularity(robot, case) else Tone.ANSWER
     # F of a task that nothing resists is rounding error.
     F = 0.0 if robot is not None and robot.task_is_free and several is None else task_F(robot, result.F)
@@ -193,7 +195,9 @@ def check_lines(result: SolveResult) -> Iterator[Line]:
     evidence = result.optimality
     if evidence is not None:
         for direction in evidence.flat:
-            yield Line(", ".join(f"{name} {rate:+.4g}" for name, rate in direction.items()), label="flat direction")
+            steps = [f"{name} by {rate:+.4g}" for name, rate in direction.items()]
+            moved = " and ".join(each for each in (", ".join(steps[:-1]), steps[-1]) if each)
+            yield Line(f"moving {moved} keeps F: other designs are equally good", label="flat direction")
         if math.isfinite(evidence.stationarity):
             checks = f"stationarity {residual(evidence.stationarity)}, feasibility {residual(evidence.feasibility)}"
             curvature = evidence.eigenvalues
@@ -339,6 +343,21 @@ def singularity_lines(robot: RobotData, units: Units) -> Iterator[Line]:
     yield Line(f"{robot.rank}: singular; with all actuators locked nothing resists{several}", label="rank of J")
     for motion in robot.free_motions:
         yield Line(f"  {motion_words(motion, units, robot_size(robot))}")
+
+
+def exclusion_line(case: Case, robot: RobotData | None) -> Line | None:
+    """Return the limit that excludes singular designs, for an answer that is singular although its case expects none.
+
+    None if the case has this limit or minimises a quantity of the actuators, and for a robot that is singular at all
+    poses.
+    """
+    limits = {each.name for each in case.limits}
+    if not is_unasked_singularity(robot, case) or case.model.rank < FULL_RANK or "smallest_singular_value" in limits:
+        return None
+    if any(task.measure for task in case.tasks):
+        return None
+    words = "add smallest_singular_value = { min = ..., length = ... } to [limits] to exclude singular designs"
+    return Line(words, label="advice")
 
 
 def tolerance_line(lost: ToleranceLoss, F: float | None, units: Units) -> Line:

@@ -42,11 +42,13 @@ def model_words(name: str, model: Model | None, options: Sequence[ModelOption]) 
     if model is not None:
         yield Line(model.description)
     if options:
-        rows = [
-            (option.name, option.allowed, "none: must be given" if option.default is None else option.default)
-            for option in options
+        choices = [
+            (option.name, option.allowed, option.default or "none: must be given", option.meaning) for option in options
         ]
-        yield TextTable(("option", "allowed", "default"), tuple(rows))
+        # The meaning is annotated by few robots of other packages.
+        columns = 4 if any(option.meaning for option in options) else 3
+        headers = ("option", "allowed", "default", "meaning")
+        yield TextTable(headers[:columns], tuple(row[:columns] for row in choices))
     if model is None:
         return
     yield TextTable(

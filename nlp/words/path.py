@@ -9,7 +9,7 @@ from ..case.pathfile import PLACE
 from ..case.pose import Free
 from ..case.task import Sense
 from ..proof.workspace.verdict import Outcome
-from .claims import SINGULAR, rank_line
+from .claims import CLAIM_WORDS, SINGULAR, rank_line, unproved_ranks
 from .motors import OUTCOME_WORDS, TONES
 from .numbers import number, quantity_words
 from .text import Line, TextTable, Tone, in_part
@@ -168,7 +168,8 @@ def verdict_words(result: PathResult) -> str:
 def path_proof_lines(case: Case, proof: PathProofData) -> Iterator[Line]:
     """Yield the proof of a solved design along its path."""
     whole = f"{proof.file}, {proof.segments:,} segment{'s' * (proof.segments != 1)}: "
-    yield proof_line(proof, "path", "point", whole)
+    ranks = {each.name: each.outcome for each in proof.claims if each.name in CLAIM_WORDS}
+    yield proof_line(proof, unproved_ranks(ranks), proof.claims, "path", "point", whole)
     stated = case.path
     for (name, dimension), value in zip(PLACE.items(), () if stated is None else stated.place, strict=False):
         if value != 0:

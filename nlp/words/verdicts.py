@@ -47,11 +47,15 @@ def answer_words(ranks: Sequence[Outcome], limits: Sequence[Outcome], where: str
     return f"NOT PROVED: {', '.join(parts)}"
 
 
-def proof_line(proof: ExchangeData, where: str, place: str, whose: str = "") -> Line:
+def proof_line(
+    proof: ExchangeData, ranks: Iterable[str], claims: Iterable[VerdictData], where: str, place: str, whose: str = ""
+) -> Line:
     """Return the outcome of the proof for a solved design over its workspace or along its path.
 
     Args:
         proof: the proof.
+        ranks: ranks that are not proved, in words.
+        claims: verdicts of the proof; limits that are not proved are named.
         where: name of the domain: ``workspace`` or ``path``.
         place: word for a pose of the domain, ``pose`` or ``point``.
         whose: text before the answer.
@@ -61,7 +65,17 @@ def proof_line(proof: ExchangeData, where: str, place: str, whose: str = "") -> 
             f"{whose}proved: no singularity and no violated limit at any {place}", label=where, tone=Tone.ANSWER
         )
     words = f"not proved: {counted(proof.designs[-1].unproved, 'claim')} violated or undecided"
+    named = _tightest([each for each in claims if each.limit is not None and each.outcome is not Outcome.PROVED])
+    texts = [*ranks, *map(_unproved_words, named)][:SHOWN]
+    words += f": {'; '.join(texts)}" if texts else ""
     return Line(whose + words, label=where, tone=Tone.NO_ANSWER)
+
+
+def _unproved_words(each: VerdictData) -> str:
+    """Return a limit that is not proved with its outcome, the proved bound and the reached value."""
+    values = {"proved bound": each.bound, "reached": each.reached}
+    texts = [OUTCOME_WORDS[each.outcome], *(f"{key} {number(x)}" for key, x in values.items() if x is not None)]
+    return f"{quantity_words(each.name)} {_limit_words(each)} ({', '.join(texts)})"
 
 
 def exchange_lines(proof: ExchangeData, where: str) -> Iterator[Line]:
@@ -139,13 +153,6 @@ def tightest_table(
     extremes: Sequence[VerdictData], title: str = "limits with the smallest margin over all poses"
 ) -> Iterator[TextTable]:
     """Yield the limits with the smallest margin: violated ones first, then undecided ones."""
-    limited = [each for each in extremes if each.limit is not None]
-    limited.sort(key=lambda each: (_ORDER.index(each.outcome), ordered(_room(each))))
-    seen: dict[str, VerdictData] = {}
-    for each in limited:
-        # One row stands for all legs and joints with this limit.
-        key = getattr(each, "key", None) or f"{each.name.partition(' ')[0]} {each.sense}"
-        seen.setdefault(f"{each.outcome} {key}", each)
     rows = [
         (
             quantity_words(each.name),
@@ -154,11 +161,21 @@ def tightest_table(
             "none" if each.reached is None else number(each.reached),
             Line(OUTCOME_WORDS[each.outcome], tone=TONES[each.outcome]),
         )
-        for each in list(seen.values())[:_TIGHTEST]
+        for each in _tightest([each for each in extremes if each.limit is not None])[:_TIGHTEST]
     ]
     if rows:
         headers = ("quantity", "limit", "proved bound", "reached", "outcome")
         yield TextTable(headers, tuple(rows), name="tightest", title=title)
+
+
+def _tightest(limited: Sequence[VerdictData]) -> list[VerdictData]:
+    """Return the claim with the smallest margin of each limit and outcome: violated, undecided, then proved ones."""
+    seen: dict[str, VerdictData] = {}
+    for each in sorted(limited, key=lambda each: (_ORDER.index(each.outcome), ordered(_room(each)))):
+        # One claim stands for all legs and joints with this limit.
+        key = getattr(each, "key", None) or f"{each.name.partition(' ')[0]} {each.sense}"
+        seen.setdefault(f"{each.outcome} {key}", each)
+    return list(seen.values())
 
 
 def _room(each: VerdictData) -> float:

@@ -14,7 +14,7 @@ from ..case.task import Sense
 from ..interruption import STOPPED
 from ..proof.statement.claims import CONSTRAINTS, REGULAR
 from ..proof.workspace.verdict import EVERYWHERE, Outcome
-from .claims import CLAIM_WORDS, rank_line, violation_lines
+from .claims import CLAIM_WORDS, rank_line, unproved_ranks, violation_lines
 from .motors import OUTCOME_WORDS, ends_of_motor, motor_tables
 from .numbers import number
 from .poses import pose_words
@@ -138,7 +138,7 @@ def _violating_robot_table(case: Case, extremes: Sequence[VerdictData]) -> Itera
 def proof_lines(proof: WorkspaceProofData | None) -> Iterator[Line]:
     """Yield the proof of a solved design over its workspace."""
     if proof is not None:
-        yield proof_line(proof, "workspace", "pose")
+        yield proof_line(proof, unproved_ranks({REGULAR: proof.regular.outcome}), proof.extremes, "workspace", "pose")
         yield from exchange_lines(proof, "workspace")
 
 

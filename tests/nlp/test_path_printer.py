@@ -495,14 +495,19 @@ def test_the_reader_takes_lines_in_both_functions(tmp_path: Path) -> None:
 def test_the_page_about_a_delta_proves_a_file_and_names_what_is_out_of_reach(cli: Run, tmp_path: Path) -> None:
     """Carriages of the page are compared with the closed form of a linear Delta."""
     page = (Path(__file__).parents[2] / "docs" / "printing.md").read_text(encoding="utf-8")
-    robot, case = re.findall("```toml\n(.*?)```", page, re.DOTALL)
-    saved(tmp_path / "linear-delta.toml", robot)
+    diameter, case = re.findall("```toml\n(.*?)```", page, re.DOTALL)
+    radius, rod, away = 174.75, 333.0, np.linspace(0, 30, 50)
+    height = np.sqrt(rod**2 - radius**2)
+    scaled = " ".join(output_of(cli("workspace", str(saved(tmp_path / "diameter.toml", diameter)), "--scale")).split())
+    proved = re.search(r"largest proved diameter (\S+) mm", scaled)
+    assert proved is not None
+    exact = 2 * (np.sqrt(rod**2 - (height - 120) ** 2) - radius)
+    assert exact * (1 - 1e-3) <= float(proved[1]) <= exact
     stated = saved(tmp_path / "printer.toml", case)
     saved(tmp_path / "part.gcode", "G28\nG1 X0 Y0 Z0 F3000\nG1 X30\nM84")
     shown = " ".join(output_of(cli("path", str(stated))).split())
     assert "PROVED at every point: no singularity, 12 limits satisfied" in shown
-    radius, rod, away = 130.25, 269.0, np.linspace(0, 30, 50)
-    carriages = -330 + np.sqrt(rod**2 - (radius - away) ** 2)
+    carriages = np.sqrt(rod**2 - (radius - away) ** 2) - height
     found = re.search(r"actuator unit smallest largest speed 1 mm (\S+) (\S+) ", shown)
     assert found is not None
     smallest, largest = map(float, found.groups())
