@@ -92,8 +92,18 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
         CaseError: the case is inconsistent, or C cannot be generated for its tasks or its poses.
         InputError: the functions of the case have no finite value at any trial point.
     """
-    subject = find_subject(case)
-    nlp, prefix = subject.nlp, identifier(case.name)
+    return c_of_subject(find_subject(case), source)
+
+
+def c_of_subject(subject: Subject, source: str = _NO_CASE_FILE) -> dict[str, str]:
+    """Generate the files of :func:`generate_c` from the program of a case.
+
+    Args:
+        subject: program of the case, and its optimal value.
+        source: text of the case file.
+    """
+    nlp = subject.nlp
+    case, prefix = nlp.case, identifier(nlp.case.name)
     held = fixed_conditions(nlp)
     staged = stage_functions(nlp.program, magnitude_of(nlp), f"{prefix}_CASADI", held)
     limits = run_time_limits(nlp, f"{prefix}_CASADI")

@@ -75,7 +75,7 @@ def shared_library(files: Mapping[str, str]) -> Path:
     key = hashlib.sha256(
         "\0".join([*(part for item in sorted(files.items()) for part in item), compiler, version, *_FLAGS]).encode()
     ).hexdigest()
-    folder = _folder()
+    folder = cache_folder()
     library = folder / f"{key[:32]}.so"
     if library.exists():
         return library
@@ -118,7 +118,7 @@ def _run(words: list[str]) -> str:
         raise InputError(f"{words[0]}: {fault}: {error.said}") from None
 
 
-def _folder() -> Path:
+def cache_folder() -> Path:
     """Return the user's cache folder; a new temporary folder if it cannot be written."""
     import tempfile  # noqa: PLC0415 - few solves are compiled
 

@@ -1,0 +1,328 @@
+"""Data of a live page from a case: sliders, limits, loads, and the arrays of the module, in the case's units.
+
+Values inside the module are in the units of computations, with angles in radians; ``factor`` converts them to the
+case's units.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import TypedDict
+
+import numpy as np
+
+from ...models import Dimension, FloatArray, Parameter
+from ...models.instance import length_of
+from ...models.statics import driven_joints
+from ..case.case import Case
+from ..case.forces import dimension_of_force, dimension_of_speed
+from ..embedding.runtimelimits import run_time_limits
+from ..program.nlp import Nlp
+from ..program.places import FreeRotation, Place
+from ..results.objective import unit_of_objective
+from ..units import Units, rate_unit
+from .functions import ViewFunctions
+from .source import ViewSource
+
+#: Range of the slider of a fixed value: part of the value, part of the robot's size, and angle.
+_PART, _WAY, _TURN = 0.5, 0.25, math.radians(45)
+
+
+class ArrayData(TypedDict):
+    """Array of the module: number for its address, and its length."""
+
+    name: str
+    size: int
+
+
+class SliderData(TypedDict):
+    """Value with a slider; ``set`` is its name for ``--set``, empty for a component of a rotation.
+
+    ``vector`` and ``index`` are its place among the variables ``x`` or the fixed parameters ``p``. For ``turn``, the
+    variable is the sine of half the shown angle.
+    """
+
+    name: str
+    set: str
+    group: str
+    unit: str
+    factor: float
+    vector: str
+    index: int
+    low: float
+    high: float
+    start: float
+    turn: bool
+
+
+class RotationData(TypedDict):
+    """Rotation with a free axis: prefix of its names, and indices of the vector part of its quaternion."""
+
+    prefix: str
+    q: list[int]
+
+
+class LimitData(TypedDict):
+    """Limit that can be set: key below ``limits``, unit, value, and allowed values."""
+
+    key: str
+    unit: str
+    factor: float
+    value: float
+    above: float | None
+    most: float | None
+
+
+class RowData(TypedDict):
+    """Value of a limit: name, keys of both sides, index among the readings (-1 for none), bounds and unit."""
+
+    name: str
+    keys: list[str]
+    reading: int
+    low: float | None
+    high: float | None
+    unit: str
+    factor: float
+
+
+class TaskData(TypedDict):
+    """Task: name, sense, first index of its twist in ``p``, index of its weight (-1 for none), unit of its rates."""
+
+    name: str
+    sense: str
+    twist: int
+    weight: int
+    unit: str
+
+
+class ActuatorData(TypedDict):
+    """Actuator: name, limb, units of its force and of its speed, and factor of the speed."""
+
+    name: str
+    limb: str
+    force: str
+    speed: str
+    factor: float
+
+
+class QuantityData(TypedDict):
+    """Quantity of the robot: name, owners, unit and factor."""
+
+    name: str
+    owners: list[str]
+    unit: str
+    factor: float
+
+
+class ViewData(TypedDict):
+    """Everything that a live page needs besides its module and its drawing."""
+
+    arrays: list[ArrayData]
+    blocks: Mapping[str, tuple[int, int]]
+    sliders: list[SliderData]
+    rotations: list[RotationData]
+    inner: list[int]
+    limits: list[LimitData]
+    rows: list[RowData]
+    tasks: list[TaskData]
+    loads: list[str]
+    actuators: list[ActuatorData]
+    quantities: list[QuantityData]
+    units: Mapping[str, str]
+    F_unit: str
+    sense: str
+    poses: int
+    limbs: list[str]
+    row_limbs: list[str]
+    seeds: int
+    has_slopes: bool
+    checksum: str
+
+
+def view_data(source: ViewSource) -> ViewData:
+    """Return the data of the live page of a case."""
+    nlp, functions = source.subject.nlp, source.functions
+    case, program, units = nlp.case, nlp.program, nlp.case.units
+    loading = "largest" in functions.blocks
+    weights = program.places.weights or [-1] * len(case.tasks)
+    twists = [each.start for each in program.places.twists]
+    return {
+        "arrays": arrays_of(nlp, functions),
+        "blocks": functions.blocks,
+        "sliders": [*_sliders(nlp)],
+        "rotations": _rotations(nlp),
+        "inner": sorted(program.places.inner),
+        "limits": _limits(nlp),
+        "rows": _rows(functions, units),
+        "tasks": [
+            {
+                "name": task.name,
+                "sense": task.sense.value,
+                "twist": twist,
+                "weight": int(weight),
+                "unit": rate_unit(np.ravel(task.twist).tolist(), units) if task.is_stated else "",
+            }
+            for task, twist, weight in zip(case.tasks, twists, weights, strict=False)
+        ],
+        "loads": [each.name for each in case.loading.cases] if loading else [],
+        "actuators": _actuators(case),
+        "quantities": [
+            {
+                "name": each.name,
+                "owners": list(each.owners),
+                "unit": units.label(each.dimension),
+                "factor": units.shown(1.0, each.dimension),
+            }
+            for each in case.model.quantities
+        ],
+        "units": {"length": units.length, "angle": units.angle, "force": units.force},
+        "F_unit": unit_of_objective(case, 0) if len(case.tasks) == 1 else unit_of_objective(case),
+        "sense": nlp.sense.value,
+        "poses": len(program.robots),
+        "limbs": list(case.model.limbs),
+        "row_limbs": [row.limb for row in case.model.frame_rows],
+        "seeds": 16,
+        "has_slopes": functions.slopes is not None,
+        "checksum": source.checksum,
+    }
+
+
+def arrays_of(nlp: Nlp, functions: ViewFunctions) -> list[ArrayData]:
+    """Return the arrays of the module in the order of ``place`` in ``view.c.in``."""
+    n, p, c = nlp.n, len(nlp.program.arguments), len(nlp.program.constraints)
+    limits = len(run_time_limits(nlp, "view").limits)
+    readings, view = len(functions.readings.known), functions.view.numel_out(0)
+    sizes = {"p": p, "x": n, "lower": n, "upper": n, "limits": limits, "F": 1, "gradient": n, "slopes": p, "g": c}
+    sizes |= {"readings": readings, "view": view, "singular_values": 6, "solution": n, "solution_F": 1, "violation": 1}
+    sizes |= {"residual": 1, "lower_multipliers": n, "upper_multipliers": n, "limit_multipliers": limits}
+    sizes |= {"g_lower": c, "g_upper": c, "twist": 7, "case_lower": n, "case_upper": n}
+    return [{"name": name, "size": size} for name, size in sizes.items()]
+
+
+def _sliders(nlp: Nlp) -> Iterator[SliderData]:
+    """Yield the sliders of dimensions and poses."""
+    case, places = nlp.case, nlp.program.places
+    count = sum(len(item.components) for item in case.model.parameters)
+    parameters = [item for item in case.model.parameters for _ in item.components]
+    size = length_of(case.model, _parameter_values(nlp))
+    for k, ((name, dimension), place) in enumerate(zip(case.scalars.items(), places.numbers, strict=True)):
+        parameter = parameters[k] if k < count else None
+        low, high, start = _range(nlp, place, dimension, size, parameter)
+        factor = case.units.shown(1.0, dimension)
+        yield {
+            "name": name,
+            "set": name,
+            "group": "dimension" if parameter is not None else "pose",
+            "unit": case.units.label(dimension),
+            "factor": factor,
+            "vector": place.vector,
+            "index": place.index,
+            "low": low,
+            "high": high,
+            "start": start,
+            "turn": False,
+        }
+    for rotation, prefix in zip(places.rotations, case.pose_prefixes, strict=True):
+        if not isinstance(rotation, FreeRotation):
+            continue
+        for index, letter in zip(rotation.q, "xyz", strict=True):
+            yield {
+                "name": f"{prefix}turn_{letter}",
+                "set": "",
+                "group": "pose",
+                "unit": case.units.angle,
+                "factor": case.units.shown(1.0, Dimension.ANGLE),
+                "vector": "x",
+                "index": index,
+                "low": float(nlp.lower[index]),
+                "high": float(nlp.upper[index]),
+                "start": float(nlp.start[index]),
+                "turn": True,
+            }
+
+
+def _parameter_values(nlp: Nlp) -> list[float]:
+    """Return the values of the robot's parameters at the start."""
+    count = sum(len(item.components) for item in nlp.case.model.parameters)
+    vectors: Mapping[str, FloatArray] = {"x": nlp.start, "p": nlp.arguments}
+    return [float(vectors[place.vector][place.index]) for place in nlp.program.places.numbers[:count]]
+
+
+def _range(
+    nlp: Nlp, place: Place, dimension: Dimension, size: float, parameter: Parameter | None
+) -> tuple[float, float, float]:
+    """Return the ends of a slider and its start; a fixed value has a range about it."""
+    if place.vector == "x":
+        return float(nlp.lower[place.index]), float(nlp.upper[place.index]), float(nlp.start[place.index])
+    value = float(nlp.arguments[place.index])
+    if dimension is Dimension.ANGLE:
+        half = _TURN
+    elif dimension is Dimension.NUMBER:
+        half = max(1.0, abs(value))
+    elif parameter is not None and value:
+        half = _PART * abs(value)
+    else:
+        half = _WAY * size
+    return value - half, value + half, value
+
+
+def _rotations(nlp: Nlp) -> list[RotationData]:
+    """Return the rotations with a free axis."""
+    named = zip(nlp.program.places.rotations, nlp.case.pose_prefixes, strict=True)
+    return [{"prefix": prefix, "q": list(each.q)} for each, prefix in named if isinstance(each, FreeRotation)]
+
+
+def _limits(nlp: Nlp) -> list[LimitData]:
+    """Return the limits that can be set in the module, in its order."""
+    units = nlp.case.units
+    return [
+        {
+            "key": each.key,
+            "value": each.default,
+            "above": _finite(each.above),
+            "most": _finite(each.most),
+            "unit": units.label(each.dimension),
+            "factor": units.shown(1.0, each.dimension),
+        }
+        for each in run_time_limits(nlp, "view").limits
+    ]
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _rows(functions: ViewFunctions, units: Units) -> list[RowData]:
+    """Return the values of limits."""
+    readings = functions.readings
+    found: list[RowData] = []
+    for k, each in enumerate(readings.rows):
+        reading = each.constraint.reading
+        low, high = (float(reading.from_value(end)) if math.isfinite(end) else None for end in (each.lower, each.upper))
+        found.append(
+            {
+                "name": each.constraint.name,
+                "keys": list(each.constraint.keys),
+                "reading": readings.known.index(k) if k in readings.known else -1,
+                "low": low,
+                "high": high,
+                "unit": units.label(reading.dimension),
+                "factor": units.shown(1.0, reading.dimension),
+            }
+        )
+    return found
+
+
+def _actuators(case: Case) -> list[ActuatorData]:
+    """Return the actuators."""
+    return [
+        {
+            "name": joint.name,
+            "limb": joint.limb,
+            "force": case.units.label(dimension_of_force(joint)),
+            "speed": case.units.label(dimension_of_speed(joint)),
+            "factor": case.units.shown(1.0, dimension_of_speed(joint)),
+        }
+        for joint in driven_joints(case.model)
+    ]

@@ -1,0 +1,89 @@
+"""C of a live view: the files of ``codegen``, with the view's functions and the exports of the module."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from string import Template
+
+from ..case.case import Case
+from ..embedding.codegen import c_of_subject
+from ..embedding.ctext import identifier
+from ..embedding.manifest import solver_files
+from ..embedding.subject import Subject, find_subject
+from ..embedding.templates import casadi_texts
+from .functions import ViewFunctions, view_functions
+
+#: Folder of the template and of the headers in place of those of a C library.
+FOLDER = Path(__file__).parent / "c"
+_HEADERS = ("math.h", "string.h", "memory.c")
+
+
+@dataclass(frozen=True, eq=False)
+class ViewSource:
+    """C of a live view.
+
+    Attributes:
+        subject: program of the C, and its optimal value.
+        functions: functions of the view.
+        files: text by file name.
+    """
+
+    subject: Subject
+    functions: ViewFunctions
+    files: Mapping[str, str]
+
+    @property
+    def checksum(self) -> str:
+        """SHA-256 of all files."""
+        return checksum_of(self.files)
+
+
+def checksum_of(files: Mapping[str, str], *further: str) -> str:
+    """Return the SHA-256 of files by name, and of further texts."""
+    parts = [*(part for item in sorted(files.items()) for part in item), *further]
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()
+
+
+def view_source(case: Case) -> ViewSource:
+    """Return the C of the live view of a case.
+
+    Raises:
+        CaseError: the case is inconsistent, or C cannot be generated for it.
+        InputError: the functions of the case have no finite value at any trial point.
+    """
+    subject = find_subject(case)
+    generated = c_of_subject(subject)
+    prefix = identifier(case.name)
+    functions = view_functions(subject.nlp, f"{prefix}_VIEW")
+    files = {name: generated[name] for name in solver_files(generated, prefix, ".c", ".h")}
+    files |= {f"{prefix}-view-casadi{end}": text for end, text in casadi_texts(functions.all, f"{prefix}_VIEW").items()}
+    files[f"{prefix}-view.c"] = _exports(subject, functions, prefix)
+    files |= {name: (FOLDER / name).read_text(encoding="utf-8") for name in _HEADERS}
+    return ViewSource(subject, functions, files)
+
+
+def _exports(subject: Subject, functions: ViewFunctions, prefix: str) -> str:
+    """Return the C of the module's exports."""
+    places = subject.nlp.program.places
+    joints = sorted(places.inner) if functions.closure else []
+    # Without as many equations as joint coordinates, there are no derivatives of F with closed loops.
+    closed = list(functions.closure) if len(functions.closure) == len(joints) else []
+    names = {
+        "id": prefix,
+        "ID": prefix.upper(),
+        "ninputs": functions.view.numel_in(0),
+        "nview": functions.view.numel_out(0),
+        "rows_at": functions.blocks["rows"][0],
+        "nclosure": len(closed),
+        "closure_rows": ", ".join(map(str, [*closed, 0])),
+        "closure_joints": ", ".join(map(str, [*(joints if closed else []), 0])),
+        "nreadings": len(functions.readings.known),
+        "has_slopes": int(functions.slopes is not None),
+        "view_work": max(each.sz_w() for each in functions.all),
+        "view_sz_arg": max(each.sz_arg() for each in functions.all),
+        "view_sz_res": max(each.sz_res() for each in functions.all),
+    }
+    return Template((FOLDER / "view.c.in").read_text(encoding="utf-8")).substitute(names)

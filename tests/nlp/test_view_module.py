@@ -1,0 +1,205 @@
+"""The module of a live page, run by Node: its values are those of the program, and its optimum is that of ``solve``."""
+
+import json
+import shutil
+import subprocess
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from builders import EACH_KIND, Array, assert_words, soaked, starter
+from numpy.typing import ArrayLike
+
+from screwsynth.models import model_names
+from screwsynth.nlp import Case, Nlp, load_case, shipped_cases, solve
+from screwsynth.nlp.errors import CaseError, EvaluationError, InputError
+from screwsynth.nlp.evidence.evaluation import starting_point
+from screwsynth.nlp.evidence.kkt import close_equations
+from screwsynth.nlp.evidence.loads import loads_at
+from screwsynth.nlp.evidence.state import evaluate
+from screwsynth.nlp.output import live
+from screwsynth.nlp.output.pictures.posture import Linkage
+from screwsynth.nlp.view import wasm
+from screwsynth.nlp.view.data import arrays_of
+from screwsynth.nlp.view.source import ViewSource, view_source
+from screwsynth.nlp.view.wasm import compile_module, find_compiler
+
+HARNESS = Path(__file__).parent / "view_values.mjs"
+MODULE = Path(live.__file__).parent / "page" / "module.js"
+FEW = ("hexapod-machining", "paper-4.1-helical", "hexapod-spindle", "flight-simulator")
+LIVE = [*shipped_cases(), *(f"new {name}" for name in model_names())]
+needs = [
+    pytest.mark.skipif(shutil.which("node") is None, reason="Node is not installed"),
+    pytest.mark.skipif(find_compiler() is None, reason="no compiler for WebAssembly is installed"),
+]
+pytestmark = needs
+
+
+class Made(NamedTuple):
+    """The C of a case's live page, compiled."""
+
+    source: ViewSource
+    content: bytes
+
+    @property
+    def nlp(self) -> Nlp:
+        return self.source.subject.nlp
+
+
+@cache
+def made(name: str) -> Made:
+    try:
+        source = view_source(case_of(name))
+    except CaseError as error:
+        pytest.skip(f"no C: {error}")
+    return Made(source, compile_module(source.files))
+
+
+def case_of(name: str) -> Case:
+    return starter(name[4:]) if name.startswith("new ") else load_case(name)
+
+
+def run(
+    folder: Path, given: Made, points: list[dict[str, Any]], *, from_x: bool = False, seeds: int | None = None
+) -> dict[str, Any]:
+    """What Node computes with the module."""
+    shutil.copy(MODULE, folder / "module.mjs")
+    (folder / "view.wasm").write_bytes(given.content)
+    arrays = arrays_of(given.nlp, given.source.functions)
+    told = {"arrays": arrays, "points": points, "from_x": from_x, "seeds": seeds}
+    (folder / "given.json").write_text(json.dumps(told))
+    node = shutil.which("node")
+    assert node is not None
+    done = subprocess.run([node, str(HARNESS), str(folder)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return dict(json.loads(done.stdout))
+
+
+def close(found: list[float | None], expected: ArrayLike, error: float = 1e-12) -> None:
+    """Check values against the largest of them; what is not finite is so in both."""
+    want = np.asarray(expected, dtype=np.float64).ravel()
+    values = np.array([np.nan if each is None else each for each in found])
+    want = np.where(np.isfinite(want), want, np.nan)
+    size = float(np.nanmax(np.abs(want), initial=0.0)) or 1.0
+    np.testing.assert_allclose(values, want, rtol=0, atol=error * size)
+
+
+def block(found: dict[str, Any], source: ViewSource, name: str) -> list[float | None]:
+    first, size = source.functions.blocks[name]
+    return list(found["view"][first : first + size])
+
+
+def check_values(found: dict[str, Any], given: Made, x: Array, p: Array, pose: int) -> None:
+    """Check the values of a point with the program's functions, which the C does not come from."""
+    nlp = replace(given.nlp, arguments=p)
+    kernels, functions = nlp.program.kernels, given.source.functions
+    values = kernels.derivatives(x, p)
+    close([found["F"]], values.F)
+    close(found["g"], values.g) if len(found["g"]) else None
+    state = kernels.robot_states[pose](x, p)
+    close(block(found, given.source, "rates"), state.rates)
+    close(block(found, given.source, "F"), state.F)
+    close(block(found, given.source, "rotation"), state.rotation)
+    close(block(found, given.source, "position"), state.position)
+    start = 0
+    for quantity in state.quantities:
+        size = quantity.size
+        close(block(found, given.source, "quantities")[start : start + size], quantity)
+        start += size
+    if not functions.closure and functions.slopes is not None:
+        close(found["gradient"], values.gradient)
+        close(found["slopes"], kernels.argument_derivatives(x, p).gradient)
+    try:
+        here = evaluate(nlp, x, pose)
+    except EvaluationError:
+        return
+    unknowns = x[list(nlp.program.places.unknowns[pose])]
+    posture = Linkage(nlp.case.model, state.parameters.ravel(), nlp.case.characteristic_length).posture_at(
+        here.rotation, here.position, unknowns
+    )
+    close(block(found, given.source, "points"), posture.points)
+    close(found["singular_values"][: len(here.singular_values)], here.singular_values)
+    if "largest" in functions.blocks and not here.is_singular:
+        loads = loads_at(nlp, x, here, pose)
+        error = 1e-12 / (here.singular_values[-1] / here.singular_values[0]) ** 2
+        for end in ("largest", "smallest"):
+            forces = [getattr(each, end) for load in loads.loads for each in load.actuators]
+            close(block(found, given.source, end), forces, error)
+        close(block(found, given.source, "speeds"), [each.value for each in loads.speeds], error)
+
+
+@pytest.mark.parametrize("name", soaked(LIVE, [*FEW, "new 6-ups"]))
+def test_values_are_those_of_the_program(name: str, tmp_path: Path) -> None:
+    given = made(name)
+    nlp, count = given.nlp, 100
+    rng = np.random.default_rng(1)
+    x = nlp.lower + (nlp.upper - nlp.lower) * rng.random((count, nlp.n))
+    p = nlp.arguments * (1 + 1e-3 * rng.standard_normal((count, len(nlp.arguments))))
+    poses = rng.integers(0, len(nlp.program.robots), count)
+    points = [{"x": a.tolist(), "p": b.tolist(), "pose": int(k)} for a, b, k in zip(x, p, poses, strict=True)]
+    found = run(tmp_path, given, points)["points"]
+    for k, each in enumerate(found):
+        check_values(each, given, x[k], p[k], int(poses[k]))
+
+
+@pytest.mark.parametrize("name", soaked(LIVE, FEW))
+def test_optimum_is_that_of_solve(name: str, tmp_path: Path) -> None:
+    given = made(name)
+    solution = solve(given.nlp.case)
+    if not solution.status.is_answer:
+        pytest.skip(f"solve ends without an optimum: {solution.status.value}")
+    answer = run(tmp_path, given, [], seeds=16)["solved"]
+    combination = solution.combination
+    own = solution.outcomes[0].own if combination is None else combination.combined
+    assert own is not None
+    assert answer["F"] == pytest.approx(own.F, rel=1e-6, abs=1e-6 * given.nlp.objective_size)
+
+
+@pytest.mark.parametrize("name", soaked([f"new {each}" for each in EACH_KIND], ["new delta"]))
+def test_derivatives_follow_closed_loops(name: str, tmp_path: Path) -> None:
+    """Central differences with the loops closed again at each point."""
+    given = made(name)
+    nlp = given.nlp
+    if not given.source.functions.closure or given.source.functions.slopes is None:
+        pytest.skip("no closed loops")
+    x = starting_point(nlp)
+    found = run(tmp_path, given, [{"x": x.tolist(), "p": nlp.arguments.tolist(), "pose": 0}])["points"][0]
+    inner = set(nlp.program.places.inner)
+
+    def value_at(x: Array, p: Array) -> float:
+        moved = replace(nlp, arguments=p)
+        return moved.evaluate(close_equations(moved, x)).F
+
+    size = nlp.objective_size
+    for i in [k for k in range(nlp.n) if k not in inner][:3]:
+        step = 1e-5 * (nlp.upper[i] - nlp.lower[i])
+        ends = [value_at(x + sign * step * np.eye(nlp.n)[i], nlp.arguments) for sign in (1, -1)]
+        assert found["gradient"][i] == pytest.approx((ends[0] - ends[1]) / (2 * step), rel=1e-4, abs=1e-6 * size)
+
+
+def test_modules_are_compiled_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    given = made("paper-4.1-helical")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    first = compile_module(given.source.files)
+    (target,) = (tmp_path / "screwsynth").glob("*.wasm")
+    target.write_bytes(b"kept")
+    assert compile_module(given.source.files) == b"kept"
+    assert first[:4] == b"\0asm"
+
+
+def test_a_faulty_source_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    with pytest.raises(InputError) as caught:
+        compile_module({"a.c": "int f(void) { return x; }\n"})
+    assert_words(str(caught.value), "the compiler for WebAssembly failed", "a.c")
+    assert not list((tmp_path / "screwsynth").glob("*"))
+
+
+def test_without_a_compiler_a_sentence_says_how_to_get_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(wasm, "find_compiler", lambda: None)
+    with pytest.raises(InputError) as caught:
+        compile_module({})
+    assert_words(str(caught.value), "screwsynth[view]", "clang", "lld")
