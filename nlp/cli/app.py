@@ -28,6 +28,10 @@ GROUPS = {
             "inverse hexapod-linuxcnc --poses poses.csv --csv joints.csv",
         ),
         "report": ("Solve a case, and write an HTML report.", "report paper-4.1-helical --out report.html"),
+        "view": (
+            "Open a page with the robot, its sliders, and the solver.",
+            "view hexapod-machining --out view.html",
+        ),
     },
     "Prove": {
         "certify": (

@@ -1,0 +1,52 @@
+"""Command ``view``."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from . import options
+from .commandline import Argument, print_line
+
+
+def view(
+    case: Annotated[str, Argument("CASE", "Case file, name of a shipped case or of a robot, or a robot file (.toml).")],
+    settings: options.SettingTexts = None,
+    out: Annotated[str | None, options.file("--out", "HTML file to write; - is stdout")] = None,
+    no_open: Annotated[bool, options.flag("--no-open", "Do not open the page in a browser")] = False,
+    starts: options.Starts = None,
+    seed: options.Seed = None,
+    jobs: options.Jobs = None,
+    _time: options.Time = None,
+) -> None:
+    """Write a page with the robot, its sliders, and the solver, and open it.
+
+    The page is one file, which solves again while a slider moves, without a network.
+    """
+    import tempfile
+    from dataclasses import replace
+    from pathlib import Path
+
+    from ..errors import InputError, one_line
+    from ..output.files import check_outputs, write_text
+    from ..output.live.page import live_page
+    from ..view.source import view_source
+    from .progress import solve_with_progress
+    from .viewed import read_viewed
+
+    if out is None and no_open:
+        raise InputError("--no-open: the page would be nowhere; give --out FILE, or leave --no-open out")
+    (loaded, _, inputs), is_solved = read_viewed(case, options.read_settings(settings))
+    loaded = replace(loaded, search=loaded.search.but(starts, seed))
+    target = str(Path(tempfile.mkdtemp(prefix="screwsynth.")) / "view.html") if out is None else out
+    check_outputs(inputs, {"--out": target})
+    source = view_source(loaded)
+    solution = solve_with_progress(loaded, jobs)[0] if is_solved and not source.subject.nlp.is_fixed else None
+    page = live_page(source, solution, case)
+    write_text(target, page.text)
+    if target != "-":
+        words = f"{one_line(target)}: {len(page.text.encode()) / 1000:.0f} kB"
+        print_line(f"{words}; the sliders do not work: {page.fault}" if page.fault else words)
+    if not no_open and target != "-":
+        import webbrowser
+
+        webbrowser.open(Path(target).absolute().as_uri())

@@ -1,0 +1,101 @@
+"""Text of a case file in parts: fixed text, and the names of values that a page fills in."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterator
+from typing import TypedDict
+
+from ...case.case import Case
+from ...errors import CaseError
+
+#: Sections of a case file that do not belong to another point.
+_DROPPED = ("expect", "published")
+_NUMBER = r"[-+]?[0-9.]+(?:e[-+]?\d+)?"
+
+
+class SetPart(TypedDict):
+    """Place of a value by its name, as for ``--set``."""
+
+    set: str
+
+
+def case_parts(case: Case, limits: Collection[str]) -> list[str | SetPart]:
+    """Return the parts of a case file of a case with fixed variables; empty if no case file can state it.
+
+    Args:
+        case: the case.
+        limits: keys of the limits that the page can change.
+    """
+    try:
+        text = case.to_toml()
+    except CaseError:
+        return []
+    found: list[str | SetPart] = []
+    for part in _parts(case, text, limits):
+        if isinstance(part, str) and found and isinstance(found[-1], str):
+            found[-1] += part
+        else:
+            found.append(part)
+    return found
+
+
+def _parts(case: Case, text: str, limits: Collection[str]) -> Iterator[str | SetPart]:
+    """Yield the parts of a text of :meth:`.Case.to_toml`."""
+    names = {item.name: case.component_names(item) for item in case.model.parameters}
+    section, pose, is_dropped = "", -1, False
+    for line in text.splitlines(keepends=True):
+        if line.startswith("["):
+            section = line.strip().strip("[]")
+            is_dropped = section.partition(".")[0] in _DROPPED
+            pose += section == "pose"
+        if is_dropped:
+            continue
+        key, equals, _ = line.partition(" = ")
+        key = key.strip().strip('"')
+        if equals and section == "robot.parameters" and key in names:
+            yield from _assigned(line, names[key])
+        elif equals and section == "pose" and key == "position":
+            yield from _assigned(line, tuple(f"{case.pose_prefixes[pose]}p_{letter}" for letter in "xyz"))
+            yield from _rotation(case, pose)
+        elif equals and section == "pose" and key == "rotation":
+            continue
+        elif equals and section.startswith("limits"):
+            yield from _limit(line, ".".join([section, key]), limits)
+        else:
+            yield line
+
+
+def _assigned(line: str, names: tuple[str, ...]) -> Iterator[str | SetPart]:
+    """Yield a line with values in place of its own: a number, or a list of them."""
+    yield f"{line.partition(' = ')[0]} = {'[' if len(names) > 1 else ''}"
+    for k, name in enumerate(names):
+        yield ", " if k else ""
+        yield {"set": name}
+    yield "]\n" if len(names) > 1 else "\n"
+
+
+def _rotation(case: Case, pose: int) -> Iterator[str | SetPart]:
+    """Yield the rotation of a pose by axis and angle."""
+    axis, prefix = case.poses[pose].rotation.axis, case.pose_prefixes[pose]
+    yield "rotation = { axis = "
+    if axis is None:
+        yield {"set": f"{prefix}axis"}
+    else:
+        yield f"[{', '.join(repr(float(each)) for each in axis)}]"
+    yield ", angle = "
+    yield {"set": f"{prefix}angle"}
+    yield " }\n"
+
+
+def _limit(line: str, key: str, limits: Collection[str]) -> Iterator[str | SetPart]:
+    """Yield a line of a limit with values in place of the numbers of its keys."""
+    at = 0
+    for match in re.finditer(rf"(\w+) = ({_NUMBER})(?=[ ,}}\n])", line):
+        if f"{key}.{match[1]}".removeprefix("limits.") not in limits:
+            continue
+        yield line[at : match.start(2)]
+        yield {"set": f"{key}.{match[1]}"}
+        at = match.end(2)
+    yield line[at:]
+

@@ -1,0 +1,315 @@
+"""Live page of a case: the robot, its sliders, and the module that solves, in one HTML text."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import re
+import shlex
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from string import Template
+from typing import Any
+
+import numpy as np
+
+from ....models import FloatArray
+from ...case.case import Case
+from ...errors import EvaluationError, InputError
+from ...evidence.evaluation import starting_point
+from ...evidence.state import evaluate
+from ...program.nlp import Nlp
+from ...results.data import SolveResult
+from ...results.result import result_of
+from ...solver.solution import Solution
+from ...view.data import ViewData, view_data
+from ...view.source import ViewSource
+from ...view.wasm import compile_module
+from ...words.lines import headline, task_lines, title_line
+from ..pictures.drawing import Drawing, drawing_of
+from ..pictures.view import clearest_view
+from ..report.frames import joint_data, link_data
+from ..report.markup import Markup, join_markup, paragraphs, script_json, tag
+from .casefile import case_parts
+
+#: Modules of the page in the order of their imports.
+SCRIPTS = ("numbers.js", "module.js", "state.js", "text.js", "scene.js", "canvas.js", "panel.js", "main.js")
+_IMPORT = re.compile(r'^import \{[^}]*\} from "\./\w+\.js";\n', re.MULTILINE)
+_EXPORT = re.compile(r"^export (?=const|class)", re.MULTILINE)
+#: Statuses of the module in words, by code.
+_STATUSES = (
+    "optimum",
+    "the search in the page ended at no optimum; the point is feasible",
+    "no feasible point was found with these values",
+    "the values are not allowed",
+    "the search was stopped",
+    "an optimum in another assembly mode than home",
+    "optimum at the end of a joint range or of the home assembly mode",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class LivePage:
+    """Live page of a case.
+
+    Attributes:
+        text: HTML of the page.
+        fault: reason why the page cannot solve; empty if it can.
+        size: bytes of the module; 0 without one.
+    """
+
+    text: str
+    fault: str
+    size: int
+
+
+def live_page(source: ViewSource, solution: Solution | None, command: str) -> LivePage:
+    """Return the live page of a case.
+
+    Args:
+        source: C of the live view.
+        solution: solution of the case; None for a case that is only evaluated.
+        command: name of the case on the command line.
+    """
+    nlp = source.subject.nlp
+    case = nlp.case
+    try:
+        module, fault = compile_module(source.files), ""
+    except InputError as error:
+        module, fault = b"", str(error)
+    data = view_data(source)
+    answer = None if solution is None else _answer(solution)
+    start = starting_point(nlp)
+    x = start if answer is None else np.array(answer["x"])
+    drawing = _drawing(nlp, x)
+    page = {
+        **data,
+        "closure": list(source.functions.closure),
+        "scene": _scene(drawing),
+        "camera": _camera(drawing),
+        "view": _view(source, x),
+        "p": nlp.arguments.tolist(),
+        "start": start.tolist(),
+        "answer": answer,
+        "statuses": list(_STATUSES),
+        "F_name": _name_of_F(case),
+        "is_stated": case.tasks[0].is_stated,
+        "command": shlex.quote(command),
+        "case_parts": case_parts(case, [each["key"] for each in data["limits"]]),
+        "has_module": bool(module),
+    }
+    parts = {
+        "title": tag("title", f"{case.title or case.name} - screwsynth"),
+        "style": Markup(_file("live.css")),
+        "heading": join_markup([tag("h1", title_line(case).words), *_task(case, solution)]),
+        "answer": _answer_markup(answer),
+        "body": _body(case, data, drawing, fault),
+        "footer": _footer(source, module),
+        "data": script_json(page),
+        "module": base64.b64encode(gzip.compress(module, mtime=0)).decode("ascii") if module else "",
+        "script": Markup(script_text()),
+    }
+    return LivePage(Template(_file("live.html.in")).substitute(parts), fault, len(module))
+
+
+def script_text() -> str:
+    """Return the modules of the page as one: imports and exports are left out, so all names are in one scope."""
+    return "".join(_EXPORT.sub("", _IMPORT.sub("", _file(name))) for name in SCRIPTS)
+
+
+def _file(name: str) -> str:
+    return (files("screwsynth.nlp.output.live") / "page" / name).read_text(encoding="utf-8")
+
+
+def _name_of_F(case: Case) -> str:  # noqa: N802 - the objective's name
+    """Return the name of the objective in the headline."""
+    if len(case.tasks) > 1:
+        return case.method.value
+    return "F" if case.pose_count == 1 else f"F ({case.over_poses.value} over {case.pose_count} poses)"
+
+
+def _answer(solution: Solution) -> dict[str, Any]:
+    """Return the program's answer: point, words of the terminal's headline, and whether it is an optimum."""
+    combination = solution.combination
+    own = solution.outcomes[0].own if combination is None else combination.combined
+    x = solution.outcomes[0].x if own is None else own.x
+    result = result_of(solution)
+    if isinstance(result, SolveResult):
+        words = headline(result, solution.case).words
+    else:
+        words = solution.status.value
+    return {"x": x.tolist(), "words": words, "isOptimum": solution.status.is_answer}
+
+
+def _answer_markup(answer: dict[str, Any] | None) -> Markup:
+    """Return the content of the headline; the script fills it after a change."""
+    return join_markup(
+        [
+            tag("span", "" if answer is None else answer["words"], id="F"),
+            tag("span", id="word"),
+            tag("span", id="words"),
+            tag("span", "Found and checked by the program, not by this page.", id="proved", hidden=True),
+        ]
+    )
+
+
+def _task(case: Case, solution: Solution | None) -> Iterable[Markup]:
+    """Yield the task in words."""
+    if solution is None:
+        return
+    result = result_of(solution)
+    if isinstance(result, SolveResult) and result.robot is not None and result.robot.task is not None:
+        yield tag("div", paragraphs(task_lines(result.robot.task, case.units)), class_="task")
+
+
+def _drawing(nlp: Nlp, x: FloatArray) -> Drawing:
+    """Return the drawing of the robot at a point.
+
+    Raises:
+        InputError: the robot has no configuration at the point.
+    """
+    try:
+        return drawing_of(nlp, x, evaluate(nlp, x))
+    except EvaluationError as error:
+        raise InputError(f"{error}; there is no robot to show") from None
+
+
+def _scene(drawing: Drawing) -> dict[str, Any]:
+    """Return the lines, outlines and joints of the drawing."""
+    joints = zip(joint_data(drawing), drawing.model.scene.joints, strict=True)
+    return {
+        "links": link_data(drawing),
+        "plates": {body.value: list(loop) for body, loop in drawing.plates},
+        "joints": [{**data, "axes": len(joint.axes)} for data, joint in joints],
+        "corners": list(drawing.corners),
+        "size": drawing.size,
+    }
+
+
+def _camera(drawing: Drawing) -> dict[str, float]:
+    view = clearest_view(drawing)
+    return {"azimuth": view.azimuth, "elevation": view.elevation}
+
+
+def _view(source: ViewSource, x: FloatArray) -> list[float]:
+    """Return the values of the view at a point, for a picture before the module starts."""
+    nlp, functions = source.subject.nlp, source.functions
+    inputs = functions.inputs(x, nlp.arguments).full().ravel()[: functions.view.numel_in(0)]
+    values = functions.view(inputs).full().ravel()
+    return np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0).tolist()
+
+
+def _body(case: Case, data: ViewData, drawing: Drawing, fault: str) -> Markup:
+    """Return the picture and the controls."""
+    stated = drawing.case is not None and case.tasks[0].is_stated
+    choices = [(f"rate {k}", f"rate, {task['name']}") for k, task in enumerate(data["tasks"]) if stated]
+    choices += [(f"force {k}", f"actuator force, {name}") for k, name in enumerate(data["loads"])]
+    options = [tag("option", words, value=value) for value, words in choices or [("rate 0", "rate")]]
+    poses = [tag("option", f"pose {k + 1}", value=k) for k in range(data["poses"])]
+    words = "Robot in three dimensions. Arrow keys turn it, plus and minus zoom, 0 resets the view."
+    picture = tag(
+        "figure",
+        tag("canvas", id="robot", tabindex="0", role="img", aria_label=words),
+        tag(
+            "figcaption",
+            tag("label", "Colour of limbs: ", tag("select", *options, id="colour")),
+            tag("span", class_="scale", aria_hidden="true"),
+            tag("span", "blue negative, orange positive"),
+            tag("label", "Shown: ", tag("select", *poses, id="pose")) if len(poses) > 1 else None,
+            tag("button", "Reset view", type="button", id="view-reset"),
+            tag("button", "Fit", type="button", id="view-fit"),
+            tag("span", _legend(stated=stated), class_="extra") if stated else None,
+        ),
+        id="picture",
+    )
+    return join_markup([picture, tag("div", *_controls(data, fault), id="controls", tabindex="-1")])
+
+
+def _legend(*, stated: bool) -> str:
+    return "Black: axis of the task; purple: its pitch and the velocities of the platform." if stated else ""
+
+
+def _controls(data: ViewData, fault: str) -> list[Markup]:
+    """Return the controls beside the picture."""
+    if fault:
+        return [tag("p", f"The sliders of this page do not work: {fault}.", class_="warning")]
+
+    def button(key: str, words: str, **more: object) -> Markup:
+        return tag("button", words, type="button", id=key, **more)
+
+    modes = tag(
+        "div",
+        button("mode-solve", "Solve", aria_pressed="true"),
+        button("mode-evaluate", "Evaluate", aria_pressed="false"),
+        tag("span", class_="gap"),
+        button("to-answer", "Program's answer"),
+        button("to-start", "Start"),
+        button("to-next", "Next optimum"),
+        button("free-all", "Release all"),
+        class_="controls",
+        role="group",
+        aria_label="Mode and points",
+    )
+    note = "A moved value is held, the others are solved for. Thin bars: change of F over each range."
+    groups = [
+        tag("section", tag("h2", words), tag("div", id=f"{key}s"), id=f"{key}-group")
+        for key, words in (("dimension", "Dimensions"), ("pose", "Pose"))
+    ]
+    values = tag(
+        "dl",
+        *(
+            tag("div", tag("dt", words), tag("dd", id=key), id=f"{key}-row")
+            for key, words in (
+                ("rank", "rank of J"),
+                ("singular", "smallest singular value"),
+                ("turn", "rotation"),
+                ("time", "last change"),
+            )
+        ),
+    )
+    copies = tag(
+        "div",
+        button("copy-set", "Copy command"),
+        button("copy-case", "Copy case file"),
+        button("copy-link", "Copy link"),
+        class_="controls",
+    )
+    copied = tag(
+        "div",
+        tag("label", "Text", id="copied-words", for_="copied-text"),
+        tag("textarea", id="copied-text", readonly=True, spellcheck="false"),
+        id="copied",
+        hidden=True,
+    )
+    limits = tag("section", tag("h2", "Limits"), tag("div", id="limits"), id="limits-group")
+    content = [modes, tag("p", note, class_="note"), *groups, limits, values, _actuators(data), copies, copied]
+    return [tag("div", *content, class_="needs-module")]
+
+
+def _actuators(data: ViewData) -> Markup:
+    """Return the table of actuator forces and speeds; empty without loads and speeds."""
+    if "largest" not in data["blocks"]:
+        return Markup("")
+    forces, speeds = ({each[key] for each in data["actuators"]} for key in ("force", "speed"))
+    heads = ["actuator", *(f"{name}, {_one(forces)}" for name in data["loads"])]
+    heads += [f"speed, {_one(speeds)}"] if data["blocks"]["speeds"][1] else []
+    head = tag("thead", tag("tr", *(tag("th", words, scope="col") for words in heads)))
+    table = tag("table", tag("caption", "Actuator forces and speeds"), head, tag("tbody", id="actuators"))
+    return tag("div", table, class_="scroll", tabindex="0", role="region", aria_label="Actuator forces and speeds")
+
+
+def _one(units: Sequence[str] | set[str]) -> str:
+    """Return the common unit; several units one after the other."""
+    return " or ".join(sorted(units))
+
+
+def _footer(source: ViewSource, module: bytes) -> Markup:
+    """Return the origin of the values of the page."""
+    if not module:
+        return tag("p", "Made by screwsynth.")
+    words = (
+        "Made by screwsynth. Values after a change are computed in this page by the C that "
+        "screwsynth codegen writes, compiled to WebAssembly; SHA-256 of the C: "
+    )
+    return tag("p", words, tag("code", source.checksum[:16]), ".")

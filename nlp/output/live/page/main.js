@@ -1,0 +1,169 @@
+// The live page: loads the module, and shows the state after each change.
+import { CaseModule } from "./module.js";
+import { State } from "./state.js";
+import { argumentsOf, caseFileOf, fragmentOf, takeFragment } from "./text.js";
+import { axesOf, colourOf, piecesOf, robotOf } from "./scene.js";
+import { Picture } from "./canvas.js";
+import { LimitBars, Sliders, byId, make, showValues } from "./panel.js";
+import { plus } from "./numbers.js";
+
+/** Bytes from base64, unpacked. @param {string} text */
+const unpack = (text) => {
+  const bytes = Uint8Array.from(atob(text), (sign) => sign.charCodeAt(0));
+  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
+};
+
+const data = JSON.parse(byId("data").textContent ?? "{}");
+/** @type {State | null} */
+let state = null;
+const colours = () => {
+  const style = getComputedStyle(document.documentElement), get = (/** @type {string} */ name) => style.getPropertyValue(`--${name}`).trim();
+  return { ink: get("ink"), muted: get("muted"), line: get("line"), halo: get("back"), purple: get("purple"), rail: get("rail"), joint: get("joint"), baseFace: get("base-face"), platformFace: get("platform-face"), baseEdge: get("base-edge"), platformEdge: get("platform-edge") };
+};
+let palette = colours();
+const picture = new Picture(/** @type {HTMLCanvasElement} */ (byId("robot")), data.camera, () => draw());
+let isWaiting = false;
+
+/** Value of each limb for its colour, relative to the largest. @param {ArrayLike<number>} view */
+const limbValues = (view) => {
+  const choice = /** @type {HTMLSelectElement} */ (byId("colour")).value, [kind, index] = choice.split(" ");
+  /** @type {Map<string, number>} */
+  const found = new Map();
+  const take = (/** @type {string} */ limb, /** @type {number} */ value) => {
+    if (!(Math.abs(found.get(limb) ?? 0) > Math.abs(value))) found.set(limb, value);
+  };
+  if (kind === "force") {
+    const count = data.actuators.length;
+    data.actuators.forEach((/** @type {any} */ each, /** @type {number} */ k) => {
+      const [high, low] = ["largest", "smallest"].map((name) => view[data.blocks[name][0] + Number(index) * count + k]);
+      take(each.limb, Math.abs(high) >= Math.abs(low) ? high : low);
+    });
+  } else {
+    const [first] = data.blocks.rates, tasks = data.tasks.length;
+    data.row_limbs.forEach((/** @type {string} */ limb, /** @type {number} */ k) => take(limb, view[first + k * tasks + Number(index)]));
+  }
+  const most = Math.max(...[...found.values()].map(Math.abs), 1e-300);
+  return { found, part: (/** @type {string | null} */ limb) => (found.get(limb ?? "") ?? 0) / most };
+};
+
+const draw = () => {
+  const view = state ? state.module.arrays.view : data.view;
+  const robot = robotOf(view, data.blocks, data.scene), values = limbValues(view);
+  if (!picture.fitted.length) picture.fitted = [...robot.points, robot.position];
+  const p = state ? state.module.arrays.p : data.p;
+  const task = Number(/** @type {HTMLSelectElement} */ (byId("colour")).value.startsWith("rate") ? /** @type {HTMLSelectElement} */ (byId("colour")).value.split(" ")[1] : 0);
+  const twist = data.is_stated ? [...p.slice(data.tasks[task].twist, data.tasks[task].twist + 6)] : null;
+  const axes = axesOf(picture.camera);
+  const pieces = piecesOf(robot, data.scene, { axes, colours: palette, limbColour: (link) => colourOf(values.part(link.limb)), twist });
+  /** @type {Map<string, { text: string, at: any }>} */
+  const labels = new Map();
+  for (const link of data.scene.links) {
+    if (link.limb === null || link.kind === "rail" || labels.has(link.limb)) continue;
+    const [a, b] = link.ends.map((/** @type {number} */ k) => robot.points[k]);
+    labels.set(link.limb, { text: link.limb, at: plus(a, plus(b, a, -1), 0.3) });
+  }
+  picture.draw(pieces, [...labels.values()], palette);
+  document.documentElement.dataset.drawn = "yes";
+};
+
+/** Shows the state: values, limits, picture. */
+const show = () => {
+  if (state) {
+    sliders?.refresh();
+    showValues(state, bars?.refresh() ?? []);
+    const isEvaluated = state.mode === "evaluate";
+    byId("mode-solve").setAttribute("aria-pressed", String(!isEvaluated));
+    byId("mode-evaluate").setAttribute("aria-pressed", String(isEvaluated));
+  }
+  draw();
+};
+/** @type {Sliders | undefined} */
+let sliders;
+/** @type {LimitBars | undefined} */
+let bars;
+/** @type {Map<any, () => void>} */
+const pending = new Map();
+/**
+ * Runs a change before the next frame, and shows it. Of several changes with one key, only the last one runs.
+ * @param {() => void} act
+ * @param {any} [key]
+ */
+const change = (act, key = Symbol("change")) => {
+  pending.set(key, act);
+  if (isWaiting) return;
+  isWaiting = true;
+  requestAnimationFrame(() => {
+    isWaiting = false;
+    const acts = [...pending.values()];
+    pending.clear();
+    for (const each of acts) each();
+    show();
+  });
+};
+
+/** @param {string} text @param {string} words */
+const copy = async (text, words) => {
+  const area = /** @type {HTMLTextAreaElement} */ (byId("copied-text"));
+  area.value = text;
+  byId("copied").hidden = false;
+  byId("copied-words").textContent = words;
+  try {
+    await navigator.clipboard.writeText(text);
+    byId("copied-words").textContent = `${words}, copied`;
+  } catch {
+    area.focus();
+    area.select();
+  }
+};
+
+const listen = () => {
+  const on = (/** @type {string} */ id, /** @type {() => void} */ act) => byId(id).addEventListener("click", act);
+  const live = () => /** @type {State} */ (state);
+  on("mode-solve", () => change(() => live().setMode("solve")));
+  on("mode-evaluate", () => change(() => live().setMode("evaluate")));
+  on("to-answer", () => change(() => live().jump("answer")));
+  on("to-start", () => change(() => live().jump("start")));
+  on("to-next", () => change(() => live().jump("next")));
+  on("free-all", () => change(() => {
+    live().held.clear();
+    live().update(null);
+  }));
+  on("copy-set", () => copy(`screwsynth evaluate ${data.command} ${argumentsOf(live())}`, "Command"));
+  on("copy-case", () => copy(caseFileOf(live()), "Case file"));
+  on("copy-link", () => copy(`${location.href.split("#")[0]}${fragmentOf(live())}`, "Link"));
+  byId("copy-case").hidden = !data.case_parts;
+  globalThis.addEventListener("hashchange", () => change(() => takeFragment(live(), location.hash)));
+};
+
+byId("colour").addEventListener("change", draw);
+byId("view-reset").addEventListener("click", () => picture.reset());
+byId("view-fit").addEventListener("click", () => {
+  picture.fitted = [];
+  picture.camera.zoom = 1;
+  draw();
+});
+globalThis.addEventListener("resize", () => requestAnimationFrame(draw));
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+  palette = colours();
+  draw();
+});
+const poseChoice = /** @type {HTMLSelectElement | null} */ (document.getElementById("pose"));
+poseChoice?.addEventListener("change", () => change(() => {
+  if (!state) return;
+  state.pose = Number(poseChoice.value);
+  state.look();
+}));
+
+show();
+if (data.has_module) {
+  const loaded = await CaseModule.load(await unpack(byId("module").textContent ?? ""), data.arrays);
+  state = new State(loaded, data);
+  if (location.hash.length > 1) takeFragment(state, location.hash);
+  sliders = new Sliders(state, change);
+  bars = new LimitBars(state, change);
+  listen();
+  document.documentElement.classList.add("live");
+  Object.assign(globalThis, { screwsynth: { state, show, change, make } });
+  show();
+}
+document.documentElement.dataset.ready = "yes";

@@ -1,0 +1,337 @@
+// State of a live page: values, held sliders and limits; solve and evaluation; the state as text.
+import { STATUSES } from "./module.js";
+
+/**
+ * @typedef {{ name: string, set: string, group: string, unit: string, factor: number, vector: "x" | "p", index: number,
+ *   low: number, high: number, start: number, turn: boolean }} Slider
+ * @typedef {{ key: string, unit: string, factor: number, value: number, above: number | null, most: number | null }} Limit
+ * @typedef {{ name: string, keys: string[], reading: number, low: number | null, high: number | null, unit: string,
+ *   factor: number }} Row
+ * @typedef {{ key: string, name: string, side: "min" | "max", limit: number, value: number, unit: string, factor: number,
+ *   isViolated: boolean, settable: number }} LimitState
+ * @typedef {"program" | "optimum" | "point" | "none"} Kind
+ */
+
+/** Violation of a limit, relative to it, that counts as rounding. */
+const ROUNDING = 1e-6;
+/** Seeds of a solve that follows a slider where the search from the last point fails. */
+const FEW_SEEDS = 4;
+/** Random starts of the search for other local optima. */
+const STARTS = 24;
+
+/** Values of a case in its module, and what is known about them. */
+export class State {
+  /**
+   * @param {import("./module.js").CaseModule} module
+   * @param {any} data
+   */
+  constructor(module, data) {
+    this.module = module;
+    this.data = data;
+    /** @type {Slider[]} */
+    this.sliders = data.sliders;
+    /** @type {Limit[]} */
+    this.limits = data.limits;
+    /** @type {Set<number>} held variables by index in x */
+    this.held = new Set();
+    /** @type {"solve" | "evaluate"} */
+    this.mode = "solve";
+    this.pose = 0;
+    /** @type {Kind} */
+    this.kind = "point";
+    this.status = 0;
+    this.fault = 0;
+    this.seconds = 0;
+    this.inner = new Set(data.inner);
+    this.low = module.arrays.case_lower.slice();
+    this.high = module.arrays.case_upper.slice();
+    this.rowLow = module.arrays.g_lower.slice();
+    this.rowHigh = module.arrays.g_upper.slice();
+    /** @type {number[][]} other local optima */
+    this.others = [];
+    this.jump("answer");
+  }
+
+  /** @param {Slider} slider */
+  read(slider) {
+    const value = this.module.arrays[slider.vector][slider.index];
+    return (slider.turn ? 2 * Math.asin(Math.max(-1, Math.min(1, value))) : value) * slider.factor;
+  }
+
+  /**
+   * Value of the module from the shown one.
+   * @param {Slider} slider
+   * @param {number} shown
+   */
+  inside(slider, shown) {
+    const value = shown / slider.factor;
+    return slider.turn ? Math.sin(value / 2) : value;
+  }
+
+  /** @param {Slider} slider */
+  ends(slider) {
+    const shown = (/** @type {number} */ value) => (slider.turn ? 2 * Math.asin(value) : value) * slider.factor;
+    return [shown(slider.low), shown(slider.high)];
+  }
+
+  /** @param {Slider} slider */
+  isHeld(slider) {
+    return slider.vector === "p" || this.held.has(slider.index);
+  }
+
+  /**
+   * Moves a slider: its value is held, and the others follow or stay.
+   * @param {Slider} slider
+   * @param {number} shown
+   */
+  move(slider, shown) {
+    this.module.arrays[slider.vector][slider.index] = this.inside(slider, shown);
+    if (slider.vector === "x") this.held.add(slider.index);
+    this.update(slider);
+  }
+
+  /**
+   * @param {Slider} slider
+   * @param {boolean} isHeld
+   */
+  hold(slider, isHeld) {
+    if (slider.vector === "p") return;
+    if (isHeld) this.held.add(slider.index);
+    else this.held.delete(slider.index);
+    if (!isHeld && this.mode === "solve") this.update(null);
+  }
+
+  /**
+   * Sets a limit in the case's unit; false where the value is not allowed.
+   * @param {number} index
+   * @param {number} shown
+   */
+  setLimit(index, shown) {
+    const value = shown / this.limits[index].factor;
+    this.restoreRows();
+    if (!Number.isFinite(value) || this.module.setLimit(index, value)) return false;
+    this.rowLow = this.module.arrays.g_lower.slice();
+    this.rowHigh = this.module.arrays.g_upper.slice();
+    this.update(null);
+    return true;
+  }
+
+  restoreRows() {
+    this.module.arrays.g_lower.set(this.rowLow);
+    this.module.arrays.g_upper.set(this.rowHigh);
+  }
+
+  /** @param {"solve" | "evaluate"} mode */
+  setMode(mode) {
+    this.mode = mode;
+    this.update(null);
+  }
+
+  /** Values of the sliders between their ends in x. */
+  bounds() {
+    const { lower, upper, x } = this.module.arrays;
+    const { case_lower, case_upper } = this.module.arrays;
+    for (let i = 0; i < x.length; i += 1) {
+      const isHeld = this.held.has(i);
+      lower[i] = isHeld ? x[i] : case_lower[i];
+      upper[i] = isHeld ? x[i] : case_upper[i];
+    }
+  }
+
+  /**
+   * Solves or evaluates after a change, as the mode says.
+   * @param {Slider | null} moved
+   */
+  update(moved) {
+    const begin = performance.now();
+    if (this.mode === "solve") this.solveFromHere();
+    else this.close(moved);
+    this.look();
+    this.seconds = (performance.now() - begin) / 1000;
+  }
+
+  solveFromHere() {
+    const { module } = this;
+    this.restoreRows();
+    this.bounds();
+    let answer = module.solve(true, 0);
+    if (!this.isAnswer(answer.status)) answer = module.solve(true, FEW_SEEDS);
+    if (answer.status !== 3) module.arrays.x.set(module.arrays.solution);
+    this.status = answer.status;
+    this.kind = this.isAnswer(answer.status) ? "optimum" : "none";
+  }
+
+  /** @param {number} status */
+  isAnswer(status) {
+    return STATUSES[status] === "OK" || STATUSES[status] === "RANGE_END";
+  }
+
+  /**
+   * Evaluates the point; joint coordinates from closed loops follow, and where they cannot, so does the pose.
+   * @param {Slider | null} moved
+   */
+  close(moved) {
+    this.kind = "point";
+    this.status = 0;
+    if (!this.inner.size) return;
+    const { arrays } = this.module;
+    const rows = new Set(this.data.closure);
+    for (let k = 0; k < arrays.g_lower.length; k += 1) {
+      if (!rows.has(k)) {
+        arrays.g_lower[k] = -1e300;
+        arrays.g_upper[k] = 1e300;
+      }
+    }
+    const poses = new Set(this.sliders.filter((each) => each.group === "pose" && each.vector === "x").map((each) => each.index));
+    for (const follows of [false, true]) {
+      for (let i = 0; i < arrays.x.length; i += 1) {
+        const isFree = this.inner.has(i) || (follows && poses.has(i) && !(moved && moved.vector === "x" && moved.index === i));
+        arrays.lower[i] = isFree ? arrays.case_lower[i] : arrays.x[i];
+        arrays.upper[i] = isFree ? arrays.case_upper[i] : arrays.x[i];
+      }
+      const answer = this.module.solve(true, 0);
+      this.status = answer.violation <= 1e-7 ? 0 : answer.status || 2;
+      if (this.status === 0) {
+        arrays.x.set(arrays.solution);
+        break;
+      }
+    }
+    this.restoreRows();
+    if (this.status) this.kind = "none";
+  }
+
+  /** Evaluates everything that is shown. */
+  look() {
+    this.fault = this.module.evaluate(this.pose, true).fault;
+  }
+
+  /**
+   * Jumps to a point: the program's answer, the start of the case, or the next local optimum.
+   * @param {"answer" | "start" | "next"} where
+   */
+  jump(where) {
+    const { arrays } = this.module;
+    this.held.clear();
+    this.seconds = 0;
+    if (where === "next") {
+      this.next();
+      return;
+    }
+    this.module.exports.reset();
+    this.rowLow = arrays.g_lower.slice();
+    this.rowHigh = arrays.g_upper.slice();
+    this.kind = "point";
+    this.status = 0;
+    const { answer, start } = this.data;
+    if (where === "answer" && answer) {
+      arrays.x.set(answer.x);
+      this.kind = answer.isOptimum ? "program" : "point";
+    } else {
+      arrays.x.set(start);
+    }
+    this.look();
+  }
+
+  /** Next local optimum of those from random starts, by its value. */
+  next() {
+    const { arrays } = this.module;
+    this.restoreRows();
+    this.bounds();
+    if (!this.others.length) this.others = this.search();
+    if (!this.others.length) {
+      this.solveFromHere();
+    } else {
+      const now = arrays.x.slice();
+      const at = this.others.findIndex((each) => this.isNear(each, now));
+      arrays.x.set(this.others[(at + 1) % this.others.length]);
+      this.kind = "optimum";
+      this.status = 0;
+    }
+    this.look();
+  }
+
+  /** Local optima from random starts, best first. */
+  search() {
+    const { arrays } = this.module;
+    const kept = arrays.x.slice();
+    /** @type {{ F: number, x: number[] }[]} */
+    const found = [];
+    let seed = 1;
+    const random = () => (seed = (seed * 48271) % 2147483647) / 2147483647;
+    for (let k = 0; k < STARTS; k += 1) {
+      for (let i = 0; i < arrays.x.length; i += 1) {
+        const isJoint = this.inner.has(i);
+        arrays.x[i] = isJoint ? this.data.start[i] : arrays.lower[i] + random() * (arrays.upper[i] - arrays.lower[i]);
+      }
+      const answer = this.module.solve(true, 0);
+      if (answer.status !== 0) continue;
+      const x = [...arrays.solution];
+      if (!found.some((each) => this.isNear(each.x, x))) found.push({ F: answer.F, x });
+    }
+    arrays.x.set(kept);
+    const sign = this.data.sense === "max" ? -1 : 1;
+    return found.sort((a, b) => sign * (a.F - b.F)).map((each) => each.x);
+  }
+
+  /**
+   * @param {ArrayLike<number>} one
+   * @param {ArrayLike<number>} other
+   */
+  isNear(one, other) {
+    const { case_lower, case_upper } = this.module.arrays;
+    for (let i = 0; i < one.length; i += 1) {
+      if (!this.inner.has(i) && Math.abs(one[i] - other[i]) > 1e-5 * (case_upper[i] - case_lower[i])) return false;
+    }
+    return true;
+  }
+
+  /** Limits with the value that is nearest to each, violated or not. @returns {LimitState[]} */
+  limitStates() {
+    const { readings, limits } = this.module.arrays;
+    /** @type {Map<string, LimitState>} */
+    const found = new Map();
+    for (const row of this.data.rows) {
+      for (const side of /** @type {const} */ (["min", "max"])) {
+        const stated = side === "min" ? row.low : row.high;
+        if (stated === null) continue;
+        const key = row.keys[side === "min" ? 0 : 1] || `${row.name}.${side}`;
+        const settable = this.limits.findIndex((each) => each.key === key);
+        const limit = settable < 0 ? stated : limits[settable];
+        const value = row.reading < 0 ? NaN : readings[row.reading];
+        const over = side === "min" ? limit - value : value - limit;
+        const isViolated = over > ROUNDING * Math.max(Math.abs(limit), Math.abs(value));
+        const before = found.get(key);
+        if (before && !(over > (side === "min" ? before.limit - before.value : before.value - before.limit))) continue;
+        found.set(key, { key, name: row.name, side, limit, value, unit: row.unit, factor: row.factor, isViolated, settable });
+      }
+    }
+    return [...found.values()];
+  }
+
+  /** Derivative of F by the shown value of a slider; NaN where it is not known. @param {Slider} slider */
+  slope(slider) {
+    if (!this.data.has_slopes || this.fault & 2) return NaN;
+    const { gradient, slopes, x } = this.module.arrays;
+    const raw = slider.vector === "x" ? gradient[slider.index] : slopes[slider.index];
+    const turn = slider.turn ? Math.sqrt(Math.max(0, 1 - x[slider.index] ** 2)) / 2 : 1;
+    return (raw * turn) / slider.factor;
+  }
+
+  /** Text of the headline: what is known about the point, and from whom. */
+  headline() {
+    const { data } = this;
+    const free = this.sliders.filter((each) => each.vector === "x" && !this.held.has(each.index)).length;
+    const held = this.sliders.filter((each) => each.vector === "x" && this.held.has(each.index)).map((each) => each.name);
+    if (this.fault & 1) return { word: "no robot", words: "The robot has no configuration at these values.", isAnswer: false };
+    if (this.kind === "program") return { word: "optimal", words: data.answer.words, isAnswer: true };
+    if (this.kind === "optimum") {
+      const what = free ? "local optimum" : "point";
+      const end = held.length ? ` with ${held.join(", ")} held` : "";
+      return { word: "local optimum", words: `${what}${end}; computed in this page, not proved`, isAnswer: true };
+    }
+    if (this.kind === "none") {
+      return { word: "no optimum", words: `no optimum: ${data.statuses[this.status]}`, isAnswer: false };
+    }
+    return { word: "point", words: "value at this point; computed in this page, nothing is optimised", isAnswer: false };
+  }
+}
