@@ -26,10 +26,10 @@ def view(
     from dataclasses import replace
     from pathlib import Path
 
-    from ..errors import InputError, one_line
+    from ..errors import CaseError, InputError, one_line
     from ..output.files import check_outputs, write_text
     from ..output.live.page import live_page
-    from ..view.source import view_source
+    from ..view.source import view_source, view_without_solver
     from .progress import solve_with_progress
     from .viewed import read_viewed
 
@@ -39,7 +39,10 @@ def view(
     loaded = replace(loaded, search=loaded.search.but(starts, seed))
     target = str(Path(tempfile.mkdtemp(prefix="screwsynth.")) / "view.html") if out is None else out
     check_outputs(inputs, {"--out": target})
-    source = view_source(loaded)
+    try:
+        source = view_source(loaded)
+    except CaseError as error:
+        source = view_without_solver(loaded, str(error))
     solution = solve_with_progress(loaded, jobs)[0] if is_solved and not source.subject.nlp.is_fixed else None
     page = live_page(source, solution, case)
     write_text(target, page.text)

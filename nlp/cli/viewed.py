@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -38,7 +39,7 @@ def read_viewed(name: str, settings: Settings) -> Viewed:
     if name in model_names() and name not in shipped_cases() and not Path(name).exists():
         text = starter_case(build_model(name))
         case = case_from_tables(tomllib.loads(text), name=name, source=name, settings=settings)
-        return Viewed(CaseFile(case, text, {}), is_solved=False)
+        return Viewed(CaseFile(replace(case, title=f"Robot {name}"), text, {}), is_solved=False)
     path = find_case(name)
     tables = tables_of(path, read_text(path))
     if not is_robot_file(tables):
@@ -47,4 +48,5 @@ def read_viewed(name: str, settings: Settings) -> Viewed:
     case = case_from_tables(
         tomllib.loads(text), name=path.stem, source=path.name, settings=settings, folder=path.parent
     )
-    return Viewed(CaseFile(case, text, inputs_of(path, tables)), is_solved=False)
+    titled = replace(case, title=f"Robot {path.stem}")
+    return Viewed(CaseFile(titled, text, inputs_of(path, tables)), is_solved=False)

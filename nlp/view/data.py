@@ -39,6 +39,8 @@ class ArrayData(TypedDict):
 class SliderData(TypedDict):
     """Value with a slider; ``set`` is its name for ``--set``, empty for a component of a rotation.
 
+    ``pose`` is the index of its stated pose, -1 for a dimension.
+
     ``vector`` and ``index`` are its place among the variables ``x`` or the fixed parameters ``p``. For ``turn``, the
     variable is the sine of half the shown angle.
     """
@@ -54,6 +56,7 @@ class SliderData(TypedDict):
     high: float
     start: float
     turn: bool
+    pose: int
 
 
 class RotationData(TypedDict):
@@ -75,11 +78,12 @@ class LimitData(TypedDict):
 
 
 class RowData(TypedDict):
-    """Value of a limit: name, keys of both sides, index among the readings (-1 for none), bounds and unit."""
+    """Value of a limit: name, keys of both sides, indices of reading and constraint (-1 for none), bounds and unit."""
 
     name: str
     keys: list[str]
     reading: int
+    constraint: int
     low: float | None
     high: float | None
     unit: str
@@ -123,6 +127,8 @@ class ViewData(TypedDict):
     sliders: list[SliderData]
     rotations: list[RotationData]
     inner: list[int]
+    kept: list[int]
+    notice: str
     limits: list[LimitData]
     rows: list[RowData]
     tasks: list[TaskData]
@@ -152,9 +158,11 @@ def view_data(source: ViewSource) -> ViewData:
         "blocks": functions.blocks,
         "sliders": [*_sliders(nlp)],
         "rotations": _rotations(nlp),
-        "inner": sorted(program.places.inner),
+        "inner": _following(nlp),
+        "kept": [*functions.closure, *_level_rows(nlp)],
+        "notice": case.stated_pose_notice if case.limits_over else "",
         "limits": _limits(nlp),
-        "rows": _rows(functions, units),
+        "rows": _rows(nlp, functions, units),
         "tasks": [
             {
                 "name": task.name,
@@ -222,6 +230,7 @@ def _sliders(nlp: Nlp) -> Iterator[SliderData]:
             "high": high,
             "start": start,
             "turn": False,
+            "pose": -1 if parameter is not None else _stated_pose(case, name),
         }
     for rotation, prefix in zip(places.rotations, case.pose_prefixes, strict=True):
         if not isinstance(rotation, FreeRotation):
@@ -239,7 +248,14 @@ def _sliders(nlp: Nlp) -> Iterator[SliderData]:
                 "high": float(nlp.upper[index]),
                 "start": float(nlp.start[index]),
                 "turn": True,
+                "pose": _stated_pose(case, f"{prefix}turn"),
             }
+
+
+def _stated_pose(case: Case, name: str) -> int:
+    """Return the index of the stated pose of a coordinate by its name."""
+    prefixes = case.pose_prefixes
+    return next(k for k, prefix in enumerate(prefixes) if len(prefixes) == 1 or name.startswith(prefix))
 
 
 def _parameter_values(nlp: Nlp) -> list[float]:
@@ -265,6 +281,19 @@ def _range(
     else:
         half = _WAY * size
     return value - half, value + half, value
+
+
+def _following(nlp: Nlp) -> list[int]:
+    """Return the indices in ``x`` of joint coordinates from closed loops, and of the level of a worst case."""
+    epigraph = nlp.program.places.epigraph
+    return sorted([*nlp.program.places.inner, *([] if epigraph is None else [epigraph.level])])
+
+
+def _level_rows(nlp: Nlp) -> list[int]:
+    """Return the indices of the constraints that determine the level of a worst case."""
+    epigraph, constraints = nlp.program.places.epigraph, nlp.program.constraints
+    rows = () if epigraph is None else {id(each) for each in epigraph.constraints}
+    return [k for k, each in enumerate(constraints) if id(each) in rows]
 
 
 def _rotations(nlp: Nlp) -> list[RotationData]:
@@ -293,9 +322,9 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _rows(functions: ViewFunctions, units: Units) -> list[RowData]:
+def _rows(nlp: Nlp, functions: ViewFunctions, units: Units) -> list[RowData]:
     """Return the values of limits."""
-    readings = functions.readings
+    readings, places = functions.readings, {id(each): k for k, each in enumerate(nlp.program.constraints)}
     found: list[RowData] = []
     for k, each in enumerate(readings.rows):
         reading = each.constraint.reading
@@ -305,6 +334,7 @@ def _rows(functions: ViewFunctions, units: Units) -> list[RowData]:
                 "name": each.constraint.name,
                 "keys": list(each.constraint.keys),
                 "reading": readings.known.index(k) if k in readings.known else -1,
+                "constraint": places.get(id(each.constraint), -1),
                 "low": low,
                 "high": high,
                 "unit": units.label(reading.dimension),

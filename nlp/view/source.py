@@ -14,6 +14,7 @@ from ..embedding.ctext import identifier
 from ..embedding.manifest import solver_files
 from ..embedding.subject import Subject, find_subject
 from ..embedding.templates import casadi_texts
+from ..program.formulation import formulate_each
 from .functions import ViewFunctions, view_functions
 
 #: Folder of the template and of the headers in place of those of a C library.
@@ -28,12 +29,14 @@ class ViewSource:
     Attributes:
         subject: program of the C, and its optimal value.
         functions: functions of the view.
-        files: text by file name.
+        files: text by file name; empty if C cannot be generated.
+        fault: reason why C cannot be generated; empty if it can.
     """
 
     subject: Subject
     functions: ViewFunctions
     files: Mapping[str, str]
+    fault: str = ""
 
     @property
     def checksum(self) -> str:
@@ -63,6 +66,17 @@ def view_source(case: Case) -> ViewSource:
     files[f"{prefix}-view.c"] = _exports(subject, functions, prefix)
     files |= {name: (FOLDER / name).read_text(encoding="utf-8") for name in _HEADERS}
     return ViewSource(subject, functions, files)
+
+
+def view_without_solver(case: Case, fault: str) -> ViewSource:
+    """Return the live view of a case for which C cannot be generated: its drawing, without a module.
+
+    Args:
+        case: the case.
+        fault: reason why C cannot be generated.
+    """
+    subject = Subject(formulate_each(case)[0], None)
+    return ViewSource(subject, view_functions(subject.nlp, f"{identifier(case.name)}_VIEW"), {}, fault)
 
 
 def _exports(subject: Subject, functions: ViewFunctions, prefix: str) -> str:

@@ -98,4 +98,3 @@ def _limit(line: str, key: str, limits: Collection[str]) -> Iterator[str | SetPa
         yield {"set": f"{key}.{match[1]}"}
         at = match.end(2)
     yield line[at:]
-

@@ -21,12 +21,14 @@ from ...evidence.evaluation import starting_point
 from ...evidence.state import evaluate
 from ...program.nlp import Nlp
 from ...results.data import SolveResult
+from ...results.objective import unit_of_objective
 from ...results.result import result_of
 from ...solver.solution import Solution
 from ...view.data import ViewData, view_data
 from ...view.source import ViewSource
 from ...view.wasm import compile_module
 from ...words.lines import headline, task_lines, title_line
+from ...words.numbers import number
 from ..pictures.drawing import Drawing, drawing_of
 from ..pictures.view import clearest_view
 from ..report.frames import joint_data, link_data
@@ -74,10 +76,7 @@ def live_page(source: ViewSource, solution: Solution | None, command: str) -> Li
     """
     nlp = source.subject.nlp
     case = nlp.case
-    try:
-        module, fault = compile_module(source.files), ""
-    except InputError as error:
-        module, fault = b"", str(error)
+    module, fault = _module(source)
     data = view_data(source)
     answer = None if solution is None else _answer(solution)
     start = starting_point(nlp)
@@ -85,7 +84,6 @@ def live_page(source: ViewSource, solution: Solution | None, command: str) -> Li
     drawing = _drawing(nlp, x)
     page = {
         **data,
-        "closure": list(source.functions.closure),
         "scene": _scene(drawing),
         "camera": _camera(drawing),
         "view": _view(source, x),
@@ -98,6 +96,7 @@ def live_page(source: ViewSource, solution: Solution | None, command: str) -> Li
         "command": shlex.quote(command),
         "case_parts": case_parts(case, [each["key"] for each in data["limits"]]),
         "has_module": bool(module),
+        "stated_poses": [k for k, pose in enumerate(case.poses) for _ in pose.displacements],
     }
     parts = {
         "title": tag("title", f"{case.title or case.name} - screwsynth"),
@@ -111,6 +110,16 @@ def live_page(source: ViewSource, solution: Solution | None, command: str) -> Li
         "script": Markup(script_text()),
     }
     return LivePage(Template(_file("live.html.in")).substitute(parts), fault, len(module))
+
+
+def _module(source: ViewSource) -> tuple[bytes, str]:
+    """Return the compiled module and an empty text; without a module, the reason."""
+    if source.fault:
+        return b"", source.fault
+    try:
+        return compile_module(source.files), ""
+    except InputError as error:
+        return b"", str(error)
 
 
 def script_text() -> str:
@@ -135,11 +144,16 @@ def _answer(solution: Solution) -> dict[str, Any]:
     own = solution.outcomes[0].own if combination is None else combination.combined
     x = solution.outcomes[0].x if own is None else own.x
     result = result_of(solution)
-    if isinstance(result, SolveResult):
-        words = headline(result, solution.case).words
-    else:
-        words = solution.status.value
+    words = headline(result, solution.case).words if isinstance(result, SolveResult) else _combined_words(solution)
     return {"x": x.tolist(), "words": words, "isOptimum": solution.status.is_answer}
+
+
+def _combined_words(solution: Solution) -> str:
+    """Return F of each task, and the status of all."""
+    units = [unit_of_objective(solution.case, k) for k in range(len(solution.outcomes))]
+    named = zip(solution.outcomes, units, strict=True)
+    parts = [f"{each.task.name}: F = {number(each.F)} {unit}".rstrip() for each, unit in named]
+    return f"{'; '.join(parts)}   ({solution.status.value})"
 
 
 def _answer_markup(answer: dict[str, Any] | None) -> Markup:
@@ -149,7 +163,6 @@ def _answer_markup(answer: dict[str, Any] | None) -> Markup:
             tag("span", "" if answer is None else answer["words"], id="F"),
             tag("span", id="word"),
             tag("span", id="words"),
-            tag("span", "Found and checked by the program, not by this page.", id="proved", hidden=True),
         ]
     )
 
@@ -284,7 +297,8 @@ def _controls(data: ViewData, fault: str) -> list[Markup]:
     )
     limits = tag("section", tag("h2", "Limits"), tag("div", id="limits"), id="limits-group")
     content = [modes, tag("p", note, class_="note"), *groups, limits, values, _actuators(data), copies, copied]
-    return [tag("div", *content, class_="needs-module")]
+    notice = [tag("p", f"In this page {data['notice']}.", class_="note")] if data["notice"] else []
+    return [tag("div", *notice, *content, class_="needs-module")]
 
 
 def _actuators(data: ViewData) -> Markup:

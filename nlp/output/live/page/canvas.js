@@ -145,7 +145,7 @@ export class Picture {
 
   /** World axes in a corner. @param {import("./scene.js").Axes} axes @param {number} ratio @param {Record<string, string>} colours */
   triad(axes, ratio, colours) {
-    const { context, canvas } = this, size = 24 * ratio, x = 40 * ratio, y = canvas.height - 36 * ratio;
+    const { context, canvas } = this, size = 20 * ratio, x = canvas.width - 34 * ratio, y = canvas.height - 32 * ratio;
     context.font = `${11 * ratio}px system-ui, sans-serif`;
     context.lineWidth = 1.4 * ratio;
     context.strokeStyle = colours.muted;

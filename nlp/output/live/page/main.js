@@ -2,7 +2,7 @@
 import { CaseModule } from "./module.js";
 import { State } from "./state.js";
 import { argumentsOf, caseFileOf, fragmentOf, takeFragment } from "./text.js";
-import { axesOf, colourOf, piecesOf, robotOf } from "./scene.js";
+import { axesOf, colourOf, extentOf, piecesOf, robotOf } from "./scene.js";
 import { Picture } from "./canvas.js";
 import { LimitBars, Sliders, byId, make, showValues } from "./panel.js";
 import { plus } from "./numbers.js";
@@ -49,11 +49,11 @@ const limbValues = (view) => {
 const draw = () => {
   const view = state ? state.module.arrays.view : data.view;
   const robot = robotOf(view, data.blocks, data.scene), values = limbValues(view);
-  if (!picture.fitted.length) picture.fitted = [...robot.points, robot.position];
   const p = state ? state.module.arrays.p : data.p;
   const task = Number(/** @type {HTMLSelectElement} */ (byId("colour")).value.startsWith("rate") ? /** @type {HTMLSelectElement} */ (byId("colour")).value.split(" ")[1] : 0);
   const twist = data.is_stated ? [...p.slice(data.tasks[task].twist, data.tasks[task].twist + 6)] : null;
   const axes = axesOf(picture.camera);
+  if (!picture.fitted.length) picture.fitted = extentOf(robot, data.scene, twist);
   const pieces = piecesOf(robot, data.scene, { axes, colours: palette, limbColour: (link) => colourOf(values.part(link.limb)), twist });
   /** @type {Map<string, { text: string, at: any }>} */
   const labels = new Map();
@@ -163,6 +163,7 @@ if (data.has_module) {
   bars = new LimitBars(state, change);
   listen();
   document.documentElement.classList.add("live");
+  document.documentElement.classList.toggle("no-slopes", !data.has_slopes);
   Object.assign(globalThis, { screwsynth: { state, show, change, make } });
   show();
 }

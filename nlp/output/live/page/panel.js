@@ -24,6 +24,16 @@ export const make = (name, attributes, ...content) => {
   return found;
 };
 
+/** Picture of a padlock. @param {boolean} isClosed */
+const padlock = (isClosed) => {
+  const space = "http://www.w3.org/2000/svg", picture = document.createElementNS(space, "svg"), path = document.createElementNS(space, "path");
+  picture.setAttribute("viewBox", "0 0 16 16");
+  picture.setAttribute("aria-hidden", "true");
+  path.setAttribute("d", `M3 7.5h10v7H3z${isClosed ? "M5 7.5v-3a3 3 0 0 1 6 0v3" : "M5 7.5v-3a3 3 0 0 1 5.8-1"}`);
+  picture.append(path);
+  return picture;
+};
+
 /** Text that is set only where it differs, so that a page is laid out once. @param {Element} element @param {string} text */
 const say = (element, text) => {
   if (element.textContent !== text) element.textContent = text;
@@ -82,12 +92,13 @@ export class Sliders {
       if (document.activeElement !== range || Math.abs(Number(range.value) - value) > 1e-9 * (high - low)) range.value = String(value);
       range.setAttribute("aria-valuetext", measured(value, slider.unit));
       element.classList.toggle("held", isHeld);
+      element.hidden = slider.pose >= 0 && slider.pose !== state.data.stated_poses[state.pose];
       const words = slider.vector === "p" ? "fixed in the case" : isHeld ? "held: not solved for" : "solved for";
       if (lock.title !== words) {
         lock.title = words;
         lock.setAttribute("aria-label", `${slider.name}: ${words}`);
         lock.setAttribute("aria-pressed", String(isHeld));
-        lock.textContent = isHeld ? "\u{1F512}\uFE0E" : "\u{1F513}\uFE0E";
+        lock.replaceChildren(padlock(isHeld));
       }
       const part = Number.isFinite(gains[k]) ? Math.min(1, Math.abs(gains[k]) / most) : 0;
       bar.style.width = `${(50 * part).toFixed(1)}%`;
@@ -113,13 +124,13 @@ export class LimitBars {
     for (const each of states) {
       if (!this.rows.has(each.key)) this.add(each);
       const { element, value, fill, mark, entry } = this.rows.get(each.key);
-      const shown = each.value * each.factor, limit = each.limit * each.factor;
-      const low = Math.min(0, shown, limit), high = Math.max(shown, limit, low + 1e-300) * (Math.max(shown, limit) > 0 ? 1.12 : 1);
-      const part = (/** @type {number} */ at) => `${Math.max(0, Math.min(100, (100 * (at - low)) / (high - low))).toFixed(1)}%`;
+      const shown = each.value * each.factor, isKnown = Number.isFinite(shown), limit = each.limit * each.factor;
+      const at = isKnown ? shown : limit, low = Math.min(0, at, limit), high = Math.max(at, limit, low + 1e-300) * (Math.max(at, limit) > 0 ? 1.12 : 1);
+      const part = (/** @type {number} */ value) => `${Math.max(0, Math.min(100, (100 * (value - low)) / (high - low))).toFixed(1)}%`;
       element.classList.toggle("violated", each.isViolated);
-      say(value, `${Number.isFinite(shown) ? digits(settled(shown, limit), 5) : "\u2013"}${each.isViolated ? " violated" : ""}`);
+      say(value, `${isKnown ? digits(settled(shown, limit), 5) : each.isViolated ? "" : "satisfied"}${each.isViolated ? " violated" : ""}`);
       element.title = each.name;
-      fill.style.width = Number.isFinite(shown) ? part(shown) : "0";
+      fill.style.width = isKnown ? part(shown) : "0";
       mark.style.left = part(limit);
       if (entry && document.activeElement !== entry) entry.value = digits(limit);
     }
@@ -152,22 +163,24 @@ export class LimitBars {
 /** Headline, and the values of the point. @param {State} state @param {import("./state.js").LimitState[]} limits */
 export const showValues = (state, limits) => {
   const { data, module } = state, { F, singular_values } = module.arrays;
-  const { word, words, isAnswer } = state.headline();
+  const { word, words, isFault } = state.headline();
   const violated = limits.filter((each) => each.isViolated).length;
   const value = state.fault & 3 ? NaN : F[0];
-  say(byId("F"), `${data.F_name} = ${measured(value, data.F_unit)}`);
+  const extreme = state.kind === "program" && data.tasks.length === 1 ? (data.sense === "max" ? "largest " : "smallest ") : "";
+  say(byId("F"), `${extreme}${data.F_name} = ${measured(value, data.F_unit)}`);
   say(byId("word"), word);
   say(byId("words"), words + (violated ? `; ${violated} limit${violated > 1 ? "s" : ""} violated` : ""));
-  byId("answer").classList.toggle("none", !isAnswer || violated > 0);
+  byId("answer").classList.toggle("none", isFault || violated > 0);
   byId("answer").classList.toggle("proved", state.kind === "program");
-  byId("proved").hidden = state.kind !== "program";
   const rank = module.rank();
   say(byId("rank"), `${rank}${rank < 6 ? " (singular)" : ""}`);
   say(byId("singular"), digits(singular_values[5], 5));
   const turns = rotationsOf(state).map((/** @type {any} */ each) => `${each.axis.map((/** @type {number} */ part) => digits(settled(part, 1), 5)).join("  ")}, ${measured(settled(each.angle, 180), data.units.angle)}`);
   say(byId("turn"), turns.join("; "));
   byId("turn-row").hidden = !turns.length;
-  say(byId("time"), state.seconds ? `${(1000 * state.seconds).toFixed(1)} ms` : "");
+  say(byId("time"), `${(1000 * state.seconds).toFixed(1)} ms`);
+  byId("time-row").hidden = !state.seconds;
+  byId("to-answer").hidden = !data.answer;
   showActuators(state);
 };
 

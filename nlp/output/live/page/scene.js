@@ -73,21 +73,31 @@ export const screwOf = (twist) => {
   return { axis: unitOf(omega), point, pitch: dot(omega, v) / square };
 };
 
+/** Ends of the drawn axis of a twist. @param {{ axis: Vector, point: Vector, pitch: number }} screw @param {Robot} robot @param {number} size @returns {Vector[]} */
+const endsOf = ({ axis, point, pitch }, robot, size) => {
+  if (pitch === Infinity) return [robot.position, plus(robot.position, axis, 0.7 * size)];
+  const along = robot.points.map((each) => dot(plus(each, point, -1), axis));
+  return [plus(point, axis, Math.min(...along) - 0.12 * size), plus(point, axis, Math.max(...along) + 0.3 * size)];
+};
+
+/** Points that a picture should contain. @param {Robot} robot @param {any} scene @param {number[] | null} twist @returns {Vector[]} */
+export const extentOf = (robot, scene, twist) => {
+  const round = robot.circles.flatMap(([centre, through, normal]) => arcOf(centre, unitOf(normal), plus(through, centre, -1), 2 * Math.PI, 0, 12));
+  return [...robot.points, robot.position, ...round, ...(twist ? endsOf(screwOf(twist), robot, scene.size) : [])];
+};
+
 /** Pieces of the task's motion: axis with arrow, helix of its pitch, and velocities of the platform's corners. @param {Piece[]} into @param {number[]} twist @param {Robot} robot @param {any} scene @param {Axes} axes @param {Record<string, string>} colours */
 const addMotion = (into, twist, robot, scene, axes, colours) => {
-  const { axis, point, pitch } = screwOf(twist), { size } = scene;
-  if (pitch === Infinity) {
-    addLine(into, robot.position, plus(robot.position, axis, 0.7 * size), { colour: colours.ink, width: 3, head: true }, axes);
-  } else {
-    const along = robot.points.map((each) => dot(plus(each, point, -1), axis));
-    const low = Math.min(...along) - 0.15 * size, high = Math.max(...along) + 0.3 * size;
-    addLine(into, plus(point, axis, low), plus(point, axis, high), { colour: colours.ink, width: 2.5, head: true }, axes, 12);
+  const screw = screwOf(twist), { axis, pitch } = screw, { size } = scene;
+  const [from, end] = endsOf(screw, robot, size);
+  addLine(into, from, end, { colour: colours.ink, width: 2.5, head: true }, axes, 12);
+  if (pitch !== Infinity) {
     const other = /** @type {Vector} */ (Math.abs(axis[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0]);
     const arm = /** @type {Vector} */ (unitOf(cross(axis, other)).map((each) => each * 0.11 * size));
     const isFlat = Math.abs(pitch) <= 0.01 * 0.11 * size;
     const turn = isFlat ? 5.6 : Math.min(6 * Math.PI, (0.3 * size) / Math.abs(pitch));
     const rise = isFlat ? 0 : pitch;
-    const path = arcOf(plus(point, axis, high - 0.16 * size - Math.abs(rise * turn)), axis, arm, turn, rise, 48);
+    const path = arcOf(plus(end, axis, -0.12 * size - Math.abs(rise * turn)), axis, arm, turn, rise, 48);
     path.slice(1).forEach((to, k) => addLine(into, path[k], to, { colour: colours.purple, width: 2, head: k === path.length - 2 }, axes, 1));
   }
   const omega = /** @type {Vector} */ (twist.slice(0, 3)), v = /** @type {Vector} */ (twist.slice(3, 6));

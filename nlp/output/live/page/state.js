@@ -3,10 +3,10 @@ import { STATUSES } from "./module.js";
 
 /**
  * @typedef {{ name: string, set: string, group: string, unit: string, factor: number, vector: "x" | "p", index: number,
- *   low: number, high: number, start: number, turn: boolean }} Slider
+ *   low: number, high: number, start: number, turn: boolean, pose: number }} Slider
  * @typedef {{ key: string, unit: string, factor: number, value: number, above: number | null, most: number | null }} Limit
  * @typedef {{ name: string, keys: string[], reading: number, low: number | null, high: number | null, unit: string,
- *   factor: number }} Row
+ *   factor: number, constraint: number }} Row
  * @typedef {{ key: string, name: string, side: "min" | "max", limit: number, value: number, unit: string, factor: number,
  *   isViolated: boolean, settable: number }} LimitState
  * @typedef {"program" | "optimum" | "point" | "none"} Kind
@@ -158,7 +158,23 @@ export class State {
     if (!this.isAnswer(answer.status)) answer = module.solve(true, FEW_SEEDS);
     if (answer.status !== 3) module.arrays.x.set(module.arrays.solution);
     this.status = answer.status;
-    this.kind = this.isAnswer(answer.status) ? "optimum" : "none";
+    this.kind = !this.isAnswer(answer.status) ? "none" : this.freeNames().length ? "optimum" : "point";
+    if (this.kind === "optimum" && this.isProgram()) {
+      module.arrays.x.set(this.data.answer.x);
+      this.kind = "program";
+    }
+  }
+
+  /** Names of the variables that are solved for. */
+  freeNames() {
+    return this.sliders.filter((each) => each.vector === "x" && !this.held.has(each.index)).map((each) => each.name);
+  }
+
+  /** Whether everything is as in the program's answer, which is an optimum. */
+  isProgram() {
+    const { answer, p } = this.data, { arrays } = this.module;
+    const isSame = this.limits.every((each, k) => arrays.limits[k] === each.value);
+    return Boolean(answer?.isOptimum) && !this.held.size && isSame && arrays.p.every((each, k) => each === p[k]) && this.isNear(answer.x, arrays.x);
   }
 
   /** @param {number} status */
@@ -175,7 +191,7 @@ export class State {
     this.status = 0;
     if (!this.inner.size) return;
     const { arrays } = this.module;
-    const rows = new Set(this.data.closure);
+    const rows = new Set(this.data.kept);
     for (let k = 0; k < arrays.g_lower.length; k += 1) {
       if (!rows.has(k)) {
         arrays.g_lower[k] = -1e300;
@@ -244,7 +260,7 @@ export class State {
       const now = arrays.x.slice();
       const at = this.others.findIndex((each) => this.isNear(each, now));
       arrays.x.set(this.others[(at + 1) % this.others.length]);
-      this.kind = "optimum";
+      this.kind = this.isProgram() ? "program" : "optimum";
       this.status = 0;
     }
     this.look();
@@ -287,7 +303,7 @@ export class State {
 
   /** Limits with the value that is nearest to each, violated or not. @returns {LimitState[]} */
   limitStates() {
-    const { readings, limits } = this.module.arrays;
+    const { readings, limits, g, g_lower, g_upper } = this.module.arrays;
     /** @type {Map<string, LimitState>} */
     const found = new Map();
     for (const row of this.data.rows) {
@@ -299,7 +315,9 @@ export class State {
         const limit = settable < 0 ? stated : limits[settable];
         const value = row.reading < 0 ? NaN : readings[row.reading];
         const over = side === "min" ? limit - value : value - limit;
-        const isViolated = over > ROUNDING * Math.max(Math.abs(limit), Math.abs(value));
+        const bound = side === "min" ? g_lower : g_upper, k = row.constraint;
+        const excess = k < 0 ? 0 : side === "min" ? bound[k] - g[k] : g[k] - bound[k];
+        const isViolated = row.reading < 0 ? excess > ROUNDING * Math.abs(bound[k]) : over > ROUNDING * Math.max(Math.abs(limit), Math.abs(value));
         const before = found.get(key);
         if (before && !(over > (side === "min" ? before.limit - before.value : before.value - before.limit))) continue;
         found.set(key, { key, name: row.name, side, limit, value, unit: row.unit, factor: row.factor, isViolated, settable });
@@ -320,18 +338,18 @@ export class State {
   /** Text of the headline: what is known about the point, and from whom. */
   headline() {
     const { data } = this;
-    const free = this.sliders.filter((each) => each.vector === "x" && !this.held.has(each.index)).length;
     const held = this.sliders.filter((each) => each.vector === "x" && this.held.has(each.index)).map((each) => each.name);
-    if (this.fault & 1) return { word: "no robot", words: "The robot has no configuration at these values.", isAnswer: false };
-    if (this.kind === "program") return { word: "optimal", words: data.answer.words, isAnswer: true };
+    if (this.fault & 1) return { word: "no robot", words: "The robot has no configuration at these values.", isFault: true };
+    if (this.kind === "program") return { word: "optimal", words: "found and checked by the program, not by this page", isFault: false };
     if (this.kind === "optimum") {
-      const what = free ? "local optimum" : "point";
-      const end = held.length ? ` with ${held.join(", ")} held` : "";
-      return { word: "local optimum", words: `${what}${end}; computed in this page, not proved`, isAnswer: true };
+      const changed = this.sliders.filter((each) => each.vector === "p" && this.module.arrays.p[each.index] !== data.p[each.index]).map((each) => each.name);
+      const parts = [held.length ? `${held.join(", ")} held` : "", changed.length ? `${changed.join(", ")} changed` : ""].filter(Boolean);
+      const end = parts.length ? ` with ${parts.join(", ")}` : "";
+      return { word: "local optimum", words: `found in this page${end}; not proved`, isFault: false };
     }
     if (this.kind === "none") {
-      return { word: "no optimum", words: `no optimum: ${data.statuses[this.status]}`, isAnswer: false };
+      return { word: "no optimum", words: data.statuses[this.status], isFault: true };
     }
-    return { word: "point", words: "value at this point; computed in this page, nothing is optimised", isAnswer: false };
+    return { word: "point", words: "value at this point; computed in this page, nothing is optimised", isFault: false };
   }
 }

@@ -1,0 +1,288 @@
+"""Live pages in a real browser: what they compute, what they say about it, and what they give out again."""
+
+import json
+import re
+import shlex
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from builders import Run, assert_words, saved, soaked
+from pages import Page
+
+from screwsynth.nlp import load_case, shipped_cases, solve
+from screwsynth.nlp.evidence.evaluation import starting_point
+from screwsynth.nlp.evidence.state import evaluate
+from screwsynth.nlp.output.live.page import SCRIPTS, script_text
+from screwsynth.nlp.program.formulation import formulate
+from screwsynth.nlp.view import wasm
+from screwsynth.nlp.view.wasm import find_compiler
+
+needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no compiler for WebAssembly is installed")
+#: Sets a slider as a hand does, and ends when the page shows it.
+MOVE = """
+const [name, value, done] = arguments, { state } = screwsynth;
+const k = state.sliders.findIndex((each) => each.name === name), range = document.getElementById(`slider-${k}`);
+range.value = String(value);
+range.dispatchEvent(new Event("input"));
+requestAnimationFrame(() => requestAnimationFrame(() => done(true)));"""
+CLICK = """
+const [id, done] = arguments;
+document.getElementById(id).click();
+requestAnimationFrame(() => requestAnimationFrame(() => done(true)));"""
+SHOWN = "return [...arguments].map((id) => document.getElementById(id).textContent)"
+STATE = "const { state } = screwsynth; return [state.module.arrays.F[0], state.kind, state.status]"
+
+
+class Live:
+    """A live page in the browser."""
+
+    def __init__(self, chrome: Any) -> None:  # noqa: ANN401 - the driver may be missing
+        self.chrome = chrome
+
+    def move(self, name: str, value: float) -> None:
+        self.chrome.execute_async_script(MOVE, name, value)
+
+    def click(self, key: str) -> None:
+        self.chrome.execute_async_script(CLICK, key)
+
+    def shown(self, *keys: str) -> list[str]:
+        return list(self.chrome.execute_script(SHOWN, *keys))
+
+    @property
+    def F(self) -> float:  # noqa: N802 - the objective's name
+        return float(self.chrome.execute_script(STATE)[0])
+
+    def copied(self, key: str) -> str:
+        self.click(key)
+        return str(self.chrome.execute_script("return document.getElementById('copied-text').value"))
+
+    @property
+    def faults(self) -> list[Any]:
+        return [each for each in self.chrome.get_log("browser") if each["level"] == "SEVERE"]
+
+
+def until_ready(chrome: Any) -> None:  # noqa: ANN401 - the driver may be missing
+    chrome.execute_async_script(
+        "const done = arguments[0], look = () => document.documentElement.dataset.ready === 'yes' ? done(true)"
+        " : setTimeout(look, 20); look();"
+    )
+
+
+@pytest.fixture
+def live(browser: Any, cli: Run, tmp_path: Path) -> Iterator[Callable[..., Live]]:  # noqa: ANN401
+    """A live page of a case, opened from disk."""
+
+    def open_page(case: str, *options: str, width: int = 1000, fragment: str = "") -> Live:
+        page = tmp_path / f"{Path(case).stem}.html"
+        code, _, errors = cli("view", case, "--out", str(page), "--no-open", *options)
+        assert (code, errors) == (0, "")
+        return opened(page, width, fragment)
+
+    def opened(page: Path, width: int = 1000, fragment: str = "") -> Live:
+        browser.get("about:blank")
+        browser.get_log("browser")
+        size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        browser.get(page.as_uri() + fragment)
+        until_ready(browser)
+        return Live(browser)
+
+    yield open_page
+    browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+@needs_compiler
+@pytest.mark.browser
+def test_the_optimum_follows_a_slider(live: Callable[..., Live]) -> None:
+    page = live("hexapod-machining")
+    answer = solve(load_case("hexapod-machining")).outcomes[0]
+    assert page.shown("F", "word") == [f"largest F = {answer.F:.7g} (in/rad)²", "optimal"]
+    assert_words(*page.shown("words"), "found and checked by the program")
+    page.move("p_z", 19.0)
+    words = " ".join(page.shown("F", "word", "words"))
+    assert not re.search(r"\boptimal\b|largest|checked by the program", words)
+    assert_words(words, "local optimum", "p_z held", "not proved")
+    own = solve(load_case("hexapod-machining", {"p_z": 19.0})).outcomes[0]
+    assert pytest.approx(page.F, rel=1e-6) == own.F
+    page.click("to-answer")
+    assert page.shown("word") == ["optimal"]
+    # Released again, the search returns to the program's point, and the words with it.
+    page.move("p_z", 20.0)
+    page.click("free-all")
+    assert pytest.approx(answer.F, rel=1e-9) == page.F
+    assert page.shown("word") == ["optimal"]
+    assert page.faults == []
+
+
+@needs_compiler
+@pytest.mark.browser
+def test_evaluation_shows_violated_limits(live: Callable[..., Live]) -> None:
+    page = live("hexapod-machining")
+    page.click("mode-evaluate")
+    page.move("p_z", 24.5)
+    page.move("x1", 30.0)
+    name, values = "hexapod-machining", page.copied("copy-set")
+    settings = dict(each.split("=") for each in shlex.split(values)[4::2])
+    numbers = {key: [*map(float, text.split(","))] for key, text in settings.items()}
+    nlp = formulate(load_case(name, {key: own[0] if len(own) == 1 else own for key, own in numbers.items()}))
+    assert pytest.approx(evaluate(nlp, starting_point(nlp)).F, rel=1e-9) == page.F
+    violated = page.chrome.execute_script(
+        "return [...document.querySelectorAll('.limit.violated')].map((each) => each.textContent)"
+    )
+    assert any("footprint.base" in each and "violated" in each for each in violated)
+    assert_words(*page.shown("words"), "nothing is optimised", "violated")
+
+
+@needs_compiler
+@pytest.mark.browser
+@pytest.mark.parametrize("case", soaked([*shipped_cases()], ["paper-4.1-helical", "reachy-mini"]))
+def test_a_state_goes_out_and_comes_back(live: Callable[..., Live], cli: Run, tmp_path: Path, case: str) -> None:
+    page = live(case)
+    if not page.chrome.execute_script("return document.documentElement.classList.contains('live')"):
+        pytest.skip("no solver in the page")
+    name, low, high, now = page.chrome.execute_script(
+        "const { state } = screwsynth, slider = state.sliders[0];"
+        " return [slider.name, ...state.ends(slider), state.read(slider)]"
+    )
+    page.click("mode-evaluate")
+    page.move(
+        name, now + 0.04 * (low + high - 2 * now if abs(low + high - 2 * now) > 0.1 * (high - low) else high - low)
+    )
+    F, link = page.F, page.copied("copy-link")
+    command = shlex.split(page.copied("copy-set"))
+    target = tmp_path / "evaluated.json"
+    assert cli(*command[1:], "--json", str(target))[0] in (0, 1)
+    found = json.loads(target.read_text())
+    values = [each["F"] for each in found["tasks"]] if "tasks" in found else [found["F"]]
+    assert any(value == pytest.approx(F, rel=1e-7) for value in values) or len(values) > 1
+    text = page.copied("copy-case")
+    if text:
+        again = saved(tmp_path / f"{case}.toml", text)
+        second = tmp_path / "again.json"
+        assert cli("evaluate", str(again), "--json", str(second))[2] == ""
+        assert json.loads(second.read_text()).get("F") == pytest.approx(found.get("F"), rel=1e-9)
+    page.chrome.get("about:blank")
+    page.chrome.get(link)
+    until_ready(page.chrome)
+    assert pytest.approx(F, rel=1e-9) == page.F
+    assert page.shown("word") != ["optimal"]
+    assert page.faults == []
+
+
+@needs_compiler
+@pytest.mark.browser
+def test_loops_stay_closed_while_a_slider_moves(live: Callable[..., Live]) -> None:
+    page = live("delta")
+    page.click("mode-evaluate")
+    page.move("p_x", 0.11)
+    page.move("rb", 0.17)
+    settings = dict(each.split("=") for each in shlex.split(page.copied("copy-set"))[4::2])
+    from screwsynth.nlp.cli.viewed import read_viewed  # noqa: PLC0415 - only here
+
+    nlp = formulate(read_viewed("delta", {key: float(text) for key, text in settings.items()}).file.case)
+    assert pytest.approx(evaluate(nlp, starting_point(nlp)).F, rel=1e-9) == page.F
+
+
+HOSTILE = """
+title = "a</script><script>window.hacked=1</script>\\u2028'\\"<img src=x onerror=window.hacked=2>"
+units = { length = "cm" }
+pose = { position = [0, 0, { min = 15, max = 30 }] }
+task = [{ name = "</script><b>&amp;'\\u2028", sense = "max", axis = [0, 0, 1], pitch = inf }]
+limits = { leg_length = { min = 2, max = 60 } }
+solve = { starts = 2 }
+[robot]
+model = "stewart-gough"
+parameters = { x1 = 12, x2 = 4, x3 = 30, x4 = 20 }
+"""
+
+
+@needs_compiler
+@pytest.mark.browser
+def test_texts_of_a_case_stay_texts(live: Callable[..., Live], tmp_path: Path) -> None:
+    case = saved(tmp_path / "hostile.toml", HOSTILE)
+    page = live(str(case), fragment="#p_z=<img src=x>&x1=NaN&p_x=1e999&held=__proto__&mode=</script>")
+    assert page.chrome.execute_script("return [window.hacked, document.images.length]") == [None, 0]
+    assert "</script><script>window.hacked=1</script>" in page.shown("answer")[0] + str(
+        page.chrome.execute_script("return document.querySelector('h1').textContent")
+    )
+    assert page.shown("word") == ["optimal"]
+    assert page.faults == []
+    html = Page((tmp_path / "hostile.html").read_text(encoding="utf-8"))
+    assert len(html.scripts) == 3
+
+
+@needs_compiler
+@pytest.mark.browser
+def test_a_narrow_page_by_keyboard(live: Callable[..., Live]) -> None:
+    page = live("paper-4.1-helical", width=420)
+    assert page.chrome.execute_script("return document.documentElement.scrollWidth") <= 420
+    entry = page.chrome.execute_script("return document.querySelector('.slider:not([hidden]) .entry')")
+    entry.clear()
+    entry.send_keys("12.25\ue007")
+    page.chrome.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]))")
+    assert_words(*page.shown("words"), "x1", "changed")
+    before = page.F
+    slider = page.chrome.find_element("id", "slider-0")
+    slider.send_keys("\ue012\ue012")
+    page.chrome.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]))")
+    assert before != page.F
+    unnamed = page.chrome.execute_script(
+        "return [...document.querySelectorAll('button, input, select, canvas')]"
+        ".filter((each) => !(each.textContent.trim() || each.getAttribute('aria-label') || each.labels?.length))"
+        ".map((each) => each.outerHTML)"
+    )
+    assert unnamed == []
+    entry.clear()
+    entry.send_keys("many\ue007")
+    assert entry.get_attribute("aria-invalid") == "true"
+
+
+@pytest.mark.browser
+def test_without_a_compiler_the_page_says_how_to_get_one(
+    live: Callable[..., Live], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(wasm, "find_compiler", lambda: None)
+    page = live("paper-4.1-helical")
+    assert_words(page.chrome.find_element("id", "controls").text, "do not work", "screwsynth[view]")
+    assert_words(*page.shown("F"), "407.2", "optimal")
+    painted = (
+        "const { data } = c.getContext('2d').getImageData(0, 0, c.width, c.height); return data.some((each) => each)"
+    )
+    painted = f"const c = document.getElementById('robot'); {painted}"
+    assert page.chrome.execute_script(painted)
+    assert page.faults == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["paper-4.1-helical", "--no-open"], ["--no-open", "--out"]),
+        (["no-such-case", "--out", "page.html", "--no-open"], ["no-such-case"]),
+        (["paper-4.1-helical", "--out", "page.html", "--no-open", "--set", "y1=2"], ["y1"]),
+        (["paper-4.1-helical", "--out", "none/page.html", "--no-open"], ["none/page.html"]),
+    ],
+)
+def test_a_fault_is_one_sentence(
+    cli: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], words: list[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, out, errors = cli("view", *arguments)
+    assert (code, out) == (2, "")
+    assert_words(errors, *words)
+    assert "Traceback" not in errors
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_scripts_are_modules_for_node_and_one_script_for_the_page(tmp_path: Path) -> None:
+    text = script_text()
+    assert not re.search(r"^(import|export) ", text, re.MULTILINE)
+    assert len(SCRIPTS) == len(set(SCRIPTS))
+    node = shutil.which("node")
+    if node is None:
+        pytest.skip("Node is not installed")
+    whole = saved(tmp_path / "page.mjs", text)
+    subprocess.run([node, "--check", str(whole)], check=True)
