@@ -143,6 +143,7 @@ class ViewData(TypedDict):
     row_limbs: list[str]
     seeds: int
     has_slopes: bool
+    has_members: bool
     checksum: str
 
 
@@ -192,6 +193,8 @@ def view_data(source: ViewSource) -> ViewData:
         "row_limbs": [row.limb for row in case.model.frame_rows],
         "seeds": 16,
         "has_slopes": functions.slopes is not None,
+        # The rows of a member are not those of results, so singular values of both differ by a unit of length.
+        "has_members": bool(case.model.members),
         "checksum": source.checksum,
     }
 

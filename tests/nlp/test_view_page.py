@@ -286,3 +286,29 @@ def test_scripts_are_modules_for_node_and_one_script_for_the_page(tmp_path: Path
         pytest.skip("Node is not installed")
     whole = saved(tmp_path / "page.mjs", text)
     subprocess.run([node, "--check", str(whole)], check=True)
+
+
+@needs_compiler
+@pytest.mark.browser
+def test_a_hand_moves_and_turns_the_platform(live: Callable[..., Live]) -> None:
+    page = live("hexapod-machining")
+    page.click("mode-evaluate")
+    pull = """
+    const [turns, done] = arguments, canvas = document.getElementById("robot"), { state } = screwsynth;
+    const box = canvas.getBoundingClientRect(), robot = screwsynth.place();
+    const at = (type, x, y) => canvas.dispatchEvent(new PointerEvent(type, {
+      pointerId: 1, clientX: box.left + x, clientY: box.top + y, shiftKey: turns, bubbles: true }));
+    canvas.setPointerCapture = () => {};
+    at("pointerdown", ...robot);
+    at("pointermove", robot[0] + 12, robot[1] - 20);
+    at("pointerup", robot[0] + 12, robot[1] - 20);
+    requestAnimationFrame(() => requestAnimationFrame(() => done([...state.module.arrays.x])));"""
+    before = page.chrome.execute_script("return [...screwsynth.state.module.arrays.x]")
+    moved = page.chrome.execute_async_script(pull, False)
+    assert moved[:4] == before[:4]
+    assert moved[6] > before[6]
+    assert moved[7:] == before[7:]
+    turned = page.chrome.execute_async_script(pull, True)
+    assert turned[:7] == moved[:7]
+    assert turned[7:] != moved[7:]
+    assert_words(*page.shown("words"), "nothing is optimised")

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from collections.abc import Collection, Iterator
-from typing import TypedDict
+from typing import Any, TypedDict
+
+import numpy as np
 
 from ...case.case import Case
 from ...errors import CaseError
 
 #: Sections of a case file that do not belong to another point.
 _DROPPED = ("expect", "published")
+#: Values of a task that a page can change.
+TASK_KEYS = ("axis", "point", "pitch")
 _NUMBER = r"[-+]?[0-9.]+(?:e[-+]?\d+)?"
 
 
@@ -40,15 +45,27 @@ def case_parts(case: Case, limits: Collection[str]) -> list[str | SetPart]:
     return found
 
 
+def stated_tasks(case: Case) -> list[dict[str, Any]]:
+    """Return axis, point and pitch of each task as a case file states them; empty tables for other tasks."""
+    try:
+        tasks = tomllib.loads(case.to_toml())["task"]
+    except (CaseError, KeyError):
+        return [{} for _ in case.tasks]
+    found = [{key: value for key, value in task.items() if key in TASK_KEYS} for task in tasks]
+    return [each if {"axis", "pitch"} <= each.keys() else {} for each in found]
+
+
 def _parts(case: Case, text: str, limits: Collection[str]) -> Iterator[str | SetPart]:
     """Yield the parts of a text of :meth:`.Case.to_toml`."""
     names = {item.name: case.component_names(item) for item in case.model.parameters}
-    section, pose, is_dropped = "", -1, False
+    tasks = stated_tasks(case)
+    section, pose, task, is_dropped = "", -1, -1, False
     for line in text.splitlines(keepends=True):
         if line.startswith("["):
             section = line.strip().strip("[]")
             is_dropped = section.partition(".")[0] in _DROPPED
             pose += section == "pose"
+            task += section == "task"
         if is_dropped:
             continue
         key, equals, _ = line.partition(" = ")
@@ -60,6 +77,10 @@ def _parts(case: Case, text: str, limits: Collection[str]) -> Iterator[str | Set
             yield from _rotation(case, pose)
         elif equals and section == "pose" and key == "rotation":
             continue
+        elif equals and section == "task" and key in tasks[task]:
+            yield f"{key} = "
+            yield {"set": f"task[{task}].{key}"}
+            yield "\n"
         elif equals and section.startswith("limits"):
             yield from _limit(line, ".".join([section, key]), limits)
         else:
@@ -82,7 +103,7 @@ def _rotation(case: Case, pose: int) -> Iterator[str | SetPart]:
     if axis is None:
         yield {"set": f"{prefix}axis"}
     else:
-        yield f"[{', '.join(repr(float(each)) for each in axis)}]"
+        yield f"[{', '.join(map(repr, np.ravel(axis).tolist()))}]"
     yield ", angle = "
     yield {"set": f"{prefix}angle"}
     yield " }\n"

@@ -29,11 +29,12 @@ from ...view.source import ViewSource
 from ...view.wasm import compile_module
 from ...words.lines import headline, task_lines, title_line
 from ...words.numbers import number
+from ...words.text import Line
 from ..pictures.drawing import Drawing, drawing_of
 from ..pictures.view import clearest_view
 from ..report.frames import joint_data, link_data
 from ..report.markup import Markup, join_markup, paragraphs, script_json, tag
-from .casefile import case_parts
+from .casefile import case_parts, stated_tasks
 
 #: Modules of the page in the order of their imports.
 SCRIPTS = ("numbers.js", "module.js", "state.js", "text.js", "scene.js", "canvas.js", "panel.js", "main.js")
@@ -96,6 +97,8 @@ def live_page(source: ViewSource, solution: Solution | None, command: str) -> Li
         "command": shlex.quote(command),
         "case_parts": case_parts(case, [each["key"] for each in data["limits"]]),
         "has_module": bool(module),
+        "stated_tasks": _for_json(stated_tasks(case)),
+        "prefixes": list(case.pose_prefixes),
         "stated_poses": [k for k, pose in enumerate(case.poses) for _ in pose.displacements],
     }
     parts = {
@@ -169,11 +172,11 @@ def _answer_markup(answer: dict[str, Any] | None) -> Markup:
 
 def _task(case: Case, solution: Solution | None) -> Iterable[Markup]:
     """Yield the task in words."""
-    if solution is None:
-        return
-    result = result_of(solution)
+    result = None if solution is None else result_of(solution)
+    lines: list[Line] = []
     if isinstance(result, SolveResult) and result.robot is not None and result.robot.task is not None:
-        yield tag("div", paragraphs(task_lines(result.robot.task, case.units)), class_="task")
+        lines = [*task_lines(result.robot.task, case.units)]
+    yield tag("div", paragraphs(lines), class_="task", id="stated-task")
 
 
 def _drawing(nlp: Nlp, x: FloatArray) -> Drawing:
@@ -200,6 +203,11 @@ def _scene(drawing: Drawing) -> dict[str, Any]:
     }
 
 
+def _for_json(tasks: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return tasks for JSON, with the text ``inf`` for the pitch of a translation."""
+    return [{**task, "pitch": str(task["pitch"])} if task else {} for task in tasks]
+
+
 def _camera(drawing: Drawing) -> dict[str, float]:
     view = clearest_view(drawing)
     return {"azimuth": view.azimuth, "elevation": view.elevation}
@@ -210,7 +218,7 @@ def _view(source: ViewSource, x: FloatArray) -> list[float]:
     nlp, functions = source.subject.nlp, source.functions
     inputs = functions.inputs(x, nlp.arguments).full().ravel()[: functions.view.numel_in(0)]
     values = functions.view(inputs).full().ravel()
-    return np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0).tolist()
+    return [float(each) if np.isfinite(each) else 0.0 for each in values]
 
 
 def _body(case: Case, data: ViewData, drawing: Drawing, fault: str) -> Markup:
@@ -265,6 +273,7 @@ def _controls(data: ViewData, fault: str) -> list[Markup]:
         aria_label="Mode and points",
     )
     note = "A moved value is held, the others are solved for. Thin bars: change of F over each range."
+    tasks = tag("details", tag("summary", "Task"), tag("div", id="tasks"), id="tasks-group", hidden=True)
     groups = [
         tag("section", tag("h2", words), tag("div", id=f"{key}s"), id=f"{key}-group")
         for key, words in (("dimension", "Dimensions"), ("pose", "Pose"))
@@ -296,7 +305,7 @@ def _controls(data: ViewData, fault: str) -> list[Markup]:
         hidden=True,
     )
     limits = tag("section", tag("h2", "Limits"), tag("div", id="limits"), id="limits-group")
-    content = [modes, tag("p", note, class_="note"), *groups, limits, values, _actuators(data), copies, copied]
+    content = [modes, tag("p", note, class_="note"), *groups, tasks, limits, values, _actuators(data), copies, copied]
     notice = [tag("p", f"In this page {data['notice']}.", class_="note")] if data["notice"] else []
     return [tag("div", *notice, *content, class_="needs-module")]
 

@@ -22,6 +22,10 @@ export class Picture {
     /** @type {Vector[]} points that fit into the frame */
     this.fitted = [];
     this.changed = changed;
+    /** Last projection: directions, and pixels of the page per length. */
+    this.last = { axes: axesOf(view), scale: 1, place: (/** @type {Vector} */ each) => [each[0], each[1]] };
+    /** @type {((x: number, y: number, turns: boolean) => ((across: number, up: number) => void) | null) | null} takes hold of the platform */
+    this.grab = null;
     this.listen();
   }
 
@@ -63,6 +67,7 @@ export class Picture {
       canvas.width / 2 + scale * (dot(each, axes.right) - across),
       canvas.height / 2 - scale * (dot(each, axes.up) - upwards),
     ];
+    this.last = { axes, scale: scale / ratio, place: (/** @type {Vector} */ each) => place(each).map((value) => value / ratio) };
     const part = Math.min(1.15, Math.max(0.62, Math.min(canvas.width, canvas.height) / ratio / 520));
     context.clearRect(0, 0, canvas.width, canvas.height);
     context.lineCap = "round";
@@ -183,7 +188,12 @@ export class Picture {
     /** @type {Map<number, { x: number, y: number }>} */
     const fingers = new Map();
     let apart = 0;
+    /** @type {{ pull: (across: number, up: number) => void, x: number, y: number } | null} */
+    let grabbed = null;
     canvas.addEventListener("pointerdown", (event) => {
+      const box = canvas.getBoundingClientRect();
+      const pull = fingers.size ? null : (this.grab?.(event.clientX - box.left, event.clientY - box.top, event.shiftKey) ?? null);
+      grabbed = pull && { pull, x: event.clientX, y: event.clientY };
       fingers.set(event.pointerId, { x: event.clientX, y: event.clientY });
       canvas.setPointerCapture(event.pointerId);
       apart = 0;
@@ -193,6 +203,10 @@ export class Picture {
       if (!before) return;
       const now = { x: event.clientX, y: event.clientY };
       fingers.set(event.pointerId, now);
+      if (fingers.size === 1 && grabbed) {
+        grabbed.pull((now.x - grabbed.x) / this.last.scale, (grabbed.y - now.y) / this.last.scale);
+        return;
+      }
       if (fingers.size === 1) this.turn(-0.5 * (now.x - before.x), 0.4 * (now.y - before.y));
       if (fingers.size === 2) {
         const [a, b] = [...fingers.values()], far = Math.hypot(a.x - b.x, a.y - b.y);
@@ -201,8 +215,16 @@ export class Picture {
       }
     });
     for (const end of ["pointerup", "pointercancel"]) {
-      canvas.addEventListener(end, (event) => fingers.delete(/** @type {PointerEvent} */ (event).pointerId));
+      canvas.addEventListener(end, (event) => {
+        fingers.delete(/** @type {PointerEvent} */ (event).pointerId);
+        grabbed = null;
+      });
     }
+    canvas.addEventListener("pointermove", (event) => {
+      if (fingers.size) return;
+      const box = canvas.getBoundingClientRect();
+      canvas.style.cursor = this.grab?.(event.clientX - box.left, event.clientY - box.top, false) ? "move" : "grab";
+    });
     canvas.addEventListener("wheel", (event) => {
       if (!event.ctrlKey && document.activeElement !== canvas) return;
       event.preventDefault();

@@ -4,7 +4,7 @@ import { State } from "./state.js";
 import { argumentsOf, caseFileOf, fragmentOf, takeFragment } from "./text.js";
 import { axesOf, colourOf, extentOf, piecesOf, robotOf } from "./scene.js";
 import { Picture } from "./canvas.js";
-import { LimitBars, Sliders, byId, make, showValues } from "./panel.js";
+import { LimitBars, Sliders, TaskFields, byId, showValues } from "./panel.js";
 import { plus } from "./numbers.js";
 
 /** Bytes from base64, unpacked. @param {string} text */
@@ -70,6 +70,7 @@ const draw = () => {
 const show = () => {
   if (state) {
     sliders?.refresh();
+    fields?.refresh();
     showValues(state, bars?.refresh() ?? []);
     const isEvaluated = state.mode === "evaluate";
     byId("mode-solve").setAttribute("aria-pressed", String(!isEvaluated));
@@ -79,6 +80,8 @@ const show = () => {
 };
 /** @type {Sliders | undefined} */
 let sliders;
+/** @type {TaskFields | undefined} */
+let fields;
 /** @type {LimitBars | undefined} */
 let bars;
 /** @type {Map<any, () => void>} */
@@ -116,7 +119,34 @@ const copy = async (text, words) => {
   }
 };
 
+/** Whether a point is in a polygon, or near one of its corners. @param {number} x @param {number} y @param {number[][]} corners */
+const isOn = (x, y, corners) => {
+  let isIn = false;
+  corners.forEach(([ax, ay], k) => {
+    const [bx, by] = corners[(k + 1) % corners.length];
+    if (ay > y !== by > y && x < ax + ((y - ay) * (bx - ax)) / (by - ay)) isIn = !isIn;
+  });
+  return isIn || corners.some(([ax, ay]) => Math.hypot(x - ax, y - ay) < 14);
+};
+
+/** Takes hold of the platform at a point of the picture. @type {NonNullable<Picture["grab"]>} */
+const grab = (x, y, turns) => {
+  if (!state) return null;
+  const own = state, { place, axes } = picture.last;
+  const robot = robotOf(own.module.arrays.view, data.blocks, data.scene);
+  const corners = (data.scene.plates.platform ?? data.scene.corners).map((/** @type {number} */ k) => place(robot.points[k]));
+  if (!isOn(x, y, [...corners]) && Math.hypot(...place(robot.position).map((each, k) => each - [x, y][k])) > 16) return null;
+  const quaternion = own.quaternion();
+  if (turns && quaternion) {
+    const from = quaternion.map((index) => own.module.arrays.x[index]), size = data.scene.size;
+    return (across, up) => change(() => own.turn(from, [0, 1, 2].map((k) => (axes.up[k] * across - axes.right[k] * up) / (0.6 * size))), "grab");
+  }
+  const begin = own.positions().map((slider) => (slider ? own.module.arrays[slider.vector][slider.index] : 0));
+  return (across, up) => change(() => own.place(begin.map((each, k) => each + axes.right[k] * across + axes.up[k] * up)), "grab");
+};
+
 const listen = () => {
+  picture.grab = grab;
   const on = (/** @type {string} */ id, /** @type {() => void} */ act) => byId(id).addEventListener("click", act);
   const live = () => /** @type {State} */ (state);
   on("mode-solve", () => change(() => live().setMode("solve")));
@@ -161,10 +191,11 @@ if (data.has_module) {
   if (location.hash.length > 1) takeFragment(state, location.hash);
   sliders = new Sliders(state, change);
   bars = new LimitBars(state, change);
+  fields = new TaskFields(state, change);
   listen();
   document.documentElement.classList.add("live");
   document.documentElement.classList.toggle("no-slopes", !data.has_slopes);
-  Object.assign(globalThis, { screwsynth: { state, show, change, make } });
+  Object.assign(globalThis, { screwsynth: { state, show, place: () => picture.last.place(robotOf(loaded.arrays.view, data.blocks, data.scene).position) } });
   show();
 }
 document.documentElement.dataset.ready = "yes";

@@ -109,6 +109,45 @@ export class Sliders {
   }
 }
 
+/** Fields for axis, point and pitch of each task. */
+export class TaskFields {
+  /** @param {State} state @param {(act: () => void, key?: any) => void} change */
+  constructor(state, change) {
+    this.state = state;
+    /** @type {{ entry: any, read: () => number }[]} */
+    this.fields = [];
+    const length = state.data.units.length;
+    const units = /** @type {Record<string, string>} */ ({ axis: "", point: length, pitch: `${length}/rad` });
+    state.data.stated_tasks.forEach((/** @type {any} */ stated, /** @type {number} */ task) => {
+      for (const key of /** @type {const} */ (["axis", "point", "pitch"])) {
+        if (stated[key] === undefined) continue;
+        const count = key === "pitch" ? 1 : 3, name = `${state.data.tasks[task].name}: ${key}`;
+        const entries = Array.from({ length: count }, (_, place) => this.field(task, key, place, count > 1 ? `${name}, ${"xyz"[place]}` : name, change));
+        byId("tasks").append(make("div", { class: "task-row" }, make("span", { class: "name" }, name), ...entries, make("span", { class: "unit" }, units[key])));
+      }
+    });
+    byId("tasks-group").hidden = !this.fields.length;
+  }
+
+  /** @param {number} task @param {"axis" | "point" | "pitch"} key @param {number} place @param {string} name @param {(act: () => void) => void} change */
+  field(task, key, place, name, change) {
+    const entry = make("input", { type: "text", inputmode: "text", class: "entry", "aria-label": name, autocomplete: "off" });
+    entry.addEventListener("change", () => change(() => {
+      const text = entry.value.trim().replace(",", "."), value = text === "inf" ? Infinity : text === "" ? NaN : Number(text);
+      entry.setAttribute("aria-invalid", String(!this.state.setTask(task, key, place, value)));
+    }));
+    this.fields.push({ entry, read: () => (key === "pitch" ? this.state.tasks[task].pitch : this.state.tasks[task][key][place]) });
+    return entry;
+  }
+
+  refresh() {
+    for (const { entry, read } of this.fields) {
+      const text = digits(read());
+      if (document.activeElement !== entry && entry.value !== text) entry.value = text;
+    }
+  }
+}
+
 /** Bars of the limits with editable values. */
 export class LimitBars {
   /** @param {State} state @param {(act: () => void, key?: any) => void} change */
@@ -172,9 +211,11 @@ export const showValues = (state, limits) => {
   say(byId("words"), words + (violated ? `; ${violated} limit${violated > 1 ? "s" : ""} violated` : ""));
   byId("answer").classList.toggle("none", isFault || violated > 0);
   byId("answer").classList.toggle("proved", state.kind === "program");
+  byId("stated-task").hidden = state.hasOtherTask();
   const rank = module.rank();
   say(byId("rank"), `${rank}${rank < 6 ? " (singular)" : ""}`);
   say(byId("singular"), digits(singular_values[5], 5));
+  byId("singular-row").hidden = data.has_members;
   const turns = rotationsOf(state).map((/** @type {any} */ each) => `${each.axis.map((/** @type {number} */ part) => digits(settled(part, 1), 5)).join("  ")}, ${measured(settled(each.angle, 180), data.units.angle)}`);
   say(byId("turn"), turns.join("; "));
   byId("turn-row").hidden = !turns.length;

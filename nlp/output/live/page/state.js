@@ -47,6 +47,8 @@ export class State {
     this.high = module.arrays.case_upper.slice();
     this.rowLow = module.arrays.g_lower.slice();
     this.rowHigh = module.arrays.g_upper.slice();
+    /** @type {{ axis: number[], point: number[], pitch: number }[]} tasks as they are now */
+    this.tasks = [];
     /** @type {number[][]} other local optima */
     this.others = [];
     this.jump("answer");
@@ -87,6 +89,7 @@ export class State {
   move(slider, shown) {
     this.module.arrays[slider.vector][slider.index] = this.inside(slider, shown);
     if (slider.vector === "x") this.held.add(slider.index);
+    this.others = [];
     this.update(slider);
   }
 
@@ -112,6 +115,38 @@ export class State {
     if (!Number.isFinite(value) || this.module.setLimit(index, value)) return false;
     this.rowLow = this.module.arrays.g_lower.slice();
     this.rowHigh = this.module.arrays.g_upper.slice();
+    this.others = [];
+    this.update(null);
+    return true;
+  }
+
+  /** Tasks of the case by axis, point and pitch. */
+  statedTasks() {
+    return this.data.stated_tasks.map((/** @type {any} */ { axis, point, pitch }) => ({
+      axis: [...(axis ?? [])],
+      point: [...(point ?? [])],
+      pitch: pitch === "inf" ? Infinity : Number(pitch),
+    }));
+  }
+
+  /**
+   * Sets a value of a task; false where it has no motion.
+   * @param {number} index
+   * @param {"axis" | "point" | "pitch"} key
+   * @param {number} place component of an axis or point
+   * @param {number} value
+   */
+  setTask(index, key, place, value) {
+    const task = this.tasks[index], made = { ...task, axis: [...task.axis], point: [...task.point] };
+    if (key === "pitch") made.pitch = value;
+    else made[key][place] = value;
+    const point = made.point.length ? made.point : [0, 0, 0];
+    if (Number.isNaN(value) || (key !== "pitch" && !Number.isFinite(value))) return false;
+    const twist = this.module.twist(made.axis, point, made.pitch);
+    if (!twist || !twist.every(Number.isFinite)) return false;
+    this.tasks[index] = made;
+    this.others = [];
+    this.module.arrays.p.set(twist, this.data.tasks[index].twist);
     this.update(null);
     return true;
   }
@@ -216,6 +251,60 @@ export class State {
     if (this.status) this.kind = "none";
   }
 
+  /** Sliders of the position of the shown pose that a hand can move: free ones, or else fixed ones. */
+  positions() {
+    const stated = this.data.stated_poses[this.pose], prefix = this.data.prefixes[stated];
+    const found = ["x", "y", "z"].map((letter) => this.sliders.find((each) => each.set === `${prefix}p_${letter}`));
+    const isFree = found.some((each) => each?.vector === "x");
+    return found.map((each) => (each && (!isFree || each.vector === "x") ? each : null));
+  }
+
+  /** Indices of the quaternion of the shown pose; null for a fixed axis. @returns {number[] | null} */
+  quaternion() {
+    const prefix = this.data.prefixes[this.data.stated_poses[this.pose]];
+    return this.data.rotations.find((/** @type {{ prefix: string }} */ each) => each.prefix === prefix)?.q ?? null;
+  }
+
+  /**
+   * Moves the platform to a position, as far as its sliders allow.
+   * @param {number[]} target
+   */
+  place(target) {
+    /** @type {Slider | null} */
+    let last = null;
+    this.positions().forEach((slider, k) => {
+      if (!slider) return;
+      const isFree = slider.vector === "x", value = isFree ? Math.max(slider.low, Math.min(slider.high, target[k])) : target[k];
+      this.module.arrays[slider.vector][slider.index] = value;
+      if (isFree) this.held.add(slider.index);
+      last = slider;
+    });
+    this.update(last);
+  }
+
+  /**
+   * Turns the platform from a rotation, by a small rotation vector in the world frame.
+   * @param {number[]} from vector part of a unit quaternion
+   * @param {number[]} turn
+   */
+  turn(from, turn) {
+    const q = this.quaternion();
+    if (!q) return;
+    const angle = Math.hypot(...turn), part = angle ? Math.sin(angle / 2) / angle : 0, real = Math.cos(angle / 2);
+    const a = turn.map((each) => each * part), [x, y, z] = from, w = Math.sqrt(Math.max(0, 1 - x * x - y * y - z * z));
+    const made = [
+      real * x + w * a[0] + a[1] * z - a[2] * y,
+      real * y + w * a[1] + a[2] * x - a[0] * z,
+      real * z + w * a[2] + a[0] * y - a[1] * x,
+    ];
+    const { x: point, case_lower, case_upper } = this.module.arrays;
+    q.forEach((index, k) => {
+      point[index] = Math.max(case_lower[index], Math.min(case_upper[index], made[k]));
+      this.held.add(index);
+    });
+    this.update(null);
+  }
+
   /** Evaluates everything that is shown. */
   look() {
     this.fault = this.module.evaluate(this.pose, true).fault;
@@ -236,6 +325,8 @@ export class State {
     this.module.exports.reset();
     this.rowLow = arrays.g_lower.slice();
     this.rowHigh = arrays.g_upper.slice();
+    this.tasks = this.statedTasks();
+    this.others = [];
     this.kind = "point";
     this.status = 0;
     const { answer, start } = this.data;
@@ -335,6 +426,12 @@ export class State {
     return (raw * turn) / slider.factor;
   }
 
+  /** Whether a task is not that of the case. */
+  hasOtherTask() {
+    const { p } = this.module.arrays, six = [0, 1, 2, 3, 4, 5];
+    return this.data.tasks.some((/** @type {{ twist: number }} */ { twist }) => six.some((k) => p[twist + k] !== this.data.p[twist + k]));
+  }
+
   /** Text of the headline: what is known about the point, and from whom. */
   headline() {
     const { data } = this;
@@ -343,6 +440,7 @@ export class State {
     if (this.kind === "program") return { word: "optimal", words: "found and checked by the program, not by this page", isFault: false };
     if (this.kind === "optimum") {
       const changed = this.sliders.filter((each) => each.vector === "p" && this.module.arrays.p[each.index] !== data.p[each.index]).map((each) => each.name);
+      if (this.hasOtherTask()) changed.push("the task");
       const parts = [held.length ? `${held.join(", ")} held` : "", changed.length ? `${changed.join(", ")} changed` : ""].filter(Boolean);
       const end = parts.length ? ` with ${parts.join(", ")}` : "";
       return { word: "local optimum", words: `found in this page${end}; not proved`, isFault: false };

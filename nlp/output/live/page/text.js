@@ -26,6 +26,7 @@ export const settingsOf = (state) => {
   for (const { prefix, axis, angle } of rotationsOf(state)) {
     found.push([`${prefix}axis`, axis.join(",")], [`${prefix}angle`, String(angle)]);
   }
+  found.push(...taskSettings(state, false));
   state.limits.forEach((limit, k) => {
     const value = state.module.arrays.limits[k];
     if (value !== limit.value && limit.key.includes(".") && !limit.key.startsWith("angle")) {
@@ -34,6 +35,18 @@ export const settingsOf = (state) => {
   });
   return found;
 };
+
+/** Names and values of the tasks, all or the changed ones. @param {State} state @param {boolean} all @returns {[string, string][]} */
+const taskSettings = (state, all) => {
+  const stated = state.statedTasks();
+  return state.tasks.flatMap((task, k) =>
+    /** @type {const} */ (["axis", "point", "pitch"])
+      .filter((key) => state.data.stated_tasks[k][key] !== undefined && (all || String(task[key]) !== String(stated[k][key])))
+      .map((key) => /** @type {[string, string]} */ ([`task[${k}].${key}`, key === "pitch" ? infinite(task.pitch) : task[key].join(",")])),
+  );
+};
+/** @param {number} value */
+const infinite = (value) => (value === Infinity ? "inf" : String(value));
 
 /** @param {State} state @param {Slider} slider */
 const isStart = (state, slider) => state.module.arrays[slider.vector][slider.index] === slider.start;
@@ -47,6 +60,7 @@ export const caseFileOf = (state) => {
   if (!state.data.case_parts) return "";
   const values = new Map(settingsOf(state).map(([name, value]) => [name, value]));
   for (const slider of state.sliders) if (slider.set) values.set(slider.set, String(state.read(slider)));
+  for (const [name, value] of taskSettings(state, true)) values.set(name, value);
   state.limits.forEach((limit, k) => values.set(`limits.${limit.key}`, String(state.module.arrays.limits[k] * limit.factor)));
   return state.data.case_parts
     .map((/** @type {string | { set: string }} */ part) => (typeof part === "string" ? part : tomlNumber(values.get(part.set) ?? "0", part.set)))
@@ -54,7 +68,7 @@ export const caseFileOf = (state) => {
 };
 
 /** @param {string} text @param {string} name */
-const tomlNumber = (text, name) => (name.endsWith("axis") ? `[${text.split(",").map(whole).join(", ")}]` : whole(text));
+const tomlNumber = (text, name) => (name.endsWith("axis") || name.endsWith(".point") ? `[${text.split(",").map(whole).join(", ")}]` : whole(text));
 /** A number of TOML: with a digit on both sides of a point, and a sign of an exponent. @param {string} text */
 const whole = (text) => text.replace(/^(-?\d+)e/, "$1.0e");
 
@@ -62,6 +76,7 @@ const whole = (text) => text.replace(/^(-?\d+)e/, "$1.0e");
 export const fragmentOf = (state) => {
   const parts = new URLSearchParams();
   for (const slider of state.sliders) parts.set(slider.name, String(state.read(slider)));
+  for (const [name, value] of taskSettings(state, false)) parts.set(name, value);
   const held = state.sliders.filter((each) => each.vector === "x" && state.held.has(each.index));
   if (held.length) parts.set("held", held.map((each) => each.name).join(" "));
   if (state.mode === "evaluate") parts.set("mode", "evaluate");
@@ -82,6 +97,12 @@ export const takeFragment = (state, fragment) => {
     const shown = finite(parts.get(`limits.${limit.key}`));
     if (shown !== null && state.setLimit(k, shown)) isFound = true;
   });
+  for (const [name] of taskSettings(state, true)) {
+    const [, index, key] = /** @type {RegExpExecArray} */ (/^task\[(\d+)\]\.(axis|point|pitch)$/.exec(name));
+    const values = (parts.get(name) ?? "").split(",").filter(Boolean);
+    const isWhole = values.length === (key === "pitch" ? 1 : 3);
+    if (isWhole) values.forEach((text, k) => (isFound = state.setTask(Number(index), /** @type {any} */ (key), k, text === "inf" ? Infinity : Number(text)) || isFound));
+  }
   for (const slider of state.sliders) {
     const shown = finite(parts.get(slider.name));
     if (shown === null) continue;
