@@ -19,8 +19,9 @@ from .source import checksum_of
 
 #: Flags of every compiler: a module without a C library, with the memory instructions that all engines have.
 _FLAGS = ("-std=c99", "-O2", "-nostdlib", "-ffreestanding", "-mbulk-memory", "-Wno-unused-command-line-argument", "-I.")
-#: Flags of the linker: only what the exports need, without names, and with the stack below all data.
-_LINKS = ("--no-entry", "--gc-sections", "--strip-all", "--stack-first", "-z", "stack-size=1048576")
+#: Flags of the linker: only what the exports need, without names. With clang, the stack is put below all data.
+_LINKS = ("--no-entry", "--gc-sections", "--strip-all", "-z", "stack-size=1048576")
+_CLANG_LINKS = ("--stack-first",)
 #: Advice where no compiler is installed.
 ADVICE = "no compiler for WebAssembly is installed: pip install 'screwsynth[view]' brings one, or install clang and lld"
 
@@ -32,11 +33,13 @@ class Compiler(NamedTuple):
         name: name for people.
         words: program and its first arguments.
         version: first line of its version.
+        links: further flags of the linker.
     """
 
     name: str
     words: tuple[str, ...]
     version: str
+    links: tuple[str, ...] = ()
 
 
 def find_compiler() -> Compiler | None:
@@ -45,7 +48,7 @@ def find_compiler() -> Compiler | None:
     if clang and linker:
         found = _checked("clang", (clang, "--target=wasm32"), [clang, "--version"])
         if found is not None:
-            return found
+            return found._replace(links=_CLANG_LINKS)
     if importlib.util.find_spec("ziglang") is not None:
         zig = (sys.executable, "-m", "ziglang")
         return _checked("zig", (*zig, "cc", "-target", "wasm32-freestanding"), [*zig, "version"])
@@ -74,7 +77,7 @@ def compile_module(files: Mapping[str, str], compiler: Compiler | None = None) -
     found = compiler or find_compiler()
     if found is None:
         raise InputError(ADVICE)
-    key = checksum_of(files, *found.words, found.version, *_FLAGS, *_LINKS)
+    key = checksum_of(files, *found.words, found.version, *_FLAGS, *_LINKS, *found.links)
     folder = cache_folder()
     target = folder / f"{key[:32]}.wasm"
     if target.exists():
@@ -83,7 +86,7 @@ def compile_module(files: Mapping[str, str], compiler: Compiler | None = None) -
         for name, text in files.items():
             (Path(temporary) / name).write_text(text, encoding="utf-8")
         sources = sorted(name for name in files if name.endswith(".c"))
-        links = [f"-Wl,{','.join(_LINKS)}"]
+        links = [f"-Wl,{','.join([*_LINKS, *found.links])}"]
         try:
             run_program([*found.words, *_FLAGS, *sources, *links, "-o", "view.wasm"], Path(temporary))
         except RunError as error:

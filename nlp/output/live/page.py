@@ -244,11 +244,11 @@ def _body(case: Case, data: ViewData, drawing: Drawing, fault: str) -> Markup:
         ),
         id="picture",
     )
-    return join_markup([picture, tag("div", *_controls(data, fault), id="controls", tabindex="-1")])
+    return join_markup([picture, tag("div", *_controls(data, fault), id="controls", tabindex="-1"), _values(data)])
 
 
 def _legend(*, stated: bool) -> str:
-    return "Black: axis of the task; purple: its pitch and the velocities of the platform." if stated else ""
+    return "Straight arrow: axis of the task. Purple: its pitch, and velocities of the platform." if stated else ""
 
 
 def _controls(data: ViewData, fault: str) -> list[Markup]:
@@ -278,18 +278,6 @@ def _controls(data: ViewData, fault: str) -> list[Markup]:
         tag("section", tag("h2", words), tag("div", id=f"{key}s"), id=f"{key}-group")
         for key, words in (("dimension", "Dimensions"), ("pose", "Pose"))
     ]
-    values = tag(
-        "dl",
-        *(
-            tag("div", tag("dt", words), tag("dd", id=key), id=f"{key}-row")
-            for key, words in (
-                ("rank", "rank of J"),
-                ("singular", "smallest singular value"),
-                ("turn", "rotation"),
-                ("time", "last change"),
-            )
-        ),
-    )
     copies = tag(
         "div",
         button("copy-set", "Copy command"),
@@ -304,10 +292,27 @@ def _controls(data: ViewData, fault: str) -> list[Markup]:
         id="copied",
         hidden=True,
     )
-    limits = tag("section", tag("h2", "Limits"), tag("div", id="limits"), id="limits-group")
-    content = [modes, tag("p", note, class_="note"), *groups, tasks, limits, values, _actuators(data), copies, copied]
+    content = [modes, tag("p", note, class_="note"), *groups, tasks, copies, copied]
     notice = [tag("p", f"In this page {data['notice']}.", class_="note")] if data["notice"] else []
     return [tag("div", *notice, *content, class_="needs-module")]
+
+
+def _values(data: ViewData) -> Markup:
+    """Return the places of limits, singular values, rotation, forces and speeds at the point."""
+    values = tag(
+        "dl",
+        *(
+            tag("div", tag("dt", words), tag("dd", id=key), id=f"{key}-row")
+            for key, words in (
+                ("rank", "rank of J"),
+                ("singular", "smallest singular value"),
+                ("turn", "rotation"),
+                ("time", "last change"),
+            )
+        ),
+    )
+    limits = tag("section", tag("h2", "Limits"), tag("div", id="limits"), id="limits-group")
+    return tag("div", values, _actuators(data), limits, id="values", class_="needs-module")
 
 
 def _actuators(data: ViewData) -> Markup:

@@ -90,6 +90,13 @@ export class Picture {
       context.stroke();
       return;
     }
+    if (piece.kind === "line" && Math.hypot(flat[1][0] - flat[0][0], flat[1][1] - flat[0][1]) < 1) {
+      // A line that is seen from its end.
+      context.arc(flat[0][0], flat[0][1], (piece.width * ratio) / 2, 0, 2 * Math.PI);
+      context.fillStyle = piece.colour;
+      context.fill();
+      return;
+    }
     flat.forEach(([x, y], k) => (k ? context.lineTo(x, y) : context.moveTo(x, y)));
     if (piece.kind === "face") {
       context.closePath();

@@ -119,11 +119,12 @@ export class TaskFields {
     const length = state.data.units.length;
     const units = /** @type {Record<string, string>} */ ({ axis: "", point: length, pitch: `${length}/rad` });
     state.data.stated_tasks.forEach((/** @type {any} */ stated, /** @type {number} */ task) => {
+      if (stated.axis && state.tasks.length > 1) byId("tasks").append(make("p", { class: "task-name" }, state.data.tasks[task].name));
       for (const key of /** @type {const} */ (["axis", "point", "pitch"])) {
         if (stated[key] === undefined) continue;
         const count = key === "pitch" ? 1 : 3, name = `${state.data.tasks[task].name}: ${key}`;
         const entries = Array.from({ length: count }, (_, place) => this.field(task, key, place, count > 1 ? `${name}, ${"xyz"[place]}` : name, change));
-        byId("tasks").append(make("div", { class: "task-row" }, make("span", { class: "name" }, name), ...entries, make("span", { class: "unit" }, units[key])));
+        byId("tasks").append(make("div", { class: "task-row" }, make("span", { class: "name" }, key), ...entries, make("span", { class: "unit" }, units[key])));
       }
     });
     byId("tasks-group").hidden = !this.fields.length;
