@@ -45,7 +45,7 @@ def driven_joints(model: Model) -> tuple[DrivenJoint, ...]:
 
 
 def degrees_of_freedom(model: Model) -> int:
-    """Return the degrees of freedom of the platform with free actuators, at almost all dimensions and poses."""
+    """Return the degrees of freedom of the platform with unlocked actuators, at almost all dimensions and poses."""
     if model.generic is not None:
         return 6 - model.generic.constraints
     return 6 - sum(row.kind is not WrenchKind.FORCE for row in model.wrenches)

@@ -49,7 +49,7 @@ class Mobility:
     """Degrees of freedom and actuator rates at a point.
 
     Attributes:
-        freedoms: degrees of freedom of the platform with free actuators.
+        freedoms: degrees of freedom of the platform with unlocked actuators.
         constraint_rank: rank of the constraint wrenches.
         actuator_rates: rate of each actuator for the program's task: rad or length per unit of time; infinite if the
             actuator cannot drive the platform, NaN where the motion does not determine it.

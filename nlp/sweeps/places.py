@@ -171,7 +171,9 @@ def place(source: CaseSource, chosen: Points) -> Places:
     tables = tomllib.loads(source.text)
     programs = {k: _program(case) for k, case in existing_cases(source, chosen)}
     if not programs:
-        raise NotPlacedError("the robot does not exist at the points for the comparison of programs")
+        raise NotPlacedError(
+            "the robot cannot be assembled at any of the points that the sweep tests before it compiles the case"
+        )
     nlp = next(iter(programs.values()))
     program = nlp.program
     limits = run_time_limits(nlp, "sweep")

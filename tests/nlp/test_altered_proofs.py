@@ -325,7 +325,7 @@ def test_errors_of_legs_are_those_of_the_command(cli: Run, folder: Path) -> None
     case, proof = str(folder / "machines.toml"), str(folder / "machines.json")
     code, out, err = cli("verify-proof", proof, case)
     assert (code, out) == (1, "")
-    assert "leg errors of at most 0.01 in, but 0 was given: see --leg-error" in err
+    assert "leg-length errors of at most 0.01 in, but --leg-error is 0" in err
     assert cli("verify-proof", proof, case, "--leg-error", "-0.019999999999")[0] == 2
     out = output_of(cli("verify-proof", proof, case, "--leg-error", "0.01", "--all"))
     assert "for every robot whose joint centres are off by at most 0.01 in" in out
@@ -421,7 +421,7 @@ def test_proofs_of_machines_with_settings_or_of_a_result(cli: Run, tmp_path: Pat
         assert "F: of the task 'push'" in out
         refusal_of(cli("verify-proof", proof, *options), "needs the argument CASE")
     code, _, err = cli("verify-proof", proof, free, "--set", "x2=11.6")
-    assert (code, err) == (1, "rejected: the proof is for other joint centres than this case's\n")
+    assert (code, err) == (1, "rejected: the proof is for other joint centres than those of this case\n")
     for option in (("--above", "1"), ("--all-assemblies",)):
         refusal_of(cli("verify-proof", proof, *option), "does not apply to this kind of proof")
 

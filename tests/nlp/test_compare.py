@@ -186,7 +186,7 @@ def test_bad_input_is_one_sentence(path: str, tmp_path: Path, cli: Run) -> None:
         (("6-ups", "delta", "--part", "1"), "--part 1: must be at least 0 and below 1"),
         (("6-ups", "delta", "--time", "0"), "--time 0: must be positive"),
         (("6-ups", "delta", "--json", str(taken)), "is not a folder"),
-        (("6-ups", "delta", "--json", "-", "--csv", "-"), "standard output can take one of"),
+        (("6-ups", "delta", "--json", "-", "--csv", "-"), "can go to standard output"),
         (("delta", "3-puu", "--part", "0", "--starts", "1"), "task tilt: no compared robot has the degrees"),
     ):
         refusal_of(cli("compare", path, *arguments), words)

@@ -68,7 +68,7 @@ def test_refusals_are_one_sentence_and_write_nothing(tmp_path: Path, cli: Run, m
     for words, fault in {
         ("--format", "stl", "--out", str(out)): "--format stl: no such format; allowed: mjcf, urdf, csv, dxf, all",
         ("--format", "mjcf", "--out", str(tmp_path / "full")): "contains mine.txt, not written by screwsynth",
-        ("--format", "mjcf", "--out", str(out), "--pose", "2"): "--pose 2: the case has 1 pose",
+        ("--format", "mjcf", "--out", str(out), "--pose", "2"): "--pose 2: no such pose; the case has 1 pose",
     }.items():
         refusal_of(cli("export", case, *words), fault)
     monkeypatch.setitem(sys.modules, "ezdxf", None)

@@ -315,7 +315,7 @@ REFUSED = [
     ("F1 G18 G2 X1 J1", "J1", "plane of G18"),
     ("F1 G90.1 G2 X1 I1", "G90.1", "both I and J"),
     ("F1 G2 X1 Y0 I0.4", "G2", "start and end of the arc are 0.4 and 0.6 from its centre"),
-    ("F1 G3 X201 Y0 I100", "G3", "100 and 101 from its centre; these may differ by 0.101"),
+    ("F1 G3 X201 Y0 I100", "G3", "100 and 101 from its centre; these distances may differ by at most 0.101"),
     ("F1 G2 X1 I0", "G2", "centre of the arc coincides with its start or end"),
     ("F1 G2 X0 Y0 R1", "G2", "give I, J, K instead"),
     ("F1 G2 X2.1 Y0 R1", "G2", "2.1 apart, more than two radii of 1"),

@@ -64,7 +64,7 @@ REFUSALS = {
     ),
     "missing robot": (
         changed('model = "stewart-gough", ', ""),
-        "case.toml: robot.model: is missing: give model, or the name of a robot file by file",
+        "case.toml: robot.model: is missing: give model, or file with the name of a robot file",
     ),
     "missing key": (
         changed("pitch = 1\n", ""),
@@ -168,11 +168,11 @@ REFUSALS = {
     ),
     "two robots": (
         changed("model =", 'file = "robot.toml", model ='),
-        "case.toml: robot.model: conflicts with file: give the robot in one way",
+        "case.toml: robot.model: conflicts with robot.file; give only one of them",
     ),
     "not a robot file": (
         changed('model = "stewart-gough", ', 'file = "robot.toml", ', "robot.toml", "robot = 3\ntask = 3\n"),
-        "robot.toml: the file: is a case, not a robot file; screwsynth solve takes it",
+        "robot.toml: the file: is a case, not a robot file; use it with screwsynth solve",
     ),
     "joint without type": (
         changed(

@@ -242,7 +242,7 @@ def test_the_commands_write_and_check_proofs(cli: Run, tmp_path: Path) -> None:
         assert missing in out
     saved(file, edited(text, ("min = -2, max = 2", "min = -2, max = 3")))
     code, _, err = cli("verify-proof", str(target), str(file))
-    assert (code, err) == (1, "rejected: the proof is for another workspace than this case's\n")
+    assert (code, err) == (1, "rejected: the proof is for another workspace than that of this case\n")
     content = json.loads(target.read_text(encoding="utf-8"))
     nodes = bytes([Node.OUTSIDE])
     content["claims"][0]["tree"] = packed_text(nodes)

@@ -129,7 +129,7 @@ def _constant(tree: ast.expr, angle: float) -> float | None:
         return None
     value = float(expression(tree, {}, angle))
     if not math.isfinite(value):
-        raise ExpressionError(f"has a constant part with {sign!r} without a finite value")
+        raise ExpressionError(f"has constants for which {sign!r} gives no finite value")
     return value
 
 

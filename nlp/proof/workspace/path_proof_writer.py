@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 #: Reasons for claims without a proof: claims of this kind have no proof record, or the singular pose is only computed.
 _NO_RECORD = "claims of this kind along a path have no proof record"
-_COMPUTED = "a pose that is only computed in floating point has no proof"
+_COMPUTED = "the pose was only computed in floating point, so it is not proved"
 
 
 def path_proof_of(case: Case, judged: Judgement, record: ProofRecord, text: str, premises: PathPremises) -> Proof:

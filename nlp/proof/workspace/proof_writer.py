@@ -165,7 +165,7 @@ class _Writer:
             return ProofClaim(name, "", "singular", sides=tuple(map(tuple, found.sides.tolist())))
         robots = self.robot.within_tolerance
         if robots is None or found.reason:
-            raise ProofError(f"{words_of(found)}; a pose that is only computed in floating point has no proof")
+            raise ProofError(f"{words_of(found)}; the pose was only computed in floating point, so it is not proved")
         # With the largest errors in these directions, the determinant keeps the opposite sign and is farther from 0.
         if found.errors is None:
             raise ProofError(words_of(found))
