@@ -112,7 +112,7 @@ def _loop_words(model: Model) -> Iterator[Line | TextTable]:
         (each.name, each.opened, str(each.unknowns), str(each.equations), str(each.equations - each.kept))
         for each in model.structure
     ]
-    yield TextTable(("loop", "opened at", "unknowns", "equations", "dropped"), tuple(loops))
+    yield TextTable(("loop", "opened at", "unknowns", "equations", "redundant"), tuple(loops))
     kept = len(model.closure)
     words = f"{unknowns} unknowns{', including these variables' if free else ''}, {every} equations"
     words += f", {every - kept} of them redundant" if kept < every else ", none of them redundant"

@@ -210,9 +210,9 @@ FAULTS: list[tuple[str, str | bytes, tuple[str, ...], str]] = [
     ("m.xml", HEAD.replace('pos="0.0 0.0 ', 'pos="1e200 0.0 '), BODY, "must have finite coordinates of at most 1e+09"),
     ("m.urdf", URDF.replace('xyz="1.0 0.0 0.0"', 'xyz="1 0 inf"', 1), ALL, "must be three finite numbers"),
     ("m.urdf", URDF.replace('<link name="rod_2"/>', '<link name="rod_1"/>'), ALL, "has two elements <link> with the name 'rod_1'"),
-    ("m.urdf", URDF.replace('<link name="torso"/>', '<link name="torso"/><link name="spare"/>'), ALL, "must have exactly one root link, which is no joint's child, got torso, spare"),
+    ("m.urdf", URDF.replace('<link name="torso"/>', '<link name="torso"/><link name="spare"/>'), ALL, "must have exactly one root link (a link that is not the child of a joint), got torso, spare"),
     ("m.urdf", '<robot xmlns:xacro="http://ros.org/wiki/xacro"><xacro:include filename="a"/></robot>', ALL, "has xacro elements, which are not supported; convert it to plain URDF first"),
-    ("m.urdf", '<robot><link name="a"/><joint name="j" type="fixed"><parent link="a"/><child link="a"/></joint></robot>', ALL, "must have exactly one root link, which is no joint's child, got none"),
+    ("m.urdf", '<robot><link name="a"/><joint name="j" type="fixed"><parent link="a"/><child link="a"/></joint></robot>', ALL, "must have exactly one root link (a link that is not the child of a joint), got none"),
     ("m.urdf", URDF.replace('<child link="horn_1"/>', '<child link="horn_1"/><mimic joint="x"/>'), ALL, 'mimic = "x": must be the name of another joint'),
     # Dimensions.
     ("m.xml", HEAD, (*BODY, "--free", "circle9"), "--free circle9: no such joint, circle or symmetry; did you mean 'circle3'?"),

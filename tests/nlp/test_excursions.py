@@ -244,7 +244,7 @@ def test_a_case_is_written_as_it_is_stated() -> None:
         ),
         (
             {"pose": {"position": [0, 0, 1], "rotation": {"axis": [0, 1, 0], "angle": 10}}},
-            "workspace.rotation: must be left out, or about the axis of the pose: with about",
+            "workspace.rotation: must be left out, or rotate about the axis of the pose's rotation: with about",
         ),
         (
             {"pose": {"position": [0, 0, 1], "rotation": {"angle": {"min": -10, "max": 10}}}},

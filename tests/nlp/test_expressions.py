@@ -80,7 +80,7 @@ REFUSED = {
     "x1 - 1.5*y2 >= 0": ("'y2' at position 10 is not a quantity of this case", "allowed: x1, x2"),
     "x1 +* x2 >= 0": ("got '*' at position 5", "x1 +»* x2"),
     "x1 x2 >= 0": ("expected an operator", "got 'x2' at position 4"),
-    "(x1 - x2 >= 0": ("closes position 1", "got '>=' at position 10"),
+    "(x1 - x2 >= 0": ("closes the one at position 1", "got '>=' at position 10"),
     "x1) >= 0": ("got ')' at position 3",),
     "0 <= x1 <= 3": ("expected an operator or the end", "got '<=' at position 9"),
     "sqrt x1 >= 0": ('expected "(" after sqrt',),

@@ -145,7 +145,7 @@ REFUSALS = {
     ),
     "case as robot": (
         changed('"stewart-gough"', '"paper-4.2"'),
-        ("case.toml: robot.model = \"paper-4.2\": no such robot; 'paper-4.2' is a case; screwsynth solve takes it"),
+        ("case.toml: robot.model = \"paper-4.2\": no such robot; 'paper-4.2' is a case; use it with screwsynth solve"),
     ),
     "unknown option": (
         changed("model =", 'layuot = "aligned", model ='),
@@ -326,8 +326,8 @@ REFUSALS = {
     "mass without gravity": (
         above("load = [{ mass = 3 }]"),
         (
-            "case.toml: gravity.acceleration: is missing: give [gravity] acceleration, with mass "
-            "times acceleration in N, such as [0, 0, -9.81] for a mass in kg"
+            "case.toml: gravity.acceleration: is missing: give [gravity] acceleration in units in which mass "
+            "times acceleration is in N, such as [0, 0, -9.81] for a mass in kg"
         ),
     ),
     "two forms of a load": (
@@ -379,8 +379,8 @@ REFUSALS = {
             "axis = [1, 0, 0], angle = 5 } }"
         ),
         (
-            "case.toml: workspace.rotation: must be left out, or about the axis of the pose: with "
-            "about = 'pose', two axes are not supported"
+            "case.toml: workspace.rotation: must be left out, or rotate about the axis of the pose's rotation: with "
+            "about = 'pose', rotations about different axes cannot be combined"
         ),
     ),
     "path place": (

@@ -215,7 +215,7 @@ def test_joints_are_no_design() -> None:
         (("--over", "x1=1,2", "--over", "EMPTY"), "a file of points cannot be combined with ranges or lists"),
         ((), "--over: is missing: NAME=FIRST:LAST:COUNT, parameter to vary"),
         (("--over", "x1=1,2", "--engine", "fast"), "--engine fast: must be compiled or ipopt"),
-        (("--over", "x1=10,12", "--starts", "17", "--engine", "compiled"), "at most 16 starting points, and 17 are"),
+        (("--over", "x1=10,12", "--starts", "17", "--engine", "compiled"), "at most 16 starting points, but 17 are"),
         (("--over", "x1=1,2", "--over", "x2=1,2", "--over", "x3=1,2", "--plot", "p.png"), "got a grid over 3 names"),
     ],
 )  # fmt: skip

@@ -164,7 +164,7 @@ def test_other_trees_are_rejected(proof: Proof) -> None:
     tree = node_bytes(Node.CUT, 0, value=0.0) + bytes([Node.BOUNDED] * 2)
     for name, other, fault in (
         ("position error", tree[:-1], "ends"),
-        ("position error", tree + tree[-1:], "goes on"),
+        ("position error", tree + tree[-1:], "additional data after its last box"),
         ("position error", node_bytes(Node.CUT, 0, value=4.0) + tree[10:], "outside of it"),
         ("regular", b"\x07", "where a box must be"),
         ("regular", bytes([Node.CUT, 6]) + bytes(8), "names variable 6"),
@@ -176,7 +176,7 @@ def test_other_trees_are_rejected(proof: Proof) -> None:
 def test_a_proof_is_for_its_case_only(proof: Proof) -> None:
     assert "another workspace" in refused(proof, ("max = 9 }", "max = 9.5 }"))
     assert "other joint centres" in refused(proof, ("11.543", "11.544"))
-    assert "other expressions" in refused(alone(proof, "F"), ("axis = [0, 0, 1]", "axis = [0, 1, 1]"))
+    assert "its expressions or bounds differ" in refused(alone(proof, "F"), ("axis = [0, 0, 1]", "axis = [0, 1, 1]"))
     assert "see regular" in refused(replace(proof, claims=proof.claims[1:]))
     assert "exactly once" in refused(replace(proof, claims=(*proof.claims, proof.claims[0])))
     assert "leg_clearance" in refused(proof, ("leg_clearance = { min = 0.5 }", ""))
@@ -213,7 +213,7 @@ def test_a_refuted_workspace_carries_two_poses(tolerance: str) -> None:
     given = on_paper(case, text, with_limits=False)[1]
     (found,) = check.check_workspace_proof(given, case).claims
     assert found.is_refuted
-    missing = {"the claim was not judged", "the claim requires bounds of leg lengths, which have no proof"}
+    missing = {"no search for this claim was made", "the claim needs bounds of leg lengths, which are not proved"}
     assert {each.reason for each in given.unproved} <= missing
     first, second = claim(given, "regular").sides
     for sides, fault in (

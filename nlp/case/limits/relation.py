@@ -215,7 +215,9 @@ class _Reader:
         tree = self.sum()
         token = self.next()
         if token.text != ")":
-            raise self.wrong(token, f"expected an operator or the bracket that closes position {opened.place + 1}")
+            raise self.wrong(
+                token, f"expected an operator or the bracket that closes the one at position {opened.place + 1}"
+            )
         return tree
 
     def _split(self) -> Iterator[_Token]:

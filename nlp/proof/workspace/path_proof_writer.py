@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from .proof_record import Key, ProofRecord
 
 #: Reasons for claims without a proof: claims of this kind have no proof record, or the singular pose is only computed.
-_NO_RECORD = "claims of this kind along a path have no proof record"
+_NO_RECORD = "proof files do not support claims of this kind along a tool path"
 _COMPUTED = "the pose was only computed in floating point, so it is not proved"
 
 

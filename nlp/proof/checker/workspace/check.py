@@ -75,7 +75,7 @@ _WRONG_REASON = "a claim of this kind cannot be proved by the reason"
 #: A tree with a single leaf.
 _WHOLE = bytes([Node.BOUNDED])
 #: Message about a proof with displaced joint centres of a claim about the nominal robot.
-_WITHOUT_TOLERANCE = "the proof of this claim needs a tolerance, and the claim is about the robot without one"
+_WITHOUT_TOLERANCE = "the proof is for robots within a joint-centre tolerance, but the case has no tolerance"
 
 
 @dataclass(frozen=True)

@@ -171,7 +171,8 @@ class _PieceRule:
         """Return the message for a claim that could not be proved."""
         k = int(np.floor(0.5 * self.lower[0, claim] + 0.5 * self.upper[0, claim]))
         low, high = (each[0, claim] - k for each in (self.lower, self.upper))
-        return f"the claim could not be proved on segment {k + 1} between its parameters {low:.6g} and {high:.6g}"
+        where = f"segment {k + 1}, for parameters of this segment from {low:.6g} to {high:.6g}"
+        return f"the claim could not be proved on {where}"
 
 
 def _workspace(case: Case, low: FloatArray, high: FloatArray, *, is_tangents: bool) -> Workspace:
