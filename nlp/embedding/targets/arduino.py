@@ -27,9 +27,7 @@ def write(case: Case, coordinates: str, *, single: bool) -> dict[str, str]:
         InputError: likewise.
     """
     controller = case.controller
-    library = library_of(
-        case, length=controller.length, angle=controller.angle, single=single, coordinates=coordinates
-    )
+    library = library_of(case, length=controller.length, angle=controller.angle, single=single, coordinates=coordinates)
     name, names = identifier(case.name), library.names
     texts = {
         **names,

@@ -1,4 +1,4 @@
-"""Configuration of kinematics that a controller has: dimensions, zeros and world frame in its conventions, with a check.
+"""Configuration of kinematics that a controller has: dimensions, zeros and world frame in its conventions.
 
 The controller's formula is computed here with the numbers as they are printed, and compared with inverse kinematics.
 """
@@ -18,7 +18,7 @@ from ...case.case import Case
 from ...case.controller import Controller
 from ...errors import CaseError
 from ..kinematics import Kinematics
-from .kinds import TOLERANCE, Delta, Legs, OtherKindError, delta_of, equal_rods, legs_of
+from .kinds import TOLERANCE, Delta, Legs, OtherKindError, Struts, delta_of, equal_rods, legs_of, struts_of
 from .samples import Range, Samples, ranges_of, samples_of
 
 #: Part of the robot's size, or radians, below which an origin or an angle is rounding.
@@ -60,10 +60,11 @@ class Configuration(NamedTuple):
         case: case with these conventions.
         robot: its kinematics.
         order: index of the actuator of each joint of the controller.
-        radius, height: dimensions of a Delta; 0 for legs.
-        angles: (a,) direction of each limb in the controller's frame, degrees; empty for legs.
-        arms, rods: (a,) lengths; empty for legs.
-        base, platform: (a, 3) joints of legs; empty for a Delta.
+        radius, height: dimensions of a Delta; 0 for others.
+        angles: (a,) direction of each limb in the controller's frame, degrees; empty for others.
+        arms, rods: (a,) lengths of a Delta; empty for others.
+        base: (a, 3) base joints of legs and struts; empty for a Delta.
+        platform: (a, 3) platform joints of legs, or (a, 2) radius and height of the rings of struts.
         ranges: limits of each joint.
         home: (a,) coordinates at home.
         difference: largest difference between formula and inverse kinematics, in sizes or radians.
@@ -111,7 +112,7 @@ def delta_configuration(case: Case, rules: Rules) -> Configuration:
         delta = delta_of(plain, samples)
         if delta.turns != rules.turns:
             parts = "arms that turn" if delta.turns else "carriages that slide"
-            raise OtherKindError(f"the robot has {parts}")  # noqa: TRY301 - one place makes the message
+            raise OtherKindError(f"the robot has {parts}")
         if rules.equal:
             equal_rods(delta, plain)
         return _delta(case, rules, plain, delta, samples)
@@ -211,25 +212,61 @@ def leg_configuration(case: Case, target: str, kind: str, hint: str) -> Configur
         raise refused(case, target, kind, str(error), hint) from None
 
 
+def strut_configuration(case: Case, target: str, kind: str, hint: str) -> Configuration:
+    """Return the joints of five struts at a spindle, in the world frame that the case states for its controller.
+
+    Raises:
+        CaseError: the robot has others.
+    """
+    plain = Kinematics(case)
+    try:
+        samples = samples_of(plain)
+        return _struts(case, plain, struts_of(plain, samples), samples)
+    except OtherKindError as error:
+        raise refused(case, target, kind, str(error), hint) from None
+
+
 def _legs(case: Case, plain: Kinematics, legs: Legs, samples: Samples) -> Configuration:
-    size = plain.size / plain.transform.scale
-    zeros = {each.name: rounded(_plain(float(zero), size)) for each, zero in zip(plain.drives, legs.zero, strict=True)}
-    given = replace(case.controller, length=length_unit(case), angle="deg", zero=_shared(zeros, 0.0), sign=_shared({}, 1.0))
-    own = replace(case, controller=given)
-    robot = Kinematics(own)
-    transform = robot.transform
-    base = transform.scale * (legs.base - transform.offset) @ transform.turn
+    found = _lengths(case, plain, legs.base, legs.zero, np.ones(len(legs.zero)), samples)
     # The platform frame is turned with the world frame: a rotation of the controller is T' R T.
-    platform = transform.scale * legs.platform @ transform.turn
-    base, platform = (np.array([[rounded(_plain(v, robot.size)) for v in row] for row in each]) for each in (base, platform))
-    count = range(len(robot.drives))
-    home = tuple(float(each) for each in robot.home_coordinates)
-    found = Configuration(
-        own, robot, tuple(count), ranges_of(robot, samples), home, 0.0, base=base, platform=platform
-    )
+    transform = found.robot.transform
+    platform = _round(transform.scale * legs.platform @ transform.turn, found.robot.size)
     poses = transform.poses(samples.positions, samples.rotations)
     ends = poses[:, None, 9:] + np.einsum("nij,kj->nki", poses[:, :9].reshape(-1, 3, 3), platform)
-    return _checked(found, samples, np.linalg.norm(ends - base, axis=2))
+    return _checked(found._replace(platform=platform), samples, np.linalg.norm(ends - found.base, axis=2))
+
+
+def _struts(case: Case, plain: Kinematics, struts: Struts, samples: Samples) -> Configuration:
+    found = _lengths(case, plain, struts.base, struts.zero, struts.sign, samples)
+    transform = found.robot.transform
+    rings = _round(transform.scale * struts.rings, found.robot.size)
+    poses = transform.poses(samples.positions, samples.rotations)
+    seen = np.einsum("nji,nkj->nki", poses[:, :9].reshape(-1, 3, 3), found.base - poses[:, None, 9:])
+    around = np.hypot(seen[:, :, 0], seen[:, :, 1])
+    lengths = np.hypot(around - rings[:, 0], seen[:, :, 2] - rings[:, 1])
+    return _checked(found._replace(platform=rings), samples, lengths)
+
+
+def _lengths(
+    case: Case, plain: Kinematics, base: FloatArray, zero: FloatArray, sign: FloatArray, samples: Samples
+) -> Configuration:
+    """Return the configuration of actuators whose coordinates are lengths, without its platform joints."""
+    size = plain.size / plain.transform.scale
+    names = [each.name for each in plain.drives]
+    zeros = {name: rounded(_plain(float(each), size)) for name, each in zip(names, zero, strict=True)}
+    senses = dict(zip(names, sign.tolist(), strict=True))
+    given = replace(case.controller, length=length_unit(case), angle="deg")
+    own = replace(case, controller=replace(given, zero=_shared(zeros, 0.0), sign=_shared(senses, 1.0)))
+    robot = Kinematics(own)
+    transform = robot.transform
+    points = _round(transform.scale * (base - transform.offset) @ transform.turn, robot.size)
+    home = tuple(float(each) for each in robot.home_coordinates)
+    return Configuration(own, robot, tuple(range(len(names))), ranges_of(robot, samples), home, 0.0, base=points)
+
+
+def _round(points: FloatArray, size: float) -> FloatArray:
+    """Return points as they are printed, without rounding errors."""
+    return np.array([[rounded(_plain(float(value), size)) for value in row] for row in points])
 
 
 def _checked(found: Configuration, samples: Samples, computed: FloatArray) -> Configuration:
@@ -262,7 +299,8 @@ def _shared(values: Mapping[str, float], usual: float) -> Mapping[str, float]:
     every = set(values.values())
     if len(every) > 1:
         return MappingProxyType(dict(values))
-    return MappingProxyType({"": each for each in every if each != usual})
+    first = next(iter(values.values()))
+    return MappingProxyType({} if first == usual else {"": first})
 
 
 def _angle(value: float) -> float:

@@ -72,7 +72,7 @@ def _rotary(found: Configuration) -> list[str]:
     words.append(f"H{each((found.height,) * 3)}")
     least = [one.least for one in found.ranges if one.least is not None]
     most = [one.most for one in found.ranges if one.most is not None]
-    if len(least) == len(most) == 3:  # noqa: PLR2004 - three arms
+    if len(least) == len(most) == 3:
         words.append(f"A{printed(max(least))}:{printed(min(most))}")
     return [f"M669 K10 {' '.join(words)} {corrections}", "M666 X0 Y0 Z0"]
 
@@ -95,12 +95,14 @@ def _readme(found: Configuration, file: str, firmware: str, height: float | None
         "unchecked": UNCHECKED,
     }
     what = (
-        f"`{file}` has the geometry for {firmware}. At poses near home, its formula with these numbers differs from the "
-        f"robot by at most {found.difference:.1g} of the robot's size (angles: rad); the firmware computes in single "
+        f"`{file}` has the geometry for {firmware}. At poses near home, its formula with these numbers differs from "
+        f"the robot by at most {found.difference:.1g} of the robot's size (angles: rad). The firmware has single "
         "precision."
     )
     more = ["State the printable radius yourself; `screwsynth workspace` proves it."]
     if not turns and height is None:
         more.append("The case has no upper limit of the carriages: add the height H that you measure.")
-    more.append(f"Generated C has the same conventions with this table:\n\n```toml\n{conventions_table(found.robot)}```")
+    more.append(
+        f"Generated C has the same conventions with this table:\n\n```toml\n{conventions_table(found.robot)}```"
+    )
     return readme(found.case, what, words, "\n\n".join(more))

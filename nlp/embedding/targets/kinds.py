@@ -1,4 +1,4 @@
-"""Kinds of robots that controllers know: rotary and linear Deltas and six straight legs, recognised by their geometry.
+"""Kinds of robots that controllers know, recognised by geometry: Deltas, six straight legs, five struts at a spindle.
 
 A Delta's limb is an arm or a carriage with rods of a fixed length. Its dimensions are fitted to inverse kinematics at
 poses near home, which is linear least squares, so every model of such a robot is recognised: with two rods, with a
@@ -8,7 +8,6 @@ parallelogram, or with universal joints.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import casadi as ca
@@ -87,6 +86,22 @@ class Legs(NamedTuple):
     zero: FloatArray
 
 
+class Struts(NamedTuple):
+    """Five struts whose ends turn in rings about the platform's z axis, in the conventions of the case.
+
+    Attributes:
+        base: (5, 3) base joints in the world frame.
+        rings: (5, 2) radius and height of the ends in the platform frame.
+        zero: (5,) length of each strut where its coordinate is 0.
+        sign: (5,) 1 if a positive coordinate makes the strut longer, else -1.
+    """
+
+    base: FloatArray
+    rings: FloatArray
+    zero: FloatArray
+    sign: FloatArray
+
+
 def delta_of(robot: Kinematics, samples: Samples) -> Delta:
     """Return the dimensions of a Delta.
 
@@ -100,11 +115,12 @@ def delta_of(robot: Kinematics, samples: Samples) -> Delta:
     if len(drives) != 3 or len({each.dimension for each in drives}) != 1:
         raise OtherKindError(f"the robot has {len(drives)} actuators that turn or slide, a Delta 3 of one type")
     if robot.coordinates != (0, 1, 2) or samples.turned > TOLERANCE:
-        raise OtherKindError(f"the platform turns by {units.text(samples.turned, Dimension.ANGLE)} or more along a line")
+        raise OtherKindError(
+            f"the platform turns by {units.text(samples.turned, Dimension.ANGLE)} or more along a line"
+        )
     turns = drives[0].dimension is Dimension.ANGLE
-    axes = _axes(robot)
     fit = _arm if turns else _carriage
-    limbs = tuple(fit(robot, samples, k, axis, size) for k, axis in enumerate(axes))
+    limbs = tuple(fit(robot, samples, k, each.axis, size) for k, each in enumerate(_drives(robot)))
     if not turns:
         limbs = _outward(limbs)
     radial = np.array([[math.cos(each.outward), math.sin(each.outward)] for each in limbs])
@@ -147,22 +163,34 @@ def equal_rods(found: Delta, robot: Kinematics) -> None:
             raise OtherKindError(f"the limb of {limb.actuator} is at {shown[0]} from the first one, not {shown[1]}")
 
 
-def _axes(robot: Kinematics) -> list[FloatArray]:
-    """Return the direction (3,) of each actuator at home: axis of an arm, or line of a carriage."""
+class _Drive(NamedTuple):
+    """Actuator at home: its direction, and the screws (6, k) of the joints between base and actuator."""
+
+    axis: FloatArray
+    before: FloatArray
+
+
+def _drives(robot: Kinematics) -> list[_Drive]:
+    """Return the actuators at home: axis of an arm, or line of a carriage or strut.
+
+    Raises:
+        OtherKindError: an actuator is no joint.
+    """
     model, start = robot.robot.model, robot.start
     joints = {each.joint: each.name for each in model.actuators}
     parameters = robot.case.fixed_parameters("the kind of a robot is recognised with fixed dimensions")
-    found: dict[str, FloatArray] = {}
+    found: dict[str, _Drive] = {}
     for path in model.joint_screws:
         screws = ca.Function("screws", Substitution.identity(model).all, [ca.densify(path.all)])
         at_start = np.array(screws(parameters, start[12:], start[:9].reshape(3, 3).T, start[9:12]), dtype=np.float64)
         for column in path.driven:
             name, screw = joints.get(path.joints[column], ""), at_start[:, column]
-            found.setdefault(name, screw[:3] if np.linalg.norm(screw[:3]) else screw[3:])
+            line = screw[:3] if np.linalg.norm(screw[:3]) else screw[3:]
+            found.setdefault(name, _Drive(line / np.linalg.norm(line), at_start[:, :column]))
     missing = [each.name for each in robot.drives if each.name not in found]
     if missing:
         raise OtherKindError(f"the actuator {missing[0]} is no joint with an axis")
-    return [found[each.name] / np.linalg.norm(found[each.name]) for each in robot.drives]
+    return [found[each.name] for each in robot.drives]
 
 
 def _arm(robot: Kinematics, samples: Samples, k: int, axis: FloatArray, size: float) -> Limb:
@@ -250,7 +278,9 @@ def legs_of(robot: Kinematics, samples: Samples) -> Legs:
     legs, units, size = robot.robot.robot.legs, robot.case.units, robot.size / robot.transform.scale
     slides = [each.dimension is Dimension.LENGTH for each in robot.drives]
     if len(legs) != 6 or len(slides) != 6 or not all(slides):
-        raise OtherKindError(f"the robot has {len(legs)} straight legs and {len(slides)} actuators, a hexapod 6 of both")
+        raise OtherKindError(
+            f"the robot has {len(legs)} straight legs and {len(slides)} actuators, a hexapod 6 of both"
+        )
     centres = ca.horzcat(*[ca.vertcat(each.base, each.platform) for each in legs])
     values = np.array(ca.Function("legs", [robot.robot.z], [ca.densify(centres)])(robot.start), dtype=np.float64).T
     base, platform = values[:, :3], values[:, 3:]
@@ -260,6 +290,53 @@ def legs_of(robot: Kinematics, samples: Samples) -> Legs:
         spread = float(np.ptp(zero[:, k]))
         if spread > TOLERANCE * size:
             shown = units.text(spread, Dimension.LENGTH)
-            raise OtherKindError(f"actuator {drive.name} is not the length of leg {legs[k].name}: they differ by {shown}")
+            raise OtherKindError(
+                f"actuator {drive.name} is not the length of leg {legs[k].name}: they differ by {shown}"
+            )
     return Legs(base, platform, np.asarray(zero.mean(axis=0)))
 
+
+def struts_of(robot: Kinematics, samples: Samples) -> Struts:
+    """Return the joints of five struts at a spindle.
+
+    Raises:
+        OtherKindError: the robot has others.
+    """
+    size, slides = robot.size / robot.transform.scale, [each.dimension is Dimension.LENGTH for each in robot.drives]
+    if len(slides) != 5 or not all(slides):
+        raise OtherKindError(f"the robot has {len(slides)} actuators, a pentapod 5 that slide")
+    found = [_strut(robot, samples, k, each, size) for k, each in enumerate(_drives(robot))]
+    base, rings, zero, sign = (np.array(each) for each in zip(*found, strict=True))
+    return Struts(base, rings, zero, sign)
+
+
+def _strut(
+    robot: Kinematics, samples: Samples, k: int, drive: _Drive, size: float
+) -> tuple[FloatArray, FloatArray, float, float]:
+    """Return base joint, ring, zero and sign of a strut."""
+    units, name = robot.case.units, robot.drives[k].name
+    # A point on all axes between base and strut: p x omega = v.
+    turning = [each for each in drive.before.T if np.linalg.norm(each[:3])]
+    if len(turning) < 2:
+        raise OtherKindError(f"the strut of {name} does not begin with a ball joint or a universal joint")
+    rows = np.vstack([np.cross(np.eye(3), each[:3]).T for each in turning])
+    values = np.concatenate([each[3:] for each in turning])
+    base = np.linalg.lstsq(rows, values, rcond=None)[0]
+    off = float(np.abs(rows @ base - values).max())
+    if off > TOLERANCE * size:
+        shown = units.text(off, Dimension.LENGTH)
+        raise OtherKindError(f"the strut of {name} does not begin in a point: its axes pass each other at {shown}")
+    seen = np.einsum("nji,nj->ni", samples.rotations, base - samples.positions) / size
+    q = samples.coordinates[:, k] / size
+    around, height = np.hypot(seen[:, 0], seen[:, 1]), seen[:, 2]
+    rows = np.column_stack([2 * around, 2 * height, 2 * q, np.ones(len(q))])
+    radius, level, slope, _ = _least_squares(rows, around**2 + height**2 - q**2, f"the strut of {name}")
+    lengths = np.hypot(around - radius, height - level)
+    zeros = lengths - math.copysign(1.0, slope) * q
+    spread = float(np.ptp(zeros))
+    if spread > TOLERANCE:
+        shown = units.text(spread * size, Dimension.LENGTH)
+        raise OtherKindError(
+            f"the end of strut {name} is in no ring about the platform's z axis: lengths differ by {shown}"
+        )
+    return base, size * np.array([radius, level]), size * float(zeros.mean()), math.copysign(1.0, slope)

@@ -84,9 +84,11 @@ def _readme(found: Configuration, kind: str) -> str:
         "unchecked": UNCHECKED,
     }
     what = (
-        f"`printer.cfg` has the geometry for Klipper's `{kind}`; add pins, endstops and speeds. At poses near home, its "
-        f"formula with these numbers differs from the robot by at most {found.difference:.1g} of the robot's size "
+        f"`printer.cfg` has the geometry for Klipper's `{kind}`; add pins, endstops and speeds. At poses near home, "
+        f"its formula with these numbers differs from the robot by at most {found.difference:.1g} of the robot's size "
         "(angles: rad)."
     )
     table = conventions_table(found.robot)
-    return readme(found.case, what, words, f"Generated C has the same conventions with this table:\n\n```toml\n{table}```")
+    return readme(
+        found.case, what, words, f"Generated C has the same conventions with this table:\n\n```toml\n{table}```"
+    )

@@ -53,12 +53,15 @@ def _fault(robot: Kinematics) -> str:
     """Return why Klipper cannot move a robot, as a sentence; empty if it can."""
     units, count = robot.case.units, len(robot.drives)
     if robot.freedoms != 3 or count != 3:
-        return f"Klipper moves robots of 3 translations by 3 motors: this one has {robot.freedoms} degrees of freedom and {count} motors"
+        own = f"this one has {robot.freedoms} degrees of freedom and {count} motors"
+        return f"Klipper moves robots of 3 translations by 3 motors: {own}"
     turned = samples_of(robot).turned
     if robot.coordinates != (0, 1, 2) or turned > TOLERANCE:
-        return f"Klipper moves robots of 3 translations: this platform turns by {units.text(turned, Dimension.ANGLE)} or more"
+        angle = units.text(turned, Dimension.ANGLE)
+        return f"Klipper moves robots of 3 translations: this platform turns by {angle} or more"
     if robot.unknowns:
-        return f"Klipper computes one motor alone, in closed form: {robot.unknowns} joint coordinates of this robot have none"
+        own = f"{robot.unknowns} joint coordinates of this robot have none"
+        return f"Klipper computes one motor alone, in closed form: {own}"
     if robot.forward is None:
         return "Klipper needs forward kinematics, and the actuators of this robot do not determine the pose"
     return ""
@@ -85,7 +88,8 @@ defs_kin_{name} = \"\"\"
 def _readme(case: Case, robot: Kinematics, name: str) -> str:
     kinds = ["rad" if each.dimension is Dimension.ANGLE else "mm" for each in robot.drives]
     steppers = "\n".join(
-        f"[stepper_{letter}]\n# actuator {drive.name}, {kind}\nposition_endstop: ...\nposition_min: ...\nposition_max: ...\n"
+        f"[stepper_{letter}]\n# actuator {drive.name}, {kind}\n"
+        "position_endstop: ...\nposition_min: ...\nposition_max: ...\n"
         for letter, drive, kind in zip("abc", robot.drives, kinds, strict=True)
     )
     words = {
@@ -96,12 +100,13 @@ def _readme(case: Case, robot: Kinematics, name: str) -> str:
         "  of reach.",
     }
     what = (
-        f"A patch for Klipper: copy `kin_{name}.c` into `klippy/chelper` and `{name}.py` into `klippy/kinematics`, and add "
-        "the lines of `chelper.patch.md`. Klipper compiles the file at its next start."
+        f"A patch for Klipper: copy `kin_{name}.c` into `klippy/chelper` and `{name}.py` into `klippy/kinematics`, and "
+        "add the lines of `chelper.patch.md`. Klipper compiles the file at its next start."
     )
     more = (
         "`homing_start` is a position from which every endstop is reached. Angles are within half a turn of home.\n\n"
-        f"```ini\n[printer]\nkinematics: {name}\nhoming_start: x, y, z\nposition_min: x, y, z\nposition_max: x, y, z\n\n"
+        f"```ini\n[printer]\nkinematics: {name}\nhoming_start: x, y, z\n"
+        "position_min: x, y, z\nposition_max: x, y, z\n\n"
         f"{steppers}```"
     )
     return readme(case, what, words, more)

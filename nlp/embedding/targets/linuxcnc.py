@@ -8,7 +8,15 @@ from collections.abc import Sequence
 from ....models import Dimension, FloatArray
 from ...case.case import Case
 from ..kinematics import Kinematics
-from .configuration import Configuration, Rules, delta_configuration, leg_configuration, printed, printed_home
+from .configuration import (
+    Configuration,
+    Rules,
+    delta_configuration,
+    leg_configuration,
+    printed,
+    printed_home,
+    strut_configuration,
+)
 from .samples import Range
 from .texts import conventions_table, frame_words, readme, zero_words
 
@@ -28,20 +36,25 @@ def write(case: Case) -> dict[str, str]:
     Raises:
         CaseError: no module does.
     """
-    drives = Kinematics(case).drives
-    if len(drives) == 3:
-        turns = drives[0].dimension is Dimension.ANGLE
-        found = delta_configuration(case, _ROTARY if turns else _LINEAR)
-        module = "rotarydeltakins" if turns else "lineardeltakins"
-        lines = _rotary(found) if turns else _linear(found)
-        words = "XYZ"
-    else:
-        found, module = leg_configuration(case, TARGET, "genhexkins", _HINT), "genhexkins"
-        lines, words = _hexapod(found), "XYZABC"
+    found, module, words = _found(case)
+    lines = {"rotarydeltakins": _rotary, "lineardeltakins": _linear, "genhexkins": _joints, "pentakins": _joints}[
+        module
+    ](found)
     head = f"# {module} for this robot; lengths in {found.case.controller.length}\n"
     ini = ini_text(found.robot, module, words, found.order, found.ranges, found.home)
     hal = head + "".join(f"setp {module}.{name} {printed(value)}\n" for name, value in lines)
     return {"kinematics.hal": hal, "kinematics.ini": ini, "README.md": _readme(found, module)}
+
+
+def _found(case: Case) -> tuple[Configuration, str, str]:
+    """Return the configuration, the module, and the words of the coordinates."""
+    drives = Kinematics(case).drives
+    if len(drives) == 3:
+        rules = _ROTARY if drives[0].dimension is Dimension.ANGLE else _LINEAR
+        return delta_configuration(case, rules), rules.kind, "XYZ"
+    if len(drives) == 5:
+        return strut_configuration(case, TARGET, "pentakins", _HINT), "pentakins", "XYZAB"
+    return leg_configuration(case, TARGET, "genhexkins", _HINT), "genhexkins", "XYZABC"
 
 
 def _rotary(found: Configuration) -> list[tuple[str, float]]:
@@ -54,12 +67,14 @@ def _linear(found: Configuration) -> list[tuple[str, float]]:
     return [("R", found.radius), ("L", found.rods[0])]
 
 
-def _hexapod(found: Configuration) -> list[tuple[str, float]]:
+def _joints(found: Configuration) -> list[tuple[str, float]]:
+    is_hexapod = found.platform.shape[1] == 3
+    plate, axes = ("platform", "xyz") if is_hexapod else ("effector", "rz")
     return [
-        (f"{plate}.{k}.{axis}", float(value))
-        for plate, points in (("base", found.base), ("platform", found.platform))
+        (f"{name}.{k}.{axis}", float(value))
+        for name, own, points in (("base", "xyz", found.base), (plate, axes, found.platform))
         for k, point in enumerate(points)
-        for axis, value in zip("xyz", point, strict=True)
+        for axis, value in zip(own, point, strict=True)
     ]
 
 
@@ -95,7 +110,9 @@ def ini_text(
         kind = "ANGULAR" if drive.dimension is Dimension.ANGLE else "LINEAR"
         lines += ["", f"[JOINT_{joint}]", f"# actuator {drive.name}", f"TYPE = {kind}"]
         for name, value in (("MIN_LIMIT", ranges[joint].least), ("MAX_LIMIT", ranges[joint].most)):
-            stated = f"{name} = {printed(value)}" if value is not None else f"# {name}: the case has no limit; state one"
+            stated = (
+                f"{name} = {printed(value)}" if value is not None else f"# {name}: the case has no limit; state one"
+            )
             lines.append(stated)
         lines.append(f"HOME = {printed_home(home[joint], float(robot.motor_sizes[k]))}")
     return "\n".join(lines) + "\n"
@@ -129,9 +146,12 @@ def _readme(found: Configuration, module: str) -> str:
         f"module, and merge the INI sections into yours. At poses near home, its formula with these numbers differs "
         f"from the robot by at most {found.difference:.1g} of the robot's size (angles: rad)."
     )
-    more = [f"This table in the case gives generated C the same conventions:\n\n```toml\n{conventions_table(found.robot)}```"]
+    table = conventions_table(found.robot)
+    more = [f"This table in the case gives generated C the same conventions:\n\n```toml\n{table}```"]
     if module == "genhexkins":
         more.insert(0, "Pins of tool offset, spindle offset and screw lead keep their value 0.")
+    if module == "pentakins":
+        more.insert(0, "The pin of tool offset keeps its value 0. Turns about the spindle do not change the struts.")
     if module == "rotarydeltakins":
         more.insert(0, "`platformradius` is the radius of the motor axes less that of the platform's joints.")
     return readme(found.case, what, words, "\n\n".join(more))

@@ -66,4 +66,3 @@ def write(case: Case) -> dict[str, str]:
         "kinematics.ini": ini,
         "README.md": readme(library.case, what, about, more),
     }
-

@@ -168,11 +168,12 @@ def _readme(library: Library, package: str, joints: list[str]) -> str:
         "frame": frame_words(robot) + f"\n  Joints are {', '.join(joints)}.",
         "zero": zero_words(robot, range(len(robot.drives))) + " `mechanical_reduction` and `offset` are not read.",
         "units": "lengths in m, angles in rad, efforts in N and N m; velocities and efforts keep the power equal.",
-        "unchecked": "ros2_control does not load transmissions by itself: the hardware component does. Joint limits are\n"
-        "  those of its controllers, not those of the loops.",
+        "unchecked": "ros2_control does not load transmissions by itself: the hardware component does. Joint limits\n"
+        "  are those of its controllers, not those of the loops.",
     }
     what = (
-        f"`{package}` is a package for ros2_control: build it with colcon, and copy `transmission.urdf` into the robot's "
-        "description. Handles are taken by name. A value out of reach leaves the last outputs, and `fault()` is true."
+        f"`{package}` is a package for ros2_control: build it with colcon, and copy `transmission.urdf` into the "
+        "robot's description. Handles are taken by name. A value out of reach leaves the last "
+        "outputs, and `fault()` is true."
     )
     return readme(library.case, what, words)

@@ -49,7 +49,7 @@ def samples_of(robot: Kinematics) -> Samples:
         p = robot.start[9:12] + spread * size * given[:, :3]
         R = np.array([matrix_of_rpy(*each) for each in 2 * spread * given[:, 3:]]) @ home
         found = inverse(robot.case, p, R)
-        closed = found.closed & ~found.singular
+        closed = found.closed
         if closed.mean() >= _ENOUGH:
             break
     turned = float(np.abs(found.rotations[closed] - home).max(initial=0.0))
@@ -77,7 +77,7 @@ def ranges_of(robot: Kinematics, samples: Samples) -> tuple[Range, ...]:
     poses = robot.transform.poses(samples.positions, samples.rotations)
     points = np.array([robot.point(*each) for each in zip(poses, samples.unknowns, strict=True)])
     function = ca.Function("margins", [robot.z], [ca.densify(ca.vertcat(*[each.margin for each in limits]))])
-    margins = values_at(function, points)[0][:, :, 0]
+    margins: FloatArray = values_at(function, points)[0][:, :, 0]
 
     def bounds(k: int, sense: float) -> list[float]:
         """Return the bounds below (sense 1) or above (sense -1) a coordinate."""

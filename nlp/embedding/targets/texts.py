@@ -60,7 +60,9 @@ def zero_words(robot: Kinematics, order: Sequence[int]) -> str:
         text = f"{units.text(zero, drive.dimension)} {sign} q" if zero else f"{sign} q".removeprefix("+ ")
         joints.setdefault(text, []).append(f"{joint} (actuator {markdown_text(drive.name)})")
     shown = "; ".join(f"{text} for {', '.join(names)}" for text, names in joints.items())
-    measured = "the length of the leg" if "leg_length" in robot.robot.measures else "the actuator's coordinate from home"
+    measured = (
+        "the length of the leg" if "leg_length" in robot.robot.measures else "the actuator's coordinate from home"
+    )
     return f"the coordinates of the joints are {shown}. In the case, q is {measured}."
 
 
