@@ -24,21 +24,22 @@ def write(case: Case) -> dict[str, str]:
     """Return the callback, the class and a description of the patch.
 
     Raises:
-        CaseError: the robot does not have three translations in closed form.
+        CaseError: the robot does not have three translations.
         InputError: an actuator coordinate is not known.
     """
     fault = _fault(Kinematics(case))
     if fault:
         raise CaseError("--target", fault, TARGET, case.source)
     library = library_of(case, length="mm", angle="rad")
-    robot = library.robot
+    robot, names = library.robot, library.names
     name = identifier(case.name)
     texts = {
-        **library.names,
+        **names,
         "name": name,
         "library": library.whole,
         "turns": str([each.dimension is Dimension.ANGLE for each in robot.drives]),
         "letters": "abc",
+        "state": f"    double u[{names['KIN']}_STATE];\n    {names['kin']}_start(u);\n" if robot.unknowns else "",
         "distance": printed(float(f"{_CHECKED * robot.size:.2g}")),
     }
     return {
@@ -59,9 +60,6 @@ def _fault(robot: Kinematics) -> str:
     if robot.coordinates != (0, 1, 2) or turned > TOLERANCE:
         angle = units.text(turned, Dimension.ANGLE)
         return f"Klipper moves robots of 3 translations: this platform turns by {angle} or more"
-    if robot.unknowns:
-        own = f"{robot.unknowns} joint coordinates of this robot have none"
-        return f"Klipper computes one motor alone, in closed form: {own}"
     if robot.forward is None:
         return "Klipper needs forward kinematics, and the actuators of this robot do not determine the pose"
     return ""
@@ -103,7 +101,11 @@ def _readme(case: Case, robot: Kinematics, name: str) -> str:
         f"A patch for Klipper: copy `kin_{name}.c` into `klippy/chelper` and `{name}.py` into `klippy/kinematics`, and "
         "add the lines of `chelper.patch.md`. Klipper compiles the file at its next start."
     )
-    more = (
+    slow = (
+        "Joint coordinates without a closed form are followed from call to call, each motor for itself: about 2 us a call on "
+        "a desktop computer, so keep the step rate below 20,000 steps a second.\n\n"
+    )
+    more = (slow if robot.unknowns else "") + (
         "`homing_start` is a position from which every endstop is reached. Angles are within half a turn of home.\n\n"
         f"```ini\n[printer]\nkinematics: {name}\nhoming_start: x, y, z\n"
         "position_min: x, y, z\nposition_max: x, y, z\n\n"

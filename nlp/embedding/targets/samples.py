@@ -73,7 +73,7 @@ def ranges_of(robot: Kinematics, samples: Samples) -> tuple[Range, ...]:
     limits = limits_of(robot)
     q = robot.transform.coordinates(samples.coordinates)
     if not limits or not len(q):
-        return (Range(None, None),) * q.shape[1]
+        return (Range(None, None),) * len(robot.drives)
     poses = robot.transform.poses(samples.positions, samples.rotations)
     points = np.array([robot.point(*each) for each in zip(poses, samples.unknowns, strict=True)])
     function = ca.Function("margins", [robot.z], [ca.densify(ca.vertcat(*[each.margin for each in limits]))])
@@ -86,5 +86,5 @@ def ranges_of(robot: Kinematics, samples: Samples) -> tuple[Range, ...]:
         return [float(each) for each in offsets.mean(axis=0)[constant]]
 
     return tuple(
-        Range(max(bounds(k, 1.0), default=None), min(bounds(k, -1.0), default=None)) for k in range(q.shape[1])
+        Range(max(bounds(k, 1.0), default=None), min(bounds(k, -1.0), default=None)) for k in range(len(robot.drives))
     )
