@@ -5,12 +5,14 @@ Expected numbers are those of LinuxCNC's modules, or of geometry by bisection, a
 """
 
 import ctypes
+import importlib
 import math
 import re
 import shutil
 import subprocess
+import sys
 import tomllib
-from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -23,7 +25,9 @@ from generated import COMPILERS, needs_compiler, run
 from kinematics_library import typical_case
 from test_kinematics_c import ANKLE, LINEAR, ROTARY, case_of
 
+from screwsynth.models.statics import driven_joints
 from screwsynth.nlp import Case, CaseError, InputError, inverse
+from screwsynth.nlp.case.controllertable import ControllerTable
 from screwsynth.nlp.case.robotcase import read_robot_case
 from screwsynth.nlp.embedding.kinematics import Kinematics, matrix_of_rpy
 from screwsynth.nlp.embedding.targets import TARGETS, Request, export_kinematics
@@ -33,7 +37,10 @@ pytestmark = needs_compiler
 
 HEADERS = Path(__file__).parents[1] / "controllers"
 #: Flags of LinuxCNC's build, and the functions that its real-time mathematics declares.
-LINUXCNC = ["-std=gnu11", "-O2", "-Wall", "-Wextra", "-Werror", "-Wframe-larger-than=2560", "-fno-builtin-sin", "-fno-builtin-cos"]
+LINUXCNC = [
+    "-std=gnu11", "-O2", "-Wall", "-Wextra", "-Werror", "-Wframe-larger-than=2560", "-fno-builtin-sin", "-fno-builtin-cos",
+    "-fno-builtin-sincos",
+]  # fmt: skip
 LIBM = {
     "sin", "cos", "tan", "sqrt", "fabs", "atan", "atan2", "asin", "acos", "exp", "pow", "fmin", "fmax", "fmod", "round",
     "ceil", "floor",
@@ -87,11 +94,6 @@ def table_of(files: dict[str, str]) -> str:
 def with_table(case: Case, table: str) -> Kinematics:
     """Return the kinematics of a case with a table of conventions."""
     assert case.model.actuators
-    from dataclasses import replace  # noqa: PLC0415
-
-    from screwsynth.models.statics import driven_joints  # noqa: PLC0415
-    from screwsynth.nlp.case.controllertable import ControllerTable  # noqa: PLC0415
-
     own = ControllerTable.model_validate(tomllib.loads(table)["controller"]).read(case.model, case.units)
     own.check(driven_joints(case.model), case.units)
     return Kinematics(replace(case, controller=own))
@@ -267,7 +269,7 @@ def test_limits_become_those_of_joints() -> None:
     assert " A-70:10 " in files["config.g"]
 
 
-def delta_text(angles: tuple[float, ...], more: tuple[float, ...], unit: str, up: str = "z") -> str:
+def delta_text(angles: tuple[float, ...], more: tuple[float, ...], unit: str) -> str:
     """Return the robot file of a rotary Delta with limbs at angles, and knees that are farther outwards."""
     text = f"""
 name = "delta"
@@ -383,7 +385,8 @@ class Module:
         run(COMPILERS[0], *flags, "-c", self.source, "-o", "module.o", where=folder)
         shown = run("nm", "-u", "module.o", where=folder).split()
         self.needed = set(shown) - {"U"}
-        hal = "int hal_init(const char *n) { return n != 0; } int hal_ready(int c) { return c; } int hal_exit(int c) { return c; }"
+        same = "(int c) { return c; }"
+        hal = f"int hal_init(const char *n) {{ return n != 0; }} int hal_ready{same} int hal_exit{same}"
         (folder / "hal.c").write_text(hal, encoding="utf-8")
         run(COMPILERS[0], *flags, "-shared", "-fPIC", self.source, "hal.c", "-lm", "-o", "module.so", where=folder)
         self.loaded = ctypes.CDLL(str(folder / "module.so"))
@@ -461,25 +464,40 @@ def test_module_of_linuxcnc_with_rotations(name: str, tmp_path: Path) -> None:
             assert rates[: module.count, k] == pytest.approx(slope, abs=1e-6 * size)
 
 
-def klipper(case: Case, folder: Path) -> tuple[ctypes.CDLL, ModuleType, str]:
+def klipper(case: Case, folder: Path, patch: pytest.MonkeyPatch) -> tuple[ctypes.CDLL, ModuleType, str]:
     """Return Klipper's step generator as a library, and its class as a module."""
     files = export_kinematics(case, "", "klipper-patch")
     (source,) = (name for name in files if name.endswith(".c"))
     name = source.removeprefix("kin_").removesuffix(".c")
-    (folder / source).write_text(files[source], encoding="utf-8")
+    for file in (source, f"{name}.py"):
+        (folder / file).write_text(files[file], encoding="utf-8")
     flags = f"-O2 -Wall -Wextra -Werror -shared -fPIC -I{HEADERS / 'klipper'}".split()
-    run("gcc", *flags, source, "-lm", "-o", "chelper.so", where=folder)
-    library = ctypes.CDLL(str(folder / "chelper.so"))
+    run("gcc", *flags, source, "-lm", "-o", "steps.so", where=folder)
+    library = ctypes.CDLL(str(folder / "steps.so"))
     getattr(library, f"{name}_stepper_alloc").restype = ctypes.c_void_p
-    module = ModuleType(name)
-    module.__dict__["__file__"] = f"{name}.py"
-    exec(
-        compile(files[f"{name}.py"].replace("import chelper\nimport stepper\n", ""), f"{name}.py", "exec"),
-        module.__dict__,
+    declared = re.findall(r"^    .*?(\w+)\(.*\);$", files["chelper.patch.md"], re.MULTILINE)
+    assert len(declared) == 3
+    assert all(hasattr(library, each) for each in declared)
+    for path in (HEADERS / "klipper", folder):
+        patch.syspath_prepend(str(path))
+    for module in ("chelper", "stepper", name):
+        patch.delitem(sys.modules, module, raising=False)
+    importlib.import_module("chelper").libraries.append(library)
+    return library, importlib.import_module(name), name
+
+
+def tool_head(home: Array) -> tuple[Any, Any]:
+    """Return Klipper's tool head and configuration, as far as kinematics need them."""
+    values = {"homing_start": home.tolist(), "position_min": [-50.0] * 3, "position_max": [50.0] * 3}
+    config = SimpleNamespace(
+        getsection=lambda name: name,
+        get_printer=lambda: SimpleNamespace(register_event_handler=lambda *_: None),
+        getfloat=lambda _name, default, **_: default,
+        getfloatlist=lambda name, **_: values[name],
+        error=ValueError,
     )
-    for line in re.findall(r"^    (.*\(.*\);)$", files["chelper.patch.md"], re.MULTILINE):
-        assert line.split("(")[0].split()[-1].lstrip("*") in files[source]
-    return library, module, name
+    head = SimpleNamespace(get_trapq=lambda: None, get_max_velocity=lambda: (100.0, 1000.0), Coord=lambda *each: each)
+    return head, config
 
 
 class Stepper(ctypes.Structure):
@@ -494,7 +512,7 @@ class Stepper(ctypes.Structure):
 
 @pytest.mark.skipif(not shutil.which("gcc"), reason="gcc is not installed")
 @pytest.mark.parametrize("name", ["rotary", "uneven"])
-def test_step_generator_of_klipper(name: str, tmp_path: Path) -> None:
+def test_step_generator_of_klipper(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Callback and class: coordinates of inverse kinematics; out of reach, the last value stays and moves are refused.
 
     With a longer arm, passive joints have no closed form.
@@ -502,7 +520,7 @@ def test_step_generator_of_klipper(name: str, tmp_path: Path) -> None:
     uneven = robot_case(delta_text((0, 120, 240), (0, 0.5, 0), "mm"), tmp_path)
     case = uneven if name == "uneven" else case_of(IN_MM, "rotary")
     assert (Kinematics(case).unknowns > 0) == (name == "uneven")
-    library, module, name = klipper(case, tmp_path)
+    library, module, name = klipper(case, tmp_path, monkeypatch)
     home = Kinematics(case).home[9:12]
     positions = home + np.random.default_rng(0).uniform(-3, 3, (20, 3))
     found = inverse(case, positions)
@@ -518,13 +536,12 @@ def test_step_generator_of_klipper(name: str, tmp_path: Path) -> None:
 
         for p, q in zip(positions, found.coordinates, strict=True):
             assert at(p) == pytest.approx(q[motor], abs=1e-10)
-        line = np.array([at(home + [-3, 2, 1], 0.003 * k) for k in range(2001)])
+        line = np.array([at(home + np.array([-3, 2, 1]), 0.003 * k) for k in range(2001)])
         assert np.abs(np.diff(line)).max() < 3 * np.abs(np.diff(line)).mean() < 3 * 0.003
         last = at(positions[-1])
         for point in (np.array([0, 0, -100.0]), np.array([math.nan, 0, 0])):
             assert at(point) == last
-    own = printer(library, module, tmp_path)
-    kinematics = module.load_kinematics(*own(home))
+    kinematics = module.load_kinematics(*tool_head(home))
     steppers = dict(zip(("stepper_a", "stepper_b", "stepper_c"), found.coordinates[0], strict=True))
     assert kinematics.calc_position(steppers) == pytest.approx(positions[0].tolist(), abs=1e-9)
 
@@ -543,67 +560,6 @@ def test_step_generator_of_klipper(name: str, tmp_path: Path) -> None:
         with pytest.raises(ValueError, match="reach"):
             kinematics.check_move(move(home, np.array(end)))
     assert kinematics.get_status(0.0)["homed_axes"] == "xyz"
-
-
-def printer(library: ctypes.CDLL, module: ModuleType, folder: Path) -> Callable[[Array], tuple[Any, Any]]:
-    """Give a class of Klipper's the modules that it imports; returns a tool head and a configuration."""
-    assert folder.exists()
-
-    class Rail:
-        def __init__(self, config: str, *, units_in_radians: bool) -> None:
-            assert units_in_radians
-            self.name = config
-
-        def get_name(self) -> str:
-            return self.name
-
-        def get_homing_info(self) -> SimpleNamespace:
-            return SimpleNamespace(position_endstop=0.0)
-
-        def get_range(self) -> tuple[float, float]:
-            return -1.2, 1.2
-
-        def setup_itersolve(self, name: str, motor: int) -> None:
-            assert getattr(library, name)(motor)
-
-        def get_steppers(self) -> list[Any]:
-            return []
-
-        def set_position(self, position: Any) -> None:  # noqa: ANN401 - three numbers
-            assert len(position) == 3
-
-    def new(kind: str, given: Any = 3) -> Any:  # noqa: ANN401 - as in cffi
-        assert kind in ("double[]", "double[3]")
-        count = given if isinstance(given, int) else len(given)
-        return (ctypes.c_double * count)(*([] if isinstance(given, int) else given))
-
-    class Calls:
-        def __getattr__(self, name: str) -> Any:  # noqa: ANN401
-            def call(*arguments: Any) -> int:  # noqa: ANN401
-                given = [ctypes.c_double(each) if isinstance(each, float) else each for each in arguments]
-                return int(getattr(library, name)(*given))
-
-            return call
-
-    module.__dict__["chelper"] = SimpleNamespace(get_ffi=lambda: (SimpleNamespace(new=new), Calls()))
-    module.__dict__["stepper"] = SimpleNamespace(PrinterRail=Rail)
-
-    def made(home: Array) -> tuple[Any, Any]:
-        values = {"homing_start": home.tolist(), "position_min": [-50.0] * 3, "position_max": [50.0] * 3}
-        events = SimpleNamespace(register_event_handler=lambda *_: None)
-        config = SimpleNamespace(
-            getsection=lambda name: name,
-            get_printer=lambda: events,
-            getfloat=lambda _name, default, **_: default,
-            getfloatlist=lambda name, **_: values[name],
-            error=ValueError,
-        )
-        head = SimpleNamespace(
-            get_trapq=lambda: None, get_max_velocity=lambda: (100.0, 1000.0), Coord=lambda *each: each
-        )
-        return head, config
-
-    return made
 
 
 DRIVER = """

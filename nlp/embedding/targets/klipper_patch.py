@@ -102,8 +102,8 @@ def _readme(case: Case, robot: Kinematics, name: str) -> str:
         "add the lines of `chelper.patch.md`. Klipper compiles the file at its next start."
     )
     slow = (
-        "Joint coordinates without a closed form are followed from call to call, each motor for itself: about 2 us a call on "
-        "a desktop computer, so keep the step rate below 20,000 steps a second.\n\n"
+        "Joint coordinates without a closed form are followed from call to call, each motor for itself. A call takes "
+        "about 2 us on a desktop computer: keep the rate below 20,000 steps a second.\n\n"
     )
     more = (slow if robot.unknowns else "") + (
         "`homing_start` is a position from which every endstop is reached. Angles are within half a turn of home.\n\n"
