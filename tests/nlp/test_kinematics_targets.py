@@ -38,8 +38,8 @@ pytestmark = needs_compiler
 HEADERS = Path(__file__).parents[1] / "controllers"
 #: Flags of LinuxCNC's build, and the functions that its real-time mathematics declares.
 LINUXCNC = [
-    "-std=gnu11", "-O2", "-Wall", "-Wextra", "-Werror", "-Wframe-larger-than=2560", "-fno-builtin-sin", "-fno-builtin-cos",
-    "-fno-builtin-sincos",
+    "-std=gnu11", "-O2", "-Wall", "-Wextra", "-Werror", "-Wframe-larger-than=2560", "-fno-builtin-sin",
+    "-fno-builtin-cos", "-fno-builtin-sincos",
 ]  # fmt: skip
 LIBM = {
     "sin", "cos", "tan", "sqrt", "fabs", "atan", "atan2", "asin", "acos", "exp", "pow", "fmin", "fmax", "fmod", "round",
