@@ -26,7 +26,7 @@ are in :mod:`screwsynth.models` with the rest of the screw algebra.
 from screwsynth.nlp import __version__ as __version__
 from screwsynth.nlp.system.lazynames import lazy_names
 
-# The public names stand in ``__init__.pyi``.
+# ``__init__.pyi`` lists the public names.
 __all__, __getattr__ = lazy_names("screwsynth", "screwsynth", __file__)
 
 

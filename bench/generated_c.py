@@ -266,7 +266,7 @@ def versions() -> str:
     found = [name for name in ("gcc", CORTEX_M7.compilers[0]) if shutil.which(name)]
     lines = [output(Path(), name, "--version").splitlines()[0] for name in found]
     cores, load = os.cpu_count(), os.getloadavg()[0]
-    return f"{', '.join(lines)}; {' '.join(FLAGS)}; {cores} cores, load {load:.1f} at the begin."
+    return f"{', '.join(lines)}; {' '.join(FLAGS)}; {cores} cores, load {load:.1f} at the beginning."
 
 
 def counts_of(builds: list[Build]) -> list[str]:

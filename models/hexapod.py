@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
-from typing import Literal, NamedTuple, TypeAlias
+from typing import Annotated, Literal, NamedTuple, TypeAlias
 
 import casadi as ca
 from casadi import SX
@@ -21,7 +21,11 @@ from .legs import legged_platform
 from .model import Model, ModelError
 from .parts import Dimension, Leg, Parameter, PoseSymbols
 
-Symmetry: TypeAlias = Literal["none", "mirror", "threefold", "threefold-mirror"]
+Symmetry: TypeAlias = Annotated[
+    Literal["none", "mirror", "threefold", "threefold-mirror"],
+    '"none": all legs are given; "mirror": legs 1, 3, 4 and their reflections in y = 0; "threefold": legs 1, 2 and '
+    'their rotations by 120 and 240 deg about z; "threefold-mirror": leg 1, its reflection, and the rotations of both',
+]
 
 
 class _Image(NamedTuple):

@@ -187,7 +187,9 @@ def _check_names(model: Model) -> None:
         raise _model_error(model, f"names appear twice: {', '.join(repeated)}")
     for unknown in model.unknowns:
         if not -math.inf < unknown.lower < unknown.upper < math.inf:
-            raise _model_error(model, f"unknown {unknown.name!r} needs finite bounds, lower below upper")
+            raise _model_error(
+                model, f"the unknown joint coordinate {unknown.name!r} needs finite bounds, the lower below the upper"
+            )
 
 
 def _check_shapes(model: Model) -> None:
@@ -195,8 +197,10 @@ def _check_shapes(model: Model) -> None:
     for parameter in model.parameters:
         if len(parameter.typical) not in (1, 3):
             raise _model_error(model, f"parameter {parameter.name!r} should have 1 or 3 components")
-        if len(parameter.starter or parameter.typical) != len(parameter.typical):
-            raise _model_error(model, f"parameter {parameter.name!r} needs as many components in a starter case")
+        starter, typical = len(parameter.starter or parameter.typical), len(parameter.typical)
+        if starter != typical:
+            fault = f"parameter {parameter.name!r} needs {typical} components in its starter value, as in its typical"
+            raise _model_error(model, f"{fault} value; got {starter}")
     expected: list[tuple[str, SX, tuple[int, int]]] = [
         ("pose rotation", model.pose.rotation, (3, 3)),
         ("pose position", model.pose.position, (3, 1)),

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Literal
+from typing import Annotated, Literal, TypeAlias
 
 import casadi as ca
 from casadi import SX
@@ -28,12 +28,20 @@ _THIRD = 2 * math.pi / 3
 _SIXTH = math.pi / 3
 _HEXAGON = math.radians(30)
 
+#: Option of the robot with its meaning.
+Layout: TypeAlias = Annotated[
+    Literal["aligned", "octahedral"],
+    '"aligned": platform pairs above base pairs, as in the paper; "octahedral": platform pairs turned by 60 deg, as in '
+    "most hexapods",
+]
 
-def stewart_gough(*, layout: Literal["aligned", "octahedral"] = "aligned") -> Model:
+
+def stewart_gough(*, layout: Layout = "aligned") -> Model:
     """Return the 6-6 Stewart-Gough platform with joints on two circles (Fig. 3).
 
     Args:
-        layout: ``aligned`` as in the paper, or ``octahedral``.
+        layout: ``aligned``: platform pairs above base pairs, as in the paper. ``octahedral``: platform pairs turned by
+            60 degrees, as in most hexapods.
 
     Raises:
         ModelError: the layout is unknown.
@@ -63,8 +71,24 @@ def stewart_gough(*, layout: Literal["aligned", "octahedral"] = "aligned") -> Mo
         parameters=(
             Parameter("x1", x1, Dimension.LENGTH, "radius of the base's joint circle", (12.0,), 0.0),
             Parameter("x2", x2, Dimension.LENGTH, "radius of the platform's joint circle", (8.0,), 0.0),
-            Parameter("x3", x3, Dimension.ANGLE, "half angle of a base pair", (math.radians(20),), 0.0, _HEXAGON),
-            Parameter("x4", x4, Dimension.ANGLE, "half angle of a platform pair", (math.radians(8),), 0.0, _HEXAGON),
+            Parameter(
+                "x3",
+                x3,
+                Dimension.ANGLE,
+                "half angle of a base pair (0: triangle, 30 deg: hexagon)",
+                (math.radians(20),),
+                0.0,
+                _HEXAGON,
+            ),
+            Parameter(
+                "x4",
+                x4,
+                Dimension.ANGLE,
+                "half angle of a platform pair (0: triangle, 30 deg: hexagon)",
+                (math.radians(8),),
+                0.0,
+                _HEXAGON,
+            ),
         ),
         pose=pose,
         home=(0.0, 0.0, 35.0),

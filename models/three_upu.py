@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Annotated, Literal, TypeAlias
 
 import casadi as ca
 from casadi import SX
@@ -28,10 +28,18 @@ from .wrench import couple_about
 
 _THIRD = 2 * math.pi / 3
 
+#: Options of the robot with their meanings.
+Axes: TypeAlias = Annotated[
+    Literal["free", "limb", "snu", "tsai"],
+    'axes of the upper universal joints; "free": both are parameters; "limb": the first is a parameter, the second is '
+    'perpendicular to it and to the limb; "snu", "tsai": the first is radial or tangential, the second as in "limb"',
+]
+Azimuth: TypeAlias = Annotated[
+    Literal["fixed", "free"], '"free": the azimuth of the first limb is a parameter; all limbs rotate with it'
+]
 
-def three_upu(
-    *, axes: Literal["free", "limb", "snu", "tsai"] = "free", azimuth: Literal["fixed", "free"] = "fixed"
-) -> Model:
+
+def three_upu(*, axes: Axes = "free", azimuth: Azimuth = "fixed") -> Model:
     """Return the 3-UPU robot (Section 4.4).
 
     Args:

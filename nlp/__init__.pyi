@@ -36,6 +36,9 @@ from .case.pose import Pose as Pose
 from .case.pose import Rotation as Rotation
 from .case.pose import along_screw as along_screw
 from .case.pose import over_grid as over_grid
+from .case.positionsets import HalfSpace as HalfSpace
+from .case.positionsets import PositionSet as PositionSet
+from .case.positionsets import SetKind as SetKind
 from .case.reader import PoseRows as PoseRows
 from .case.reader import case_from_tables as case_from_tables
 from .case.reader import load_case as load_case

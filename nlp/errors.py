@@ -14,7 +14,11 @@ A failed search raises no exception: the solution has its outcome as status.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
+
+#: Name of a load without a name in the case file.
+_UNNAMED_LOAD = re.compile(r"load \d+\b")
 
 
 class ScrewsynthError(Exception):
@@ -140,3 +144,8 @@ def _text_of(value: object) -> str:
     """Return a value as in a case file, with at most 60 characters."""
     text = f'"{value}"' if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else f"{value}"
     return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def load_words(name: str) -> str:
+    """Return a load in words: ``load "cutting"``, or the name itself for a load without a name, such as ``load 1``."""
+    return name if _UNNAMED_LOAD.match(name) else f'load "{name}"'

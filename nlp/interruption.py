@@ -168,7 +168,10 @@ def within(seconds: float | None, part: float = 1.0) -> Iterator[None]:
 
 
 def one_search(seconds: float | None = None) -> AbstractContextManager[None]:
-    """Limit the work of a block as one search: to its fraction of the remaining time, and to ``seconds``."""
+    """Limit the time of a block that is one search.
+
+    The limit is the fraction of the remaining time that the enclosing block allows one search, and ``seconds``.
+    """
     left, part = seconds_left(), _end.get().part
     return within(left * part if seconds is None else min(seconds, left * part))
 

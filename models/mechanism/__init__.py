@@ -1,4 +1,4 @@
-"""Robots of any topology in numbers: links and joints as a graph, at one configuration.
+"""Robots of any topology with numerical dimensions: links and joints as a graph, at one configuration.
 
 The modules in order, each of which imports only those before it: ``topology`` (connected parts, bridges, spanning
 trees), ``graph`` (links, joints and couplings, and checks of a mechanism), ``motions`` (links and screws at any

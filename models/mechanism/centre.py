@@ -1,8 +1,8 @@
 """Centre of a member: reference point of its couples, by the rules of robots given joint by joint.
 
 In this order: the mean of several passive joints on the platform; the passive spherical joint, or the common point of
-three successive passive hinges, nearest the platform; that of two hinges; the point of the last passive joint; without
-one, that of the last joint. A nested loop between two hinges ends their sequence.
+three successive passive hinges, nearest the platform; the common point of two hinges; the point of the last passive
+joint; without a passive joint, the point of the last joint. A nested loop between two hinges ends their sequence.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def _last(mechanism: Mechanism, member: MemberGraph) -> tuple[int, ...]:
 
 
 def _rows(mechanism: Mechanism, member: MemberGraph) -> list[list[int]]:
-    """Return the passive joints common to all paths from base to platform, in sequences of directly successive ones."""
+    """Return the passive joints common to all paths from base to platform, in groups of successive joints."""
     base, platform, edges = _ends(mechanism, member)
     path = bridges_between(base, platform, edges)
     rows: list[list[int]] = [[]]

@@ -1,8 +1,8 @@
 """Closure of a mechanism's loops at a pose of its platform, at actuator coordinates, or at both.
 
-From the stated configuration, pose and actuators move along a straight line to the requested ones. At each step,
-Newton's method with damped least-norm steps and a line search closes the loops. Steps are halved if it does not
-converge, or if a joint moves too far.
+From the stated configuration, pose and actuators move along a straight line to the requested pose and actuator
+coordinates. At each step, Newton's method with damped least-norm steps and a line search closes the loops. Steps are
+halved if it does not converge, or if a joint moves too far.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def close(
     Args:
         mechanism: the mechanism.
         position: (3,) origin of the platform frame in the world frame, length; None for a free pose.
-        rotation: (3, 3) rotation of the platform frame in the world frame; None for the stated one.
+        rotation: (3, 3) rotation of the platform frame in the world frame; None for the stated rotation.
         actuators: joint coordinates by name, radians or length from the stated configuration. Other joints move as the
             loops require; without a pose, other actuators stay at rest.
 
@@ -85,9 +85,8 @@ def close(
     path = _Path(motions, held, pose)
     at, values = path.closed(motions.stated, 0.0)
     if at is None:
-        raise MechanismError(
-            "", f"its loops are open by {values[0]:.3g} at the stated configuration, with no closed one nearby"
-        )
+        fault = f"its loops are open by {values[0]:.3g} at the stated configuration"
+        raise MechanismError("", f"{fault}, and no closed configuration was found nearby")
     spectra = [values]
     done, step = 0.0, 1.0 if pose is None and not any(held.values()) else _FIRST
     while done < 1.0:
@@ -139,7 +138,7 @@ def closed_nearby(motions: Motions, near: Coordinates) -> ClosedMechanism | None
 
 
 class _Path:
-    """Equations along a path: loops, couplings, and the platform's pose.
+    """Equations along a path of the mechanism: loops, couplings, and the platform's pose.
 
     Args:
         motions: kinematics of the mechanism.
@@ -169,7 +168,7 @@ class _Path:
         return Equations(np.concatenate(rows), np.vstack(derivatives))
 
     def closed(self, at: Coordinates, part: float) -> tuple[Coordinates | None, FloatArray]:
-        """Return the coordinates of closed loops near given ones.
+        """Return the coordinates near given coordinates at which the loops are closed.
 
         Returns:
             Coordinates, with the singular values of the derivatives; or None, with the remaining residual.
@@ -189,7 +188,7 @@ class _Path:
         return found, np.asarray(singular, dtype=np.float64)
 
     def reduced(self, at: Coordinates, part: float) -> tuple[Coordinates, FloatArray, FloatArray]:
-        """Return the coordinates of least residual near given ones, with the residual and its derivatives."""
+        """Return the coordinates of least residual near given coordinates, with the residual and its derivatives."""
         descent = Descent(
             self.motions, lambda there, placed: self.equations(there, placed, part), self._free, _EXACT, stuck=_STUCK
         )
@@ -249,7 +248,7 @@ def _closed(path: _Path, at: Coordinates, nearness: float, points: int) -> Close
 
 
 def _placed(mechanism: Mechanism, placed: Placed, coordinates: Mapping[str, float]) -> Mechanism:
-    """Return a mechanism stated at another of its configurations."""
+    """Return the mechanism stated at the configuration with the given joint coordinates."""
 
     def link(each: MechanismLink) -> MechanismLink:
         there = placed.displacements[each.name]

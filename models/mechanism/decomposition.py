@@ -5,8 +5,8 @@ of another shape become networks, each with the reason.
 
 For members, links are merged if a locked joint, a weld, or a joint fixed by couplings connects them. Without base and
 platform, each connected part of the rest is a member; so is a joint directly between base and platform. Coupled joints
-belong to one member. The same with free actuators is a *limb* here, of any shape. Links with a single joint are left
-out.
+belong to one member. A part that is connected in this way with free actuators is called a *limb* here; it may have any
+shape. Links with a single joint are left out.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .topology import Classes, parts
 
 
 class GraphJoint(NamedTuple):
-    """Joint in the graph.
+    """Joint of a mechanism as an edge of its graph.
 
     Attributes:
         one, other: names of the links of the joint.
@@ -63,7 +63,7 @@ class Decomposition:
 
     Attributes:
         limbs: limbs in the order of their first joints.
-        networks: other parts between base and platform.
+        networks: parts between base and platform that are not limbs.
     """
 
     limbs: tuple[LimbPaths, ...]
@@ -123,7 +123,7 @@ def _joined(
 def without_dangling(
     ends: Sequence[tuple[str, str]], joints: Sequence[int], roots: tuple[str, str], coupled: Collection[int]
 ) -> list[int]:
-    """Return joints without those of dangling links, which have a single joint, removed repeatedly."""
+    """Return joints without those of links with a single joint; such links are removed repeatedly."""
     kept = list(joints)
     while True:
         count: dict[str, int] = {}
@@ -141,7 +141,7 @@ def without_dangling(
 def _limb(
     ends: Sequence[tuple[str, str]], part: Sequence[int], joints: Sequence[GraphJoint], roots: tuple[str, str]
 ) -> LimbPaths | str:
-    """Return the limb of a connected part, or the reason why it is not a limb."""
+    """Return a connected part of the graph as a limb, or the reason why it is not a limb."""
     root, top = roots
     first = [k for k in part if root in ends[k]]
     if len(first) > 1:
@@ -181,13 +181,13 @@ def _limb(
 
 @dataclass(frozen=True)
 class MemberGraph:
-    """Member in the graph.
+    """Member of a mechanism, by the joints of its graph.
 
     Attributes:
         limb: number of the member's limb, from 0.
         passive: indices of the joints that move with locked actuators.
-        joints: indices of these joints and of all others on which the member's motions with free actuators depend:
-            those of the limb without the passive joints of other members.
+        joints: indices of all joints on which the member's motions with free actuators depend: those of the limb
+            without the passive joints of other members.
         on_platform: indices of the passive joints on the platform, or on a link locked to it.
     """
 

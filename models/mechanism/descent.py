@@ -22,7 +22,7 @@ CLOSED = 1e-11
 
 
 class Reached(NamedTuple):
-    """Coordinates of a mechanism with the values of equations.
+    """Iterate: joint coordinates of a mechanism, with the values of the equations there.
 
     Attributes:
         at: joint coordinates.
@@ -54,7 +54,7 @@ class Descent:
 
     Args:
         motions: kinematics of the mechanism.
-        equations: function of coordinates and of the mechanism at these.
+        equations: function of coordinates and of the mechanism at these coordinates; it returns the equations.
         free: indices of the variable coordinates.
         closed: largest left side at a solution.
         size: (f,) scale of each variable coordinate, for least-norm steps.

@@ -29,7 +29,7 @@ class MechanismError(ValueError):
     """Error of an inconsistent mechanism.
 
     Attributes:
-        place: link or joint in words; empty for the whole mechanism.
+        place: name of the link or joint with the fault, in words; empty for the whole mechanism.
         fault: description of the fault, as a clause.
     """
 
@@ -66,7 +66,7 @@ class MechanismJoint:
         name: unique name among the joints.
         kind: kind of the joint: ``R``, ``P``, ``H``, ``S`` or ``weld``.
         inner: name of the link on the base side.
-        outer: name of the other link; the coordinate is its motion relative to ``inner``.
+        outer: name of the other link; the joint coordinate is the motion of ``outer`` relative to ``inner``.
         point: (3,) centre of the joint, or point of its axis, in the world frame, length.
         axis: (3,) unit vector along the axis in the world frame; zero for ``S`` and ``weld``.
         pitch: translation per radian of an ``H`` joint, length.
@@ -158,7 +158,8 @@ def check_mechanism(mechanism: Mechanism) -> None:
     if not any(joint.actuated for joint in mechanism.joints):
         raise MechanismError("actuated", "is given at no joint; at least one actuator must drive the robot")
     path = bridges_between(mechanism.base, mechanism.platform, edges)
-    if path.is_open:
+    coupled = {name for coupling in mechanism.couplings for name, _ in coupling.factors}
+    if path.is_open and not any(mechanism.joints[k].name in coupled for k in path.bridges):
         names = _listing([mechanism.joints[k].name for k in path.bridges])
         fault = f"is {mechanism.platform!r}, at the end of an open chain ({names}); a parallel robot has closed loops"
         raise MechanismError("platform", fault)
@@ -171,7 +172,7 @@ def _check_joint(joint: MechanismJoint, links: Iterable[str]) -> None:
         if name not in links:
             raise MechanismError(place, f"has the link {name!r}, which is unknown; links are {_listing(links)}")
     if joint.inner == joint.outer:
-        raise MechanismError(place, f"connects the link {joint.inner!r} to itself; two links are needed")
+        raise MechanismError(place, f"connects the link {joint.inner!r} to itself; two different links are needed")
     points = [joint.point] if joint.outer_point is None else [joint.point, joint.outer_point]
     if not all(np.isfinite(point).all() for point in points):
         raise MechanismError(place, "has a point that is not finite")

@@ -91,7 +91,7 @@ def robot_tables(mechanism: Mechanism) -> dict[str, Any]:
 
 
 def _head(mechanism: Mechanism) -> dict[str, Any]:
-    """Return name and home."""
+    """Return the first robot-file tables of a mechanism: name and home."""
     return {"name": mechanism.name or "robot", "home": _numbers(mechanism.link(mechanism.platform).position)}
 
 
@@ -105,7 +105,7 @@ def _decomposed(mechanism: Mechanism) -> tuple[list[_FileJoint], Decomposition]:
 
 
 def _sentence(network: Network, joints: Sequence[_FileJoint]) -> tuple[str, str]:
-    """Return place and fault of a part that is not a limb."""
+    """Return the joints of a part that is not a limb, and the reason, as place and fault of a message."""
     names = [name for k in network.joints for name in joints[k].names]
     shown = ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
     return f"joints {shown}", f"do not form a limb with branches: {network.reason}"
@@ -131,7 +131,10 @@ def _named(table: dict[str, Any], taken: set[str]) -> dict[str, Any]:
 
 
 def _outward(table: dict[str, Any], is_outward: bool) -> dict[str, Any]:
-    """Return a joint's table from the base side on; a reversed axis keeps the sign of the coordinate."""
+    """Return a joint's table in the order from base to platform.
+
+    For a joint stated in the other order, the axis is reversed, so that the coordinate keeps its sign.
+    """
     if is_outward:
         return table
     turned = dict(table)

@@ -26,14 +26,14 @@ def null_space(matrix: FloatArray) -> FloatArray:
 
 
 def column_space(matrix: FloatArray, scale: float) -> FloatArray:
-    """Return an orthonormal basis (m, r) of the column span, without rounding errors of a scale."""
+    """Return an orthonormal basis (m, r) of the column span; singular values far below ``scale`` count as 0."""
     left, values, _ = np.linalg.svd(matrix, full_matrices=False)
     return np.asarray(left[:, : rank_of(values, scale)])
 
 
 @dataclass(frozen=True, eq=False)
 class AllowedTwists:
-    """Motions of a mechanism's platform and joints.
+    """Motions that free joints allow: twists of the platform and rates of the joints.
 
     Attributes:
         twists: (6, r) basis of the platform twists: angular velocity, then velocity of the platform point at the world
@@ -70,7 +70,7 @@ class Mobility:
 
         Args:
             joints: indices of the joints in use; welds are always in use.
-            free: indices of the joints among these that move.
+            free: indices, among ``joints``, of the joints that move.
         """
         own = [k for k, each in enumerate(self.mechanism.joints) if k in joints or each.kind == "weld"]
         widths = [WIDTHS[self.mechanism.joints[k].kind] if k in free else 0 for k in own]

@@ -93,7 +93,7 @@ class Placed(NamedTuple):
 
     Attributes:
         displacements: (4, 4) displacement of each link from the stated configuration, by name.
-        joints: (4, 4) relative displacement of each joint at its coordinates.
+        joints: (4, 4) displacement of each joint's outer link relative to its inner link.
         screws: (6, k) current unit screws of each joint's axes, as twists about the world origin.
         twists: (6, n) twists of each link for unit rates of the tree's coordinates, by name.
     """
@@ -130,7 +130,7 @@ class Motions:
         mechanism: the mechanism.
 
     Attributes:
-        columns: slice of the coordinates of each joint.
+        columns: slice of each joint's coordinates among all coordinates.
         count: number of coordinates.
         size: reference length of coordinates and residuals.
     """
@@ -192,7 +192,7 @@ class Motions:
         return Equations(np.concatenate(residuals), np.vstack(slopes))
 
     def towards(self, placed: Placed, link: str, target: FloatArray) -> Equations:
-        """Return the error of a link relative to a displacement (4, 4), in the form of :meth:`loops`."""
+        """Return the error of a link's displacement relative to a target (4, 4), as for a joint in :meth:`loops`."""
         origin = next(each.position for each in self.mechanism.links if each.name == link)
         residual = self._mismatch(placed.displacements[link] @ inverse(target), moved(target, origin))
         return Equations(residual, self.at_point(placed.twists[link], moved(target, origin)))

@@ -1,4 +1,4 @@
-"""Generic ranks of a mechanism, and singularities by comparison of its ranks with them."""
+"""Generic ranks of a mechanism, and singularities: configurations with other ranks."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class SingularityType(enum.Enum):
 
 
 class MechanismSingularity(NamedTuple):
-    """Singularity: type, and number of the member from 0; None for the whole robot."""
+    """Singularity: its type, and the index of the singular member; None for the whole robot."""
 
     type: SingularityType
     member: int | None = None
@@ -77,7 +77,7 @@ def generic_ranks(mechanism: Mechanism, seed: int = 0) -> RobotRanks:
     """
     ranks = [wrenches_of(each).ranks for each in closed_configurations(mechanism, seed=seed)]
     if not ranks:
-        raise MechanismError("", "no closed configuration near this one: check that the mechanism is mobile")
+        raise MechanismError("", "found no closed configuration near this one: check that the mechanism is mobile")
     passive = _most_frequent([each.passive for each in ranks])
     every = _most_frequent([each.all for each in ranks])
     # A limb with dependent joints has more wrenches than generic, and would raise the ranks.
@@ -98,7 +98,7 @@ def singularities_of(ranks: RobotRanks, generic: RobotRanks) -> tuple[MechanismS
 
     Args:
         ranks: ranks at the configuration.
-        generic: ranks at almost all configurations.
+        generic: generic ranks: those at almost all configurations.
     """
     found: list[MechanismSingularity] = []
     for k, passive in enumerate(ranks.passive):

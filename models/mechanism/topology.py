@@ -24,7 +24,7 @@ class Classes(Generic[Node]):
             self.merge(*pair)
 
     def find(self, name: Node) -> Node:
-        """Return the representative of the set with a name."""
+        """Return the representative name of the set that contains a name."""
         while self._parents[name] != name:
             self._parents[name] = self._parents[self._parents[name]]
             name = self._parents[name]
@@ -58,7 +58,7 @@ def reached(start: Node, edges: Iterable[Edge[Node]]) -> set[Node]:
 
 
 def parts(nodes: Iterable[Node], edges: Sequence[Edge[Node]]) -> list[list[Node]]:
-    """Return the connected parts of a set of nodes, in the nodes' order, by edges with both ends in the set."""
+    """Return the connected parts of a set of nodes, in the order of the nodes; only edges inside the set count."""
     allowed = list(nodes)
     own = set(allowed)
     inner = [edge for edge in edges if edge[0] in own and edge[1] in own]

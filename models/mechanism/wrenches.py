@@ -31,7 +31,7 @@ def scaled_twists(twists: FloatArray, centre: FloatArray, length: float) -> Floa
 
 @dataclass(frozen=True, eq=False)
 class MemberWrenches:
-    """Member with locked actuators.
+    """Wrenches and allowed twists of a member with locked actuators.
 
     Attributes:
         limb: number of the member's limb, from 1.
@@ -40,7 +40,7 @@ class MemberWrenches:
         centre: (3,) centre of the member in the world frame, length.
         projector: (6, 6) projector ``P_k`` in scaled coordinates about the centre.
         actuation: (6, a) ``rho``: resisted component of each actuator's screw, in scaled coordinates.
-        relations: (r, a) equations of the actuator rates only, which the member's loops impose.
+        relations: (r, a) equations that the member's loops impose on actuator rates only.
         rows: (d, 6) orthonormal basis of the member's wrenches as rows of ``J``, with work rate ``row . (v, w)``;
             constraint wrenches first.
         kinds: kind of each row.
@@ -82,9 +82,9 @@ class RobotRanks:
     """Ranks of a robot at a configuration.
 
     Attributes:
-        passive: dimension of ``T_k`` of each member.
-        all: dimension of the twists of each member with free actuators.
-        jacobian: rank of all rows.
+        passive: dimension of each member's ``T_k``, the twists that it allows with locked actuators.
+        all: dimension of the twists that each member allows with free actuators.
+        jacobian: rank of J, of all rows.
         constraints: rank of the constraint wrenches of all limbs.
     """
 
@@ -136,7 +136,7 @@ class RobotWrenches:
         return float(sum(float(np.sum(member.resisted(chi) ** 2)) for member in self.members))
 
     def rates(self, twist: Sequence[float] | FloatArray) -> Mapping[str, float]:
-        """Return the actuator rates for a twist (6,), by least squares over what each limb resists.
+        """Return the actuator rates for a twist (6,), by least squares over the resisted components of all limbs.
 
         A rate is infinite for an actuator that cannot drive the platform, and NaN if the twist does not determine it.
         The fit is exact for a possible platform twist.

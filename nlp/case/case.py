@@ -296,6 +296,13 @@ class Case(Whole, Shown):
         return {"": "", "workspace": "over the workspace", "path": "along the path"}[self.limits_over]
 
     @property
+    def uses_forces(self) -> bool:
+        """True if actuator forces under loads are limited or minimised."""
+        return any(each.needs_loads for each in self.limits) or any(
+            task.measure and MEASURES[task.measure][0] for task in self.tasks
+        )
+
+    @property
     def is_optimised_everywhere(self) -> bool:
         """True if the worst value over the workspace or path is optimised, not that at the stated poses only."""
         return bool(self.limits_over) and (bool(self.tasks[0].measure) or self.worst_everywhere)
@@ -392,9 +399,8 @@ def _check_choices(case: Case) -> None:
         if item.is_direction:
             raise CaseError(key, "must be numbers or { min, max }: a direction cannot have { values }")
         if len(case.tasks) > 1 and case.method is Method.AVERAGE:
-            fault = (
-                f"must be 'weighted-sum' or 'worst-case': {key} has catalogue values, and an average is not one of them"
-            )
+            fault = f"must be 'weighted-sum' or 'worst-case': {key} has catalogue values"
+            fault += ", and an average of catalogue values need not be a catalogue value"
             raise CaseError("combine.method", fault, case.method.value)
         if case.method is Method.WORST_CASE and len({task.sense for task in case.tasks}) > 1:
             fault = f"must be 'weighted-sum': {key} has catalogue values, and tasks have both senses"
@@ -416,7 +422,8 @@ def _check_measure(case: Case, task: Task) -> None:
         fault = "must be one at most with objective.minimise, which does not optimise the F of tasks"
         raise CaseError("task", f"{fault}, got {len(case.tasks)}")
     if task.sense is not Sense.MIN:
-        raise CaseError("task[0].sense", "must be 'min' with objective.minimise; or remove the task", "max")
+        fault = 'objective.minimise needs no task: remove [[task]], or give it sense = "min"'
+        raise CaseError("task[0].sense", fault, "max")
     needs_loads, needs_motion = MEASURES[task.measure]
     if needs_loads and not case.loading.loads:
         raise CaseError(key, "needs a table [[load]] with a load on the platform", task.measure)

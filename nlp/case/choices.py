@@ -107,5 +107,5 @@ def check_no_catalogue(case: Case) -> None:
         CaseError: a dimension has catalogue values.
     """
     for each in catalogue_dimensions(case):
-        fault = "has catalogue values, and only solve, report, export and certify choose one: fix it with --set"
+        fault = "has catalogue values, and only solve, report, export and certify choose one: set a value with --set"
         raise CaseError(f"robot.parameters.{each.name}", fault, source=case.source)

@@ -55,7 +55,10 @@ def in_world(workspace: Workspace, pose: Pose) -> Workspace:
         angles = list(turns.angles)
         angles[along.place] = _moved(angles[along.place], along.sign * angle)
         turns = replace(turns, angles=tuple(angles))
-    return replace(workspace, position=position, turns=turns, about_pose=False)
+    positions = workspace.position_set
+    if positions is not None:
+        positions = positions.moved(np.array([ends_of(each)[0] for each in pose.position]))
+    return replace(workspace, position=position, turns=turns, about_pose=False, position_set=positions)
 
 
 def check_excursions(workspace: Workspace, pose: Pose, count: int, units: Units) -> None:
@@ -163,6 +166,16 @@ def _faults(workspace: Workspace, pose: Pose, units: Units, *, by_ranges: bool) 
         if is_compared and (least > high + slack or most < low - slack):
             ranges = [_span(each, units, dimension) for each in (stated, at)]
             yield OutsideWorkspace(f"{name} is {ranges[0]} there and {ranges[1]} at the pose", low <= 0 <= high)
+    positions = workspace.position_set
+    if positions is not None and not any(isinstance(each, Free) for each in pose.position):
+        # Coordinates that the shape does not couple were compared before.
+        used, point = list(positions.coordinates), np.array(workspace.middle)
+        point[used] = np.array([ends_of(each)[0] for each in pose.position])[used]
+        if not positions.contains(point):
+            place = ", ".join(units.text(value, Dimension.LENGTH) for value in point[used].tolist())
+            yield OutsideWorkspace(
+                f"the position at the pose ({place}) is outside of its {positions.kind.value}", False
+            )
 
 
 def _angles(turns: Turns, rotation: Rotation) -> list[tuple[str, Value, Value]]:

@@ -18,7 +18,7 @@ from casadi import SX
 from ...models import Model
 from ...models.parts import PlatformMotions
 from ...models.values import dataclass
-from ..errors import CaseError, nearest
+from ..errors import CaseError, load_words, nearest
 from ..units import Units
 from .checks import check_real, check_size, check_vector
 
@@ -256,7 +256,9 @@ class Loading(NamedTuple):
             single = next(self._signed([load], []))
             if not any(_does_work(single, each) for each in model.generic.motions):
                 key, value = _given_part(load)
-                fault = f"load {load.name!r} does no work in any motion of {model.name!r}, so no actuator balances it"
+                fault = (
+                    f"{load_words(load.name)} does no work in any motion of {model.name!r}, so no actuator balances it"
+                )
                 allowed = _working_parts(model.generic.motions)
                 raise CaseError(f"load[{index}]{key}", f"{fault}; give {allowed}", value)
 

@@ -38,6 +38,10 @@ class PathFile:
         angles: convention of the angles A, B and C in the G-code.
         between: interpolation of rotations between two points, ``"angles"`` or ``"slerp"``; None for the file's
             default.
+        flavour: ``"linuxcnc"`` or ``"printer"``, rules of reading the G-code.
+        end_of_file: If true, the end of the file ends the G-code, which then needs no M2, M30 or %.
+        part: number of the part of a printer's G-code that is the path, from 1; None for the only part.
+        macros: names of a printer's macros that the G-code may call; their motions are not in the file.
         place: (6,) pose of the path's frame in the world frame: position, then roll, pitch and yaw, radians; each fixed
             or free.
         has_limits: If true, a solve finds a design without singularities and violated limits along the whole path.
@@ -52,6 +56,10 @@ class PathFile:
     between: Literal["angles", "slerp"] | None = None
     place: tuple[Value, ...] = (0.0,) * 6
     has_limits: bool = False
+    flavour: Literal["linuxcnc", "printer"] = "linuxcnc"
+    end_of_file: bool = False
+    part: int | None = None
+    macros: Sequence[str] = ()
 
     def check(self, units: Units) -> None:
         """Check the pose of the path's frame.
@@ -91,5 +99,9 @@ class PathFile:
             "offsets": {name: list(origin) for name, origin in self.offsets.items()} or None,
             "angles": None if self.angles == PathFile.angles else self.angles,
             "between": self.between,
+            "flavour": None if self.flavour == PathFile.flavour else self.flavour,
+            "end_of_file": self.end_of_file or None,
+            "part": self.part,
+            "macros": list(self.macros) or None,
             "place": place if any(value is not None for value in place.values()) else None,
         }

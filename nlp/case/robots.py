@@ -113,12 +113,14 @@ class ModelOption(NamedTuple):
         allowed: description of the allowed values.
         default: default value as TOML; None if the option must be given.
         choices: allowed values, if they can be listed; otherwise empty.
+        meaning: meaning of the values; empty if the robot's function does not annotate it.
     """
 
     name: str
     allowed: str
     default: str | None
     choices: tuple[Any, ...] = ()
+    meaning: str = ""
 
 
 def model_options(name: str) -> list[ModelOption]:
@@ -130,12 +132,20 @@ def model_options(name: str) -> list[ModelOption]:
     declared, hints = _signature(name, _find_function(name))
     rows = []
     for key, option in declared.items():
-        hint = hints.get(key, Any)
+        hint, meaning = _meaning_of(hints.get(key, Any))
         choices = typing.get_args(hint) if typing.get_origin(hint) is typing.Literal else ()
         allowed = listing(map(option_text, choices)) if choices else getattr(hint, "__name__", str(hint))
         default = None if option.default is option.empty else option_text(option.default)
-        rows.append(ModelOption(key, allowed, default, choices))
+        rows.append(ModelOption(key, allowed, default, choices, meaning))
     return rows
+
+
+def _meaning_of(hint: object) -> tuple[Any, str]:
+    """Return the type of an option, and its meaning: the first text of its ``Annotated``, or empty."""
+    if typing.get_origin(hint) is not typing.Annotated:
+        return hint, ""
+    kind, *notes = typing.get_args(hint)
+    return kind, next((note for note in notes if isinstance(note, str)), "")
 
 
 def _signature(name: str, function: RobotFunction) -> tuple[Mapping[str, inspect.Parameter], dict[str, Any]]:
@@ -146,7 +156,7 @@ def _signature(name: str, function: RobotFunction) -> tuple[Mapping[str, inspect
     """
     try:
         declared = inspect.signature(function).parameters
-        hints = typing.get_type_hints(function)
+        hints = typing.get_type_hints(function, include_extras=True)
     except Exception as error:  # a hint may name anything
         raise _error(name, function, f"{type(error).__name__}: {error}") from error
     for key, option in declared.items():

@@ -102,7 +102,7 @@ class Later:
 
 
 #: Parts of a pydantic location that are branches of a union, or mark a key of a table, and not keys of the file.
-_TAGS = ("<number>", "<range>", "<values>", "<list>", "<pose>", "<poses>", "<word>", "<lists>", "[key]")
+_TAGS = ("<number>", "<range>", "<values>", "<list>", "<pose>", "<poses>", "<word>", "<lists>", "<set>", "[key]")
 
 
 def fault_of(key: str, fault: str) -> PydanticCustomError:
@@ -164,7 +164,7 @@ _MISSING = {
     **dict.fromkeys(("quantity", "source"), "give text in quotes"),
     **dict.fromkeys(("translation", "acceleration"), "give a list of 3 numbers"),
     "count": "give a whole number",
-    "length": "give a length by which moments are divided",
+    "length": "give a length by which moments are divided, such as the radius of the platform",
     "position": "give a list of 3, each a number or { min, max }",
     "reproduced": "give true or false",
     "robot": "add a table [robot]",

@@ -1,4 +1,4 @@
-"""Workspace of a case: a box of poses over which a robot is verified. Angles are radians."""
+"""Workspace of a case: a box of poses, or a set inside it, over which a robot is verified. Angles are radians."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from ..errors import CaseError
 from ..units import Units
 from .checks import check_value
 from .pose import Free, Value, ends_of, written_value
+from .positionsets import PositionSet, SetKind
 
 if TYPE_CHECKING:
     from .toml import TomlValue
@@ -67,10 +68,11 @@ class DependentCoordinate:
 
 @dataclass(frozen=True)
 class Workspace:
-    """Box of poses.
+    """Box of poses, or the poses in it with their position in a set.
 
     Attributes:
-        position: (3,) origin of the platform frame in the world frame, length; each coordinate fixed or free.
+        position: (3,) origin of the platform frame in the world frame, length; each coordinate fixed or free. With a
+            set of positions it is the box that encloses the set.
         turns: rotations of the platform.
         has_limits: If true, a solve finds a design without singularities and violated limits at every pose of the box.
         about_pose: If true, position and rotation are excursions from the stated pose of the case, see
@@ -78,6 +80,7 @@ class Workspace:
         dependent: dependent coordinates of the robot, which a verification adds; empty in a case. A range stated for a
             dependent coordinate is a limit; a number is the start of the search for its value.
         held: indices of independent coordinates with a fixed value; empty without dependent coordinates.
+        position_set: set of positions; None for all positions of the box.
 
     Raises:
         CaseError: a coordinate is not allowed; the message names its key in a case file.
@@ -89,12 +92,34 @@ class Workspace:
     about_pose: bool = False
     dependent: tuple[DependentCoordinate, ...] = ()
     held: tuple[int, ...] = ()
+    position_set: PositionSet | None = None
 
     def __post_init__(self) -> None:
         if len(self.position) != 3:
             fault = f"must be a list of 3, each a number or {{ min, max }}, got {len(self.position)}"
             raise CaseError("workspace.position", fault)
         object.__setattr__(self, "position", tuple(self.position))
+
+    @classmethod
+    def within(
+        cls,
+        positions: PositionSet,
+        turns: Turns | None = None,
+        has_limits: bool = False,
+        *,
+        about_pose: bool = False,
+    ) -> Workspace:
+        """Return the workspace with all positions of a set; see the attributes of the class."""
+        return cls(positions.box, turns or Turns(), has_limits, about_pose, position_set=positions)
+
+    @property
+    def middle(self) -> tuple[float, float, float]:
+        """Position from which searches begin: the middle of the box, or a position inside the set."""
+        if self.position_set is None:
+            x, y, z = (sum(ends_of(each)) / 2 for each in self.position)
+        else:
+            x, y, z = self.position_set.middle.tolist()
+        return x, y, z
 
     def check(self, units: Units) -> None:
         """Check the ranges of all coordinates.
@@ -105,6 +130,8 @@ class Workspace:
         Raises:
             CaseError: a coordinate is out of its range, or the box is a single pose.
         """
+        if self.position_set is not None:
+            self.position_set.check(units)
         for index, value in enumerate(self.position):
             check_value(value, f"workspace.position[{index}]", Dimension.LENGTH, units)
         turns, key = self.turns, "workspace.rotation"
@@ -154,9 +181,10 @@ class Workspace:
             digits: formatter of numbers.
         """
         dependent, groups = [each.index for each in self.dependent], dict[str, list[str]]()
-        is_any = self.turns.kind is TurnKind.ANY_AXIS
+        is_any, chosen_set = self.turns.kind is TurnKind.ANY_AXIS, self.position_set
+        shaped = () if chosen_set is None else shaped_coordinates(chosen_set)
         for k, value in self.ranged:
-            if k in dependent or (is_any and k >= 3):
+            if k in dependent or (is_any and k >= 3) or k in shaped:
                 continue
             dimension = Dimension.LENGTH if k < 3 else Dimension.ANGLE
             low, high = (digits(units.shown(each, dimension)) for each in ends_of(value))
@@ -166,7 +194,8 @@ class Workspace:
             dimension = Dimension.LENGTH if k < 3 else Dimension.ANGLE
             at = f"= {digits(units.shown(ends_of(values[k])[0], dimension))} {units.label(dimension)}"
             groups.setdefault(at, []).append(self.names[k])
-        texts = [f"{', '.join(names)} {ends}".rstrip() for ends, names in groups.items()]
+        texts = [] if chosen_set is None else [chosen_set.words(units, digits)]
+        texts += [f"{', '.join(names)} {ends}".rstrip() for ends, names in groups.items()]
         if is_any:
             most = max(map(abs, ends_of(self.turns.angles[0])))
             angle = f"{digits(units.shown(most, Dimension.ANGLE))} {units.label(Dimension.ANGLE)}"
@@ -212,9 +241,16 @@ class Workspace:
             rotation = {"axis": list(turns.axis), "angle": angles[0]}
         return {
             "about": "pose" if self.about_pose else None,
-            "position": [_written(value, units, Dimension.LENGTH) for value in self.position],
+            "position": [_written(value, units, Dimension.LENGTH) for value in self.position]
+            if self.position_set is None
+            else self.position_set.to_table(units),
             "rotation": None if turns == Turns() else rotation,
         }
+
+
+def shaped_coordinates(positions: PositionSet) -> tuple[int, ...]:
+    """Return the indices of the coordinates with ranges that follow from the shape of a set of positions."""
+    return {SetKind.BOX: (), SetKind.DISC: (0, 1), SetKind.RING: (0, 1)}.get(positions.kind, (0, 1, 2))
 
 
 def _negative(value: Value) -> Value:

@@ -11,21 +11,10 @@ from ..units import Units
 from .checks import check_direction
 from .pathfile import PLACE, Convention, PathFile
 from .pose import internal_value
+from .positionsets import PositionSet
+from .positiontables import PositionSetTable, Span
 from .table import FileName, Table, Value, Vector, fault_of
 from .workspace import TURNS, TurnKind, Turns, Workspace
-
-
-class SpanTable(Table):
-    """Range of a coordinate of the pose."""
-
-    min: FiniteFloat = Field(description="smallest value of the coordinate")
-    max: FiniteFloat = Field(description="largest value of the coordinate, above min")
-
-
-Span = Annotated[
-    Annotated[FiniteFloat, Tag("<number>")] | Annotated[SpanTable, Tag("<range>")],
-    Discriminator(lambda value: "<range>" if isinstance(value, dict | SpanTable) else "<number>"),
-]
 
 
 class WorkspaceRotationTable(Table):
@@ -63,15 +52,20 @@ class WorkspaceRotationTable(Table):
 
 
 class WorkspaceTable(Table):
-    """Workspace: a box of poses, all of which the robot must reach."""
+    """Workspace: a box of poses, or a set of positions with rotations; the robot must reach all of its poses."""
 
     about: Literal["world", "pose"] = Field(
         default="world",
         description="world: position and rotation in the world frame; pose: excursions from the pose of the case, "
         "along and about the axes of the world frame",
     )
-    position: Annotated[list[Span], Field(min_length=3, max_length=3)] = Field(
-        description="origin of the platform frame: three coordinates, each a number or { min, max }"
+    position: Annotated[
+        Annotated[Annotated[list[Span], Field(min_length=3, max_length=3)], Tag("<list>")]
+        | Annotated[PositionSetTable, Tag("<set>")],
+        Discriminator(lambda value: "<set>" if isinstance(value, dict | PositionSetTable) else "<list>"),
+    ] = Field(
+        description="origin of the platform frame: three coordinates, each a number or { min, max }; or a set of "
+        "positions: { disc }, { ring }, { cylinder }, { ball }, { cone }, { box }, each with half_spaces if needed"
     )
     rotation: WorkspaceRotationTable | None = Field(
         default=None, description="rotations of the platform; if left out, no rotation"
@@ -87,8 +81,12 @@ class WorkspaceTable(Table):
         Raises:
             CaseError: the axis of rotation is zero.
         """
+        turns, about_pose = _turns(self.rotation, units), self.about == "pose"
+        if isinstance(self.position, PositionSetTable):
+            positions: PositionSet = self.position.read(units)
+            return Workspace.within(positions, turns, has_limits, about_pose=about_pose)
         position = [internal_value(value, units, Dimension.LENGTH) for value in self.position]
-        return Workspace(position, _turns(self.rotation, units), has_limits, about_pose=self.about == "pose")
+        return Workspace(position, turns, has_limits, about_pose=about_pose)
 
 
 Six = Annotated[list[FiniteFloat], Field(min_length=6, max_length=6)]
@@ -126,6 +124,19 @@ class PathTable(Table):
         description="interpolation of rotations between two points: linear angles or slerp; the default depends on "
         "the file type",
     )
+    flavour: Literal["linuxcnc", "printer"] = Field(
+        default=PathFile.flavour, description="rules of reading the G-code: those of LinuxCNC or of 3D printers"
+    )
+    end_of_file: bool = Field(
+        default=False, description="true if the end of the file ends the G-code, which then needs no M2, M30 or %"
+    )
+    part: Annotated[int, Field(ge=1)] | None = Field(
+        default=None, description="part of a printer's G-code that is the path; the only part if left out"
+    )
+    macros: list[Annotated[str, Field(min_length=1)]] = Field(
+        default_factory=list,
+        description="names of a printer's macros that the G-code may call; their motions are not in the file",
+    )
     place: PlaceTable | None = Field(
         default=None, description="pose of the path's frame in the world frame; if left out, both frames are equal"
     )
@@ -138,7 +149,7 @@ class PathTable(Table):
             units: units of the file.
             has_limits: If true, a solve must satisfy the limits along the whole path.
         """
-        given, stated = dict(self), self.place
+        given, stated = dict(self) | {"macros": tuple(self.macros)}, self.place
         given["place"] = tuple(
             0.0 if stated is None else internal_value(getattr(stated, name), units, dimension)
             for name, dimension in PLACE.items()

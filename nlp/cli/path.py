@@ -37,6 +37,10 @@ def path(
     offset: pathoptions.Offsets = None,
     angles: pathoptions.Angles = None,
     between: pathoptions.BetweenPoints = None,
+    flavour: pathoptions.Flavour = None,
+    end_of_file: pathoptions.EndOfFile = False,
+    part: pathoptions.Part = None,
+    macro: pathoptions.Macros = None,
     gap: options.RangeGap = 1e-3,
     time: Annotated[float | None, options.time("600 if left out; 120 with --range")] = None,
     json_file: options.JsonFile = None,
@@ -76,6 +80,7 @@ def path(
     sampling = _sampling(step, within, is_written=csv_file is not None)
     _refuse_elsewhere(
         {"--along": along, "--unit": unit, "--offset": offset, "--angles": angles, "--between": between}
+        | {"--flavour": flavour, "--end-of-file": end_of_file or None, "--part": part, "--macro": macro}
         | {"--step": step, "--within": within, "--plot": plot, "--html": html, "--proof": proof},
         most,
         ranges=ranges,
@@ -85,7 +90,9 @@ def path(
     (loaded, text, inputs), chosen = options.read_changed_case(case, settings, of)
     files = options.Outputs(json=json_file, csv=csv_file, plot=plot, html=html, proof=proof)
     own = PathOptions() if along is not None or ranges or loaded.path is None else options_of(loaded.path)
-    choices = pathoptions.PathChoices(unit, start, offset or [], angles, between).over(own)
+    choices = pathoptions.PathChoices(
+        unit, start, offset or [], angles, between, flavour, end_of_file, part, macro or ()
+    ).over(own)
     if ranges:
         from .axisranges import show_ranges
 

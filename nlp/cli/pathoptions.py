@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 from . import options
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from ..path.options import PathOptions
 
 AlongFile = Annotated[
@@ -30,6 +32,18 @@ BetweenPoints = Annotated[
     str | None,
     options.text("--between", "angles|slerp", "Rotation between points: linear in the angles, or about one axis"),
 ]
+Flavour = Annotated[
+    str | None,
+    options.text(
+        "--flavour", "linuxcnc|printer", "Rules of reading G-code: LinuxCNC's, the default, or those of 3D printers"
+    ),
+]
+EndOfFile = Annotated[bool, options.flag("--end-of-file", "The end of the file ends the G-code, without M2, M30 or %")]
+Part = Annotated[int | None, options.whole("--part", "Part of a printer's G-code between homings or macros, from 1", 1)]
+Macros = Annotated[
+    list[str] | None,
+    options.several("--macro", "NAME", "Macro that a printer's G-code may call; its motions are not checked"),
+]
 
 
 class PathChoices(NamedTuple):
@@ -40,11 +54,15 @@ class PathChoices(NamedTuple):
     offsets: list[str]
     angles: str | None
     between: str | None
+    flavour: str | None = None
+    end_of_file: bool = False
+    part: int | None = None
+    macros: Sequence[str] = ()
 
     @property
     def is_any(self) -> bool:
         """True if an option is given."""
-        return any(each not in (None, []) for each in self)
+        return any(each not in (None, [], (), False) for each in self)
 
     def over(self, own: PathOptions) -> PathOptions:
         """Return the options of a case, with the given options in their place.
@@ -61,7 +79,7 @@ class PathChoices(NamedTuple):
             try:
                 return [float(part) for part in text.split(",")]
             except ValueError:
-                raise InputError(f"{option} {text}: must be six numbers with commas: X,Y,Z,A,B,C") from None
+                raise InputError(f"{option} {text}: must be six numbers, separated by commas: X,Y,Z,A,B,C") from None
 
         found = dict(own.offsets)
         for each in self.offsets:
@@ -78,4 +96,8 @@ class PathChoices(NamedTuple):
             unit=own.unit if self.unit is None else self.unit,
             start=own.start if self.start is None else numbers("--start", self.start),
             offsets=found,
+            flavour=self.flavour or own.flavour,
+            end_of_file=self.end_of_file or own.end_of_file,
+            part=own.part if self.part is None else self.part,
+            macros=tuple(self.macros or own.macros),
         )

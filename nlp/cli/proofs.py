@@ -54,7 +54,7 @@ def proof_text(
     Args:
         target: file name; ``-`` is standard output.
         judged: the verdicts.
-        record: record of the searches; None without a proof.
+        record: recorder of the searches; None without a proof.
         text: text of the case file.
         quantities: requested quantities.
         leg_error: largest error of a leg length.
@@ -102,7 +102,7 @@ def path_proof_text(
         target: file name; ``-`` is standard output.
         case: the case.
         judged: the verdicts.
-        record: record of the searches; None without a proof.
+        record: recorder of the searches; None without a proof.
         text: text of the case file.
         premises: premises about the path.
     """
@@ -214,7 +214,11 @@ def _premises(case: Case, checked: VerifiedWorkspace) -> Iterator[str]:
     about = f" {' '.join(map(exact, turns.axis))}" if turns.kind.value == "axis" else ""
     position = ", ".join(f"{name} {span(each, length)}" for name, each in zip("xyz", workspace.position, strict=True))
     rotation = ", ".join(span(each, angle) for each in turns.angles)
-    if workspace.dependent:
+    if workspace.position_set is not None and not workspace.dependent:
+        chosen = workspace.set_words(case.units, exact)
+        turned = f"rotation by {turns.kind.value}{about}: {rotation} {case.units.label(angle)}"
+        yield f"poses: every {chosen}; {turned}"
+    elif workspace.dependent:
         chosen, names = workspace.set_words(case.units, exact), workspace.names
         following = ", ".join(names[each.index] for each in workspace.dependent)
         yield f"poses: every {chosen}; dependent: {following}"
@@ -243,6 +247,12 @@ def _path_premises(premises: PathPremises, path: ProgrammedPath, case: Case) -> 
     yield f"path: {premises.file}, {len(path):,} segment{'s' * (len(path) > 1)}{with_arcs}{placed}"
     choices = {"angles": premises.angles, "between": path.between.value, "unit before G20 or G21": premises.unit}
     choices |= {name: ", ".join(map(exact, each)) for name, each in premises.offsets.items()}
+    if premises.flavour != "linuxcnc":
+        choices |= {"flavour": premises.flavour, "part": None if premises.part is None else str(premises.part)}
+    choices |= {
+        "macros": ", ".join(premises.macros) or None,
+        "end": "end of the file" if premises.end_of_file else None,
+    }
     if premises.start is not None:
         choices["start"] = ", ".join(map(exact, premises.start))
     yield f"read with: {'; '.join(f'{name} {each}' for name, each in choices.items() if each is not None)}"

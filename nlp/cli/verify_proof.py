@@ -34,6 +34,10 @@ def verify_proof(
     offset: pathoptions.Offsets = None,
     angles: pathoptions.Angles = None,
     between: pathoptions.BetweenPoints = None,
+    flavour: pathoptions.Flavour = None,
+    end_of_file: pathoptions.EndOfFile = False,
+    part: pathoptions.Part = None,
+    macro: pathoptions.Macros = None,
     whole: options.ShowAll = False,
 ) -> None:
     """Check a proof file with independent code.
@@ -50,6 +54,10 @@ def verify_proof(
     of_path = {"--along": along, "--unit": unit, "--start": start, "--offset": offset} | {
         "--angles": angles,
         "--between": between,
+        "--flavour": flavour,
+        "--end-of-file": end_of_file or None,
+        "--part": part,
+        "--macro": macro,
     }
     is_given = {"--above": above is not None, "--all-assemblies": all_assemblies, "--leg-error": leg_error != 0}
     is_given |= {name: each not in (None, []) for name, each in of_path.items()}
@@ -74,7 +82,9 @@ def verify_proof(
     if isinstance(given.premises, Statement):
         lines: Iterable[Line] = _verify(given.premises, given.claims[0], loaded, above, all_assemblies=all_assemblies)
     elif isinstance(given.premises, PathPremises):
-        choices = pathoptions.PathChoices(unit, start, offset or [], angles, between)
+        choices = pathoptions.PathChoices(
+            unit, start, offset or [], angles, between, flavour, end_of_file, part, macro or ()
+        )
         if not _hold_path(given.premises, loaded, along, choices, is_own=case is not None):
             carried.append("path")
         lines = verified_path_lines(given, given.premises, loaded)

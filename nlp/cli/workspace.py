@@ -8,6 +8,8 @@ from . import contents, options
 from .progress import spinner, tell_workspace
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from matplotlib.figure import Figure
 
     from ..case.case import Case
@@ -16,6 +18,10 @@ if TYPE_CHECKING:
     from ..proof.workspace.proof_record import ProofRecord
     from ..proof.workspace.slices.slices import Slice
     from ..results.workspace import WorkspaceResult
+    from ..words.text import Line, TextTable
+
+#: Seconds for the table of free travel.
+_TRAVEL_TIME = 30.0
 
 
 def workspace(
@@ -28,7 +34,9 @@ def workspace(
     gap: options.RangeGap = 1e-3,
     time: Annotated[float | None, options.time("60 for the proofs if left out")] = None,
     leg_error: options.LegError = 0.0,
-    scale: Annotated[bool, options.flag("--scale", "Find the largest proved box, to 1 %")] = False,
+    scale: Annotated[
+        bool, options.flag("--scale", "Find the largest proved box, to 1 %, or radius, to 0.05 %")
+    ] = False,
     proof: options.ProofFile = None,
     jobs: options.Jobs = None,
     json_file: options.JsonFile = None,
@@ -71,7 +79,7 @@ def workspace(
         return evaluate_command(case, loaded, chosen, pose)
 
     files.deliver(
-        lambda: contents.workspace_summary(loaded, result, command),
+        lambda: [*contents.workspace_summary(loaded, result, command), *(_free_travel(loaded) if whole else ())],
         whole=whole,
         done=result.proved,
         json=lambda: result,
@@ -111,6 +119,26 @@ def _judge_with_progress(
         )
 
 
+def _free_travel(case: Case) -> Iterator[Line | TextTable]:
+    """Yield the table of free travel from the stated pose of a robot with six degrees of freedom."""
+    from ...models.statics import degrees_of_freedom
+    from ..errors import InputError
+    from ..proof.workspace.axis_ranges import axis_ranges
+    from ..results.axisranges import axis_ranges_result
+    from ..words.axisranges import axis_ranges_tables
+    from ..words.text import in_part
+
+    if degrees_of_freedom(case.model) < 6:
+        return
+    try:
+        found = axis_ranges(case, with_pairs=False, time_limit=_TRAVEL_TIME)
+    except InputError:  # the pose is free
+        return
+    if found.axes:
+        axes, _ = axis_ranges_tables(axis_ranges_result(found))
+        yield from in_part("free travel", [axes])
+
+
 def _slices(case: Case, files: options.Outputs) -> tuple[Slice, ...]:
     """Return the slices that the files show; empty for a page about a robot without slices.
 
@@ -141,5 +169,6 @@ def _worst(case: Case, result: WorkspaceResult, target: str | None) -> Figure:
 
     worst = worst_claim(result, case.tasks[0].sense)
     if worst is None:
-        raise InputError(f"--plot-pose {target}: no violation, and no worst value of a quantity, is known at a pose")
+        fault = "nothing to draw: no pose with a violation or with the worst value of a quantity is known"
+        raise InputError(f"--plot-pose {target}: {fault}")
     return contents.figure_of([contents.drawing_at(case, worst)])

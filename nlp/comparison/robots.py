@@ -206,7 +206,9 @@ def placed(case: Case, contender: Contender, factor: float, part: float, length:
     first, *further = (_moved_pose(pose, offset) for pose in case.poses)
     workspace = case.workspace
     if workspace is not None and not workspace.about_pose:
-        workspace = replace(workspace, position=_moved(workspace.position, offset))
+        positions = workspace.position_set
+        positions = None if positions is None else positions.moved(-offset)
+        workspace = replace(workspace, position=_moved(workspace.position, offset), position_set=positions)
     bare = replace(
         case,
         model=model,

@@ -314,7 +314,9 @@ class Kinematics:
                 _rank(each[np.ix_(rows, columns)]) for each in slopes
             ) == len(rows):
                 chosen.append(k)
-        if len(chosen) != len(columns) or not set(range(6)) <= set(columns):
+        # Else a motion of the platform remains in which neither actuators nor loops move.
+        determined = max(map(_rank, slopes)) == 6 + max(_rank(each[:, 6:]) for each in slopes)
+        if len(chosen) != len(columns) or not determined:
             return None
         return Choice(tuple(sorted(chosen)), tuple(columns))
 

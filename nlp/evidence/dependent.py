@@ -139,6 +139,11 @@ def dependent_of(case: Case, workspace: Workspace) -> Workspace:
     room = _WIDER * (high - low) + _LEAST * chart.size[:6]
     ends = chart.ends(low - room), chart.ends(high + room)
     dependent = tuple(DependentCoordinate(k, float(ends[0][k]), float(ends[1][k])) for k in found)
+    shaped = workspace.position_set
+    if shaped is not None and any(k in shaped.coordinates for k in found):
+        names = ", ".join(workspace.names[k] for k in found if k in shaped.coordinates)
+        fault = f"states {names} by its shape, which this robot does not control; state a range or a plane shape"
+        raise CaseError(f"workspace.position.{shaped.kind.value}", fault, source=case.source)
     return replace(workspace, dependent=dependent, held=tuple(k for k in independent if k not in chart.ranged))
 
 
@@ -277,7 +282,7 @@ class _Chart:
         ends = np.array([ends_of(each) for each in values])
         ends[3:] = np.tan(0.5 * ends[3:])
         self.half = 0.5 * (ends[:, 1] - ends[:, 0])
-        self.middle = np.concatenate([ends.mean(axis=1), np.zeros(u.numel())])
+        self.middle = np.concatenate([workspace.middle, ends[3:].mean(axis=1), np.zeros(u.numel())])
         length = robot_size(case, self.middle[:3].tolist())
         self.size = np.concatenate([[length] * 3, np.ones(3), system.sizes])
         self.ranged: list[int] = np.flatnonzero(self.half > _STILL * self.size[:6]).tolist()

@@ -77,13 +77,14 @@ def shown_values(nlp: Nlp, x: FloatArray, state: RobotState) -> Mapping[str, flo
     """
     case = nlp.case
     found: dict[str, float | Vector] = {}
-    for name, value in shown_parameters(case, state).items():
-        found[case.parameter_name(name)] = value
+    shown = shown_parameters(case, state)
     for parameter in case.model.parameters:
-        values = (case.units.shown(float(each), parameter.dimension) for each in state.parameters[parameter.name])
-        found |= dict(zip(case.component_names(parameter), values, strict=True))
+        value = shown[parameter.name]
+        found[case.parameter_name(parameter.name)] = value
+        components = value if isinstance(value, tuple) else (value,)
+        found |= dict(zip(case.component_names(parameter), components, strict=True))
     for prefix, pose in zip(case.pose_prefixes, stated_poses(nlp, x), strict=True):
-        shown = type(pose).of(pose, case.units)
-        found |= {f"{prefix}p_{axis}": value for axis, value in zip("xyz", shown.position, strict=True)}
-        found |= {f"{prefix}angle": shown.angle, f"{prefix}axis": shown.axis}
+        stated = type(pose).of(pose, case.units)
+        found |= {f"{prefix}p_{axis}": value for axis, value in zip("xyz", stated.position, strict=True)}
+        found |= {f"{prefix}angle": stated.angle, f"{prefix}axis": stated.axis}
     return MappingProxyType(found)

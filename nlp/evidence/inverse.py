@@ -281,8 +281,10 @@ class RobotFunctions:
             for k, owner in enumerate(each.owners)
         }
         self.actuators = tuple(each.name for each in drives)
-        if not set(self.actuators) <= set(known) or not drives:
-            raise InputError(f"inverse kinematics: robot {model.name!r} has no expression for an actuator coordinate")
+        unknown = [name for name in self.actuators if name not in known]
+        if unknown or not drives:
+            fault = f"no formula for the coordinate of actuator {unknown[0]}" if unknown else "no actuators"
+            raise InputError(f"inverse kinematics: robot {model.name!r} has {fault}")
         self.measures = tuple(known[name][0] for name in self.actuators)
         self.turning = [k for k, each in enumerate(drives) if each.dimension is Dimension.ANGLE]
         sizes = ca.Function("sizes", [model.symbols], [ca.vertcat(SX(0, 1), *[each.size for each in own])])

@@ -23,6 +23,7 @@ from ..program.pairs import pair_constraints, tightest_pairs, with_pairs_at
 from ..system.jsonvalues import Hidden, JsonObject, Known, Measure, Shown, Slope
 from ..units import rate_unit
 from .kkt import FEASIBLE, Linearisation, linearise, multipliers
+from .state import loses_forces
 
 #: First words of the names of constraints on actuator rates.
 _RATE = "actuator_rate actuator "
@@ -77,6 +78,8 @@ def unit_of_side(case: Case, name: str, dimension: Dimension) -> str:
 def measured_slack(nlp: Nlp, x: FloatArray, at: Linearisation, numbers: Sequence[float] | None = None) -> FloatArray:
     """Return the distances (k,) of a point from all sides, negative outside, with measured singular values.
 
+    At a singular point, the distances from limits on quantities under loads are NaN: actuator forces are undetermined.
+
     The constraints of a program estimate singular values and condition numbers on the safe side. An estimate may
     therefore violate a limit that the measured value satisfies.
 
@@ -93,7 +96,16 @@ def measured_slack(nlp: Nlp, x: FloatArray, at: Linearisation, numbers: Sequence
             numbers = measured_values(nlp, x) if numbers is None else numbers
             value = float(constraints[k].reading.to_value(SX(numbers[k])))
             slack[j] = -float(nlp.sides.sign[j] * (value - nlp.sides.limit[j]) * at.per_unit[j])
+    if loses_forces(nlp, x):
+        loaded = _loaded(nlp, constraints)
+        slack[[j for j, k in sides if k in loaded]] = np.nan
     return slack
+
+
+def _loaded(nlp: Nlp, constraints: Sequence[Constraint]) -> list[int]:
+    """Return the indices of the constraints by limits on quantities that depend on loads."""
+    prefixes = tuple(f"{limit.name}." for limit in nlp.case.limits if limit.needs_loads)
+    return [k for k, each in enumerate(constraints) if any(key.startswith(prefixes) for key in each.keys)]
 
 
 def measured_violation(nlp: Nlp, x: FloatArray) -> float:
@@ -134,7 +146,7 @@ def margins_of(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
             continue
         at_side, limit = _LimitSide(side.bound, key, nlp.stated_limit(j)), nlp.stated_limit(j)
         cost = float(gained[j] * constraint.reading.slope(limit)) if optimal else None
-        is_violated = bool(slack[j] < -FEASIBLE)
+        is_violated = not slack[j] >= -FEASIBLE
         value = measured[side.constraint]
         rows.append(_margin(nlp, constraint, at_side, value, active=j in active, violated=is_violated, cost=cost))
     known = set(nlp.pairs)
@@ -207,7 +219,9 @@ def _sides(item: BoundedConstraint) -> list[_LimitSide]:
 
 
 def _measured(nlp: Nlp, x: FloatArray, constraints: Sequence[Constraint], values: FloatArray) -> list[float]:
-    """Return the measured value of each limit, radians for angles; NaN for a constraint that is not a limit.
+    """Return the measured value of each limit, radians for angles.
+
+    The value is NaN for a constraint that is not a limit, and for a quantity under loads at a singular point.
 
     Args:
         nlp: the nonlinear program.
@@ -227,4 +241,7 @@ def _measured(nlp: Nlp, x: FloatArray, constraints: Sequence[Constraint], values
     for k, each in enumerate(constraints):
         if each.measure is not None and each.spectral is not None:
             measured[k] = each.measured_at((nlp.program.x, nlp.program.p), (x, nlp.arguments))
+    if loses_forces(nlp, x):
+        for k in _loaded(nlp, constraints):
+            measured[k] = float("nan")
     return measured

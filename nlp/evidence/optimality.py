@@ -27,6 +27,7 @@ from ..units import Units
 from .kkt import FEASIBLE, STATIONARY, Linearisation, correct_point, lagrangian_hessian, linearise, multipliers
 from .margins import unit_of_side
 from .singularities import is_passive_singular
+from .state import loses_forces
 
 #: Scaled multiplier below which an active side is weakly active.
 STRONG = 1e-9
@@ -56,6 +57,7 @@ class PointKind(enum.Enum):
     SADDLE = "saddle: stationary, but F improves along some direction"
     NOT_STATIONARY = "not stationary: F improves to first order"
     LIMB_SINGULAR = "no optimum: passive joints of a limb are dependent there, so that F jumps"
+    SINGULAR = "no optimum: J is singular there, so that the loads do not determine the actuator forces"
     INFEASIBLE = "infeasible: a limit is violated"
     UNDEFINED = "undefined: the robot's equations have no finite value there"
 
@@ -149,6 +151,8 @@ def examine(nlp: Nlp, x: FloatArray) -> Evidence:
         kind, eigenvalues, flat = _second_order_test(nlp, at, mu)
         if kind.is_optimum and any(is_passive_singular(nlp, x, pose) for pose in range(len(nlp.program.robots))):
             kind = PointKind.LIMB_SINGULAR
+        elif kind.is_optimum and loses_forces(nlp, x):
+            kind = PointKind.SINGULAR
     return Evidence(
         kind=kind,
         stationarity=stationarity,
@@ -291,7 +295,7 @@ def _step_on_optimal_set(nlp: Nlp, at: Linearisation, direction: FloatArray) -> 
 
 
 def _independent_directions(directions: FloatArray) -> list[FloatArray]:
-    """Return a sparse basis of vectors (n,) of the span of directions (k, n), ordered by first components."""
+    """Return a sparse basis of vectors (n,) of the span of directions (k, n), sorted by their first nonzero index."""
     _, sizes, rows = np.linalg.svd(directions, full_matrices=False)
     basis = echelon_basis(rows[sizes > _INDEPENDENT * sizes[0]])
     return sorted(np.where(np.abs(basis) > _NEGLIGIBLE, basis, 0.0), key=lambda row: int(np.argmax(row != 0)))

@@ -1,6 +1,7 @@
 """State of the robot at one point: pose, Jacobian, rates, F, rank and free twists."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from types import MappingProxyType
 from typing import Annotated
 
@@ -190,6 +191,18 @@ def loops_are_closed(nlp: Nlp, x: FloatArray) -> bool:
         return True
     states = (kernel(x, nlp.arguments) for kernel in nlp.program.kernels.robot_states)
     return all(float(np.abs(each.loops).max(initial=0.0)) <= CLOSED for each in states)
+
+
+def loses_forces(nlp: Nlp, x: FloatArray) -> bool:
+    """Return whether J is singular at a point (n,) of a case that limits or minimises actuator forces under loads.
+
+    The loads do not determine the actuator forces there, and next to the point the forces have no common limit.
+    """
+    if not nlp.case.uses_forces:
+        return False
+    with suppress(EvaluationError):  # a point without a Jacobian is refused for that
+        return any(evaluate(nlp, x, pose).is_singular for pose in range(len(nlp.program.robots)))
+    return False
 
 
 def stated_poses(nlp: Nlp, x: FloatArray) -> list[PlatformPose]:

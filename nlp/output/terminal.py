@@ -24,7 +24,7 @@ _Styled: TypeAlias = "list[tuple[str, str]]"
 PLAIN_WIDTH = 80
 #: Number of lines of a short view.
 ROOM = 25
-#: Indent of the continuation lines of a wrapped line.
+#: Indent of the continuation lines of a wrapped line or cell, so that a continuation does not look like a row.
 _INDENT = "  "
 
 _LABEL = "dim"
@@ -241,7 +241,9 @@ class _Column:
     def __init__(self, header: str, cells: Sequence[str], styles: Sequence[str]) -> None:
         self.header, self.cells, self.styles = header, cells, styles
         inside = max(map(cell_len, cells), default=0)
-        words = max((cell_len(word) for text in (header, *cells) for word in text.split()), default=0)
+        starts = [cell_len(word) for text in (header, *cells) for word in text.split()]
+        continued = [len(_INDENT) + cell_len(word) for text in cells for word in text.split()[1:]]
+        words = max([*starts, *continued], default=0)
         #: Width without wrapping.
         self.natural = max(inside, *map(cell_len, header.split("\n")))
         #: Width with wrapping of the header only.
@@ -281,7 +283,7 @@ def _part_lines(columns: Sequence[_Column], rows: int, width: int) -> Iterator[_
     raised = [[""] * (tall - len(lines)) + lines for lines in headers]
     yield from _row_lines(raised, [_LABEL] * len(columns), widths, between)
     for k in range(rows):
-        cells = [_wrapped(column.cells[k], size) for column, size in zip(columns, widths, strict=True)]
+        cells = [_wrapped(column.cells[k], size, _INDENT) for column, size in zip(columns, widths, strict=True)]
         yield from _row_lines(cells, [column.styles[k] for column in columns], widths, between)
 
 
@@ -314,33 +316,49 @@ def _row_lines(
         yield [*line[:-1], *((text.rstrip(), style) for text, style in line[-1:])]
 
 
-def _wrapped(text: str, width: int) -> list[str]:
-    """Return the lines of a text, wrapped between words to a width."""
+def _wrapped(text: str, width: int, indent: str = "") -> list[str]:
+    """Return the lines of a text, wrapped between words to a width; a narrow column has no indent.
+
+    Args:
+        text: text with line breaks between paragraphs.
+        width: width of the column.
+        indent: indent of the continuation lines of each paragraph.
+    """
+    indent = indent if len(indent) < width // 2 else ""
     lines: list[str] = []
     for paragraph in text.split("\n"):
         if cell_len(paragraph) <= width:
             lines.append(paragraph)
             continue
-        line = ""
+        line, start = "", ""
         for word in paragraph.split():
-            pieces = list(_pieces(word, width))
-            if line and cell_len(line) + 1 + cell_len(pieces[0]) <= width and len(pieces) == 1:
+            if line and cell_len(f"{line} {word}") <= width:
                 line += f" {word}"
                 continue
-            lines += [line] if line else []
-            *full, line = pieces
+            if line:
+                lines.append(line)
+                start = indent
+            *full, last = _pieces(word, width, start, indent)
             lines += full
+            line = last
         lines.append(line)
     return lines
 
 
-def _pieces(word: str, width: int) -> Iterator[str]:
-    """Yield the pieces of a word, one piece if it fits a width."""
-    piece = ""
+def _pieces(word: str, width: int, start: str, indent: str) -> Iterator[str]:
+    """Yield the lines of a word, one line if it fits a width.
+
+    Args:
+        word: the word.
+        width: width of the column.
+        start: indent of the first line.
+        indent: indent of the other lines.
+    """
+    piece, begin = start, start
     for sign in word:
-        if piece and cell_len(piece + sign) > width:
+        if piece != begin and cell_len(piece + sign) > width:
             yield piece
-            piece = ""
+            piece = begin = indent
         piece += sign
     yield piece
 

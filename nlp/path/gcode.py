@@ -2,7 +2,7 @@
 
 Motions are read as by LinuxCNC, in its order within a line. Other words are refused with line and word, or listed as
 ignored if they cause no motion. The reader tracks the current point in machine coordinates: lengths in the unit of the
-case, and angles in degrees.
+case, and angles in degrees. :mod:`.printer` reads programs of printers with the same state.
 """
 
 from __future__ import annotations
@@ -45,10 +45,10 @@ def read_program(lines: Iterable[str], source: str, units: Units, options: PathO
     Raises:
         InputError: the program contains an unsupported word, has no end, or makes no motion.
     """
-    return _Machine(source, units, options).run(lines)
+    return Interpreter(source, units, options).run(lines)
 
 
-class _Machine:
+class Interpreter:
     """State of a machine that runs a program, and the path so far."""
 
     def __init__(self, source: str, units: Units, options: PathOptions) -> None:
@@ -78,6 +78,7 @@ class _Machine:
         self.lines, self.kinds, self.seconds = array("i"), array("B"), array("d")
         self.arcs, self.planes = array("d"), array("B")
         self.idle: dict[str, list[int]] = {}
+        self.before_path = "motion before the path"
 
     def run(self, lines: Iterable[str]) -> ProgrammedPath:
         """Return the tool path of a program; the errors are those of :func:`read_program`."""
@@ -89,9 +90,10 @@ class _Machine:
             )
             where = f"line {self.line}, {word}" if word else f"line {self.line}"
             raise InputError(f"{self.source}: {where}: {fault}") from None
-        if not has_end:
+        if not (has_end or self.options.end_of_file):
             raise InputError(
-                f"{self.source}: line {self.line}: the program has no end, M2, M30 or %; it may be cut off"
+                f"{self.source}: line {self.line}: the program has no end, M2, M30 or %; it may be cut off;"
+                " if it is complete, give --end-of-file"
             )
         if not self.lines:
             unknown = [letter for letter, axis in AXES.items() if math.isnan(self.now[axis])]
@@ -113,6 +115,7 @@ class _Machine:
             self.order,
             self.between,
             idle_words(self.idle),
+            warnings=self._warnings(),
         )
         return without_rests(path, are_timed=False)
 
@@ -132,6 +135,10 @@ class _Machine:
             elif self._execute(block_of(line)):
                 return True
         return False
+
+    def _warnings(self) -> tuple[str, ...]:
+        """Return sentences about the program that a user has to know."""
+        return ()
 
     def _note(self, word: str) -> None:
         """Record a word that causes no motion."""
@@ -361,7 +368,7 @@ class _Machine:
         """Add a segment from the point to an end; from an unknown point, only move there."""
         self.now = end
         if not self.is_known:
-            self._note("motion before the path")
+            self._note(self.before_path)
             self.is_known = not any(map(math.isnan, end))
             self.knots.extend(end if self.is_known else ())
             return

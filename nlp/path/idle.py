@@ -1,4 +1,4 @@
-"""Words of a program that move nothing."""
+"""Words of a G-code program without motion, counted."""
 
 from collections.abc import Mapping, Sequence
 
@@ -20,6 +20,6 @@ class Idle(JsonObject):
 
 
 def idle_words(counts: Mapping[str, Sequence[int]]) -> tuple[Idle, ...]:
-    """Return what moves nothing, in the order of the first lines, from first line and count of each word."""
+    """Return the words without motion in order of their first lines, from first line and number of lines of each."""
     found = sorted((line, word, lines) for word, (line, lines) in counts.items())
     return tuple(Idle(word=word, line=line, lines=lines) for line, word, lines in found)

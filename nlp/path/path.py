@@ -123,6 +123,7 @@ class ProgrammedPath:
         order: convention of the angles.
         between: interpolation between two points.
         idle: ignored words and lines, which cause no motion.
+        warnings: sentences about the file that a user has to know.
         frame: frame of the path in the world frame; None if the path is in world coordinates.
     """
 
@@ -137,6 +138,7 @@ class ProgrammedPath:
     between: Between
     idle: tuple[Idle, ...] = ()
     frame: PathFrame | None = None
+    warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for array in (self.knots, self.lines, self.kinds, self.durations, self.arcs, self.planes):

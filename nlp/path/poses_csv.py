@@ -43,9 +43,8 @@ def read_poses(text: str, source: str, units: Units, options: PathOptions) -> Pr
     has_angles = not {"qw", "axis_x", "angle"} & table.columns.keys()
     between = options.between or (Between.ANGLES if has_angles else Between.SLERP)
     if between is Between.ANGLES and not has_angles:
-        raise InputError(
-            f"{source}: linear angles need columns roll, pitch, yaw; other rotations are interpolated by slerp"
-        )
+        fault = 'between = "angles" needs the columns roll, pitch and yaw; for other columns use between = "slerp"'
+        raise InputError(f"{source}: {fault}")
     knots = np.hstack([table.block("x y z"), _angles(table, units)])
     if len(knots) < 2:
         raise InputError(f"{source}: there is no path: fewer than two points below a row that names the columns")

@@ -19,6 +19,8 @@ from .orientation import quaternions_from_angles, shortest_turns
 from .path import ProgrammedPath
 from .placing import placed
 from .poses_csv import read_poses
+from .printer import read_printer_program
+from .printerwords import sign_of_printer
 
 #: Largest size of a file, bytes: some ten million lines.
 _LARGEST = 2**28
@@ -78,10 +80,28 @@ def path_of_text(text: str, source: str, units: Units, options: PathOptions | No
     if is_table(source):
         path = read_poses(text, source, units, options)
     else:
-        path = read_program(text.split("\n"), source, units, options)
+        path = _path_of_program(text.split("\n"), source, units, options)
     if path.between is Between.SLERP:
         _check_turns(path)
     return path
+
+
+def _path_of_program(lines: list[str], source: str, units: Units, options: PathOptions) -> ProgrammedPath:
+    """Return the tool path of a program in its flavour; a refused program of a printer is named as such.
+
+    Raises:
+        InputError: the program cannot be read.
+    """
+    if options.flavour == "printer":
+        return read_printer_program(lines, source, units, options)
+    try:
+        return read_program(lines, source, units, options)
+    except InputError as error:
+        sign = sign_of_printer(lines)
+        if sign is None:
+            raise
+        advice = "give --flavour printer, or flavour = 'printer' in [path]"
+        raise InputError(f"{error}; this looks like a printer's file ({sign}): {advice}") from None
 
 
 def path_of_case(case: Case, options: PathOptions | None = None) -> ProgrammedPath:
@@ -108,7 +128,7 @@ def in_place_of_case(path: ProgrammedPath, case: Case) -> ProgrammedPath:
     numbers = () if stated is None else stated.place
     fixed = [value for value in numbers if not isinstance(value, Free)]
     if stated is not None and stated.free:
-        fault = "is free, but a path needs one placement: fix it with --set, or give a result with --of"
+        fault = "is free, but a path needs one placement: set a value with --set, or give a result with --of"
         raise CaseError(f"path.place.{stated.free[0]}", fault, source=case.source)
     return placed(path, fixed)
 
@@ -124,9 +144,15 @@ def stated_path(case: Case, options: PathOptions | None = None) -> ProgrammedPat
 
 
 def options_of(stated: PathFile) -> PathOptions:
-    """Return the options for reading the path of a case."""
-    between = None if stated.between is None else Between(stated.between)
-    return PathOptions(between, stated.angles, stated.unit, stated.start, stated.offsets)
+    """Return the options for reading the path of a case.
+
+    Raises:
+        CaseError: an option has no meaning in the flavour of the program.
+    """
+    try:
+        return PathOptions.stated_in(stated)
+    except InputError as error:
+        raise CaseError("path", str(error)) from None
 
 
 def _check_turns(path: ProgrammedPath) -> None:

@@ -45,7 +45,9 @@ def rest_length(positions: FloatArray) -> float:
 
 
 def standing(knots: FloatArray, order: Order, between: Between) -> NDArray[np.intp]:
-    """Return for each knot (n,) the knot of its rest: itself, or an earlier one.
+    """Return for each knot the index (n,) of the knot at which the platform came to rest there.
+
+    If the platform has not moved since an earlier knot, this is the earlier knot; otherwise it is the knot itself.
 
     Args:
         knots: (n, 6) positions and angles.

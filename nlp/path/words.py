@@ -161,6 +161,11 @@ def _put(letter: str, number: str, codes: dict[str, float], groups: Mapping[floa
     codes[group] = code
 
 
+def shortened(text: str) -> str:
+    """Return a text of a program with at most 40 characters, for messages."""
+    return text if len(text) <= 40 else f"{text[:37]}..."
+
+
 def _unread(parts: list[str]) -> WordError:
     """Return the error of a line that does not consist of words only.
 
@@ -168,7 +173,7 @@ def _unread(parts: list[str]) -> WordError:
         parts: text before the first word, then letter, number and following text of each word.
     """
     at = next(k for k in range(0, len(parts), 3) if parts[k])
-    text = parts[at] if len(parts[at]) <= 40 else f"{parts[at][:37]}..."
+    text = shortened(parts[at])
     sign, rest = text[0], text[1:]
     if "O" in parts[1:at:3]:
         return WordError("O", _SUBROUTINE)

@@ -49,7 +49,7 @@ def formulate_actuators(layout: Layout) -> Nlp:
     """Return the program that minimises the largest actuator force, speed or power.
 
     Args:
-        layout: layout of a case with one task, whose objective is an actuator quantity.
+        layout: symbols of a case with one task, whose objective is an actuator quantity.
 
     Raises:
         CaseError: a limb has zero length at every point of the box.
@@ -111,7 +111,7 @@ def level_constraints(nlp: Nlp, forces: PosedForces, names: Collection[str], whe
 
 
 def _size(nlp: Nlp, values: list[SX]) -> float:
-    """Return the magnitude of the objective from squares: the median at a few points; 1 if unknown."""
+    """Return the typical magnitude of the objective: the median at a few points, from its squares; 1 if unknown."""
     program = nlp.program
     function = ca.Function("largest", [program.x, program.p], [ca.sqrt(ca.mmax(ca.vertcat(*values)))])
     found = np.array([float(function(x, nlp.arguments)) for x in starting_points(nlp, _SIZE_POINTS, 0)])

@@ -1,8 +1,8 @@
 """Blocks of a program: independent parts with their own variables, objective terms and constraints.
 
 If only the poses are free, each pose has its own optimum. A search of the whole program from a sampled point finds few
-of them at once: hardly any point is good for all of 160 poses, and most violate a limit of some pose. Starting points
-and end points of searches are therefore combined block by block.
+of these optima at once: hardly any point is good for all of 160 poses, and most violate a limit of some pose. Starting
+points and end points of searches are therefore combined block by block.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class Blocks:
     def program(self, block: Block) -> Nlp:
         """Return the program of a single block, with its variables, then the level of a worst case.
 
-        It has no places of the case's parameters: it serves for searches, not for evidence.
+        The program has no places of the case's parameters, so it serves for searches, not for evidence.
         """
         nlp, program, places = self._nlp, self._nlp.program, self._nlp.program.places
         columns, rows = self.columns(block), list(block.constraints)
@@ -143,7 +143,7 @@ class Blocks:
 
 
 def _terms(nlp: Nlp) -> list[SX]:
-    """Return the terms of an objective that is a sum, the weighted F of each pose; empty for another objective.
+    """Return the terms of an objective that is a sum over poses, the weighted F of each pose; empty without a sum.
 
     With a level, the terms are those of its constraints.
     """

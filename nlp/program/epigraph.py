@@ -46,7 +46,7 @@ Number = TypeVar("Number", SX, float, FloatArray)
 
 
 def total_over_poses(values: Sequence[Number], how: OverPoses) -> Number:
-    """Return the sum or the mean of values at several poses; the sum for a worst pose.
+    """Return the sum or the mean of values at several poses; for the worst case over poses, return the sum.
 
     Args:
         values: value at each of one or more poses; all of one shape.
@@ -70,7 +70,7 @@ def formulate_worst_pose(layout: Layout, sense: Sense) -> Nlp:
     F leaves them: :func:`with_wider_level`.
 
     Args:
-        layout: layout of a case with one task.
+        layout: symbols of a case with one task.
         sense: sense of the task.
 
     Raises:
@@ -270,7 +270,7 @@ class EpigraphBuilder:
     """Epigraph under construction: the epigraph variable, last of the program's variables, and its constraints.
 
     Args:
-        layout: layout to which the epigraph variable is added.
+        layout: symbols of the case, to which the epigraph variable is added.
         bounds: bounds and start of the epigraph variable.
         ceiling: positive divisor of the constraints.
         power: 2 if the level is the root of the worst of squares.

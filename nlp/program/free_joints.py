@@ -35,7 +35,7 @@ class FreeJoint(JsonObject):
 
     Attributes:
         name: name of the variable.
-        joint: limb and place of the joint.
+        joint: limb of the joint, and its number in the limb.
         kind: kind of the coordinate: ``angle`` or ``length``.
         value: coordinate, 0 at home.
         lower: smallest coordinate: its lower limit, or the end of the search range without a limit.
@@ -89,7 +89,7 @@ def free_joints(nlp: Nlp, x: FloatArray) -> Iterator[FreeJoint]:
 
 
 def begun_at(nlp: Nlp, joints: Mapping[str, float]) -> Nlp:
-    """Return a program with a start at given free actuator coordinates, by the names of their variables."""
+    """Return a program whose start has the given free actuator coordinates, by the names of their variables."""
     start = [joints.get(each.name, value) for each, value in zip(nlp.program.variables, nlp.start, strict=True)]
     return replace(nlp, start=frozen_vector(start))
 

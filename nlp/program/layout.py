@@ -87,7 +87,7 @@ class Layout:
         robots: the robot at each pose.
         constraints: constraints that depend on a variable, and violated limits.
         constant_limits: satisfied limits that depend on no variable.
-        families: limits on many pairs, not yet constraints.
+        families: limits on many pairs of values, such as two lengths of a leg at two poses; not yet constraints.
         implied: equations that the fixed parameters already satisfy: dependent loop equations, and lengths of fixed
             directions. These equations are not constraints.
         fixed_families: limits on many pairs of fixed values, each represented by its tightest pair.
@@ -110,7 +110,7 @@ class StatedPoseSymbols(NamedTuple):
     Attributes:
         rotation: (3, 3) ``R``, platform to world coordinates.
         position: (3, 1) ``p``, origin of the platform frame, length.
-        numbers: places of the case's parameters of the pose.
+        numbers: places (indices among variables or arguments) of the case's parameters of the pose.
         symbols: symbols of these parameters.
         places: places of the rotation's variables.
         constraints: constraints on the rotation.
@@ -293,7 +293,7 @@ def _component_values(case: Case, parameter: Parameter) -> tuple[Value, ...]:
 def _divided(
     case: Case, constraints: Sequence[BoundedConstraint], table: SymbolTable
 ) -> tuple[list[BoundedConstraint], list[BoundedConstraint]]:
-    """Return the constraints with and without variables; refuse a violated constraint without variables.
+    """Divide constraints into those with and those without variables; refuse a violated constraint without variables.
 
     Raises:
         CaseError: a constraint of fixed parameters only is violated.
@@ -369,7 +369,7 @@ def assemble(
     epigraph: Epigraph | None = None,
     weights: tuple[int, ...] = (),
 ) -> Nlp:
-    """Return the program of a layout.
+    """Return the nonlinear program of a case, from its symbols and an objective.
 
     Args:
         layout: case as symbols.

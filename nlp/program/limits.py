@@ -38,7 +38,7 @@ class LimitConstraints(NamedTuple):
     Attributes:
         varying: limits that depend on the variables, and violated limits of fixed parameters.
         constant: satisfied limits of fixed parameters only.
-        families: limits on many pairs; these pairs are not in ``varying``.
+        families: limits on many pairs of values; the constraints on these pairs are not in ``varying``.
         fixed_families: families of fixed values; the tightest pair of each is in ``varying`` or ``constant``.
     """
 
@@ -109,7 +109,7 @@ def _size_of(item: BoundedConstraint, length: float) -> float:
 def _sorted_families(
     families: Sequence[PairFamily], table: SymbolTable
 ) -> tuple[list[tuple[BoundedConstraint, ...]], tuple[PairFamily, ...], tuple[PairFamily, ...]]:
-    """Return pairs that are constraints from the start, families with pairs added on demand, and fixed families.
+    """Divide the limits on pairs: constraints from the start, families with pairs added on demand, and fixed families.
 
     Constraints from the start are all pairs of small families, and the tightest pair of each fixed family.
     """

@@ -39,7 +39,7 @@ Bound: TypeAlias = Literal["min", "max", "equal"]
 
 
 class PairPlace(NamedTuple):
-    """Place of a pair of values: index of its family, and of both values in the family."""
+    """Pair of values with one limit: index of its family of values, and indices of both values in the family."""
 
     family: int
     first: int
@@ -259,7 +259,7 @@ class Nlp(Whole):
 
     @property
     def shares(self) -> list[FloatArray]:
-        """Points (n,) for measuring changes, in half ranges from the middle of the box."""
+        """Points (n,) at which changes are sampled, in half ranges from the middle of the box."""
         return [np.zeros(self.n), *(2 * self._spread(k) for k in range(1, _POINTS))]
 
     def _spread(self, k: int) -> FloatArray:

@@ -1,8 +1,8 @@
 """Limits on many pairs of values, with only violated pairs as constraints.
 
 A stroke over N poses limits ``N (N - 1)`` pairs of lengths for each leg. An optimum of a program without some pairs is
-an optimum of the whole program if it satisfies every pair. A solver therefore starts with few pairs, adds violated
-pairs, and searches again until no pair is violated.
+an optimum of the whole program if it satisfies every pair. The values of one leg are a family: all its pairs have one
+limit. A solver therefore starts with few pairs, adds violated pairs, and searches again until no pair is violated.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _ROUNDING = 1e-13
 
 
 def with_pairs_at(nlp: Nlp, points: Iterable[FloatArray]) -> Nlp:
-    """Return a program with the tightest violated pair of each family at given points as constraints.
+    """Return a program with further constraints on pairs: at each point, the tightest violated pair of each family.
 
     Args:
         nlp: the program.
@@ -34,7 +34,7 @@ def with_pairs_at(nlp: Nlp, points: Iterable[FloatArray]) -> Nlp:
 
 
 def with_pairs(nlp: Nlp, places: Iterable[PairPlace]) -> Nlp:
-    """Return a program with further pairs as its last constraints; unchanged if it already has all pairs.
+    """Return a program with constraints on further pairs, after all others; unchanged if it already has all pairs.
 
     Pairs of a symmetric robot that are the same function become one constraint.
     """
@@ -48,13 +48,13 @@ def with_pairs(nlp: Nlp, places: Iterable[PairPlace]) -> Nlp:
 
 
 def with_shared_pairs(nlps: Sequence[Nlp], places: Iterable[PairPlace]) -> list[Nlp]:
-    """Return programs with common symbols and further pairs, again with common symbols."""
+    """Return programs that share their symbols, with constraints on further pairs; the results share symbols, too."""
     first = with_pairs(nlps[0], places)
     return [replace(first, arguments=nlp.arguments, sense=nlp.sense) for nlp in nlps]
 
 
 def with_all_pairs(nlp: Nlp) -> Nlp:
-    """Return a program with every pair of its families, in an order independent of its present pairs."""
+    """Return a program with constraints on all pairs of values, in an order independent of its present pairs."""
     if not nlp.families:
         return nlp
     places = [
@@ -66,7 +66,7 @@ def with_all_pairs(nlp: Nlp) -> Nlp:
 
 
 def without_pairs(nlp: Nlp) -> Nlp:
-    """Return a program without the pairs of its families."""
+    """Return a program without the constraints on pairs of values, such as two lengths that differ by a stroke."""
     count = len(nlp.program.constraints) - nlp.pair_count
     return replace(
         nlp,
@@ -100,7 +100,7 @@ def violated_pairs(nlp: Nlp, x: FloatArray) -> list[PairPlace]:
 
 
 def pair_constraints(nlp: Nlp, place: PairPlace) -> tuple[BoundedConstraint, ...]:
-    """Return the constraints on one pair."""
+    """Return the constraints on one pair of values."""
     return nlp.families[place.family].pair(place.first, place.second)
 
 

@@ -45,7 +45,7 @@ class Kernel(Generic[T]):
 
     Args:
         function: function with any number of dense inputs and outputs.
-        result: function that makes the value of a call from new arrays (rows, columns), one for each output.
+        result: function that turns the outputs of a call, newly made arrays (rows, columns), into its return value.
     """
 
     def __init__(self, function: ca.Function, result: Callable[..., T]) -> None:
@@ -144,7 +144,7 @@ class RobotNumbers(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Program(Whole):
-    """Nonlinear program without values.
+    """Symbols and expressions of a nonlinear program, without values of its bounds and arguments.
 
     Attributes:
         variables: free variables, in the order of ``x``.

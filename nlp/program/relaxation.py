@@ -1,8 +1,8 @@
 """Smallest relaxation that makes an infeasible case feasible, as a program.
 
-Every limit gets a variable ``t >= 0`` by which it is relaxed, at every leg, joint and pose at once. The unit of ``t``
-is the limit's value, or 1 for a value of 0. The program minimises the sum of all t. A sum, unlike a sum of squares,
-relaxes few limits, so that its optimum shows which limits contradict each other.
+Every limit gets a variable ``t >= 0`` by which the limit is relaxed, at every leg, joint and pose at once. The unit of
+``t`` is the limit's value, or 1 for a value of 0. The program minimises the sum of all t. A sum, unlike a sum of
+squares, relaxes few limits, so that its optimum shows which limits contradict each other.
 """
 
 from collections.abc import Sequence

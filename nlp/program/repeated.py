@@ -137,7 +137,7 @@ class _NormalForms:
         return {(atom,): _Coefficient(1.0, 1.0)}
 
     def _wave(self, op: int, angle: _Polynomial) -> _Polynomial:
-        """Return the sine or cosine of an angle, reduced to the angle without a constant and with a positive sign."""
+        """Return the normal form of a sine or cosine; its angle has no constant and a positive first sign."""
         constant = angle.get((), _Coefficient(0.0, 0.0)).value
         rest = {monomial: each for monomial, each in angle.items() if monomial}
         if not rest:
@@ -154,7 +154,7 @@ class _NormalForms:
         return _sum(_sum({}, *parts[0]), *parts[1])
 
     def _atom(self, op: int, given: list[_Polynomial]) -> int:
-        """Return the number of the atom of an operation on normal forms."""
+        """Return the index of the atom that stands for an operation on normal forms."""
         known = self._operations.setdefault(op, [])
         for operands, place in known:
             if all(_are_same(one, other) for one, other in zip(operands, given, strict=True)):

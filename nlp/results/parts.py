@@ -201,14 +201,14 @@ class ViolationData(JsonObject):
     Attributes:
         name: name of the variable or constraint.
         bound: side: smallest, largest or required value.
-        value: value at the point.
+        value: value at the point; undetermined for a force under loads at a singular point.
         limit: allowed value.
         unit: unit of both values; absent for a plain number.
     """
 
     name: str
     bound: Bound
-    value: float
+    value: Known
     limit: float
     unit: Absent[str]
 

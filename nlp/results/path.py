@@ -111,6 +111,7 @@ class PathData(JsonObject):
         time: total time of the segments with a stated time, seconds; absent if no segment has a time.
         untimed: number of segments without a time, whose speeds are unknown; absent if no segment has a time.
         idle: words of the G-code without a motion, in the order of the lines.
+        warnings: sentences about the file that a user has to know; absent without any.
         dependent: names of the dependent coordinates of the pose; absent without any.
         claims: verdicts, ranks first.
         actuators: ranges of the actuators.
@@ -122,6 +123,7 @@ class PathData(JsonObject):
     time: Absent[float]
     untimed: Absent[int]
     idle: tuple[Idle, ...]
+    warnings: Absent[tuple[str, ...]]
     dependent: Absent[tuple[str, ...]]
     claims: tuple[PathVerdictData, ...]
     actuators: tuple[PathActuatorData, ...]
@@ -200,6 +202,7 @@ def path_result(judged: "Judgement", settings: "Settings | None" = None) -> Path
             time=judged.path.time if judged.path.is_timed else None,
             untimed=len(judged.path.untimed) if judged.path.is_timed else None,
             idle=judged.path.idle,
+            warnings=judged.path.warnings or None,
             dependent=judged.dependent or None,
             claims=_claims(judged),
             actuators=tuple(_actuators(judged)),

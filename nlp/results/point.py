@@ -221,7 +221,8 @@ def violations(nlp: Nlp, x: FloatArray) -> tuple[ViolationData, ...]:
             reading = nlp.program.constraints[side.constraint].reading
             dimension, limit, value = reading.dimension, reading.from_value(limit), measured[side.constraint]
             # Equations are no limits: only the program measures them.
-            value = reading.from_value(float(g[side.constraint])) if math.isnan(value) else value
+            is_equation = not any(nlp.program.constraints[side.constraint].keys)
+            value = reading.from_value(float(g[side.constraint])) if is_equation else value
         shown, allowed = units.shown(value, dimension), units.shown(limit, dimension)
         unit = unit_of_side(nlp.case, side.name, dimension) or None
         rows.append(ViolationData(name=side.name, bound=side.bound, value=shown, limit=allowed, unit=unit))

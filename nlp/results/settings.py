@@ -22,6 +22,8 @@ from .schema import load_result
 from .workspace import WorkspaceResult
 
 Answer: TypeAlias = SolveResult | CombinedResult | EvaluationResult
+#: Digits of a reached value in a message: its command shows nearly the same design.
+_DIGITS = 7
 #: Names of the values of a pose, after its prefix.
 _OF_POSE = ("p_x", "p_y", "p_z", "axis", "angle", RotationForm.RPY.value, RotationForm.QUATERNION.value)
 
@@ -60,8 +62,30 @@ def robot_of(result: Answer, source: str, case: Case, *, of_any_case: bool = Fal
         raise InputError(f"{source}: has the units {units.length!r} and {units.angle!r}, but the case has {own}")
     robot = result.robot
     if robot is None or (not isinstance(result, EvaluationResult) and not result.status.is_answer):
-        raise InputError(f"{source}: contains no answer: the solve has failed")
+        raise InputError(f"{source}: contains no answer: the solve has failed{_reached_words(robot, case)}")
     return robot
+
+
+def _reached_words(robot: RobotData | None, case: Case) -> str:
+    """Return the options that set the free values of a failed solve to those that it reached; empty without any."""
+    if robot is None:
+        return ""
+    free = {
+        case.parameter_name(item.name)
+        for item in case.model.parameters
+        if any(isinstance(value, Free) for value in case.components(item.name))
+    }
+    for prefix, pose in zip(case.pose_prefixes, case.poses, strict=True):
+        free |= {
+            f"{prefix}p_{axis}" for axis, value in zip("xyz", pose.position, strict=True) if isinstance(value, Free)
+        }
+        free |= {f"{prefix}angle", f"{prefix}axis"}  # settings have these names only if the rotation is free
+    reached = {name: value for name, value in settings_of(robot, case).items() if name in free}
+    texts = [
+        f" --set {name}={','.join(f'{each:.{_DIGITS}g}' for each in (value if isinstance(value, list) else [value]))}"
+        for name, value in reached.items()
+    ]
+    return f"; its reached design:{''.join(texts)}" if texts else ""
 
 
 def claim_settings(given: str, case: Case) -> Settings:

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from ...models import Dimension
 from ...models.statics import driven_joints
 from ..case.loads import NO_LOADING
 from ..case.motors import ActuatorQuantity
@@ -71,15 +72,19 @@ class MotorData(JsonObject):
 class ScaleData(JsonObject):
     """Largest factor by which the box of poses can grow about its centre so that all claims stay proved.
 
+    The radius alone grows where the positions are a disc, ring, cylinder, ball or cone.
+
     Attributes:
         factor: largest factor with a proof; null if no box is proved.
+        diameter: diameter of the largest proved set of positions, of the base for a cone; absent without a diameter.
         refuted: smallest known factor with a violated claim; null if unknown.
         claim: claim that is refuted or undecided for the next larger box; empty without one.
         pose: pose at which the claim is refuted; null without one.
-        reason: reason for the end of the search before the factor was known to 1 %; absent otherwise.
+        reason: reason for the end of the search before the factor was known to its accuracy; absent otherwise.
     """
 
     factor: float | None
+    diameter: Absent[float]
     refuted: float | None
     claim: str
     pose: WorkspacePose | None
@@ -98,7 +103,7 @@ class WorkspaceResult(JsonObject):
             robot.
         proved: If true, J has full rank at every pose, and every limit is satisfied. Quantities without a limit do not
             count.
-        poses: set of poses that the verdicts cover, in words; absent without dependent coordinates.
+        poses: set of poses that the verdicts cover, in words; absent for a box without dependent coordinates.
         dependent: names of the dependent coordinates of the pose; absent without any.
         regular: verdict on the full rank of J at every pose.
         constraints: verdict on the rank of the constraint wrenches at every pose; absent without constraint wrenches.
@@ -180,9 +185,10 @@ def workspace_of(
 
 
 def poses_of(judged: "Judgement") -> str | None:
-    """Return the set of poses that the verdicts cover, in words; None without dependent coordinates."""
+    """Return the set of poses that the verdicts cover, in words; None for a box without dependent coordinates."""
     workspace = judged.workspace
-    return f"every {workspace.set_words(judged.case.units)}" if workspace.dependent else None
+    is_box = not workspace.dependent and workspace.position_set is None
+    return None if is_box else f"every {workspace.set_words(judged.case.units)}"
 
 
 def _motors(judged: "Judgement") -> Iterator[MotorData]:
@@ -233,6 +239,7 @@ def scale_data(found: "Scale", units: Units) -> ScaleData:
     """Return the largest proved box in a case's units."""
     return ScaleData.of(
         found,
+        diameter=None if found.positions is None else units.shown(2 * found.positions.radius, Dimension.LENGTH),
         refuted=found.failed if found.refuted else None,
         pose=None if found.pose is None else pose_data(found.pose, units),
         reason=found.reason or None,
@@ -242,5 +249,5 @@ def scale_data(found: "Scale", units: Units) -> ScaleData:
 def _fixed(value: object) -> float:
     """Return a fixed number."""
     if not isinstance(value, float):
-        raise TypeError("a verified robot has fixed dimensions")
+        raise TypeError(f"a robot to be verified must have fixed dimensions, got {value!r}")
     return value

@@ -1,1 +1,1 @@
-"""Search: Ipopt from many starts, several tasks, certified solves."""
+"""Solve of a case: Ipopt from many starting points, combination of tasks, and certified solves."""

@@ -1,8 +1,8 @@
 """Block-by-block search of a program, for example pose by pose: combined starting points, and the best blocks.
 
 The fast search in C starts each block from its part of every starting point. The best results of all blocks together
-are the first start of the whole program, the second best are the second start, and so on. They are corrected and
-judged by the conditions of the whole program, like the results of any other search.
+are the first start of the whole program, the second best are the second start, and so on. These starts are corrected
+and judged by the conditions of the whole program, like the results of any other search.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from .starts import Start, StartStatus, judge
 
 
 class SearchedStarts(NamedTuple):
-    """Starts of a nonlinear program that is searched block by block.
+    """Starting points of a nonlinear program that is searched block by block, and their results.
 
     Attributes:
         points: (k, n) starting points of the whole program.
-        starts: converged starts by index, which need no further search.
+        starts: results of converged searches, by index of the starting point; they need no further search.
     """
 
     points: FloatArray
@@ -94,7 +94,7 @@ class _BlockResults:
     def sort(self, blocks: Blocks) -> None:
         """Combine the best results of all blocks, then the second best, and so on; failed searches are left out.
 
-        A block with fewer good results than starting points repeats them from the best one on.
+        A block with fewer good results than starting points repeats its results, the best first.
         """
         is_known = len(self._converged) == len(blocks.blocks)
         orders = list(blocks.orders(self.x))
@@ -111,7 +111,7 @@ class _BlockResults:
         self.x = np.array([with_exact_level(self._nlp, x) for x in self.x])
 
     def judged(self) -> dict[int, Start]:
-        """Return the converged starts by index; no starts if a block has no converged result."""
+        """Return the results of converged starts by index; empty if a block has no converged result."""
         starts: dict[int, Start] = {}
         for k in range(len(self.x)) if self._is_whole else ():
             if is_requested():

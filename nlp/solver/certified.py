@@ -1,4 +1,4 @@
-"""Certificates of a case: incumbent from a solve, branch and bound over the whole search box, and the proof record."""
+"""Certificates of a case: incumbent from a solve, branch and bound over the whole search box, and the proof file."""
 
 from __future__ import annotations
 
@@ -81,8 +81,8 @@ class Certified(Whole, Shown, Answer):
         solution: the solution.
         tasks: certificate of the separate optimum of each task.
         combined: certificate of the combined program of several tasks; None if the method has none.
-        statement: premises of the proof ``tree``: nonlinear program and options.
-        tree: nodes of the proof; None without ``with_proof``, or without a proved bound.
+        statement: nonlinear program of the case that the proof ``tree`` is about.
+        tree: bytes of the proof's tree of boxes; None without ``with_proof``, or without a proved bound.
     """
 
     solution: Solution
@@ -168,13 +168,14 @@ def certify(
 
 
 def _check_writable(case: Case, *, is_rounded: bool) -> None:
-    """Refuse a proof record of a nonlinear program that a case file cannot represent.
+    """Refuse a proof file about a nonlinear program that a case file cannot represent.
 
     Raises:
         OptionError: a case file cannot represent the program.
     """
     if is_rounded:
-        raise OptionError("proof: no case file contains the rounded dimensions; give them with --set")
+        fault = "proof: a proof file refers to the dimensions of a case, and rounded dimensions are not in it"
+        raise OptionError(f"{fault}; give them with --set instead of rounding")
     if catalogue_dimensions(case):
         raise OptionError("proof: each combination of listed values is a separate program; give the values with --set")
     if case.is_optimised_everywhere:
@@ -277,14 +278,14 @@ def _certify(
 
 
 def _incumbent(own: ProgramSolution) -> tuple[FloatArray | None, float | None]:
-    """Return the best point (n,) of a solve and its objective; only an optimum if the solve was interrupted."""
+    """Return the best point (n,) of a solve and its objective; if the solve was interrupted, only an optimum."""
     if own.status.is_answer:
         return own.x, own.F
     return (own.optima[0].x if own.status is Status.INTERRUPTED and own.optima else None), None
 
 
 def _after_solve(certificate: Certificate, own: ProgramSolution, starts: int) -> Certificate:
-    """Return an unproved certificate with the reason that its solve was cut short; a proved one unchanged."""
+    """Return a certificate; an unproved certificate gets the reason that its solve was cut short."""
     if own.status is not Status.INTERRUPTED or certificate.status is CertificateStatus.PROVED:
         return certificate
     done = f"the time for the solve was used up after {len(own.starts)} of {starts} starts"
@@ -362,7 +363,7 @@ def _certify_from_poses(
 
 
 def proof_of(certified: Certified, text: str) -> Proof:
-    """Return the proof record of a certificate.
+    """Return the proof of a certificate, to be written into a proof file.
 
     Args:
         certified: certificates from :func:`certify` with ``with_proof``.
@@ -383,7 +384,7 @@ def proof_of(certified: Certified, text: str) -> Proof:
 
 
 def _complete_tree(writer: TreeRecord | None, certificate: Certificate) -> bytes | None:
-    """Return the nodes of a complete proof; None if nothing is proved or recorded."""
+    """Return the bytes of the tree of a complete proof; None if nothing is proved or recorded."""
     complete = certificate.status in (CertificateStatus.PROVED, CertificateStatus.INFEASIBLE)
     # A program with a single point needs no search, and has no tree.
     return writer.tree() if writer is not None and complete and certificate.engine == ENGINE else None

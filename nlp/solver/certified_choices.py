@@ -1,7 +1,8 @@
 """Proof of the best combination of listed values, from bounds of parts that together cover all combinations.
 
-A part that the solve skipped is bounded with its parameters free between their smallest and largest values. It is
-split into its combinations where that bound is too wide. The gap of a part far from the best combination may be wide.
+A part that the solve skipped is bounded with its parameters free between their smallest and largest values. The
+part is split into its combinations if this bound is too wide. The gap of a part far from the best combination may be
+wide.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ _ROUNDING = 1e-6
 
 
 class _Proved(Protocol):
-    """A case with certificates of each task, and of the deciding program."""
+    """Certificates of a case: of each task, and of the deciding program."""
 
     @property
     def tasks(self) -> tuple[Certificate, ...]: ...
@@ -44,8 +45,8 @@ class ChoiceProof(NamedTuple, Generic[Proved]):
 
     Attributes:
         best: certificates of the best combination.
-        chosen: ranges of this combination.
-        certificate: certificate over all combinations; None if its tasks have no common nonlinear program.
+        chosen: index ranges of the best combination.
+        certificate: certificate over all combinations; None if the tasks have no common nonlinear program.
     """
 
     best: Proved
@@ -186,7 +187,7 @@ def _cost(certificate: Certificate, value: float) -> float:
 
 
 def _gap_of(part: ChoicePart, known: Certificate, gap: float) -> float:
-    """Return the gap of a proof that a part has no better combination."""
+    """Return the gap with which a certificate proves that a part has no better combination."""
     best = _cost(known, known.incumbent)
     if not part.cost or math.isinf(best):
         return gap

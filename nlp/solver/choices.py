@@ -1,8 +1,8 @@
 """Search over combinations of listed parameter values, each of which is solved as a case.
 
-A few combinations are solved one by one. More are searched by branch and bound: a part is solved with the parameters
-free between their smallest and largest values, and skipped where that is no better than the best combination. Every
-solve is local, from the case's starting points; the proof is in :mod:`.certified_choices`.
+A few combinations are solved one by one. Many combinations are searched by branch and bound: a part is solved with the
+parameters free between their smallest and largest values, and skipped if the result is no better than the best
+combination. Every solve is local, from the case's starting points; the proof is in :mod:`.certified_choices`.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def solve_choices(case: Case, solve_fixed: Callable[[Case], Solution], most: flo
         most: largest number of solves, after which the search ends with the best known combination.
 
     Returns:
-        The solution of the best combination, with the given case; without an answer where no combination has one.
+        The solution of the best combination, with the given case; it has no answer if no combination has one.
     """
     return _Search(case, solve_fixed, most).run()
 
@@ -102,7 +102,7 @@ class _Search:
         return replace(best, case=self._case, choice=choice)
 
     def _solve_all(self, everything: Ranges) -> list[Ranges]:
-        """Solve every combination; return the combinations that were not solved."""
+        """Solve one combination after the other until a stop is requested; return the combinations that are left."""
         left = [each for each in combinations_of(everything) if self._exists(each)]
         while left and not is_requested():
             self._solve_combination(left[0])
@@ -112,7 +112,7 @@ class _Search:
         return left
 
     def _bisect(self, everything: Ranges) -> list[Ranges]:
-        """Split the combinations until all are solved or skipped; return the parts that are neither."""
+        """Split the combinations into parts until all are solved or skipped; return the parts that are still open."""
         root = self._relax(everything)
         # Rounding gives a first answer, by which many parts can be skipped.
         if self._exists(nearest := self._nearest(root)):

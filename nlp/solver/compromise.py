@@ -62,12 +62,12 @@ class Polish(Protocol):
     """A function that searches one program from points close to its solution."""
 
     def __call__(self, nlp: Nlp, *, first: Sequence[FloatArray]) -> ProgramSolution:
-        """Solve a program from points (n,) and a few sampled starting points."""
+        """Search a program from the points ``first`` (n,) and from a few sampled starting points."""
         ...
 
 
 def solution_of_one_task(case: Case, own: ProgramSolution) -> Solution:
-    """Return the solution of a case with only one task, from the solution of its program."""
+    """Return the solution of a case with only one task, from the solution of the task's program."""
     F = own.nlp.evaluate(own.x)[0]
     outcome = TaskOutcome(case.tasks[0], own, _is_unique(own), own.x, own.state, F, own.evidence, 0.0)
     return Solution(case, own.status, own.x, (outcome,), None, own.seconds)
@@ -102,7 +102,7 @@ def combine(
         x, status, value = combined.x[: nlps[0].n], combined.status, combined.nlp.evaluate(combined.x)[0]
     paired = with_pairs_at(nlps[0], [x])
     at = linearise(paired, x)
-    outside = np.flatnonzero(measured_slack(paired, x, at) < -FEASIBLE)
+    outside = np.flatnonzero(~(measured_slack(paired, x, at) >= -FEASIBLE))
     violated = tuple(dict.fromkeys(at.sides[j].name for j in outside))
     if violated and status.is_answer:
         status = Status.INFEASIBLE
@@ -169,14 +169,14 @@ def _choose_members(
     """Choose the point of each task's optimal set that is nearest to the other tasks' points.
 
     Returns:
-        The points, whether each optimum is unique, and notices about optima that are not.
+        The chosen points, whether each task's optimum is unique, and notices about optima that are not unique.
     """
     points = [np.array(solution.x) for solution in own]
     members = [_known_members(solution) for solution in own]
     unique = [_is_unique(solution) for solution in own]
     notices = [
         f"the optimum of {solution.nlp.case.tasks[j].name!r} is not unique: "
-        "the one nearest to the other tasks' optima was used"
+        "the optimum nearest to the other tasks' optima was used"
         for j, solution in enumerate(own)
         if not unique[j] and solution.status.is_answer
     ]

@@ -34,7 +34,7 @@ class SolverResult:
     scaled objective to be minimised. They are positive at an upper limit and negative at a lower one.
 
     Attributes:
-        x: (n,) the point, in the program's units.
+        x: (n,) last point, in the units of the program.
         bound_multipliers: (n,) multipliers of the variables' bounds, per half range.
         constraint_multipliers: (c,) multipliers of the constraints, per unit of their expressions.
         reason: reason why the solver stopped.
@@ -53,7 +53,7 @@ LocalSearch = Callable[[FloatArray], SolverResult]
 
 
 class Solver(Protocol):
-    """A function that prepares searches of a program."""
+    """Interface of local solvers: a function that prepares searches of a nonlinear program."""
 
     def __call__(self, nlp: Nlp, search: Search, points: FloatArray, count: int) -> Sequence[LocalSearch]:
         """Return ``count`` searches that may run at the same time, each in one thread only.

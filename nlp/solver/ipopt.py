@@ -88,7 +88,7 @@ class Confirmation:
 
 
 class _Problem:
-    """A program in scaled variables for Ipopt, with its scales.
+    """Nonlinear program in scaled variables for Ipopt, with the scales of its variables and objective.
 
     Args:
         nlp: the nonlinear program.
@@ -110,7 +110,7 @@ class _Problem:
         self._lower, self._upper = nlp.g_lower / self._sizes, nlp.g_upper / self._sizes
 
     def function(self, options: dict[str, Any]) -> ca.Function:
-        """Return a new solver for one thread."""
+        """Return a new CasADi solver (Ipopt) for one thread."""
         return ca.nlpsol("solver", "ipopt", self._problem, options)
 
     def search(self, function: ca.Function, point: FloatArray, optimum: SolverResult | None = None) -> SolverResult:

@@ -1,4 +1,4 @@
-"""Active journal of searches: kept searches are read from it, new searches are added."""
+"""Active journal of searches: earlier searches are read from the journal, new searches are added to it."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from ..program.nlp import Nlp
 
 
 class Keeper(Protocol):
-    """A journal of searches."""
+    """Interface of a journal of searches."""
 
     def search(
         self, nlp: Nlp, search: Search, first: Sequence[FloatArray], solve: Callable[[], Any], make: Callable[..., Any]
     ) -> Any:  # noqa: ANN401 - the type of a solution is defined in a module that imports this one
-        """Return the kept solution of a search, or solve and keep it.
+        """Return the solution of a search from the journal; without an entry, search and add the solution.
 
         Args:
             nlp: the nonlinear program.

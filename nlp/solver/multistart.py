@@ -48,6 +48,12 @@ from .status import Phase, PhaseProgress, Status, no_phase
 _BETTER = 1e-6
 #: Number of starting points of the search for the smallest relaxation.
 _ELASTIC_STARTS = 8
+#: Status of a search whose best point is stationary, but no optimum.
+_REFUSED = {
+    PointKind.SADDLE: Status.SADDLE,
+    PointKind.LIMB_SINGULAR: Status.LIMB_SINGULAR,
+    PointKind.SINGULAR: Status.SINGULAR,
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,19 +61,19 @@ class ProgramSolution(Whole):
     """Outcome of a search of one program.
 
     Attributes:
-        status: outcome of the search; only :attr:`Status.OPTIMAL` stands for the best known point.
+        status: outcome of the search; only with :attr:`Status.OPTIMAL` is ``x`` the best known point.
         nlp: the nonlinear program.
         x: (n,) the best point; the status says whether the point is optimal.
         state: state of the robot at ``x``; None if its loop equations have no solution.
         evidence: evidence of optimality at ``x``; None without free variables.
-        starts: every start, in order.
+        starts: result of the search from each starting point, in order.
         optima: distinct optima of converged starts, best first.
         seed: seed of the starting points.
         seconds: wall time.
         relaxation: smallest known relaxation of the limits that makes an infeasible program feasible; empty if none
             is known.
         better: objective of a feasible point that is better than every optimum, but at which no search converged; None
-            for none.
+            without such a point.
     """
 
     status: Status
@@ -207,8 +213,8 @@ def _search_within(
 ) -> ProgramSolution:
     """Search a program from the first points and from sampled points.
 
-    Of limits on many pairs, the program has those that the starting points violate. Limits that the results violate
-    are added, and the affected starts are repeated until no limit is violated.
+    Of limits on many pairs of values, the program has only the pairs that the starting points violate. Limits that the
+    results violate are added, and the affected starts are repeated until no limit is violated.
     """
     began = time.perf_counter()
     if nlp.is_fixed:
@@ -257,7 +263,7 @@ def _searched(
     solver: Solver,
     phase: PhaseProgress,
 ) -> tuple[Nlp, dict[int, Start]]:
-    """Return a program with its active pairs, and the pending searches from points (k, n).
+    """Return a program with constraints on its active pairs, and the pending searches from points (k, n).
 
     If interrupted, the searches end before the last point.
     """
@@ -283,7 +289,7 @@ def _searched(
 def _outcome(
     status: Status, nlp: Nlp, x: FloatArray, evidence: Evidence | None, search: Search, began: float
 ) -> ProgramSolution:
-    """Return the outcome of a search at its best point (n,), without starts."""
+    """Return the outcome of a search at its best point (n,), without the results of single starts."""
     state, own = state_or_none(nlp, x), frozen_array(x, (nlp.n,))
     return ProgramSolution(status, nlp, own, state, evidence, (), (), search.seed, time.perf_counter() - began)
 
@@ -323,9 +329,7 @@ def _status(nlp: Nlp, x: FloatArray, evidence: Evidence, converged: bool, better
     if evidence.kind is PointKind.INFEASIBLE:
         # A point that only a conservative estimate refuses shows that the program is feasible.
         return Status.INFEASIBLE if measured_violation(nlp, x) > FEASIBLE else Status.NOT_CONVERGED
-    if evidence.kind is PointKind.LIMB_SINGULAR:
-        return Status.LIMB_SINGULAR
-    return Status.SADDLE if evidence.kind is PointKind.SADDLE else Status.NOT_CONVERGED
+    return _REFUSED.get(evidence.kind, Status.NOT_CONVERGED)
 
 
 def closed_point(nlp: Nlp, search: Search) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Pose of a path's frame as variables of a program."""
+"""Free pose of a path's frame as variables of a nonlinear program."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ..program.places import Scalar
 
 
 class Placement(NamedTuple):
-    """A program with the free coordinates of a path's frame as variables.
+    """Nonlinear program with the free coordinates of a path's frame as additional variables.
 
     Attributes:
         nlp: the nonlinear program.
@@ -35,7 +35,7 @@ class Placement(NamedTuple):
 
 
 def with_place(nlp: Nlp, case: Case) -> Placement:
-    """Return a program with the free coordinates of the frame of its case's path as variables."""
+    """Return a program with the free coordinates of the path's frame as additional variables."""
     place = () if case.path is None else case.path.place
     free = [k for k, value in enumerate(place) if isinstance(value, Free)]
     fixed = np.array([0.0 if isinstance(value, Free) else value for value in place])

@@ -1,6 +1,6 @@
-"""Claims at poses of a workspace as constraints of a program, for the exact robot and within a joint-centre tolerance.
+"""Claims at poses of a workspace as constraints, for the nominal robot or within a joint-centre tolerance.
 
-At such a pose the independent coordinates are fixed, and unknowns with a closed form are replaced by it. The other
+At such a pose the independent coordinates are fixed, and closed forms replace unknowns where they exist. The other
 dependent coordinates become further variables of the program, with the loop equations at this pose as constraints.
 
 Beyond the reach of a limb the closed forms are continued, so that a search may pass through such points: reach is a
@@ -81,9 +81,9 @@ class BindingPose(NamedTuple):
 
     Attributes:
         name: name of the claim.
-        pose: pose in question; for a stroke, the pose of the shortest length.
+        pose: pose at which the claim fails; for a stroke, the pose of the shortest length.
         longest: pose of the longest length, for a stroke; otherwise None.
-        errors: (m, 3) joint-centre errors of the robot within the tolerance; None for the exact robot.
+        errors: (m, 3) joint-centre errors of the robot within the tolerance; None for the nominal robot.
     """
 
     name: str
@@ -122,7 +122,8 @@ class _ClosedPose:
         robot: expressions of the robot at the pose.
         reaches: reach margins of its limbs at the pose.
         variables, symbols: further variables and their symbols, (m, 1).
-        lower, upper, start: (m,) bounds of the variables, and values that close the loops of the design.
+        lower, upper, start: (m,) bounds of the further variables, and values that close the loops of the present
+            design.
         equations: m loop equations.
     """
 
@@ -138,7 +139,7 @@ class _ClosedPose:
 
 
 class _PosedClaim(NamedTuple):
-    """A claim as constraints of a program, and of a minimised epigraph variable, with the robot at its poses."""
+    """Claim at one or two poses: its constraints, those of a minimised epigraph variable, and the robot there."""
 
     poses: tuple[_ClosedPose, ...]
     constraints: tuple[BoundedConstraint, ...]
@@ -160,7 +161,7 @@ class PoseConstraints:
             if case.workspace is None:
                 raise TypeError("case.workspace: limits over a workspace need a workspace, got None")
             box = pose_box(case.workspace)
-            middle = box.pose(0.5 * (box.lower + box.upper))
+            middle = box.pose(box.middle)
         self._nlp, self._case, self._middle, self._frame = nlp, case, middle, frame
         self._closed = closed_form(case.model, extended=True)
         names = [item.name for item in case.model.unknowns]
@@ -327,7 +328,7 @@ class PoseConstraints:
         return replace(closed, equations=equations) if len(equations) == len(names) else None
 
     def _placed(self, pose: PoseNumbers) -> SymbolicPose:
-        """Return the symbolic world pose for a pose given in the frame."""
+        """Return a pose that is given in the frame as a symbolic pose in the world."""
         if self._frame is None:
             return SymbolicPose(SX(pose.position.tolist()), SX(pose.rotation.tolist()))
         return self._frame.placed(pose)
@@ -466,7 +467,7 @@ def _are_alike(one: FloatArray, other: FloatArray, part: float) -> bool:
 
 
 def _problem(design: Case, workspace: Workspace) -> Problem | None:
-    """Return the problem of a design over its workspace; None if the loops cannot be closed at its centre."""
+    """Return the robot of a design over its workspace; None if its loops cannot be closed at the centre."""
     try:
         return build_problem(design, closed_form(design.model).model, pose_box(workspace))
     except NotJudgedError:
@@ -474,7 +475,7 @@ def _problem(design: Case, workspace: Workspace) -> Problem | None:
 
 
 def _closed_at(problem: Problem, y: FloatArray) -> FloatArray | None:
-    """Return closed loops (n,) at a pose with coordinates (6,), followed from the middle; None if that fails."""
+    """Return closed loops (n,) at a pose with coordinates (6,), followed from the middle; None if they stay open."""
     independent, dependent = list(problem.independent), list(problem.dependent)
     z = problem.start.copy()
     target = z.copy()

@@ -69,8 +69,8 @@ def round_design(
         compiled: If true, Ipopt calls the objective as compiled C.
 
     Returns:
-        The best known combination of rounded values, judged like any solution; without an answer where no combination
-        that was tried satisfies the limits.
+        The best known combination of rounded values, with the evidence of any other solution. It has no answer if no
+        combination that was tried satisfies the limits.
 
     Raises:
         InputError: the step is not positive and finite, there is nothing to round, a range has no multiple, or tasks
@@ -147,7 +147,7 @@ def _places(case: Case, solution: Solution) -> Iterator[_Place]:
 
 
 def _multiples(place: _Place, step: float, farther: int, case: Case, option: str) -> Value:
-    """Return the nearest multiples of a step to a value, and ``farther`` more multiples on each side.
+    """Return the multiples of a step nearest to a value, and ``farther`` more multiples on each side.
 
     Raises:
         InputError: there is no multiple within the bounds of the value.

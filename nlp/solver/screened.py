@@ -1,8 +1,8 @@
 """Screened starts: sequential quadratic programming in C searches each start, and Ipopt confirms the optima.
 
 The search in C (:mod:`screwsynth.nlp.screening`) takes a fraction of Ipopt's time. Ipopt starts from each distinct
-optimum of it, with the multipliers, and its last point is the answer. Ipopt also searches, from the beginning, the
-starts from which the search in C does not converge, or whose result violates the program's conditions.
+optimum of this search, with the multipliers, and Ipopt's last point is the answer. Ipopt also searches, from the
+beginning, the starts from which the search in C does not converge, or whose result violates the program's conditions.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def search_each(
         solver: local solver.
 
     Yields:
-        One start for each point, in order; after a stop request, only the complete starts.
+        One result for each point, in order; after a stop request, only the results of complete searches.
 
     Raises:
         InputError: the objective cannot be compiled, although the search asks for it.
@@ -57,7 +57,7 @@ def search_each(
 def _search_block(
     nlp: Nlp, points: FloatArray, search: Search, jobs: int | None, confirmed: _Confirmed
 ) -> Iterator[Start]:
-    """Screen points, and yield their starts in order; after a stop request, only the complete starts."""
+    """Search a block of points in C, confirm the results, and yield them in order; see :func:`search_each`."""
     found = screen(nlp, points, confirmed.sizes, search.max_iterations, jobs)
     starts: list[Start | None] = []
     for k in range(len(points)):
@@ -96,7 +96,7 @@ class _Confirmed:
         self._known: list[Start] = []
 
     def start(self, found: Screened, k: int) -> Start | None:
-        """Return the k-th start, or None if Ipopt must search from its starting point."""
+        """Return the result of the k-th search; None if Ipopt must search from its starting point."""
         if not found.converged[k]:
             return None
         n, iterations = self._nlp.n, int(found.iterations[k])
@@ -116,7 +116,7 @@ class _Confirmed:
         return start
 
     def _confirm(self, screened: SolverResult) -> Start | None:
-        """Return the start for an optimum of the search in C; None if it violates the program's conditions.
+        """Return the result for an optimum of the search in C; None if it violates the program's conditions.
 
         Ipopt's point counts unless Ipopt fails from there, or moves to a worse point.
         """

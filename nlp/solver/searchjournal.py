@@ -39,7 +39,7 @@ _DIGITS, _ROUNDING = 12, 1e-14
 
 
 class KeptSearch(NamedTuple):
-    """Outcome of a search of a program. Numbers are texts, to keep every digit and infinite values.
+    """Entry of the journal: outcome of a search of a program. Numbers are texts, to keep every digit and infinity.
 
     Attributes:
         key: text that identifies the search.
@@ -50,7 +50,7 @@ class KeptSearch(NamedTuple):
         starts: status, objective, stationarity, violation, iterations, solver and point of each start.
         optima: objective, count, spread and point of each distinct optimum.
         relaxation: key, unit, dimension, limit and needed value of each limit to relax.
-        seed, seconds, better: fields of the solution.
+        seed, seconds, better: fields of :class:`.multistart.ProgramSolution`.
     """
 
     key: str
@@ -69,7 +69,7 @@ class KeptSearch(NamedTuple):
 
 
 class KeptCertificate(NamedTuple):
-    """A certificate of a program.
+    """Entry of the journal: certificate of a program.
 
     Attributes:
         key: text that identifies the search.
@@ -109,7 +109,7 @@ class SearchJournal(JournalFile):
         )
 
     def load_entry(self, place: int, line: bytes) -> None:
-        """Store an entry that is in the file."""
+        """Keep in memory an entry that was read from the file."""
         del place
         with suppress(ValueError):
             try:
@@ -122,11 +122,11 @@ class SearchJournal(JournalFile):
         return len(self._kept)
 
     def __getitem__(self, key: str) -> KeptSearch | KeptCertificate | None:
-        """Return the entry of a key, or None."""
+        """Return the entry of the journal with a key, or None."""
         return self._kept.get(key)
 
     def add(self, entry: KeptSearch | KeptCertificate) -> None:
-        """Append an entry.
+        """Append an entry to the journal.
 
         Raises:
             InputError: the file cannot be written.

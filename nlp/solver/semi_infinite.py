@@ -66,15 +66,16 @@ SolveOne = Callable[[Nlp, Sequence[FloatArray]], ProgramSolution]
 
 @dataclass(frozen=True, eq=False)
 class ExchangeProof:
-    """The proof of a design over a workspace or along a path, by exchange of poses.
+    """Proof of a solved design over a workspace or along a path, by exchange of poses.
 
     Attributes:
         judgement: verdicts on the design.
-        poses: poses of the constraints, in the order in which they were added.
+        poses: poses that became constraints, in the order in which they were added.
         history: F and the number of unproved claims of each design, in order.
         first: verdicts on the first design, with limits at the stated poses only.
         tighter: relative amount by which the constraints are tighter than the limits of the case.
-        place: (6,) pose of a path's frame: position, then roll, pitch and yaw, radians; empty for a workspace.
+        place: (6,) pose of the path's frame in the world: position, then roll, pitch and yaw, radians; empty for a
+            workspace.
     """
 
     judgement: Judgement
@@ -91,12 +92,12 @@ class ExchangeProof:
 
 
 class JudgedDesign(NamedTuple):
-    """A design judged at every pose of a set.
+    """Design with the verdicts at every pose of a set: a workspace or a path.
 
     Attributes:
         design: design, with the set of poses as its workspace.
         judgement: verdicts on the design.
-        faults: pose for each unproved claim; None for an undecided claim without a pose.
+        faults: for each unproved claim, a pose at which the claim fails; None for an undecided claim without a pose.
     """
 
     design: Case
@@ -105,7 +106,7 @@ class JudgedDesign(NamedTuple):
 
 
 class SemiInfinite(NamedTuple):
-    """A program whose limits hold at every pose of a set.
+    """Semi-infinite program: its limits hold at every pose of a set, a workspace or a path.
 
     Attributes:
         nlp: nonlinear program without constraints at poses.
@@ -215,11 +216,11 @@ def _solve_within(
         nlp: nonlinear program with the whole margin.
         solve_one: function that solves a program.
         start: (n,) point to start from.
-        parts: parts of the margin, in the order in which they are tried.
+        parts: fractions of the whole margin, in the order in which they are tried.
 
     Returns:
-        The solution, and the parts from its margin on. If the limits of the case cannot be satisfied either, the
-        solution has no answer, and the only part is 0.
+        The solution, and the fractions from its margin on. If the limits of the case cannot be satisfied either, the
+        solution has no answer, and the only fraction is 0.
     """
     found = solve_one(with_margin(nlp, parts[0]), [start])
     if found.status.is_answer or found.status is Status.INTERRUPTED or not parts[0]:
@@ -253,10 +254,15 @@ def with_objective(design: Case, level: float) -> Case:
 
 
 def _judged(case: Case, gap: float) -> Judgement:
-    """Return the verdicts on a design over its workspace; only on the reaches if a limb does not reach every pose."""
+    """Return the verdicts on a design over its workspace; only those on reach if a limb does not reach every pose."""
     closed, workspace = closed_form(case.model), workspace_of_case(case)
     # Poses that the robot cannot take are no evidence about the reach of its limbs.
-    if closed.reaches and not workspace.dependent:
+    if workspace.position_set is not None:
+        # Programs have the box of a set, so that sampled poses are tested first.
+        found_first = judge_workspace(case, gap=gap, jobs=1, with_objective=False, until_fault=True)
+        if found_first.is_refuted:
+            return found_first
+    elif closed.reaches and not workspace.dependent:
         layout, claims = reach_claims(case, closed, workspace)
         found = tuple(prove_extreme(layout, claim, NumberSearch(gap, 1)) for claim in claims)
         if any(each.outcome is not Outcome.PROVED for each in found):
@@ -284,7 +290,7 @@ def design_of(case: Case, nlp: Nlp, x: FloatArray) -> Case:
 
 
 def faults_of(judged: Judgement) -> Iterator[BindingPose | None]:
-    """Yield a pose for each unproved claim; None for an undecided claim without a pose.
+    """Yield, for each unproved claim, a pose at which the claim fails; None for an undecided claim without a pose.
 
     There is no constraint for the rank of the constraint wrenches.
     """
@@ -311,5 +317,5 @@ def _faults_of_numbers(extremes: Sequence[Verdict]) -> Iterator[BindingPose | No
 
 
 def _errors(found: JointErrors | None) -> FloatArray | None:
-    """Return the joint-centre errors (m, 3) of a robot within the tolerance; None for the exact robot."""
+    """Return the joint-centre errors (m, 3) of a robot within the tolerance; None for the nominal robot."""
     return None if found is None else found.vectors

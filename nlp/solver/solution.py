@@ -50,10 +50,10 @@ class Answer:
         """Return the drawing of the robot with its tasks; a notebook shows it.
 
         Args:
-            file: file for the drawing, as PNG, SVG or PDF by the ending of its name; None for none.
+            file: file for the drawing, as PNG, SVG or PDF by the ending of its name; None to write no file.
 
         Raises:
-            InputError: the ending is another one, Matplotlib is not installed, or the file cannot be written.
+            InputError: the ending is not allowed, Matplotlib is not installed, or the file cannot be written.
             EvaluationError: the robot's loops cannot be closed at the point of the answer.
         """
         from .. import picture_of, plot  # noqa: PLC0415 - outputs come after answers
@@ -67,7 +67,7 @@ class Answer:
         """Return an HTML page about the answer, which opens without a network.
 
         Args:
-            file: file for the page; None for none.
+            file: file for the page; None to write no file.
 
         Raises:
             InputError: Plotly is not installed, or the file cannot be written.
@@ -102,8 +102,9 @@ class TaskOutcome:
         evidence: evidence of optimality at the solution for this task only; None without free variables.
         loss: loss of F compared with the task's separate optimum; negative if the combined search reached a better
             optimum; 0 for a case with one task.
-        exchanged: solution of the task's separate program with the poses of the exchange as constraints, for several
-            tasks with limits over a workspace or along a path; otherwise None. ``own`` is without these poses.
+        exchanged: solution of the task's separate program with constraints at the poses that the exchange added; only
+            for several tasks with limits over a workspace or along a path, otherwise None. The program of ``own`` has
+            no such constraints.
     """
 
     task: Task
@@ -139,12 +140,12 @@ class Combination:
 
 
 class ChoicePart(NamedTuple):
-    """A part of the combinations of a case's listed parameter values.
+    """Group of combinations of a case's listed parameter values.
 
     Attributes:
         ranges: index range of the values of each parameter; the second index is exclusive.
-        cost: objective as a cost to be minimised: of the combination, or with the parameters free between their
-            smallest and largest values; None without an answer.
+        cost: objective as a cost to be minimised. For a group of several combinations, it is the best objective with
+            the parameters free between their smallest and largest values. None without an answer.
     """
 
     ranges: Ranges
@@ -182,7 +183,7 @@ class Rounding:
         after: objective of the rounded design, as a cost to be minimised; infinite without an answer.
         farther: number of additional multiples on each side of the nearest ones that were searched.
         numbers: rounded dimensions; their values are NaN without an answer.
-        choice: search over the multiples; None if each dimension has only one multiple.
+        choice: search over the combinations of multiples; None if each dimension has only one multiple.
     """
 
     step: float
@@ -317,17 +318,17 @@ class Solution(Whole, Shown, Answer):
 
     @property
     def evidence(self) -> Evidence | None:
-        """Evidence of the deciding program; None for an average, and when nothing is free."""
+        """Evidence of optimality of the deciding program; None for an average, and without free variables."""
         return None if self.decided_by is None else self.decided_by.evidence
 
     @property
     def nlp(self) -> Nlp:
-        """The deciding program."""
+        """Nonlinear program of the only task, or of the combination of several tasks."""
         return self._decisive_solution().nlp
 
     @property
     def starts(self) -> tuple[Start, ...]:
-        """Every start of the deciding program, in order."""
+        """Result of every search of the deciding program, one for each starting point, in order."""
         return self._decisive_solution().starts
 
     @property
@@ -362,7 +363,8 @@ class Solution(Whole, Shown, Answer):
             EvaluationError: there is no single program, as for an average.
         """
         if self.decided_by is None:
-            raise EvaluationError("an average of tasks has no combined program: outcomes has the separate programs")
+            fault = "an average of tasks has no combined program; solution.outcomes has the program of each task"
+            raise EvaluationError(fault)
         return self.decided_by
 
 

@@ -162,7 +162,7 @@ def solve_programs(
 
 
 def _at_stated_poses(found: ProgramSolution, nlp: Nlp) -> ProgramSolution:
-    """Return the solution of an exchange as a solution of the program without constraints at its poses."""
+    """Return a solution found with the exchange's added poses as a solution of the program with stated poses only."""
     starts = tuple(replace(each, x=each.x[: nlp.n]) for each in found.starts)
     optima = tuple(replace(each, x=each.x[: nlp.n], nlp=nlp) for each in found.optima)
     # Only the combined design needs a proof: a separate optimum without proof is combined too, with a notice.

@@ -69,6 +69,7 @@ class StartStatus(enum.Enum):
     UNDEFINED = "met a point where the robot's equations have no finite value"
     STALLED = "stopped before it was stationary"
     LIMB_SINGULAR = "ended where passive joints of a limb are dependent, so that F jumps"
+    SINGULAR = "ended where J is singular and forces are undetermined: add limits.smallest_singular_value"
     OPEN = "ended where loops of the robot are open: another way to assemble its joints"
 
 
@@ -77,11 +78,16 @@ _FAILURES = {
     StopReason.INFEASIBLE: StartStatus.INFEASIBLE,
     StopReason.UNDEFINED: StartStatus.UNDEFINED,
 }
+#: Stationary points that are no optima, apart from saddles.
+_REFUSED = {
+    PointKind.LIMB_SINGULAR: StartStatus.LIMB_SINGULAR,
+    PointKind.SINGULAR: StartStatus.SINGULAR,
+}
 
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """The search from one starting point.
+    """Result of the search from one starting point.
 
     Attributes:
         status: outcome of the search.
@@ -105,7 +111,7 @@ class Start:
 def search_from(
     nlp: Nlp, points: FloatArray, search: Search, jobs: int | None = None, solver: Solver = ipopt
 ) -> Iterator[Start]:
-    """Search a program from each of several points.
+    """Search a program from each of several starting points.
 
     Args:
         nlp: the nonlinear program.
@@ -115,7 +121,7 @@ def search_from(
         solver: local solver.
 
     Yields:
-        One start for each point, in order; after a stop request, only the complete starts.
+        One result for each point, in order; after a stop request, only the results of complete searches.
 
     Raises:
         InputError: the objective cannot be compiled, although the search asks for it.
@@ -177,7 +183,7 @@ def known_optimum(nlp: Nlp, stopped: FloatArray, known: list[Start]) -> Start | 
 
 
 def judge(nlp: Nlp, found: SolverResult) -> Start:
-    """Return the last point of a local solver after Newton corrections, with its status by the conditions."""
+    """Correct the last point of a local solver by Newton's method; return it with its status by the conditions."""
     stopped = np.clip(found.x, nlp.lower, nlp.upper)
     raw = at = linearise(nlp, stopped)
     active = at.active()
@@ -224,7 +230,7 @@ def _likely_active(nlp: Nlp, at: Linearisation, found: SolverResult, share: floa
 
 
 def _independent(normals: FloatArray, order: NDArray[np.intp]) -> list[int]:
-    """Return the sides, in the given order, whose unit normals (n,) are independent of the preceding ones."""
+    """Return the sides, in the given order, whose unit normals (n,) are independent of the preceding normals."""
     kept = list[int]()
     basis = np.zeros((0, normals.shape[1]))
     for j in order:
@@ -249,9 +255,9 @@ class Optimum:
     Attributes:
         F: objective.
         count: number of starts that converged to the optimum.
-        x: (n,) one of its points.
-        spread: largest distance between its points along one variable, divided by the range of the variable: 0 for an
-            isolated optimum, up to 1 for a set of optima, which may have several pieces.
+        x: (n,) one of the points at which searches ended.
+        spread: largest distance between end points of these searches along one variable, divided by the range of the
+            variable: 0 for an isolated optimum, up to 1 for a set of optima, which may have several pieces.
         evidence: evidence of optimality at ``x``.
         nlp: nonlinear program of the optimum.
     """
@@ -277,7 +283,7 @@ def same_value(nlp: Nlp) -> float:
 def distinct_optima(nlp: Nlp, done: Sequence[Start], phase: PhaseProgress) -> tuple[list[Start], list[Optimum]]:
     """Group converged starts by F and point, and examine one point of each group, once.
 
-    Saddles and singular limbs are marked in the status of their starts; the other points are optima, best first.
+    Saddles and singular points are marked in the status of their starts; the other points are optima, best first.
 
     If an optimum is not isolated, all points with its F count as one set, which may have several pieces. Points in
     different working modes of a limb belong to different sets.
@@ -299,10 +305,7 @@ def distinct_optima(nlp: Nlp, done: Sequence[Start], phase: PhaseProgress) -> tu
         examined = [evidence, *(examine(nlp, group[0].x) for group in groups[1:])]
         for each, group in zip(examined, groups, strict=True):
             if not each.kind.is_optimum:
-                is_singular = each.kind is PointKind.LIMB_SINGULAR
-                refused |= dict.fromkeys(
-                    map(id, group), StartStatus.LIMB_SINGULAR if is_singular else StartStatus.SADDLE
-                )
+                refused |= dict.fromkeys(map(id, group), _REFUSED.get(each.kind, StartStatus.SADDLE))
                 continue
             x = np.array([start.x for start in group])
             spread = float(np.max(np.ptp(x, axis=0) / (2 * nlp.scale)))

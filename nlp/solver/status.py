@@ -21,6 +21,7 @@ class Status(enum.Enum):
     EVALUATED = "evaluated"
     SADDLE = "saddle"
     LIMB_SINGULAR = "singular limb"
+    SINGULAR = "singular"
     NOT_CONVERGED = "not converged"
     INFEASIBLE = "infeasible"
     NOT_PROVED = "not proved"

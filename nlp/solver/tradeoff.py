@@ -1,8 +1,8 @@
 """Trade-off curves: the optimum of a case as a function of one of its values, with one solve for each value.
 
 The search at each value starts from the optimum at the previous value and from the case's starting points. A second
-pass, backwards, tries the optimum at the next value. A better family of optima from one solve is thus followed along
-the curve.
+pass, backwards, tries the optimum at the next value. So a better optimum that one solve reaches is followed along the
+whole curve.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class Tradeoff:
 
 
 def _with_earlier_form(tradeoff: Callable[Given, Tradeoff]) -> Callable[Given, Tradeoff]:
-    """Return the function; it also takes the arguments of version 0.1.0: ``case_at``, ``values`` and ``name``."""
+    """Decorate a function so that it also takes the arguments of version 0.1.0: ``case_at``, ``values``, ``name``."""
 
     @wraps(tradeoff)
     def with_both(*args: Given.args, **given: Given.kwargs) -> Tradeoff:
@@ -195,7 +195,7 @@ def solve_along(
 
 
 def _certified(point: TradeoffPoint, left: int, jobs: int | None) -> TradeoffPoint:
-    """Return an answer with its certificates, in an equal share of the remaining time of ``left`` values."""
+    """Certify the answer at a value; the time is an equal share of the remaining time for ``left`` values."""
     if not point.solution.status.is_answer:
         return point
     with within(seconds_left() / left):
@@ -205,7 +205,7 @@ def _certified(point: TradeoffPoint, left: int, jobs: int | None) -> TradeoffPoi
 
 
 def _whole(solve: Callable[[], Solution]) -> Solution | None:
-    """Return the outcome of a solve; None if a stop is requested before or during it.
+    """Return the solution of a solve; None if a stop is requested before or during the solve.
 
     An interrupted search has only some of its starts, and its best point is not the optimum of its value.
     """
@@ -223,7 +223,7 @@ def _solve(case: Case, search: Search, first: Sequence[FloatArray], jobs: int | 
 
 
 def _start_from(solution: Solution) -> list[FloatArray]:
-    """Return the point of an answer with variables, as a start for its neighbours."""
+    """Return the point of an answer as a starting point for the neighbouring values; empty without variables."""
     return [solution.x] if solution.status.is_answer and solution.x.size else []
 
 

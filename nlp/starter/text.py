@@ -5,15 +5,22 @@ from __future__ import annotations
 import itertools
 import json
 import math
+import textwrap
 from collections.abc import Sequence
 
 import casadi as ca
 import numpy as np
 
-from ...models import Dimension, FloatArray, Model, Parameter, Screw
+from ...models import Dimension, FloatArray, Model, Parameter, Screw, homogenised, model_names
+from ..case.case import Case
 from ..case.limits.clearance import squared_distance
+from ..case.pose import Free, Value
+from ..case.robots import model_options
 from ..case.settings import Search
+from ..case.task import Sense, Task
 from ..case.toml import option_text, plain_value, toml_key, toml_text
+from ..case.workspace import TURNS, TurnKind, Turns, Workspace
+from ..evidence.dependent import dependent_of
 from ..units import Units
 from .home import TURN, Home, free_widths, read_home, round_number, starter_values
 
@@ -29,8 +36,13 @@ _CONES = 6
 _CONDITION = 1.5
 #: Half range of the workspace: of a position, relative to that of the pose; and of a rotation, degrees.
 _BOX, _BOX_TURN = 0.2, 5
+#: Largest bound of the smallest singular value in a comment of a starter case: leg forces are then at most five times
+#: the load that they balance, in Euclidean norm.
+_SMALLEST = 0.2
 #: Longest line whose comment is aligned with those of other lines.
 _WIDTH = 50
+#: Longest line of a comment about the lines below it.
+_COMMENT = 110
 
 
 def starter_case(model: Model, robot_file: str | None = None) -> str:
@@ -46,6 +58,7 @@ def starter_case(model: Model, robot_file: str | None = None) -> str:
     lengths = [abs(value) for item in model.parameters if item.dimension is Dimension.LENGTH for value in item.typical]
     home = read_home(model, math.hypot(*model.home) or max(lengths, default=0.0) or _size(model) or 1 / 0.25)
     workspace = _workspace_lines(model, home, units)
+    torques = _torque_lines(model, home)
     lines = [
         f'title = "My {model.name}"',
         "",
@@ -66,6 +79,8 @@ def starter_case(model: Model, robot_file: str | None = None) -> str:
         _commented("[limits]", "limits of a buildable design; the documentation lists all"),
         *_limit_lines(model, home),
         "",
+        *(f"# {line}".rstrip() for line in torques),
+        *([""] if torques else []),
         *(f"# {line}" for line in workspace),
         *([""] if workspace else []),
         "[solve]",
@@ -93,8 +108,8 @@ def _aligned(lines: Sequence[str]) -> list[str]:
 
 def _robot_lines(model: Model, robot_file: str | None, arm: float) -> list[str]:
     """Return the lines of the table ``[robot]``, without the parameters."""
-    options = [f"{key} = {option_text(value)}" for key, value in model.options.items() if key != "definition"]
     definition = model.options.get("definition")
+    options = _option_lines(model)
     robot = f'model = "{model.name}"' if definition is None else f"definition = {toml_text(plain_value(definition))}"
     if robot_file is not None:
         robot = f"file = {json.dumps(robot_file, ensure_ascii=False)}"
@@ -102,13 +117,29 @@ def _robot_lines(model: Model, robot_file: str | None, arm: float) -> list[str]:
     return ["[robot]", robot, *options, *([length] if model.has_couples else [])]
 
 
+def _option_lines(model: Model) -> list[str]:
+    """Return a line for each option of a robot, below a comment with the meaning of its values."""
+    lines = []
+    options = {key: value for key, value in model.options.items() if key != "definition"}
+    known = model_options(model.name) if options and model.name in model_names() else ()
+    meanings = {option.name: option.meaning for option in known}
+    for key, value in options.items():
+        lines += [f"# {each}" for each in textwrap.wrap(meanings.get(key, ""), _COMMENT - 2)]
+        lines.append(f"{key} = {option_text(value)}")
+    return lines
+
+
 def _pose_lines(model: Model, home: Home) -> list[str]:
     """Return the lines of the table ``[pose]``, with the coordinates free that the robot can change."""
     turning = home.turning
     lines = [
         _commented("[pose]", "pose of the platform in the base frame; all axes are parallel at home"),
+        *_range_lines(model, home),
         _position_line(model, home, home.reach),
     ]
+    if home.moves[2]:
+        height = _free_number(model.home[2], home.reach)
+        lines.append(f"# fixed height: write {_number(model.home[2])} in place of {height}")
     degrees = round(math.degrees(turning.largest))
     angle = f"angle = {{ min = {-degrees}, max = {degrees} }}"
     if turning.numbers == 3:
@@ -124,6 +155,21 @@ def _pose_lines(model: Model, home: Home) -> list[str]:
     if count > home.mobility:
         lines.append(f"# {home.mobility} of these {count} coordinates are independent; the loops determine the rest.")
     return lines
+
+
+def _range_lines(model: Model, home: Home) -> list[str]:
+    """Return the comment that separates ranges of the pose from a workspace; none for robots without a workspace."""
+    if not _has_workspace(model, home):
+        return []
+    return [
+        "# ranges here: the search chooses ONE pose. For a robot that works at ALL poses of a box,",
+        '# use [workspace] below, and over = "workspace" in [limits].',
+    ]
+
+
+def _has_workspace(model: Model, home: Home) -> bool:
+    """Return whether a case of the robot can have a workspace: several poses, and no free actuator coordinates."""
+    return not model.free_joints and bool(any(home.moves) or home.turning.numbers)
 
 
 def _task_lines(model: Model, home: Home) -> list[str]:
@@ -160,7 +206,8 @@ def _limit_lines(model: Model, home: Home) -> list[str]:
     lines = [*_actuator_lines(model, home), *_free_joint_lines(model, home), *_joint_lines(model, home)]
     is_singular = home.state.is_singular
     if "base_joint_angle" in home.state.quantities and not is_singular:
-        return lines  # cones keep the robot away from singularities, and are faster to prove
+        # Cones keep the robot away from singularities, and are faster to prove.
+        return [*lines, *_singular_value_lines(model, home)]
     if math.isfinite(home.condition):
         largest = float(f"{_CONDITION * home.condition:.2g}")
         place = "near home, which is singular" if is_singular else "at home"
@@ -169,6 +216,42 @@ def _limit_lines(model: Model, home: Home) -> list[str]:
             _commented(table, f"of J, with moments divided by length; {float(f'{home.condition:.2g}'):g} {place}")
         )
     return lines
+
+
+def _singular_value_lines(model: Model, home: Home) -> list[str]:
+    """Return the comment with a limit on the smallest singular value of a hexapod; none for other robots."""
+    if not model.legs or home.mobility < 6:
+        return []
+    values = np.array([value for item in model.parameters for value in starter_values(item)])
+    centres = ca.Function("centres", [model.symbols], [ca.horzcat(*[leg.platform for leg in model.legs])])(values)
+    radius = float(f"{math.sqrt(np.mean(np.sum(centres.full()[:2] ** 2, axis=0))):.2g}")
+    rows = np.array(homogenised(home.state.jacobian, home.state.position, radius))
+    smallest = float(np.linalg.svd(rows, compute_uv=False)[-1])
+    # The limit is satisfied at home: the value at home is rounded down to one digit.
+    digit = 10.0 ** math.floor(math.log10(smallest))
+    least = min(_SMALLEST, round(smallest // digit * digit, 9))
+    table = f"smallest_singular_value = {{ min = {least:g}, length = {radius:g} }}"
+    return [f"# {table}   # keeps the design away from singularities"]
+
+
+def _torque_lines(model: Model, home: Home) -> list[str]:
+    """Return another objective as comments, the torques of motors that turn cranks; nothing for other robots."""
+    if all(quantity.name != "actuator_angle" for quantity in model.quantities):
+        return []
+    is_rod = any(each.wrenches == 1 for each in model.structure)
+    subject = "the forces of the rods" if is_rod else "the limbs with their motors locked"
+    load = "force = [0, 0, -10]"
+    if home.motion is not None:
+        is_slide = math.isinf(home.motion.pitch)
+        load = f"force = {_vector(-10 * home.motion.axis)}" if is_slide else f"moment = {_vector(home.motion.axis)}"
+    return [
+        f"F is about {subject}. The torque of a motor also depends on its crank and on the load:",
+        _commented("[[load]]", "that the motors hold"),
+        'name = "load"',
+        _commented(load, "on the platform, along the axes of the world"),
+        _commented("[objective]", 'in the place of F; set sense = "min" in the task, or leave the task out'),
+        _commented('minimise = "actuator_force"', "the largest torque of a motor; or actuator_speed, actuator_power"),
+    ]
 
 
 def _actuator_lines(model: Model, home: Home) -> list[str]:
@@ -229,9 +312,10 @@ def _joint_lines(model: Model, home: Home) -> list[str]:
 
 def _workspace_lines(model: Model, home: Home, units: Units) -> list[str]:
     """Return the lines of a workspace around home; none for robots with a single pose or free actuator coordinates."""
-    if model.free_joints or not (any(home.moves) or home.turning.numbers):
+    if not _has_workspace(model, home):
         return []
-    position = _position_line(model, home, round_number(_BOX * home.reach))
+    reach = round_number(_BOX * home.reach)
+    position = _position_line(model, home, reach)
     turning = home.turning
     degrees = _BOX_TURN * round(turning.largest / TURN)
     angle = f"{{ min = {-degrees}, max = {degrees} }}"
@@ -241,7 +325,9 @@ def _workspace_lines(model: Model, home: Home, units: Units) -> list[str]:
         3: [f"rotation = {{ angle = {angle} }}"],
     }[turning.numbers]
     if turning.numbers == 3 and home.mobility < 6:
-        rotation = [f"rotation = {{ roll = {angle}, pitch = {angle}, yaw = {angle} }}"]
+        turn = math.radians(degrees)
+        parts = [f"{name} = {angle}" for name in _turning_about(model, home, reach, turn)]
+        rotation = [f"rotation = {{ {', '.join(parts)} }}"]
     fixed = ""
     if home.free is not None:
         item = model.parameters[home.free]
@@ -249,6 +335,29 @@ def _workspace_lines(model: Model, home: Home, units: Units) -> list[str]:
         fixed = f" --set {item.name}={','.join(value)}"
     question = f"screwsynth workspace{fixed} verifies all limits at all these poses"
     return [_commented("[workspace]", question), position, *rotation]
+
+
+def _turning_about(model: Model, home: Home, reach: float, turn: float) -> list[str]:
+    """Return those of roll, pitch and yaw that a robot changes over a workspace about home: the others stay 0.
+
+    Args:
+        model: the robot.
+        home: the robot at home.
+        reach: half range of the free components of the position, length.
+        turn: half range of the angles, radians.
+    """
+    parameters = {item.name: starter_values(item) for item in model.parameters}
+    case = Case(model, parameters, model.home, [Task.screw(Sense.MAX, axis=(0, 0, 1), pitch=math.inf)])
+    moves = zip(model.home, home.moves, strict=True)
+    position = [Free(value - reach, value + reach) if is_free else value for value, is_free in moves]
+    found = []
+    for k, name in enumerate(TURNS):
+        angles: list[Value] = [Free(-turn, turn)] * 3
+        angles[k] = 0.0
+        moved = dependent_of(case, Workspace(position, Turns(TurnKind.ROLL_PITCH_YAW, tuple(angles))))
+        if k + 3 in {*moved.held, *(each.index for each in moved.dependent)}:
+            found.append(name)
+    return found or list(TURNS)
 
 
 def _position_line(model: Model, home: Home, half: float) -> str:

@@ -130,7 +130,7 @@ def sweep_designs(sweep: Sweep, rows: Sequence[Row]) -> Designs[Row]:
             ("curve", "F over the points"),
             ("values", "All points"),
             rules=() if notice is None else (f"Note: {notice}.",),
-            below="F at each point. Numbers: regions of equal active limits.",
+            below="F at each point. Numbers: regions with the same active limits.",
             is_answer=bool(values),
         ),
         before=[Line(line + f", {proved:,} are proved" if sweep.certified else line)],

@@ -40,7 +40,8 @@ def axis_ranges_tables(result: AxisRangesResult) -> Iterator[TextTable]:
         title="free travel along each axis, with the other coordinates fixed (proved)",
     )
     pairs = [(*each.axes, number(each.factor), _pair_words(each)) for each in result.pairs]
-    yield TextTable(("axis", "and", "factor", "limited by"), tuple(pairs), name="pairs")
+    title = "free travel along two axes at once: fraction of both ranges (proved)"
+    yield TextTable(("axis", "and", "factor", "limited by"), tuple(pairs), name="pairs", title=title)
 
 
 def axis_ranges_summary(case: Case, result: AxisRangesResult) -> Iterator[Line | TextTable]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from ..case.task import Sense
@@ -11,7 +11,7 @@ from ..proof.statement.claims import CONSTRAINTS, REGULAR
 from ..proof.workspace.verdict import Outcome
 from ..results.claims import PosedClaim, refuted_claims
 from .motors import OUTCOME_WORDS, TONES
-from .numbers import number
+from .numbers import number, quantity_words
 from .text import Line
 from .verdicts import SHOWN
 
@@ -44,6 +44,13 @@ def rank_line(name: str, outcome: Outcome, after: str = "") -> Line:
     return Line(words[outcome], label=_LABELS[name], tone=TONES[outcome], after=after)
 
 
+def unproved_ranks(ranks: Mapping[str, Outcome]) -> Iterator[str]:
+    """Yield the ranks that are not proved, with their outcomes, from the outcome of each rank by its claim."""
+    for name, outcome in ranks.items():
+        if outcome is not Outcome.PROVED:
+            yield f"{CLAIM_WORDS[name]} ({OUTCOME_WORDS[outcome]})"
+
+
 def claim_words(claim: PosedClaim) -> str:
     """Return a claim at a pose: a singularity, a limb that does not reach, or a value with its limit."""
     each, length = claim.verdict, claim.length
@@ -59,7 +66,7 @@ def claim_words(claim: PosedClaim) -> str:
     if length is not None:
         end = "shortest" if length.sense is Sense.MIN else "longest"
         where = f"; limb {each.name.partition(' limb ')[2]} at its {end} length"
-    return f"{each.name}:{value}{limit}{where}"
+    return f"{quantity_words(each.name)}:{value}{limit}{where}"
 
 
 def violation_lines(result: WorkspaceResult, command: Callable[[WorkspacePose], str]) -> Iterator[Line]:

@@ -32,14 +32,14 @@ def comparison_lines(result: ComparisonResult) -> Iterator[Line]:
 
 
 def comparison_columns(result: ComparisonResult) -> Iterator[Column[ComparedRobotData]]:
-    """Yield the columns: robot, place, F, rates, sizes, limits, workspace, strokes, and certificate."""
+    """Yield the columns: robot, ranking, F, rates, sizes, limits, workspace, strokes, and certificate."""
     robots, proofs = result.robots, ColumnKind.PROOF
     tasks = next((each.tasks for each in robots if each.tasks), ())
     several, unit = len(tasks) > 1, result.units.length
     places = {robot.name: str(k) if robot.part == "ranked" else robot.part for k, robot in enumerate(robots, start=1)}
     yield Column("robot", lambda robot: robot.name, holds=str, label="robot", text=lambda robot: robot.name)
     yield Column("model", lambda robot: robot.model, holds=str)
-    yield Column("part", lambda robot: robot.part, holds=str, label="place", text=lambda robot: places[robot.name])
+    yield Column("part", lambda robot: robot.part, holds=str, label="ranking", text=lambda robot: places[robot.name])
     yield Column(
         "freedoms",
         lambda robot: robot.freedoms,

@@ -14,7 +14,7 @@ from ..results.rounding import ordered, robot_size, settled, task_F
 from ..solver.status import Status
 from ..units import Units, objective_unit
 from .joints import convention_lines, joint_lines, motion_words, reach_of, screw_words, triple
-from .numbers import number, per_words, residual, rounded_to
+from .numbers import number, per_words, quantity_words, residual, rounded_to
 from .objective import objective_words
 from .text import Line, Tone
 
@@ -31,6 +31,12 @@ _VIOLATIONS, _OPTIMA = 8, 5
 _DIGITS = 6
 #: Relative difference of the objective between two solves of one nonlinear program; below it, solver error.
 _UNCHANGED = 1e-9
+#: Rank of J of a robot that is not singular.
+FULL_RANK = 6
+#: Share of searches that converged, of which there are many, up to which the result has a caution.
+_FEW, _MANY = 0.125, 8
+#: Smallest over largest singular value of J, below which a regular robot has a caution.
+_NEAR = 1e-3
 #: Distance of optimal points, as a fraction of the variable ranges: more distant points are a set, not one optimum.
 SET = 1e-3
 
@@ -121,7 +127,7 @@ def headline(result: SolveResult, case: Case) -> Line:
     elif result.optimality is not None and result.optimality.kind is PointKind.UNDECIDED:
         status = "stationary, not proven optimal"
     if robot is not None and robot.singular:
-        status += f", singular: rank {robot.rank}"
+        status = f"SINGULAR: rank {robot.rank}, {status}"
     tone = Tone.CAUTION if is_unasked_singularity(robot, case) else Tone.ANSWER
     # F of a task that nothing resists is rounding error.
     F = 0.0 if robot is not None and robot.task_is_free and several is None else task_F(robot, result.F)
@@ -189,7 +195,9 @@ def check_lines(result: SolveResult) -> Iterator[Line]:
     evidence = result.optimality
     if evidence is not None:
         for direction in evidence.flat:
-            yield Line(", ".join(f"{name} {rate:+.4g}" for name, rate in direction.items()), label="flat direction")
+            steps = [f"{name} by {rate:+.4g}" for name, rate in direction.items()]
+            moved = " and ".join(each for each in (", ".join(steps[:-1]), steps[-1]) if each)
+            yield Line(f"moving {moved} keeps F: other designs are equally good", label="flat direction")
         if math.isfinite(evidence.stationarity):
             checks = f"stationarity {residual(evidence.stationarity)}, feasibility {residual(evidence.feasibility)}"
             curvature = evidence.eigenvalues
@@ -271,14 +279,21 @@ def violation_lines(sides: Sequence[ViolationData]) -> Iterator[Line]:
         yield Line(f"{len(sides)} limits are violated; the first {_VIOLATIONS}:", tone=Tone.FAULT)
     for side in sides[:_VIOLATIONS]:
         wanted = {"min": "at least", "max": "at most", "equal": "exactly"}[side.bound]
-        value, limit = (f"{each:.6g} {side.unit or ''}".rstrip() for each in (side.value, side.limit))
-        yield Line(f"violated: {side.name} = {value}, must be {wanted} {limit}", tone=Tone.FAULT)
+        value, limit = (
+            f"{each:.6g} {side.unit or ''}".rstrip() if math.isfinite(each) else "undetermined"
+            for each in (side.value, side.limit)
+        )
+        yield Line(f"violated: {quantity_words(side.name)} = {value}, must be {wanted} {limit}", tone=Tone.FAULT)
 
 
-def better_line(starts: StartsData) -> Line | None:
-    """Return the caution that an unconverged search reached a better point; None without such a search."""
-    if starts.better is None or not starts.optima:
+def starts_caution(starts: StartsData) -> Line | None:
+    """Return the caution that an unconverged search reached a better point, or that few searches converged."""
+    if not starts.optima:
         return None
+    if starts.better is None:
+        few = f"only {starts.converged} of {starts.run} searches converged: a better optimum may exist"
+        is_few = starts.run >= _MANY and starts.converged <= _FEW * starts.run
+        return Line(f"{few}; raise solve.starts", label="note", tone=Tone.CAUTION) if is_few else None
     reached = f"an unconverged search reached F = {number(starts.better)} within the limits"
     best = f"{starts.converged} of {starts.run} searches converged, the best at F = {number(starts.optima[0].F)}"
     return Line(f"{best}; {reached}: raise solve.max_iterations or solve.starts", label="note", tone=Tone.CAUTION)
@@ -318,12 +333,31 @@ def singularity_lines(robot: RobotData, units: Units) -> Iterator[Line]:
         yield from joint_lines(robot, robot.joints, units)
     yield from convention_lines(robot)
     if not robot.singular:
-        yield Line(f"{robot.rank}", label="rank of J")
+        values = robot.singular_values
+        words = f"{robot.rank}, nearly singular: the smallest singular value is {{:.2g}} of the largest"
+        is_near = values[-1] < _NEAR * values[0]
+        shown = Line(words.format(values[-1] / values[0]), label="rank of J", tone=Tone.CAUTION)
+        yield shown if is_near else Line(f"{robot.rank}", label="rank of J")
         return
     several = " combinations of" if len(robot.free_motions) > 1 else ""
     yield Line(f"{robot.rank}: singular; with all actuators locked nothing resists{several}", label="rank of J")
     for motion in robot.free_motions:
         yield Line(f"  {motion_words(motion, units, robot_size(robot))}")
+
+
+def exclusion_line(case: Case, robot: RobotData | None) -> Line | None:
+    """Return the limit that excludes singular designs, for an answer that is singular although its case expects none.
+
+    None if the case has this limit or minimises a quantity of the actuators, and for a robot that is singular at all
+    poses.
+    """
+    limits = {each.name for each in case.limits}
+    if not is_unasked_singularity(robot, case) or case.model.rank < FULL_RANK or "smallest_singular_value" in limits:
+        return None
+    if any(task.measure for task in case.tasks):
+        return None
+    words = "add smallest_singular_value = { min = ..., length = ... } to [limits] to exclude singular designs"
+    return Line(words, label="advice")
 
 
 def tolerance_line(lost: ToleranceLoss, F: float | None, units: Units) -> Line:

@@ -28,7 +28,7 @@ def loading_tables(case: Case, robot: RobotData) -> Iterator[TextTable]:
     if data.speeds is not None:
         size = max((each.value or 0.0 for each in data.speeds), default=0.0)
         rows = [(*_pose(each), each.actuator, _text(each.value, size), each.unit) for each in data.speeds]
-        yield TextTable((*_pose_header(data.speeds), "actuator", "speed", "unit"), tuple(rows), "speeds")
+        yield TextTable((*_pose_header(data.speeds), "actuator", "needed speed", "unit"), tuple(rows), "speeds")
 
 
 def _force_table(case: Case, loads: Sequence[HeldLoad]) -> TextTable:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 
-from ...models import Model, Parameter
+from ...models import Dimension, Model, Parameter
 from ..case.robots import ModelOption
 from ..units import Units
 from .joints import idle_words
@@ -42,15 +42,17 @@ def model_words(name: str, model: Model | None, options: Sequence[ModelOption]) 
     if model is not None:
         yield Line(model.description)
     if options:
-        rows = [
-            (option.name, option.allowed, "none: must be given" if option.default is None else option.default)
-            for option in options
+        choices = [
+            (option.name, option.allowed, option.default or "none: must be given", option.meaning) for option in options
         ]
-        yield TextTable(("option", "allowed", "default"), tuple(rows))
+        # The meaning is annotated by few robots of other packages.
+        columns = 4 if any(option.meaning for option in options) else 3
+        headers = ("option", "allowed", "default", "meaning")
+        yield TextTable(headers[:columns], tuple(row[:columns] for row in choices))
     if model is None:
         return
     yield TextTable(
-        ("parameter", "kind", "allowed (angles in deg)", "meaning"),
+        ("parameter", "kind", "allowed", "meaning"),
         tuple(
             (", ".join(item.components), item.dimension.value, _domain(item), item.description)
             for item in model.parameters
@@ -61,8 +63,8 @@ def model_words(name: str, model: Model | None, options: Sequence[ModelOption]) 
         if model.legs:
             words = f"{', '.join(leg.name for leg in model.legs)} (limits on leg lengths apply)"
             yield Line(words, label="straight legs")
-    words = "if f is the Euclidean norm of all wrench magnitudes, their power in the task is at most f sqrt(F)"
-    yield Line(words if not model.actuators else f"{words}; [[load]] gives actuator forces", label="forces")
+    words = "in the task, limb wrenches of magnitudes f_i have together a power of at most sqrt(sum f_i^2) sqrt(F)"
+    yield Line(words if not model.actuators else f"{words}; for actuator forces state [[load]]", label="power")
     if model.quantities:
         rows = [(item.name, item.dimension.value, item.description) for item in model.quantities]
         yield TextTable(("quantity", "kind", "meaning"), tuple(rows))
@@ -125,7 +127,8 @@ def _domain(parameter: Parameter) -> str:
     """Return the allowed values of a parameter, angles in degrees."""
     units = Units()
     lower, upper = (units.shown(end, parameter.dimension) for end in (parameter.lower, parameter.upper))
-    parts = ["" if math.isinf(lower) else f">= {lower:g}", "" if math.isinf(upper) else f"<= {upper:g}"]
+    unit = " deg" if parameter.dimension is Dimension.ANGLE else ""
+    parts = ["" if math.isinf(lower) else f">= {lower:g}{unit}", "" if math.isinf(upper) else f"<= {upper:g}{unit}"]
     return ", ".join(part for part in parts if part) or "any"
 
 

@@ -1,13 +1,15 @@
-"""Numbers as text.
+"""Numbers, and names of quantities, as text.
 
 A number below its error bound (``results.rounding``) has no significant digit: its text is 0.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 
+from ..errors import load_words
 from ..results.rounding import NOISE, settled
 from .text import Figure
 
@@ -15,6 +17,9 @@ from .text import Figure
 _RESIDUAL = 1e-12
 #: Significant digits of the result of a search; further digits are rounding error.
 _SOLVED = 9
+#: Sense of a force and its load in the name of a limited quantity, up to the pose.
+_LOADED = re.compile(r" (?:(backwards|smallest) )?load (.+?)(?=(?:, other sense)?(?: pose \d+)?$)")
+_SENSES = {None: "", "backwards": ", negative force", "smallest": ", smallest force"}
 
 
 def number(value: float, size: float = 0.0, *, digits: int = 7, signed: bool = False, part: float = NOISE) -> Figure:
@@ -48,6 +53,15 @@ def listed(values: Iterable[float]) -> str:
 def per_words(unit: str | None) -> str:
     """Return the unit in which a derivative is stated, such as ``per cm``; ``per 1`` for a quantity without a unit."""
     return f"per {unit or 1}"
+
+
+def quantity_words(name: str) -> str:
+    """Return the name of a limited quantity in words: the sense of its force and its load, separated by commas.
+
+    ``actuator_force actuator 2- backwards load cutting`` becomes ``actuator_force actuator 2-, negative force, load
+    "cutting"``: the name itself is that of results in JSON and of proof records.
+    """
+    return _LOADED.sub(lambda found: f"{_SENSES[found[1]]}, {load_words(found[2])}", name)
 
 
 def residual(value: float) -> str:

@@ -9,9 +9,9 @@ from ..case.pathfile import PLACE
 from ..case.pose import Free
 from ..case.task import Sense
 from ..proof.workspace.verdict import Outcome
-from .claims import SINGULAR, rank_line
+from .claims import CLAIM_WORDS, SINGULAR, rank_line, unproved_ranks
 from .motors import OUTCOME_WORDS, TONES
-from .numbers import number
+from .numbers import number, quantity_words
 from .text import Line, TextTable, Tone, in_part
 from .verdicts import (
     SHOWN,
@@ -65,7 +65,7 @@ def path_summary(
         yield from _other_faults(path, wrong)
         yield from open_lines(limited)
     yield from _knot_lines(path, case.units.length)
-    if path.time is not None or path.knots is not None:
+    if path.actuators and (path.time is not None or path.knots is not None):
         yield _actuator_table(path)
     yield from in_part("smallest margins", tightest_table(limited, TIGHTEST_ALONG))
     yield from in_part("all quantities", along_table(case, path.claims))
@@ -80,6 +80,8 @@ def _subject_lines(path: PathData) -> Iterator[Line]:
         words = ", ".join(f"{each.word} (line {each.line})" for each in path.idle[:_SHOWN])
         rest = len(path.idle) - _SHOWN
         yield Line(words + (f", and {rest} more" if rest > 0 else ""), label="ignored (no motion)")
+    for sentence in path.warnings or ():
+        yield Line(sentence, label="note", tone=Tone.CAUTION)
 
 
 def _other_faults(path: PathData, first: PathVerdictData | None) -> Iterator[Line]:
@@ -166,7 +168,8 @@ def verdict_words(result: PathResult) -> str:
 def path_proof_lines(case: Case, proof: PathProofData) -> Iterator[Line]:
     """Yield the proof of a solved design along its path."""
     whole = f"{proof.file}, {proof.segments:,} segment{'s' * (proof.segments != 1)}: "
-    yield proof_line(proof, "path", "point", whole)
+    ranks = {each.name: each.outcome for each in proof.claims if each.name in CLAIM_WORDS}
+    yield proof_line(proof, unproved_ranks(ranks), proof.claims, "path", "point", whole)
     stated = case.path
     for (name, dimension), value in zip(PLACE.items(), () if stated is None else stated.place, strict=False):
         if value != 0:
@@ -199,7 +202,7 @@ def fault_words(each: PathVerdictData, fault: PathFaultData) -> str:
         return f"{where}: {SINGULAR[each.name]}"
     verb = "falls below" if each.sense is Sense.MIN else "exceeds"
     limit = f"{number(each.limit)} {each.unit}".rstrip()
-    return f"{where}: {each.name} {verb} {limit}"
+    return f"{where}: {quantity_words(each.name)} {verb} {limit}"
 
 
 def _along_words(parameter: float) -> str:

@@ -17,18 +17,19 @@ from ..units import objective_unit
 from .joints import limb_part_table
 from .lines import (
     active_limit_lines,
-    better_line,
     certificate_lines,
     check_lines,
     choice_lines,
     combined_lines,
     combined_value_lines,
+    exclusion_line,
     fault_lines,
     heading_lines,
     is_unasked_singularity,
     objective_lines,
     optimality_line,
     singularity_lines,
+    starts_caution,
     starts_lines,
     task_lines,
     title_line,
@@ -75,7 +76,7 @@ def _task_summary(case: Case, result: SolveResult) -> Summary:
         yield from starts_lines(result.starts, robot)
         if case.limits_over == "workspace" and case.outside_workspace is not None:
             yield Line(case.outside_workspace.sentence, label="note")
-    elif (caution := better_line(result.starts)) is not None:
+    elif (caution := starts_caution(result.starts)) is not None:
         yield caution
     yield from _proof_lines(case, result)
     if result.optimality is not None:
@@ -83,6 +84,7 @@ def _task_summary(case: Case, result: SolveResult) -> Summary:
     yield from certificate_lines(result.certificate)
     if robot is not None and result.reached is None:
         yield from singularity_lines(robot, case.units)
+        yield from _advice_lines(case, robot)
     yield from _remark_lines(case)
     if robot is not None:
         yield solved_design_table(case, result, robot)
@@ -150,7 +152,7 @@ def _combined_summary(case: Case, result: CombinedResult) -> Summary:
     yield from combined_lines(result)
     yield outcome_table(combined, result.tasks)
     yield from choice_lines(result.choice, result.rounding, is_answer=point is not None)
-    if combined.starts is not None and (caution := better_line(combined.starts)) is not None:
+    if combined.starts is not None and (caution := starts_caution(combined.starts)) is not None:
         yield caution
     yield from _proof_lines(case, result)
     yield from combined_value_lines(combined)
@@ -167,6 +169,7 @@ def _combined_summary(case: Case, result: CombinedResult) -> Summary:
     if robot is not None:
         part = "" if is_unasked_singularity(robot, case) else "rank"
         yield from in_part(part, singularity_lines(robot, case.units))
+        yield from _advice_lines(case, robot)
     if point is not None and point.limits:
         title = limits_title(case, result.workspace or result.path)
         yield from in_part("limits", [limit_table(point.limits, combined.value or 0.0, title)])
@@ -234,6 +237,13 @@ def _limb_parts(case: Case, robot: RobotData) -> Summary:
     table = limb_part_table(case, robot)
     if table is not None and robot.joints is not None and robot.joints.constrained:
         yield table
+
+
+def _advice_lines(case: Case, robot: RobotData) -> Iterator[Line]:
+    """Yield the limit that excludes singular designs, if the answer is singular."""
+    advice = exclusion_line(case, robot)
+    if advice is not None:
+        yield advice
 
 
 def _remark_lines(case: Case) -> Summary:

@@ -11,7 +11,7 @@ from ..results.rounding import NOISE, rate_sizes, settled, settled_F, task_F
 from ..units import Units
 from .joints import motion_words
 from .lines import SET, counted
-from .numbers import number, per_words
+from .numbers import number, per_words, quantity_words
 from .text import TextTable
 
 if TYPE_CHECKING:
@@ -110,7 +110,7 @@ def _margin_text(margin: float, beside: float, word: str) -> str:
 
 def _place(name: str) -> str:
     """Return the place of a limit: the name without its first word."""
-    return name.partition(" ")[2]
+    return quantity_words(name.partition(" ")[2])
 
 
 def outcome_table(combined: CombinedData, tasks: Sequence[SolveResult] = ()) -> TextTable:

@@ -14,7 +14,7 @@ from ..proof.workspace.verdict import Outcome
 from ..results.rounding import ordered
 from .lines import counted, title_line
 from .motors import OUTCOME_WORDS, TONES
-from .numbers import number
+from .numbers import number, quantity_words
 from .poses import pose_words
 from .text import Line, TextTable, Tone
 
@@ -47,11 +47,15 @@ def answer_words(ranks: Sequence[Outcome], limits: Sequence[Outcome], where: str
     return f"NOT PROVED: {', '.join(parts)}"
 
 
-def proof_line(proof: ExchangeData, where: str, place: str, whose: str = "") -> Line:
+def proof_line(
+    proof: ExchangeData, ranks: Iterable[str], claims: Iterable[VerdictData], where: str, place: str, whose: str = ""
+) -> Line:
     """Return the outcome of the proof for a solved design over its workspace or along its path.
 
     Args:
         proof: the proof.
+        ranks: ranks that are not proved, in words.
+        claims: verdicts of the proof; limits that are not proved are named.
         where: name of the domain: ``workspace`` or ``path``.
         place: word for a pose of the domain, ``pose`` or ``point``.
         whose: text before the answer.
@@ -61,7 +65,17 @@ def proof_line(proof: ExchangeData, where: str, place: str, whose: str = "") -> 
             f"{whose}proved: no singularity and no violated limit at any {place}", label=where, tone=Tone.ANSWER
         )
     words = f"not proved: {counted(proof.designs[-1].unproved, 'claim')} violated or undecided"
+    named = _tightest([each for each in claims if each.limit is not None and each.outcome is not Outcome.PROVED])
+    texts = [*ranks, *map(_unproved_words, named)][:SHOWN]
+    words += f": {'; '.join(texts)}" if texts else ""
     return Line(whose + words, label=where, tone=Tone.NO_ANSWER)
+
+
+def _unproved_words(each: VerdictData) -> str:
+    """Return a limit that is not proved with its outcome, the proved bound and the reached value."""
+    values = {"proved bound": each.bound, "reached": each.reached}
+    texts = [OUTCOME_WORDS[each.outcome], *(f"{key} {number(x)}" for key, x in values.items() if x is not None)]
+    return f"{quantity_words(each.name)} {_limit_words(each)} ({', '.join(texts)})"
 
 
 def exchange_lines(proof: ExchangeData, where: str) -> Iterator[Line]:
@@ -139,26 +153,29 @@ def tightest_table(
     extremes: Sequence[VerdictData], title: str = "limits with the smallest margin over all poses"
 ) -> Iterator[TextTable]:
     """Yield the limits with the smallest margin: violated ones first, then undecided ones."""
-    limited = [each for each in extremes if each.limit is not None]
-    limited.sort(key=lambda each: (_ORDER.index(each.outcome), ordered(_room(each))))
-    seen: dict[str, VerdictData] = {}
-    for each in limited:
-        # One row stands for all legs and joints with this limit.
-        key = getattr(each, "key", None) or f"{each.name.partition(' ')[0]} {each.sense}"
-        seen.setdefault(f"{each.outcome} {key}", each)
     rows = [
         (
-            each.name,
+            quantity_words(each.name),
             _limit_words(each),
             "none" if each.bound is None else number(each.bound),
             "none" if each.reached is None else number(each.reached),
             Line(OUTCOME_WORDS[each.outcome], tone=TONES[each.outcome]),
         )
-        for each in list(seen.values())[:_TIGHTEST]
+        for each in _tightest([each for each in extremes if each.limit is not None])[:_TIGHTEST]
     ]
     if rows:
         headers = ("quantity", "limit", "proved bound", "reached", "outcome")
         yield TextTable(headers, tuple(rows), name="tightest", title=title)
+
+
+def _tightest(limited: Sequence[VerdictData]) -> list[VerdictData]:
+    """Return the claim with the smallest margin of each limit and outcome: violated, undecided, then proved ones."""
+    seen: dict[str, VerdictData] = {}
+    for each in sorted(limited, key=lambda each: (_ORDER.index(each.outcome), ordered(_room(each)))):
+        # One claim stands for all legs and joints with this limit.
+        key = getattr(each, "key", None) or f"{each.name.partition(' ')[0]} {each.sense}"
+        seen.setdefault(f"{each.outcome} {key}", each)
+    return list(seen.values())
 
 
 def _room(each: VerdictData) -> float:
@@ -172,7 +189,7 @@ def _room(each: VerdictData) -> float:
 
 def violating_robot(case: Case, name: str, machine: JointErrorsData) -> TextTable:
     """Return the joint-centre errors of the robot within the tolerance that violates a claim."""
-    unit, title = case.units.length, f"robot within the tolerance that violates: {name}"
+    unit, title = case.units.length, f"robot within the tolerance that violates: {quantity_words(name)}"
     if machine.centres is not None:
         off = [(each.joint, ", ".join(f"{part:.6g}" for part in each.error)) for each in machine.centres]
         return TextTable(("joint", f"error\n{unit}"), tuple(off), name="machine", title=title)
@@ -203,16 +220,19 @@ def outcome_lines(claims: Sequence[VerdictData]) -> Iterator[Line]:
 
 def _limit_of(claim: VerdictData) -> str:
     """Return the name of the limit of a claim, without limb, joint or actuator."""
-    return claim.name.partition(" ")[0].partition(".")[0]
+    name = claim.name.partition(" ")[0]
+    return name if name.startswith("actuator.") else name.partition(".")[0]
 
 
 def open_lines(claims: Sequence[VerdictData]) -> Iterator[Line]:
-    """Yield the undecided claims with their reasons; the first of them belong to the answer."""
+    """Yield the undecided claims with their reasons; those after the first few are in the part "undecided claims"."""
     found = [each for each in claims if each.outcome is Outcome.OPEN]
     for k, each in enumerate(found):
         reason = f": {each.reason}" if each.reason else ""
         part = "undecided claims" if k >= SHOWN else ""
-        yield Line(f"{each.name} {_limit_words(each)}{reason}", label=OUTCOME_WORDS[Outcome.OPEN], part=part)
+        yield Line(
+            f"{quantity_words(each.name)} {_limit_words(each)}{reason}", label=OUTCOME_WORDS[Outcome.OPEN], part=part
+        )
 
 
 def _limit_words(each: VerdictData) -> str:
@@ -240,7 +260,7 @@ def verdict_table(
         values = [each.limit, each.bound, each.reached][0 if has_limits else 1 :]
         cells.append(
             (
-                each.name,
+                quantity_words(each.name),
                 each.unit or "",
                 "smallest" if each.sense is Sense.MIN else "largest",
                 *("" if value is None else number(value) for value in values),

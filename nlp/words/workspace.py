@@ -14,7 +14,7 @@ from ..case.task import Sense
 from ..interruption import STOPPED
 from ..proof.statement.claims import CONSTRAINTS, REGULAR
 from ..proof.workspace.verdict import EVERYWHERE, Outcome
-from .claims import CLAIM_WORDS, rank_line, violation_lines
+from .claims import CLAIM_WORDS, rank_line, unproved_ranks, violation_lines
 from .motors import OUTCOME_WORDS, ends_of_motor, motor_tables
 from .numbers import number
 from .poses import pose_words
@@ -52,7 +52,7 @@ def _objective_lines(extremes: Sequence[VerdictData]) -> Iterator[Line]:
             continue
         if low.name == high.name and low.name.partition(" ")[0] == "F":
             ends = f"{number(low.bound)} .. {number(high.bound)} {low.unit}".rstrip()
-            yield Line(ends, label=low.name, after=" over the workspace (proved)")
+            yield Line(ends, label=low.name, after=", over the workspace (proved)")
 
 
 def verdict_words(result: WorkspaceResult) -> str:
@@ -81,7 +81,7 @@ def _needs_line(case: Case, result: WorkspaceResult) -> Iterator[Line]:
     long = [each.bound for each in legs if each.sense is Sense.MAX and each.bound is not None]
     if short and long:
         words = f"{number(min(short))} .. {number(max(long))} {case.units.length}"
-        yield Line(words, label="leg lengths", after=" over the workspace (proved)")
+        yield Line(words, label="leg lengths", after=", over the workspace (proved)")
 
 
 def workspace_summary(
@@ -138,7 +138,7 @@ def _violating_robot_table(case: Case, extremes: Sequence[VerdictData]) -> Itera
 def proof_lines(proof: WorkspaceProofData | None) -> Iterator[Line]:
     """Yield the proof of a solved design over its workspace."""
     if proof is not None:
-        yield proof_line(proof, "workspace", "pose")
+        yield proof_line(proof, unproved_ranks({REGULAR: proof.regular.outcome}), proof.extremes, "workspace", "pose")
         yield from exchange_lines(proof, "workspace")
 
 
@@ -181,19 +181,24 @@ def _search_lines(case: Case, regular: RegularData, label: str) -> Iterator[Line
 
 
 def _scale_lines(case: Case, scale: ScaleData) -> Iterator[Line]:
-    """Yield the largest proved box, and the claim that fails on the next larger one."""
+    """Yield the largest proved box or diameter, and the claim that fails on the next larger one."""
     ended = f"; the search ended early: {scale.reason}" if scale.reason else ""
-    if scale.factor is not None:
+    positions = None if case.workspace is None else case.workspace.position_set
+    size = "box" if positions is None or not positions.has_radius else "diameter"
+    if scale.factor is not None and scale.diameter is not None:
+        words = f"{scale.diameter:.6g} {case.units.length}, {scale.factor:.4g} times the stated one"
+        yield Line(words, label=f"largest proved {size}", tone=Tone.ANSWER, after=ended)
+    elif scale.factor is not None:
         words = f"{scale.factor:.4g} times the workspace"
-        yield Line(words, label="largest proved box", tone=Tone.ANSWER, after=ended)
+        yield Line(words, label=f"largest proved {size}", tone=Tone.ANSWER, after=ended)
     else:
         within = "the search was interrupted" if scale.reason == STOPPED else "none found within the time limit"
-        words = within if scale.reason else "none found; even the smallest examined box is not proved"
-        yield Line(words, label="largest proved box", tone=Tone.NO_ANSWER)
+        words = within if scale.reason else f"none found; even the smallest examined {size} is not proved"
+        yield Line(words, label=f"largest proved {size}", tone=Tone.NO_ANSWER)
     if scale.claim:
-        size = "" if scale.refuted is None else f"{scale.refuted:.4g} times, "
+        larger = "" if scale.refuted is None else f"{scale.refuted:.4g} times, "
         near = "" if scale.pose is None else f", near {pose_words(case, scale.pose)}"
-        yield Line(f"{size}fails on {_failed_words(scale.claim)}{near}", label="next larger box")
+        yield Line(f"{larger}fails on {_failed_words(scale.claim)}{near}", label=f"next larger {size}")
 
 
 def _failed_words(claim: str) -> str:

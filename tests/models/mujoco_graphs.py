@@ -16,7 +16,7 @@ from screwsynth.models.mechanism import Mechanism
 from screwsynth.models.mechanism.graph import MechanismJoint
 
 #: Steps from home, steps of Newton's method in each, and the largest residual of a closed loop.
-_PATH, _NEWTON, _CLOSED = 8, 40, 1e-13
+_PATH, _NEWTON, _CLOSED = 8, 40, 1e-12
 _INERTIA = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
 
 
@@ -53,7 +53,6 @@ class GraphEngine:
         inside: dict[str, list[str]] = {each.name: [] for each in mechanism.links}
         opening = {mechanism.base: "<worldbody>"}
         left, constraints = list(mechanism.joints), []
-        # Actuators first: the coordinate of each is one of the tree, or of a further body.
         while frontier := [each for each in left if (each.inner in opening) != (each.outer in opening)]:
             joint = min(frontier, key=lambda each: (each.kind == "S", left.index(each)))
             left.remove(joint)
@@ -71,11 +70,8 @@ class GraphEngine:
             inside[joint.inner].append(further)
             place = _numbers(joint.point)
             constraints.append(f'<weld body1="{bodies[1]}" body2="{further}" anchor="{place}"/>')
-        for joint in mechanism.joints:
-            if joint.kind == "H":
-                constraints.append(
-                    f'<joint joint1="{joint.name} slide" joint2="{joint.name}" polycoef="0 {joint.pitch!r} 0 0 0"/>'
-                )
+        screw = '<joint joint1="{0} slide" joint2="{0}" polycoef="0 {1!r} 0 0 0"/>'
+        constraints += [screw.format(each.name, each.pitch) for each in mechanism.joints if each.kind == "H"]
 
         def tree(link: str) -> str:
             closing = "</worldbody>" if link == mechanism.base else "</body>"
@@ -85,22 +81,21 @@ class GraphEngine:
         self.model = mujoco.MjModel.from_xml_string(f"<mujoco>{text}</mujoco>")
         self.model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
         self.data = mujoco.MjData(self.model)
-        self._sign = {each.name: self._sense(each, opening, mechanism.base) for each in mechanism.joints}
+        self._sign = {each.name: self._sense(each, opening) for each in mechanism.joints}
         self._couplings = np.zeros((len(mechanism.couplings), self.model.nv))
         for row, coupling in zip(self._couplings, mechanism.couplings, strict=True):
             for name, factor in coupling.factors:
                 row[self._dof(name)] = factor * self._sign[name]
-        self._home = np.array([link.position for link in mechanism.links if link.name == mechanism.platform][0])
-        self._turned = mechanism.link(mechanism.platform).rotation
+        plate = mechanism.link(mechanism.platform)
+        self._home, self._turned = plate.position, plate.rotation
         self._platform = self.model.body(mechanism.platform).id
         self._motors = [self._dof(name) for name in self.actuators]
         self._senses = np.array([self._sign[name] for name in self.actuators])
         self._update()
 
-    def _sense(self, joint: MechanismJoint, opening: dict[str, str], base: str) -> float:
+    def _sense(self, joint: MechanismJoint, opening: dict[str, str]) -> float:
         """1 where the engine's joint moves the outer link relative to the inner one, else -1."""
-        backwards = joint.inner != base and f'name="{joint.name}"' in opening[joint.inner].partition(_INERTIA)[0]
-        return -1.0 if backwards else 1.0
+        return -1.0 if f'name="{joint.name}"' in opening[joint.inner] else 1.0
 
     def _dof(self, name: str) -> int:
         return int(self.model.joint(name).dofadr[0])
@@ -149,19 +144,26 @@ class GraphEngine:
         R = np.array(self.data.xmat[self._platform]).reshape(3, 3)
         return self.data.xpos[self._platform] + R @ self._home, R @ self._turned
 
-    def motions(self) -> tuple[Array, Array]:
-        """Twists (n, 6) of the platform about its origin, and the actuator rates (n, a) in each; all closed motions."""
+    def _to_platform(self) -> Array:
+        """Twist (6, nv) of the platform about its origin, for rates of all joints."""
         linear, angular = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
         mujoco.mj_jac(self.model, self.data, linear, angular, self.pose[0], self._platform)
-        free = null_space(self.rows)
-        rates = free[self._motors] * self._senses[:, None]
-        return (np.vstack([angular, linear]) @ free).T, rates.T
+        return np.vstack([angular, linear])
 
-    def condition(self) -> float:
-        """Smallest singular value of the constraints with locked actuators that is not 0, as a part of the largest."""
+    def motions(self) -> tuple[Array, Array]:
+        """Twists (n, 6) of the platform about its origin, and the actuator rates (n, a) in each; all closed motions."""
+        free = null_space(self.rows)
+        return (self._to_platform() @ free).T, (free[self._motors] * self._senses[:, None]).T
+
+    @property
+    def regularity(self) -> float:
+        """Smallest singular value that is not 0, as a part of the largest.
+
+        The matrices are the constraints with free actuators, with locked actuators, and with the platform at rest.
+        """
         passive = np.setdiff1d(np.arange(self.model.nv), self._motors)
-        parts = []
-        for matrix in (self.rows, self.rows[:, passive]):
+        found = []
+        for matrix in (self.rows, self.rows[:, passive], np.vstack([self.rows, self._to_platform()])):
             values = np.linalg.svd(matrix, compute_uv=False)
-            parts.append(float((values[values > 1e-11 * values[0]]).min() / values[0]))
-        return min(parts)
+            found.append(float((values[values > 1e-11 * values[0]]).min() / values[0]))
+        return min(found)

@@ -18,7 +18,14 @@ from robot_files import Robot, every_joint
 import screwsynth.models
 from screwsynth.models import Model, robot
 
-GALLERY = {path.stem: path for path in sorted((Path(screwsynth.models.__file__).parent / "robots").glob("*.toml"))}
+ROBOTS = {path.stem: path for path in sorted((Path(screwsynth.models.__file__).parent / "robots").glob("*.toml"))}
+#: Tables of the robots that are given by links and joints; the others have limbs.
+NETWORKS = {
+    name: tables
+    for name, path in ROBOTS.items()
+    if "limb" not in (tables := tomllib.loads(path.read_text(encoding="utf-8")))
+}
+GALLERY = {name: path for name, path in ROBOTS.items() if name not in NETWORKS}
 SPECIAL = {path.stem: path for path in sorted((Path(__file__).parent / "special").glob("*.toml"))}
 FILES = GALLERY | SPECIAL
 LENGTH = 0.7
@@ -39,14 +46,21 @@ RANKS: dict[str, Ranks] = {
     "6-rus": Ranks((1,) * 6, (0,) * 6, 6, 0, 6, 3, 0, 6),
     "6-sps": Ranks((1,) * 6, (0,) * 6, 6, 0, 6, 3, 0, 12),
     "6-ups": Ranks((1,) * 6, (0,) * 6, 6, 0, 6, 3, 0, 6),
+    "ankle": Ranks((1, 1, 4), (0, 0, 4), 6, 4, 2, 2, 0, 4),
     "delta": Ranks((1,) * 6, (0,) * 6, 6, 3, 3, 0, 0, 9),
     "delta-parallelogram": Ranks((3,) * 3, (2,) * 3, 6, 3, 3, 0, 0, 3),
     "exechon": Ranks((3, 3, 2), (2, 2, 1), 6, 3, 3, 2, 0, 3),
     "five-bar": Ranks((5, 4), (4, 3), 6, 4, 2, 1, 0, 2),
+    "five-bar-pen": Ranks((5, 4), (4, 3), 6, 4, 2, 1, 0, 2),
+    "five-bar-plotter": Ranks((4, 4, 4), (3, 3, 4), 6, 4, 2, 0, 0, 2),
+    "linear-delta": Ranks((1,) * 6, (0,) * 6, 6, 3, 3, 0, 0, 9),
     "orthoglide": Ranks((3,) * 3, (2,) * 3, 6, 3, 3, 0, 0, 3),
+    "pentapod": Ranks((1,) * 6, (0,) * 5 + (1,), 6, 1, 5, 2, 0, 5),
     "planar-3-prr": Ranks((4,) * 3, (3,) * 3, 6, 3, 3, 1, 0, 3),
     "planar-3-rpr": Ranks((4,) * 3, (3,) * 3, 6, 3, 3, 1, 0, 3),
     "planar-3-rrr": Ranks((4,) * 3, (3,) * 3, 6, 3, 3, 1, 0, 3),
+    "rotary-delta": Ranks((1,) * 6, (0,) * 6, 6, 3, 3, 0, 0, 9),
+    "servo-hexapod": Ranks((1,) * 6, (0,) * 6, 6, 0, 6, 3, 0, 12),
     "spherical-3-rrr": Ranks((4,) * 3, (3,) * 3, 6, 3, 3, 3, 0, 3),
     "tricept": Ranks((1, 1, 1, 3), (0, 0, 0, 3), 6, 3, 3, 2, 0, 3),
     "tripteron": Ranks((3,) * 3, (2,) * 3, 6, 3, 3, 0, 0, 3),
@@ -110,10 +124,15 @@ def size_of(robot: Robot) -> float:
     return float(np.max(np.ptp(points, axis=0)))
 
 
+#: Largest displacement of a slide in parts of the robot's size, where it is less than 0.05: struts with short arms.
+SLIDES = {"pentapod": 0.005}
+
+
 def random_displacements(robot: Robot, rng: np.random.Generator) -> Array:
     """Displacements of the actuators up to 0.1 rad and up to 5 percent of the robot's size."""
     actuated = [joint for limb in robot.limbs for joint in every_joint(limb) if joint.actuated]
-    largest = [0.05 * size_of(robot) if joint.kind == "P" else 0.1 for joint in actuated]
+    share = SLIDES.get(robot.name, 0.05)
+    largest = [share * size_of(robot) if joint.kind == "P" else 0.1 for joint in actuated]
     return rng.uniform(-1, 1, len(actuated)) * largest
 
 

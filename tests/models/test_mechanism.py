@@ -19,7 +19,7 @@ from mechanism_robots import Engine, four_bar_delta, geared, projector, without
 from mujoco_robots import Oracle
 from random_mechanisms import Builder, random_mechanism, unit
 from robot_files import Joint, every_joint, robot_of
-from robot_gallery import CHI, GALLERY, LENGTH, snu, table
+from robot_gallery import CHI, GALLERY, LENGTH, size_of, snu, table
 
 from screwsynth.models import GenericRanks, Model, RobotError, Substitution, axis_angle_from_matrix, instantiate, robot
 from screwsynth.models.joints.home.chain import Joint as ChainJoint
@@ -358,10 +358,11 @@ def parallelogram(j: Sequence[Joint]) -> Expected:
 LIMBS: dict[tuple[str, int], Limb] = {
     **{(name, 0): lambda j: Expected(j[2].point, [along(j, 0, 2)]) for name in ("6-ups", "6-sps", "tricept")},
     **{(name, 0): rod(1) for name in ("6-pus", "6-rus", "6-rss", "delta")},
+    **{(name, 0): rod(1) for name in ("ankle", "linear-delta", "rotary-delta", "servo-hexapod")},
     **{(name, 0): crank(1) for name in ("3-prs", "3-rrs")},
     **{(name, 0): parallel_universals(0) for name in ("3-upu", "4-upu")},
     **{(name, 0): parallel_universals(1) for name in ("3-puu", "4-ruu")},
-    **{(name, 0): planar(1) for name in ("planar-3-rrr", "planar-3-prr")},
+    **{(name, 0): planar(1) for name in ("planar-3-rrr", "planar-3-prr", "five-bar-plotter")},
     **{(name, 0): parallelogram for name in ("delta-parallelogram", "orthoglide")},
     ("3-rps", 0): slide(2, 2),
     ("3-spr", 0): slide(2, 0),
@@ -370,8 +371,11 @@ LIMBS: dict[tuple[str, int], Limb] = {
     ("tricept", 3): lambda j: Expected(j[0].point, [X, Y], [np.cross(*j[0].axes)]),
     ("tripteron", 0): lambda j: Expected(j[3].point, [X], [Y, Z]),
     ("planar-3-rpr", 0): planar(0),
-    ("five-bar", 0): lambda j: Expected(j[1].point, [X, Y, Z], [X, Y]),
-    ("five-bar", 1): planar(1),
+    **{(name, 0): lambda j: Expected(j[1].point, [X, Y, Z], [X, Y]) for name in ("five-bar", "five-bar-pen")},
+    **{(name, 1): planar(1) for name in ("five-bar", "five-bar-pen")},
+    ("five-bar-plotter", 2): lambda j: Expected(j[1].point, [Z], [X, Y, Z]),
+    ("pentapod", 0): lambda j: Expected(j[0].point, [along(j, 0, 2)]),
+    ("pentapod", 5): lambda j: Expected(j[3].point, [], [Z]),
     ("spherical-3-rrr", 0): lambda j: Expected(0 * j[0].point, [X, Y, Z], [X]),
 }
 
@@ -383,10 +387,11 @@ def test_wrenches_of_a_member_are_those_of_its_mechanics(name: str, limb: int) -
     rows = [np.concatenate([f / np.linalg.norm(f), np.zeros(3)]) for f in expected.forces]
     rows += [np.concatenate([np.zeros(3), m / np.linalg.norm(m)]) for m in expected.couples]
     member = Oracle(robot, LENGTH).members()[limb]
-    np.testing.assert_allclose(member.centre, expected.centre, rtol=0, atol=1e-14)
+    rounding = 1e-14 * max(1.0, size_of(robot))
+    np.testing.assert_allclose(member.centre, expected.centre, rtol=0, atol=rounding)
     np.testing.assert_allclose(np.array(rows) @ np.array(rows).T, np.eye(len(rows)), rtol=0, atol=1e-14)
     # Orthonormal rows with the same projector span the same wrenches.
-    np.testing.assert_allclose(np.array(rows).T @ np.array(rows), member.projector, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(np.array(rows).T @ np.array(rows), member.projector, rtol=0, atol=rounding)
 
 
 def test_every_robot_of_the_gallery_has_a_limb_here() -> None:

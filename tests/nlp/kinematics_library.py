@@ -39,7 +39,7 @@ class Answer(NamedTuple):
 class Library:
     """Kinematics of a case in C, called from Python."""
 
-    def __init__(self, case: Case, *, single: bool = False, coordinates: str = "pose") -> None:
+    def __init__(self, case: Case, *, single: bool = False, coordinates: str = "pose", optimise: str = "-O2") -> None:
         self.case, self.robot = case, Kinematics(case)
         self.kin = kinematics_prefix(case.name)
         self.files = generate_kinematics(case, "", single=single, coordinates=coordinates)
@@ -47,7 +47,7 @@ class Library:
         for name, text in self.files.items():
             (self.folder / name).write_text(text, encoding="utf-8")
         sources = [name for name in self.files if name.endswith(".c") and "kinematics" in name]
-        flags = [*STRICT.split(), "-O2", "-shared", "-fPIC"]
+        flags = [*STRICT.split(), optimise, "-shared", "-fPIC"]
         command = [COMPILERS[0], *flags, *sources, "-lm", "-o", "library.so"]
         done = subprocess.run(command, cwd=self.folder, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr

@@ -72,6 +72,9 @@ BOX = """[workspace]
 position = [{ min = -0.5, max = 0.5 }, 0.5, 20]
 rotation = { axis = [0, 0, 1], angle = { min = -1, max = 1 } }
 """
+ROUND = """[workspace]
+position = { ring = { radius = 1, inner_radius = 0.4, angle = { min = -40, max = 200 }, z = [20, 20.5] } }
+"""
 MACHINE = HEXAPOD + LIMITS + BOX
 SINGULAR = """[workspace]
 position = [{ min = -5, max = 5 }, { min = -5, max = 5 }, { min = 15, max = 25 }]
@@ -125,6 +128,7 @@ KINDS = {
     "no point": Kind(PLATFORM + "[limits]\nleg_length = { max = 3 }\n", ("certify",)),
     "home's mode": Kind(DELTA, ("certify",)),
     "workspace": Kind(HEXAPOD + LIMITS + SPECTRAL + BOX, ("workspace", "--gap", "0.1", *ERROR), ERROR),
+    "round workspace": Kind(HEXAPOD + LIMITS + ROUND, ("workspace", "--gap", "0.1", *ERROR), ERROR),
     "loops": Kind(TRIPOD, ("workspace", "--gap", "0.5", "--time", "0.2")),
     "cranks": Kind(CRANKS, ("workspace", "--gap", "0.5")),
     "singular": Kind(HEXAPOD + SINGULAR, ("workspace", "--gap", "0.9", "--time", "0.2")),

@@ -294,7 +294,7 @@ def test_certify_names_the_limbs_with_unknowns_first(tmp_path: Path, cli: Run) -
     assert shown.startswith("Delta certificate proved")
     assert f"unknowns {words}" in shown
     out = output_of(cli("verify-proof", str(proof)))
-    assert "within the limits of delta in the home working mode" in unbroken(out)
+    assert "within the limits of case 'delta' in the home working mode" in unbroken(out)
     every = json.loads(output_of(cli("certify", str(path), "--all-assemblies", "--json", "-")))
     assert every["certificate"]["status"] == "proved"
     status, out, _ = cli("certify", str(path), "--all-assemblies", "--time", "1e-9")

@@ -124,7 +124,7 @@ def test_several_tasks_are_combined_for_each_combination() -> None:
     assert choice.solved == 4
     tables["combine"] = {"method": "average"}
     tables["robot"]["parameters"] |= {name: {"values": each} for name, each in values.items()}
-    with pytest.raises(CaseError, match="an average is not one of them"):
+    with pytest.raises(CaseError, match="an average of catalogue values need not be a catalogue value"):
         case_from(tables)
 
 

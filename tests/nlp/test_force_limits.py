@@ -23,10 +23,12 @@ from screwsynth.nlp.case.limits.forces import ActuatorForce, ActuatorPower, Actu
 from screwsynth.nlp.case.loads import Load, Loading, Motion
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.kkt import close_equations
+from screwsynth.nlp.evidence.optimality import PointKind
 from screwsynth.nlp.formats.solved.mechanism_of import mechanism_of
 from screwsynth.nlp.formats.writing.mjcf import mjcf_text
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.verdict import Outcome
+from screwsynth.nlp.solver.starts import StartStatus
 
 LEGS = ("1-", "1+", "2-", "2+", "3-", "3+")
 #: A weight that is always there, a force of both signs at a tool that also has one of any direction, and a gust.
@@ -484,3 +486,47 @@ def test_speeds_of_actuators_that_turn_have_the_unit_of_angles(angle: str) -> No
     # Legs that slide have a speed of length, whatever the unit of angles.
     six: Case = case_from(replace(SIX, units=own).to_toml() + tables)
     assert six.limits == Limits(ActuatorSpeed(max=90.0))
+
+
+PRESS = """\
+units = { length = "LENGTH", force = "N", angle = "deg" }
+robot.model = "stewart-gough"
+robot.layout = "octahedral"
+robot.parameters = { x1 = X1, x2 = X2, x3 = { min = 0, max = 30 }, x4 = { min = 0, max = 30 } }
+pose = { position = [{ min = -Q, max = Q }, { min = -Q, max = Q }, Z] }
+task = [{ sense = "max", axis = [0, 0, -1], pitch = inf }]
+load = [{ force = [0, 0, 300] }]
+solve.starts = 4
+"""
+
+
+@pytest.mark.parametrize(("length", "metre"), [("m", 1.0), ("mm", 1e3)])
+def test_a_singular_design_breaks_limits_on_forces_that_it_leaves_undetermined(length: str, metre: float) -> None:
+    """F is largest where both circles carry regular hexagons: three parallel pairs of legs, and J has rank 3."""
+    numbers = {"X1": 0.18, "X2": 0.11, "Q": 0.03, "Z": 0.25}
+    text = PRESS.replace("LENGTH", length)
+    for name, value in numbers.items():
+        text = text.replace(name, repr(value * metre))
+    free = solve(case_from(text))
+    assert free.status.is_answer
+    assert free.state is not None
+    assert free.state.is_singular
+    limited = f"{text}[limits]\nactuator_force = {{ max = 80 }}\n"
+    refused = solve(case_from(limited))
+    assert refused.status is Status.SINGULAR
+    assert refused.evidence is not None
+    assert refused.evidence.kind is PointKind.SINGULAR
+    assert {each.status for each in refused.starts} == {StartStatus.SINGULAR}
+    data: Any = json_data(result_of(refused))
+    assert (data["status"], data["F"]) == ("singular", None)
+    assert {each["value"] for each in data["reached"]["violated"]} == {None}
+    rows = margins_of(refused.nlp, refused.x, optimal=False)
+    assert all(each.violated and not np.isfinite(each.value) for each in rows)
+    # Kept away from the singularity, the six legs share the load: with height h and length L, f = 300 L / (6 h).
+    kept = solve(case_from(f"{limited}smallest_singular_value = {{ min = 0.2, length = {0.11 * metre!r} }}\n"))
+    assert kept.status is Status.OPTIMAL
+    assert kept.state is not None
+    legs = kept.state.quantities["leg_length"]
+    shared = 300 * legs / (6 * 0.25 * metre)
+    values = [each.value for each in margins_of(kept.nlp, kept.x, optimal=False) if each.key == "actuator_force.max"]
+    assert np.sort(np.abs(values)) == pytest.approx(np.sort(np.concatenate([shared, shared])), rel=1e-6)

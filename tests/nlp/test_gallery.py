@@ -33,18 +33,22 @@ from screwsynth.nlp.words.text import Line, TextTable
 TASKS = {
     **dict.fromkeys(("3-prs", "3-rps", "3-rrs", "3-spr", "exechon"), (3, "translation along z")),
     **dict.fromkeys(("3-puu", "3-upu", "three-upu", "orthoglide", "tripteron"), (3, "translation along z")),
-    **dict.fromkeys(("delta", "delta-parallelogram"), (3, "translation along z")),
+    **dict.fromkeys(("delta", "delta-parallelogram", "linear-delta", "rotary-delta"), (3, "translation along z")),
     **dict.fromkeys(("4-ruu", "4-upu"), (4, "translation along z")),
     **dict.fromkeys(("planar-3-prr", "planar-3-rpr", "planar-3-rrr"), (3, "translation along x")),
-    "five-bar": (2, "rotation about z"),
-    "spherical-3-rrr": (3, "rotation about z"),
+    **dict.fromkeys(("five-bar", "five-bar-pen"), (2, "rotation about z")),
+    "five-bar-plotter": (2, "translation along x"),
+    "ankle": (2, "rotation about y"),
+    "pentapod": (5, "translation along z"),
+    **dict.fromkeys(("spherical-3-rrr", "differential-waist"), (3, "rotation about z")),
     "tricept": (3, "rotation about x"),
 }
 #: Robots whose platform never turns, or whose task is possible without a rotation alone; and that turn about one axis.
 UPRIGHT = {
     "3-puu", "3-upu", "three-upu", "orthoglide", "tripteron", "delta", "delta-parallelogram", "3-spr", "exechon",
+    "linear-delta", "rotary-delta", "five-bar-plotter",
 }  # fmt: skip
-ONE_AXIS = {"4-ruu", "4-upu", "planar-3-prr", "planar-3-rpr", "planar-3-rrr", "five-bar"}
+ONE_AXIS = {"4-ruu", "4-upu", "planar-3-prr", "planar-3-rpr", "planar-3-rrr", "five-bar", "five-bar-pen"}
 
 
 def with_workspace(text: str) -> str:

@@ -634,9 +634,10 @@ def test_keyframes_mocap_bodies_and_tendons(tmp_path: Path) -> None:
     """A model is read where a keyframe has it; what is left out is named, with what it acts on."""
     model_text = platform_on_legs(np.random.default_rng(0), is_plain=True)
     model_text = model_text.replace(
-        "</worldbody>", '<body name="hand" mocap="true" pos="0 0 2"><site name="tip"/></body></worldbody>'
+        "</worldbody>",
+        '<body name="hand" mocap="true" pos="0 0 2"><site name="tip"/></body><site name="hook"/></worldbody>',
     )
-    tendons = '<tendon><fixed name="rope"><joint joint="q0" coef="1"/></fixed></tendon>'
+    tendons = '<tendon><spatial name="rope"><site site="tip"/><site site="hook"/></spatial></tendon>'
     more = '<weld name="grip" body1="hand" body2="top"/><tendon name="knot" tendon1="rope"/></equality>' + tendons
     model_text = model_text.replace("</equality>", more).replace(
         "</actuator>", '<motor name="winch" tendon="rope"/></actuator>'

@@ -367,7 +367,7 @@ IN_MODULES = ("hexapod", "6-rss", "delta", "orthoglide")
 
 
 @pytest.mark.parametrize(("name", "single"), [*((each, False) for each in IN_MODULES), ("6-rss", True)])
-def test_all_sources_in_one_file_have_small_stack_frames(name: str, single: bool, tmp_path: Path) -> None:  # noqa: FBT001
+def test_all_sources_in_one_file_have_small_stack_frames(name: str, single: bool, tmp_path: Path) -> None:
     case = typical_case(name)
     files = generate_kinematics(case, "", single=single)
     for file, text in files.items():

@@ -198,17 +198,17 @@ OF_ROBOTS = [
     (
         MIXED,
         '[[load]]\nname = "tool"\nmass = 2\ncentre = [1, 0, 0]',
-        f"load[0].mass = 2.0: load 'tool' {IDLE} a force along x or y, or a moment about z\n",
+        f'load[0].mass = 2.0: load "tool" {IDLE} a force along x or y, or a moment about z\n',
     ),
     (
         MIXED,
         f"{LOAD}[[load]]\nforce = [0, 0, 5]",
-        f"load[1].force = [0.0, 0.0, 5.0]: load 'load 2' {IDLE} a force along x or y, or a moment about z\n",
+        f"load[1].force = [0.0, 0.0, 5.0]: load 2 {IDLE} a force along x or y, or a moment about z\n",
     ),
     (
         MIXED,
         '[[load]]\nforce = [0, 0, 5]\nmoment = [1, 2, 0]\nframe = "platform"',
-        f"load[0]: load 'load 1' {IDLE} a force along x or y, or a moment about z\n",
+        f"load[0]: load 1 {IDLE} a force along x or y, or a moment about z\n",
     ),
     (MORE, "[limits]\nactuator_force = { max = 3 }", f"limits.actuator_force: {REDUNDANT}"),
 ]
@@ -420,7 +420,7 @@ def test_arrows_push_and_pull_the_platform_along_the_legs_to_one_scale() -> None
     # The arrows of legs and load together are no force.
     assert total + lengths["side"] == pytest.approx(np.zeros(3), abs=1e-9 * float(np.linalg.norm(lengths["side"])))
     assert {arrow.kind for arrow in drawing.forces.arrows} == {"load", "push", "pull"}
-    assert "load side" in drawing.forces.words
+    assert 'load "side"' in drawing.forces.words
 
 
 def test_torques_are_told_in_words_and_no_forces_have_no_arrows_and_no_scale() -> None:
@@ -487,8 +487,8 @@ def test_pictures_of_forces_have_no_rates_and_arrows_the_name_of_their_load() ->
     assert drawing.forces is not None
     (arrow,) = drawing.forces.arrows
     assert (arrow.kind, arrow.name, arrow.words) == ("load", "tool", "weight of tool: 19.62 N")
-    assert drawing.forces.words.startswith("weight of tool, actuator forces under load cut: longest arrow 19.62 N")
-    assert drawings_of(handling(), 1)[0].forces.words.startswith("load handling: longest arrow")
+    assert drawing.forces.words.startswith('weight of tool, actuator forces under load "cut": longest arrow 19.62 N')
+    assert drawings_of(handling(), 1)[0].forces.words.startswith('load "handling": longest arrow')
 
 
 def test_a_page_has_the_arrows_beside_the_legs_and_the_forces_of_each_pose() -> None:

@@ -478,7 +478,7 @@ def test_files_are_read_by_their_names(tmp_path: Path) -> None:
     (tmp_path / "way.CSV").write_text("\ufeffx,y,z,angle\n0,0,0,0\n1,0,0,180\n", encoding="utf-8")
     with pytest.raises(InputError, match=r"way.CSV: line 3: rotates by half a turn"):
         read_path(tmp_path / "way.CSV", MM)
-    with pytest.raises(InputError, match="linear angles need columns roll, pitch, yaw"):
+    with pytest.raises(InputError, match='between = "angles" needs the columns roll, pitch and yaw'):
         read_path(tmp_path / "way.CSV", MM, PathOptions(between=Between.ANGLES))
     (tmp_path / "part.ngc").write_bytes("\ufeffG0 X1 Y1 Z1 (M\u00e4rz)\r\nX2 ;\u00b5\rM30\r\n".encode())
     assert read_path(tmp_path / "part.ngc", MM).lines.tolist() == [2]

@@ -432,7 +432,7 @@ def test_curves_are_those_of_the_definitions(spindle: PathPicture) -> None:
     zero = np.zeros(len(t))
     cross = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
     spread = 20 * np.linalg.norm(inverted[:, :, :3] + inverted[:, :, 3:] @ cross, axis=2)
-    forces = panel(spindle, "forces, load cutting")
+    forces = panel(spindle, 'forces, load "cutting"')
     np.testing.assert_allclose(forces, np.hstack([held + spread, held - spread]), atol=1e-9)
     # The smallest of all margins is that of a length, between its limits, a force or a speed.
     own_speeds = np.abs(panel(spindle, "speeds along the path"))
@@ -461,10 +461,10 @@ def test_faults_are_marked_and_their_segments_are_shaded(spindle: PathPicture) -
 
 def test_the_first_force_beyond_its_limit_is_found(spindle: PathPicture) -> None:
     """Not the place of the largest force, which the search names."""
-    limit = 0.9 * np.abs(panel(spindle, "forces, load cutting")).max()
+    limit = 0.9 * np.abs(panel(spindle, 'forces, load "cutting"')).max()
     tables = shipped_tables("hexapod-spindle") | {"limits": {"actuator_force": {"max": limit}}}
     picture = pictured(case_from(tables), KNOTS)
-    beyond = np.abs(panel(picture, "forces, load cutting")) > limit
+    beyond = np.abs(panel(picture, 'forces, load "cutting"')) > limit
     (mark, *_), first = picture.marks, int(np.argmax(beyond.any(axis=1)))
     assert 0 < first < len(beyond) - 1
     assert picture.at[first - 1] <= mark.at <= picture.at[first]
@@ -474,7 +474,7 @@ def test_the_picture_has_its_panels(spindle: PathPicture) -> None:
     figure = path_figure(spindle)
     titles = [axes.get_title(loc="left") for axes in figure.axes]
     assert titles == [
-        "leg lengths, in", "speeds along the path, in/s", "forces, load cutting, lbf", "smallest margin, %",
+        "leg lengths, in", "speeds along the path, in/s", 'forces, load "cutting", lbf', "smallest margin, %",
     ]  # fmt: skip
     for axes, shown in zip(figure.axes, spindle.panels, strict=False):
         drawn = {line.get_gid(): line for line in axes.get_lines()}

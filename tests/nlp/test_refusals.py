@@ -344,7 +344,7 @@ REFUSALS = {
     ),
     "objective": (
         above('objective = { minimise = "actuator_force" }'),
-        "case.toml: task[0].sense = \"max\": must be 'min' with objective.minimise; or remove the task",
+        'case.toml: task[0].sense = "max": objective.minimise needs no task: remove [[task]], or give it sense = "min"',
     ),
     "empty objective": (
         above("objective = {}"),

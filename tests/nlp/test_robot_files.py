@@ -64,7 +64,7 @@ LIMB = ROBOT[ROBOT.index("[[limb]]") :]
 JOINTS = ROBOT[ROBOT.index("joints = ") :]
 AXIS, SECOND, LAST = '"A - B"', "limb 1, joint 2 (P), axis: is", 'at = "A" }'
 GRAMMAR = "which may have only numbers, names, + - * / ^, brackets and functions"
-NOT_A_NAME = "is not a name for a dimension: letters, digits and _ are allowed, a letter first"
+NOT_A_NAME = "cannot be the name of a dimension: letters, digits and _ are allowed, a letter first"
 DRIVEN = '{ type = "R", at = "B", axis = "y", actuated = true }'
 
 #: Text that is replaced, its replacement, and the sentence behind the name of the file.
@@ -79,10 +79,10 @@ FAULTS: list[tuple[str, str | bytes, str]] = [
     (AXIS, '"(rb - 1)*x"', "limb 1, joint 2 (P), axis: is '(rb - 1)*x', which is zero; a direction is needed, at the typ"),
     ('axis = "y"', 'axis = "cross(A, 2*A)"', "limb 1, joint 1 (R), axis: is 'cross(A, 2*A)', which is zero; a direction is ne"),
     ('"R", at = "B", axis = "y"', '"U", at = "B", axes = ["x", "-2*x"]', "limb 1, joint 1 (U), axes: are parallel; two different"),
-    ('"R"', '"Pa", to = "B"', "limb 1, joint 1 (Pa), to: is the same point as at; a rod needs a nonzero length"),
-    ('"R"', '"Pa", to = "B + y"', "limb 1, joint 1 (Pa), axis: is parallel to the rod from at to to; give the axis of its hinges"),
-    (JOINTS, f'joints = [{DRIVEN}, {{ type = "S", at = "A" }}, {{ type = "S", at = "A" }}]', "limb 1, joint 3 (S), at: is the point of the preceding joint S too"),
-    (JOINTS, 'joints = [{ type = "S", at = "A" }, { type = "C", at = "B", axis = "x" }, { type = "P", at = "B", axis = "y" }]', "the robot: no limb resists the platform: each has six or more independent passive joints"),
+    ('"R"', '"Pa", to = "B"', "limb 1, joint 1 (Pa), to: is the same point as \"at\"; a rod needs a nonzero length"),
+    ('"R"', '"Pa", to = "B + y"', "limb 1, joint 1 (Pa), axis: is parallel to the rod from \"at\" to \"to\"; give the axis of its hinges"),
+    (JOINTS, f'joints = [{DRIVEN}, {{ type = "S", at = "A" }}, {{ type = "S", at = "A" }}]', "limb 1, joint 3 (S), at: is also the point of the preceding joint S"),
+    (JOINTS, 'joints = [{ type = "S", at = "A" }, { type = "C", at = "B", axis = "x" }, { type = "P", at = "B", axis = "y" }]', "the robot: no limb resists any motion of the platform: each limb has six or more independent passive joints"),
     ("count = 1", "angles = [0, 120, 360]", "limb 1, repeat, angles: has 0 twice; each copy needs an angle of its own"),
     # A limb that ends nowhere, or has too much.
     (JOINTS, "", "limb 1, joints: is missing: a limb needs at least one joint"),
@@ -112,21 +112,21 @@ FAULTS: list[tuple[str, str | bytes, str]] = [
     (AXIS, '"A - D"', "which has the name 'D', which is unknown; known are A, B, h, half, pi, rb, rp, x, y, z"),
     (LAST, 'at = "AA" }', "limb 1, joint 3 (S), at: is 'AA', which has the name 'AA', which is unknown; did you mean 'A'?"),
     (AXIS, '"unti(A - B)"', "which has the function 'unti', which is unknown; did you mean 'unit'?"),
-    ('name = "rps"', 'name = "r\\u0007s"', "name: has the character '\\x07'; allowed are letters, digits, signs and spaces"),
+    ('name = "rps"', 'name = "r\\u0007s"', "name: has the character '\\x07'; only printable characters are allowed"),
     ("repeat =", 'name = "a\\u001b[31m"\nrepeat =', "limb 1, name: has the character '\\x1b'"),
     (LAST, 'at = "A", name = "b\\u0000" }', "limb 1, joint 3 (S), name: is 'b\\x00'; letters, digits and _ are allowed, a letter"),
     (LAST, 'at = "A", name = "2:1" }', "limb 1, joint 3 (S), name: is '2:1'; letters, digits and _ are allowed, a letter first"),
     ("[derived]", '"d\\u0001" = { typical = 1 }\n[derived]', f"d\\x01: {NOT_A_NAME}"),
     ("[derived]", '"a-b" = { typical = 1 }\n[derived]', f"a-b: {NOT_A_NAME}"),
     ("[derived]", '"\u03b1" = { typical = 1 }\n[derived]', f"\u03b1: {NOT_A_NAME}"),
-    ("[derived]", "sin = { typical = 1 }\n[derived]", "sin: is not a name for a dimension: expressions use it for something else"),
+    ("[derived]", "sin = { typical = 1 }\n[derived]", "sin: cannot be the name of a dimension: it is a function or a constant of expressions"),
     ('name = "rps"', "name = 3", "name = 3: must be text in quotes"),
     ('name = "rps"', 'name = "  "', 'name = "  ": must not be empty'),
     ("rp = {", "rb = {", "the file: is not valid TOML: Cannot overwrite a value (at line 5, column 23)"),
     ("half =", "rb =", "rb: is given twice"),
     ("[[limb]]", '[[limb]]\nname = "111"\njoints = [{ type = "S", at = "x" }]\n[[limb]]\nname = "11"', "limb: has two limbs with the name '111'"),
     ("B = [", "h = [", "limb 1, point h: has the name of a dimension"),
-    ("B = [", "x = [", "limb 1, x: is not a name for a point: expressions use it for something else"),
+    ("B = [", "x = [", "limb 1, x: cannot be the name of a point: it is a function or a constant of expressions"),
     ('half = "rb/2"', 'a = "b"\nb = "a"', "derived, a: is 'b', which uses 'b' before its definition; use names defined above"),
     ('half = "rb/2"', 'a = "a + 1"', "derived, a: is 'a + 1', which uses 'a' before its definition"),
     ("points = {", 'points = { D = "E", E = "D",', "limb 1, point D: is 'E', which uses 'E' before its definition"),
@@ -238,7 +238,7 @@ LINK_FAULTS: list[tuple[str, str, str]] = [
     ('axis = "z"', 'axis = "z"\npitch = 1', "joint motor (R), pitch: no such key"),
     ("actuated = true", "actuated = 1", "joint motor, actuated = 1: must be true or false"),
     ("points = {", "points = { s = [0, 0, 0],", "point s: has the name of a dimension"),
-    ("points = {", "points = { sin = [0, 0, 0],", "sin: is not a name for a point: expressions use it for something else"),
+    ("points = {", "points = { sin = [0, 0, 0],", "sin: cannot be the name of a point: it is a function or a constant of expressions"),
     ("name = ", "colour = 1\nname = ", "colour: no such key; allowed: schema, name, description, length_unit, home"),
     (LINKS[LINKS.index("[[joint]]") :], "", "joint: is missing; it must be one or more tables [[joint]]"),
     (LINKS, LINKS.replace("actuated = true", ""), "actuated: is given at no joint of the robot; write actuated = true"),
@@ -448,7 +448,12 @@ def test_the_gallery_is_found_by_name_and_each_robot_has_a_starter() -> None:
     # The starter of each is in test_gallery.py.
 
 
-METRES = {"3-puu", "6-rss", "6-sps", "delta", "delta-parallelogram", "five-bar"}
+UNITS = {
+    **dict.fromkeys(("3-puu", "6-rss", "6-sps", "delta", "delta-parallelogram", "five-bar"), "m"),
+    **dict.fromkeys(("ankle", "differential-waist"), "m"),
+    **dict.fromkeys(("five-bar-pen", "five-bar-plotter", "linear-delta", "pentapod"), "mm"),
+    **dict.fromkeys(("rotary-delta", "servo-hexapod"), "mm"),
+}
 
 
 def tables_of(name: str) -> dict[str, object]:
@@ -457,7 +462,7 @@ def tables_of(name: str) -> dict[str, object]:
 
 def test_starters_say_the_unit_of_the_robot_file() -> None:
     files = {name: tables_of(name).get("length_unit", "") for name in gallery_names()}
-    assert files == {name: "m" if name in METRES else "" for name in gallery_names()}
+    assert files == {name: UNITS.get(name, "") for name in gallery_names()}
     for name, unit in (("delta", "m"), ("3-rps", "unit"), ("stewart-gough", "cm")):
         starter = starter_text(name)
         assert tomllib.loads(starter)["units"]["length"] == unit
@@ -500,7 +505,7 @@ def test_the_default_home_is_written_too() -> None:
 
 def test_a_driven_limb_that_resists_nothing_is_refused_in_one_sentence(tmp_path: Path) -> None:
     hinges = [{"type": "C", "at": "z", "axis": "x"}, {"type": "P", "at": "z", "axis": "y"}]
-    with pytest.raises(ValueError, match="no limb resists the platform"):
+    with pytest.raises(ValueError, match="no limb resists any motion of the platform"):
         robot(name="floating", limb=[{"joints": [{"type": "S", "at": "0*x"}, *hinges]}])
     leg = {"points": {"B": (1, 0, 0), "A": (0.5, 0.4, 1)}, "repeat": {"count": 3}}
     leg["joints"] = [

@@ -389,7 +389,7 @@ def test_the_member_nearest_to_the_others_is_the_orthogonal_projection(radii: di
     np.testing.assert_allclose(turn.x / scale, expected / scale, atol=1e-5)
     np.testing.assert_allclose(found.x, (turn.x + other.x) / 2, atol=1e-14)
     assert [notice for notice in combination(found).notices if "not unique" in notice] == [
-        "the optimum of 'turn' is not unique: the one nearest to the other tasks' optima was used"
+        "the optimum of 'turn' is not unique: the optimum nearest to the other tasks' optima was used"
     ]
 
 

@@ -54,7 +54,7 @@ from screwsynth.nlp.results.poses import rotation_form, rotation_numbers
 from screwsynth.nlp.results.result import result_of
 from screwsynth.nlp.words.lines import certificate_lines, headline, motion_words, task_words
 from screwsynth.nlp.words.models import model_words
-from screwsynth.nlp.words.numbers import listed, number
+from screwsynth.nlp.words.numbers import listed, number, quantity_words
 from screwsynth.nlp.words.poses import evaluate_command, pose_words
 from screwsynth.nlp.words.summary import case_summary, evaluation_summary
 from screwsynth.nlp.words.tables import limit_table, margin_table, optimum_table
@@ -419,6 +419,38 @@ def test_no_number_of_a_solve_or_an_evaluation_is_split_at_any_width(name: str) 
     case = case_of(name)
     check_widths(solved(name))
     check_widths(tuple(evaluation_summary(case, evaluated(case))))
+
+
+def test_the_continuation_of_a_wrapped_cell_is_indented() -> None:
+    rows = (('actuator_force 2-, load "cutting"', "at the first pose"), ("leg_length 1", "at home"))
+    lines = printed([TextTable(("quantity", "where"), rows)], 34).splitlines()
+    assert lines == [
+        "quantity          where",
+        "actuator_force    at the first",
+        "  2-, load          pose",
+        '  "cutting"',
+        "leg_length 1      at home",
+    ]
+    # A word that is wider than its column keeps the indent, too.
+    assert printed([TextTable(("name",), (("a " + "b" * 15,),))], 10).splitlines() == [
+        "name",
+        "a",
+        "  bbbbbbbb",
+        "  bbbbbbb",
+    ]
+
+
+def test_a_load_without_a_name_is_named_once() -> None:
+    assert quantity_words("actuator_force actuator 1 load load 1") == "actuator_force actuator 1, load 1"
+    assert quantity_words("actuator_force actuator 1 load load 1 reversed pose 2") == (
+        "actuator_force actuator 1, load 1 reversed pose 2"
+    )
+    assert quantity_words("actuator_force actuator 1 load cutting, other sense") == (
+        'actuator_force actuator 1, load "cutting", other sense'
+    )
+    assert quantity_words("actuator_force actuator 1 backwards load tool") == (
+        'actuator_force actuator 1, negative force, load "tool"'
+    )
 
 
 def test_a_narrow_table_goes_on_below_with_the_names_of_its_rows() -> None:

@@ -181,7 +181,7 @@ def test_slips_are_found_where_toml_is_not_valid_and_nowhere_else() -> None:
 def test_a_robot_file_is_described_and_numbers_and_columns_are_named(cli: Run, tmp_path: Path) -> None:
     out = output_of(cli("models", str(ROBOTS / "reachy-mini-head.toml")))
     assert out.startswith("Reachy Mini head\n")
-    assert "radius of the motors" in out
+    assert "distance of the motors from the base's centre" in out
     words = ("x1, x2", "such as x1.max", "limits.leg_length.max", "task.pitch")
     refusal_of(cli("evaluate", "hexapod-machining", "--set", "y7=1"), *words)
     points = saved(tmp_path / "points.csv", "x1,nope\n20,3\n")

@@ -38,12 +38,12 @@ class Joint:
     """Joint at home.
 
     Attributes:
-        place: limb and joint, for messages.
+        place: place in the robot file (limb and joint), for messages.
         type: letter of the joint type: ``R, P, H, C, U, S`` or ``Pa``.
         point: (3, 1) centre of the joint or point of its axis, length.
         axes: axes with one coordinate each, from the base side on; those of a spherical joint are along x, y and z.
         actuated: True if an actuator drives the joint.
-        name: name of the joint in the robot file; empty for none.
+        name: name of the joint in the robot file; empty for a joint without a name.
         parts: joints of the robot file that this joint replaces; empty for a joint of the robot file itself.
     """
 
@@ -134,7 +134,7 @@ class HomeRobot:
         home: (3, 1) origin of the platform frame, length.
         size: (1, 1) characteristic size of the robot, length; lengths are divided by this size.
         limbs: limbs of the robot.
-        graph: links and joints, for a robot given by these; None for a robot given limb by limb.
+        graph: links and joints, for a robot given by links and joints; None for a robot given limb by limb.
     """
 
     words: RobotWords
@@ -211,9 +211,9 @@ def _with_points(place: str, points: Mapping[str, VectorExpression], names: Mapp
     """Return the values of names and points, (3, 1) for each point.
 
     Args:
-        place: text before the point in messages.
+        place: beginning of the place in messages.
         points: points by name.
-        names: values of the names before.
+        names: values of the names that are defined before.
     """
     known = dict(names)
     for name, written in points.items():
@@ -371,7 +371,8 @@ def _check_graph(graph: GraphWords) -> None:
         if link not in joined:
             raise RobotError(f"links, {link}", "is not connected to the base, neither directly nor through other links")
     path = bridges_between(graph.base, graph.platform, edges)
-    if path.is_open:
+    coupled = {name for coupling in graph.couplings for name in coupling.factors}
+    if path.is_open and not any(graph.joints[k].name in coupled for k in path.bridges):
         names = ", ".join(graph.joints[k].name for k in path.bridges)
         raise RobotError("platform", f"is at the end of an open chain ({names}); a parallel robot has closed loops")
 

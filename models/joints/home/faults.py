@@ -25,10 +25,10 @@ _ALMOST = 1e-3
 
 
 class _Pair(NamedTuple):
-    """Measure (1, 1) of two axes or joints, zero where they coincide.
+    """Distance or angle (1, 1) between two axes or joints; 0 if they coincide.
 
     Attributes:
-        place: limb and joint, for messages.
+        place: place in the robot file (limb and joint), for messages.
         measure: sine of an angle, or length relative to the robot's size.
         fault: clause for a measure that is zero for all dimensions; empty if this is allowed.
         remark: clause for a measure that is almost zero; empty if this needs no remark.
@@ -69,7 +69,7 @@ def examine_geometry(frame: PathFrame) -> list[str]:
 
 
 def _joint_faults(robot: HomeRobot, path: Sequence[Joint]) -> list[_Pair]:
-    """Return the measures within single joints of a path."""
+    """Return the distances and angles within single joints of a path."""
     found = []
     for joint in path:
         if joint.type == "U":
@@ -82,12 +82,11 @@ def _joint_faults(robot: HomeRobot, path: Sequence[Joint]) -> list[_Pair]:
             (axis,) = joint.axes
             rod = axis.rod / robot.size
             found.append(
-                _Pair(f"{joint.place}, to", ca.norm_2(rod), "is the same point as at; a rod needs a nonzero length")
+                _Pair(f"{joint.place}, to", ca.norm_2(rod), 'is the same point as "at"; a rod needs a nonzero length')
             )
             across = ca.norm_2(ca.cross(rod, axis.axis))
-            fault = (
-                "is parallel to the rod from at to to; give the axis of its hinges, which is perpendicular to the rod"
-            )
+            fault = 'is parallel to the rod from "at" to "to"'
+            fault += "; give the axis of its hinges, which is perpendicular to the rod"
             found.append(_Pair(f"{joint.place}, axis", across, fault))
     return found
 
@@ -98,7 +97,7 @@ def _rods(robot: HomeRobot, path: Sequence[Joint]) -> list[_Pair]:
     for one, other in pairwise(path):
         if {one.type, other.type} in ({"S"}, {"S", "U"}):
             length = ca.norm_2(one.point - other.point) / robot.size
-            fault = f"is the point of the preceding joint {one.type} too; a rod between them needs a length"
+            fault = f"is also the point of the preceding joint {one.type}; a rod between them needs a length"
             found.append(_Pair(f"{other.place}, at", length, fault))
     return found
 

@@ -1,4 +1,4 @@
-"""Ranks and incidences of a limb at almost all dimensions, measured at random values.
+"""Ranks of a limb, and parallel or intersecting axes, at almost all dimensions: measured at random values.
 
 A single limb needs no closed loop: its joint coordinates may have any values.
 """
@@ -128,7 +128,7 @@ def free_screws(joints: Sequence[Joint], values: SX) -> list[list[SX]]:
 
 
 def _rank(columns: FloatArray) -> int:
-    """Return the rank of columns, each scaled to unit length.
+    """Return the rank of the columns of a matrix, each scaled to unit length.
 
     Rounding changes a zero singular value by about 1e-15, so small ones count as zero. A limb that is close to a lower
     rank at several random points is taken to have that rank.

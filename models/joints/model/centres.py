@@ -1,4 +1,4 @@
-"""Robot given joint by joint, with joint-centre errors of manufacturing.
+"""Model of a robot given joint by joint, with joint-centre errors of manufacturing.
 
 The robot is assembled at home with an error of each joint centre and the nominal directions of all axes; joint
 coordinates count from there. Joints of a limb with a common centre at home, such as the hinges of a spherical joint,
@@ -31,7 +31,7 @@ _SEED = 0
 
 
 def displaced_robot(model: Model, definition: Mapping[str, object]) -> DisplacedRobot:
-    """Return a robot given joint by joint with joint-centre errors.
+    """Return the model of a robot given joint by joint, with joint-centre errors as parameters.
 
     Args:
         model: the robot.
@@ -90,7 +90,7 @@ def _displaced_legs(model: Model, dimensions: SX, centres: Sequence[Centre]) -> 
 
 
 class _Displaced:
-    """Joints with joint-centre errors.
+    """Adds joint-centre errors to joints, one limb after the other.
 
     Args:
         frame: common data of all paths of the robot.
@@ -123,7 +123,7 @@ class _Displaced:
         )
 
     def _groups(self, joints: list[Joint]) -> list[list[Joint]]:
-        """Return groups of a limb's joints, each with a common centre."""
+        """Return a limb's joints in groups; the joints of a group have a common centre at home."""
         groups: list[list[Joint]] = []
         for joint in joints:
             for group in groups:
@@ -135,7 +135,7 @@ class _Displaced:
         return groups
 
     def _error(self, name: str, group: list[Joint]) -> SX:
-        """Return the error (3, 1) of a centre without components that have no effect."""
+        """Return the error (3, 1) of the centre of a group of joints; components without effect are 0."""
         axes = [axis for joint in group for axis in joint.axes if axis.kind is not AxisKind.TRANSLATION]
         if not axes:
             return SX.zeros(3)
@@ -147,12 +147,12 @@ class _Displaced:
         return error
 
     def _new(self, name: str) -> SX:
-        """Return the symbols of the error of a new centre."""
+        """Add a joint centre, and return the symbols (3, 1) of its error."""
         self.centres.append(Centre(name, SX.sym(f"error_{len(self.centres)}", 3)))
         return self.centres[-1].error
 
     def _moved(self, joint: Joint, name: str, error: SX) -> Joint:
-        """Return a joint with a joint-centre error."""
+        """Return a joint whose centre is displaced by a joint-centre error."""
         axes = []
         for axis in joint.axes:
             rod = axis.rod

@@ -83,8 +83,9 @@ def closed_form(model: Model, *, extended: bool = False, with_angles: bool = Tru
 
     Args:
         model: the robot.
-        extended: If true, the expressions also have values out of reach, for searches that pass through it: the square
-            root continues along its tangent where the squared sine or cosine of the reach is below 1e-4.
+        extended: If true, the expressions also have values out of reach, for searches that pass through poses out of
+            reach: the square root continues along its tangent where the squared sine or cosine of the reach is below
+            1e-4.
         with_angles: If true, angles are replaced too. As unknowns they have no jump for a full rotation of a joint.
     """
     depends = [
@@ -129,7 +130,7 @@ def with_joints_at_home(model: Model) -> Model:
 
 
 def _solved(model: Model, unknown: Unknown, equation: Closure, extended: bool) -> Solved | None:
-    """Return the closed form of an unknown from an equation; None if the equation has none of these forms."""
+    """Return the closed form of an unknown from an equation; None for an equation without a closed form."""
     q = unknown.symbol
     expression = equation.expression / equation.size
 
@@ -211,7 +212,7 @@ def _is_same(model: Model, one: SX, other: SX) -> bool:
 
 
 def _rewritten(model: Model, solved: dict[int, Solved], closure: tuple[Closure, ...]) -> Model:
-    """Return a model with unknowns replaced.
+    """Return a model in which closed forms replace some unknowns.
 
     Args:
         model: the model.

@@ -63,7 +63,7 @@ class Root(NamedTuple):
 
 
 class Eliminated(NamedTuple):
-    """Unknown that follows from dimensions, pose, and the unknowns that stay variables.
+    """Eliminated unknown: it follows from dimensions, pose, and the unknowns that stay variables.
 
     Attributes:
         place: index of the unknown in the model.
@@ -131,7 +131,7 @@ class _Elimination:
         return bool(np.all(np.abs(found[:, :-1]) <= _SAME * (1 + np.abs(found[:, -1:]))))
 
     def without_absent(self, equation: Equation) -> Equation:
-        """Return an equation with 0 for the unknowns on which its value does not depend."""
+        """Return an equation in which unknowns without influence on its value are replaced by 0."""
         expression = equation.expression
         for k in self.open_unknowns(expression):
             q, size = self.model.unknowns[k].symbol, equation.size / self.model.unknowns[k].size
@@ -158,7 +158,8 @@ def eliminated(
         model: the robot.
         rotation: nine numbers, column by column, of a fixed platform rotation, with which more unknowns may follow;
             None for a variable one.
-        held: indices of unknowns that stay variables if they have two solutions; other unknowns follow from them.
+        held: indices of unknowns that stay variables if they have two solutions; closed forms of other unknowns may
+            depend on these.
     """
     if not model.unknowns:
         return ()
@@ -180,7 +181,7 @@ def eliminated(
 
 
 def _eliminate_one(work: _Elimination, gaps: Sequence[Equation], single: Sequence[Equation]) -> bool:
-    """Eliminate one unknown, from a gap if possible, else from a single equation; return False if there is none."""
+    """Eliminate one unknown, from a gap or else from one equation; return False if none can be eliminated."""
     attempts = [
         (solve, each) for solve, own in ((_from_gap, gaps), (_from_linear, single), (_from_one, single)) for each in own
     ]
@@ -240,7 +241,7 @@ def _from_one(work: _Elimination, k: int, equation: Equation) -> bool:
 
 
 def _angle_of(work: _Elimination, unknown: Unknown, e: SX, sign: float) -> tuple[Solved | None, SX]:
-    """Return the angle q with ``A cos q + B sin q + C = 0`` and a slope of given sign, and its reach; or None."""
+    """Return the angle q with ``A cos q + B sin q + C = 0`` and a slope of given sign, or None; and its reach."""
     q = unknown.symbol
     A, B, C = _harmonics(work, e, q)
     if not work.is_zero(A * ca.cos(q) + B * ca.sin(q) + C - e):
@@ -298,7 +299,7 @@ def _harmonics(work: _Elimination, e: SX, q: SX) -> tuple[SX, SX, SX]:
 
 
 def _is_positive(work: _Elimination, value: SX) -> bool:
-    """Return True if a coefficient (1, 1) of order 1 is positive at home."""
+    """Return True if a coefficient (1, 1), scaled to values of about 1, is positive at home."""
     return bool(float(work.values(value)[0, 0]) > _EDGE)
 
 
@@ -321,12 +322,12 @@ def _points(model: Model, rotation: FloatArray | None) -> list[list[FloatArray]]
 
 
 class Equation(NamedTuple):
-    """Equations of a loop.
+    """One or three equations of a loop.
 
     Attributes:
         expression: (k, 1) left sides.
         size: (1, 1) length or number by which the left sides are divided, so that their values are about 1.
-        limb: name of the limb with the loop; empty for none.
+        limb: name of the limb with the loop; empty for a loop that belongs to no limb.
         name: name of a single equation.
     """
 
@@ -339,7 +340,7 @@ class Equation(NamedTuple):
 def gaps_of(model: Model) -> dict[str, Equation]:
     """Return the gap (3, 1) of each path that is opened at the centre of a joint, by the path's name.
 
-    Any three equations of a path would do, because a gap is identified by its form.
+    Any three equations of a path may be tried as a gap, because an unknown is identified by the form of its equation.
     """
     parts: dict[str, dict[int, Equation]] = {}
     for each in (*model.loops, *model.closure):

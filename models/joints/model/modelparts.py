@@ -1,6 +1,7 @@
-"""Parts of a robot's model that are measured at closed configurations, or listed from paths and actuators.
+"""Properties of a robot's model: ranks measured at closed configurations, parameters, quantities and structure.
 
-The structure of a path is for people: its joints, the place where its loop is opened, and dimensions of its spaces.
+The structure of a path is for people: joints of the path, the joint at which its loop is opened, and dimensions of
+its wrench spaces.
 """
 
 from __future__ import annotations
@@ -38,6 +39,8 @@ from ..posed.resistance import Ranks
 
 #: Number of wrenches from which a member resists nearly all motions equally.
 _MANY_WRENCHES = 5
+#: Rank of J of a robot whose platform has one motion with all actuators locked.
+_ONE_MOTION_LEFT = 5
 #: Magnitude below which components of orthonormal motions are zero.
 _ROUNDING = 1e-9
 
@@ -102,7 +105,7 @@ def _is_determined(
 
 
 def actuator_name(robot: HomeRobot, limb: Limb, joint: Joint, number: int) -> str:
-    """Return the name of an actuator in a limb with several: its joint's name, if this is unique.
+    """Return the name of one of several actuators of a limb: the name of its joint, if this is unique.
 
     Args:
         robot: robot at home.
@@ -166,7 +169,7 @@ def quantities(actuators: Sequence[Actuator], positions: Sequence[SX]) -> tuple[
 
 
 def with_all_relations(actuators: Sequence[Actuator]) -> tuple[Actuator, ...]:
-    """Return actuators with coefficients in the relations of all limbs: 0 for relations of other limbs."""
+    """Return the actuators with a coefficient in each relation of all limbs: 0 for relations of other limbs."""
     counts = {each.limb: each.relations.shape[0] for each in actuators}
     found = []
     for each in actuators:
@@ -227,7 +230,7 @@ def _column_labels(joint: Joint, labels: Mapping[int, str]) -> list[str]:
 
 
 def with_kept(structures: Iterable[PathStructure], kept: Collection[Closure]) -> tuple[PathStructure, ...]:
-    """Return structures with the number of their loop equations that a program keeps."""
+    """Return the structures of paths with the number of loop equations that a program keeps."""
     names = {each.name for each in kept}
     return tuple(
         replace(each, kept=sum(f"loop {each.name} ({k + 1})" in names for k in range(each.equations)))
@@ -252,8 +255,17 @@ def member_remarks(structures: Sequence[PathStructure]) -> list[str]:
     return [f"{words}: within a member F weighs all directions alike"]
 
 
+def rank_remarks(rank: int, structures: Sequence[PathStructure]) -> list[str]:
+    """Return the remark on a robot of several members whose actuators leave its platform one motion everywhere."""
+    if rank != _ONE_MOTION_LEFT or sum(each.wrenches > 0 for each in structures) == 1:
+        return []
+    words = f"J has rank {rank} at all poses: with all actuators locked, the platform still moves"
+    advice = "add a passive limb that allows all other motions, as in the robot pentapod"
+    return [f"{words}; if that motion does not matter, such as a turn of a spindle about itself, {advice}"]
+
+
 def _opened(path: OpenedPath) -> str:
-    """Return the place at which a path is opened, in words, with the numbers of its written joints."""
+    """Return in words where a path is opened, with the numbers of the joints as they are written."""
     first: list[int] = [1]
     for joint in path.joints:
         first.append(first[-1] + (len(joint.parts) or 1))

@@ -39,7 +39,8 @@ class DrawnPath(NamedTuple):
         limb: the limb.
         number: index of the path in the limb.
         path: the path.
-        row: index of the path's row among those of the limb, if the path has one row and the limb several.
+        row: index, among the rows of J that belong to the limb, of the path's row; only if the path has one row and
+            the limb several.
     """
 
     limb: Limb
@@ -59,7 +60,7 @@ class _Node:
 
 @dataclass(eq=False)
 class _Sketch:
-    """Drawing under construction."""
+    """Builder of a drawing: points, lines and joint symbols, each added once."""
 
     frame: PathFrame
     size: float
@@ -72,14 +73,14 @@ class _Sketch:
     nodes: dict[str, _Node] = field(default_factory=dict)
 
     def node(self, name: str, place: Place, body: Body, kind: JointKind | None = None) -> _Node:
-        """Return a point, added unless it exists from another path."""
+        """Return the point with a name; the point is added unless another path has added it."""
         if name not in self.nodes:
             self.points[name] = Point(name, place.now, body)
             self.nodes[name] = _Node(name, self.frame.typical_value(place.home).ravel(), kind)
         return self.nodes[name]
 
     def link(self, start: _Node | None, end: _Node, drawn: DrawnPath | None, kind: LinkKind, body: Body) -> None:
-        """Add a line, unless it has zero length or exists from another path."""
+        """Add a line between two points, unless it has zero length or another path has added it."""
         if start is None or np.linalg.norm(end.at_home - start.at_home) <= _SAME * self.size:
             return
         if any((each.start, each.end) == (start.name, end.name) for each in self.links):
@@ -89,12 +90,12 @@ class _Sketch:
         self.links.append(Link(start.name, end.name, body, limb, kind, row))
 
     def symbol(self, name: str, joint: PlacedJoint, place: Place, body: Body, limb: Limb) -> None:
-        """Add the symbol of a joint, unless it exists from another path."""
+        """Add the symbol of a joint, unless another path has added it."""
         axes, owner = tuple(axis.now for axis in joint.axes), limb.name if limb.name in self.carrying else None
         self.joints.setdefault(name, JointSymbol(name, joint.kind, place.now, axes, body, owner, joint.is_actuated))
 
     def is_along(self, start: Place, end: Place, axes: Sequence[Place]) -> bool:
-        """Return True if two places differ and their line is along the first of some axes at home."""
+        """Return True if two points differ and, at home, the line between them is along the first of some axes."""
         if not axes:
             return False
         way, direction = (self.frame.typical_value(each.home).ravel() for each in (end - start, axes[0]))
@@ -102,7 +103,7 @@ class _Sketch:
         return apart > _SAME * self.size and float(np.linalg.norm(np.cross(way, direction))) <= _SAME * apart
 
     def is_same(self, one: Place, other: Place) -> bool:
-        """Return True if two places coincide at home."""
+        """Return True if two points coincide at home."""
         return float(np.abs(self.frame.typical_value((one - other).home)).max()) <= _SAME * self.size
 
 
@@ -136,7 +137,7 @@ def scene_of(
 
 
 def _add_path(sketch: _Sketch, drawn: DrawnPath, siblings: Sequence[DrawnPath]) -> None:
-    """Add a path of a limb with the paths ``siblings``."""
+    """Add a path to the drawing; ``siblings`` are all paths of the same limb."""
     joints = placed_joints(drawn.path, sketch.frame)
     stem = len(drawn.limb.stem) if len(drawn.limb.branches) > 1 else 0
     previous: _Node | None = None

@@ -47,6 +47,7 @@ from .modelparts import (
     member_remarks,
     parameters,
     quantities,
+    rank_remarks,
     structure_of,
     with_all_relations,
     with_kept,
@@ -121,10 +122,10 @@ def robot(
 
 
 class _LimbModes(NamedTuple):
-    """Data of the sign of a limb's working mode.
+    """Data from which the sign of a limb's working mode is computed.
 
     Attributes:
-        place: index of the sign among all signs.
+        place: index of the sign among all signs of the model.
         limb: name of the limb.
         paths: opened paths of the limb.
         unknowns: range of the limb's unknowns in the model.
@@ -138,7 +139,7 @@ class _LimbModes(NamedTuple):
 
 @dataclass(eq=False)
 class _Builder(ResistingParts):
-    """Parts of a robot's model under construction."""
+    """Builder of a robot's model: unknowns, equations, rows, members and actuators, limb after limb."""
 
     frame: PathFrame
     wrenches: list[Wrench] = field(default_factory=list)
@@ -224,7 +225,7 @@ class _Builder(ResistingParts):
             self.positions.append(SX(0) if way is None else way)
 
     def add_modes(self) -> None:
-        """Add each limb's sign of the working mode after its joint signs, once free actuator coordinates are known."""
+        """Add the sign of each limb's working mode; the free actuator coordinates must be known."""
         for each in reversed(self.modes):
             own = self.unknowns[each.unknowns]
             self.signs[each.place : each.place] = mode_signs(each.limb, each.paths, own, self.frame)
@@ -314,7 +315,7 @@ def model_of_home(
         at_home: the robot.
         samples: (s, d) values of the dimensions at which ranks are measured.
         definition: tables of the robot file.
-        more: further parameters in its symbols, in addition to the dimensions.
+        more: parameters of the model in addition to the dimensions.
         legs: straight legs of the robot; None to derive them.
 
     Raises:
@@ -375,13 +376,16 @@ def model_of_home(
         links=with_shared_places(builder.links, frame),
         remarks=(*remarks, *builder.remarks, *member_remarks(builder.structure)),
     )
-    return replace(model, generic=generic_ranks(model, at_home, loops.points))
+    ranks = generic_ranks(model, at_home, loops.points)
+    return replace(model, generic=ranks, remarks=(*model.remarks, *rank_remarks(ranks.jacobian, builder.structure)))
 
 
 def _check_carrying(builder: _Builder) -> None:
     """Refuse a robot without limbs that resist the platform, or without actuated joints."""
     if not (builder.wrenches or builder.members):
-        raise RobotError("", "no limb resists the platform: each has six or more independent passive joints")
+        raise RobotError(
+            "", "no limb resists any motion of the platform: each limb has six or more independent passive joints"
+        )
     if not builder.actuators:
         fault = "is given at no joint of the robot; write actuated = true at each joint that a motor drives"
         raise RobotError("actuated", fault)

@@ -57,7 +57,7 @@ class Loops(NamedTuple):
     Attributes:
         points: closed configurations.
         independent: indices of the independent loop equations.
-        free: indices of the free actuator coordinates among the unknowns, a largest independent set.
+        free: indices, among the unknowns, of the free actuator coordinates: as many independent ones as possible.
     """
 
     points: tuple[ClosedPoint, ...]
@@ -68,7 +68,7 @@ class Loops(NamedTuple):
 def examine_loops(
     frame: PathFrame, equations: Sequence[Closure], unknowns: Sequence[Unknown], driven: Sequence[int]
 ) -> Loops:
-    """Return closed configurations near home, with the independent loop equations and the free coordinates there.
+    """Return closed configurations near home, with the independent loop equations and the free actuator coordinates.
 
     Args:
         frame: common data of all paths of the robot.
@@ -108,7 +108,7 @@ def examine_loops(
                 points.append(ClosedPoint(sample, values.ravel(), R, p.ravel()))
                 jacobians.append(found.slopes)
     if not points:
-        raise RobotError("", "no closed configuration near home: check that the mechanism is mobile")
+        raise RobotError("", "found no closed configuration near home: check that the mechanism is mobile")
     own_slopes = [each[:, 6 : 6 + len(unknowns)] for each in jacobians]
     return Loops(tuple(points), independent_rows(jacobians), _free(own_slopes, driven))
 
@@ -146,7 +146,7 @@ def _is_independent(rows: FloatArray) -> bool:
 
 
 def _slopes(residual: SX, moving: SX, robot: HomeRobot) -> SX:
-    """Return the Jacobian with respect to pose, unknowns and dimensions, lengths relative to the robot's size."""
+    """Return the Jacobian of loop equations with respect to pose, unknowns and dimensions, in scaled lengths."""
     own = ca.jacobian(residual, robot.symbols)
     scales = [robot.size if item.kind.value == "length" else SX(1) for item in robot.words.dimensions.values()]
     scaled = [own[:, k] * scale for k, scale in enumerate(scales)]

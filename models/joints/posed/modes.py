@@ -1,9 +1,9 @@
 """Signs that distinguish the assembly modes of a limb: of joints that hold together, and of the home working mode.
 
 Loop equations also have solutions in which joints do not hold together, such as a hinge with opposite axes. Of the
-solutions in which they do, those of one *working mode* are connected without a singularity of the limb: an elbow bent
-to one side. The sign of a mode is that of the determinant of the equations' derivatives with respect to the limb's
-unknowns, which is zero only at such singularities:
+solutions in which joints hold together, those of one *working mode* are connected without a singularity of the limb: an
+elbow bent to one side. The sign of a mode is that of the determinant of the equations' derivatives with respect to the
+limb's unknowns, which is zero only at such singularities:
 
 * one unknown and one equation of each path that depends on it, such as that of a rod: the sum of the derivatives;
 * two unknowns of a planar limb: the derivatives of the point at the cut, and the plane's normal;
@@ -29,7 +29,7 @@ _SINGULAR = 1e-6
 
 
 def joint_signs(limb: str, name: str, path: OpenedPath) -> list[AssemblySign]:
-    """Return the signs of a path's joints that the equations leave open, each 1 where the joints hold together."""
+    """Return the signs of a path's joints that the loop equations leave open; 1 where the joints hold together."""
     return [AssemblySign(f"sign {name} ({k + 1})", limb, 1 - each, is_mode=False) for k, each in enumerate(path.checks)]
 
 

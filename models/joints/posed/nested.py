@@ -43,7 +43,7 @@ class NestedMember:
 
     Attributes:
         passive: indices of the joints that move with locked actuators.
-        joints: indices of these joints and of all joints on which they depend.
+        joints: indices of the passive joints and of all joints on which these depend.
         still: indices of the joints in ``joints`` that locked actuators and couplings fix.
         centre: indices of the joints that determine the centre: their mean, or the intersection of their axes.
         is_meeting: True if the centre is the intersection of axes.
@@ -57,7 +57,7 @@ class NestedMember:
 
 
 class Motions(NamedTuple):
-    """Motions of a member with some free joints.
+    """Motions of a member that some free joints allow: loop equations and platform twists of their rates.
 
     Attributes:
         loops: (m, n) for each loop or coupling, rows of ``L`` in angles and relative to the robot's size.
@@ -165,7 +165,7 @@ def _coupling_rows(
 
 
 class MeasuredMotions(NamedTuple):
-    """Values of motions at a closed configuration.
+    """Values of :class:`Motions` at a closed configuration.
 
     Attributes:
         loops: (m, n) for each loop or coupling, rows of ``L``.
@@ -321,7 +321,7 @@ def _centre(network: OpenNetwork, member: NestedMember) -> SX:
 
 @dataclass(eq=False, kw_only=True)
 class ResistingParts:
-    """Members and actuators of limbs under construction.
+    """Members and actuators that resist or drive the platform, collected limb after limb.
 
     Attributes:
         members: members that resist the platform.
@@ -348,7 +348,7 @@ def add_resisting(
     """Add members and actuators of a network, with ranks measured at closed configurations.
 
     Args:
-        parts: members and actuators to extend.
+        parts: members and actuators so far; those of the network are added.
         network: network at any pose.
         frame: common data of all parts of the robot.
         symbols: symbols of dimensions, unknowns, rotation and position.
@@ -422,7 +422,7 @@ def _member_name(network: OpenNetwork, number: int) -> str:
 def _structure(
     network: OpenNetwork, member: NestedMember, number: int, wrenches: int, constraints: int
 ) -> PathStructure:
-    """Return the structure of a member; the first one counts all loops."""
+    """Return the structure of a member; the first member of a network counts all loops."""
     letters = (
         f"{network.joint(k).type}*" if network.joint(k).actuated else network.joint(k).type for k in member.joints
     )

@@ -2,7 +2,7 @@
 
 Base and platform have known displacements. Other links are displaced along a spanning tree from one of the two; the
 coordinates of the tree's joints are unknowns. A joint outside the tree closes a loop: a spherical, universal or hinge
-joint by the equations of a cut, any other by a coordinate of its own and six equations. A link between two spherical
+joint by the equations of a cut, any other joint by a coordinate and six equations. A link between two spherical
 joints spins freely, so that only two rotations of its joint are unknowns.
 """
 
@@ -36,7 +36,7 @@ _RELUCTANCE = {"P": 1, "H": 1, "Pa": 1, "C": 1, "R": 2, "U": 3, "S": 9}
 
 @dataclass(eq=False)
 class OpenNetwork(Opened):
-    """Network at any pose.
+    """Network of links and joints at any pose, with opened loops.
 
     Attributes:
         name: name of the limb.
@@ -48,7 +48,7 @@ class OpenNetwork(Opened):
             spherical joint.
         values: coordinate (1, 1) of each axis that is an unknown, by joint and number of the axis.
         points: current position (3, 1) of each joint on its first link, length.
-        opened: indices of the joints that close loops.
+        opened: indices of the joints outside the spanning tree, which close loops.
         unknowns: number of joint coordinates that are unknowns.
     """
 

@@ -62,7 +62,7 @@ class Opened:
 
 @dataclass(eq=False)
 class OpenedPath(Opened):
-    """Path of joints at any pose.
+    """Path of joints at any pose, opened at its cut.
 
     Attributes:
         joints: joints from base to platform.
@@ -132,7 +132,7 @@ def open_path(joints: Sequence[Joint], cut: Cut, variables: Variables, frame: Pa
 
 
 def closures(kind: str, name: str, sides: Iterable[tuple[SX, ...]]) -> list[Closure]:
-    """Return equations named by their limb or path, such as ``loop 1.2 (3)``.
+    """Return loop equations with names by limb or path, such as ``loop 1.2 (3)``.
 
     Args:
         kind: first word of the names.
@@ -143,12 +143,12 @@ def closures(kind: str, name: str, sides: Iterable[tuple[SX, ...]]) -> list[Clos
 
 
 def loop_equations(expressions: SX, size: SX | None = None) -> list[LoopEquation]:
-    """Return equations from left sides (k, 1) and a common size; without a size the values are about 1."""
+    """Return equations from left sides (k, 1) and a common size; without a size, the left sides must be about 1."""
     return [LoopEquation(each, SX(1) if size is None else size) for each in ca.vertsplit(expressions)]
 
 
 def join_rigidly(path: Opened, one: Motion, other: Motion, place: SX, frame: PathFrame) -> None:
-    """Add the equations of coinciding bodies: equal rotations, and a common point (3, 1) at home, length."""
+    """Add the equations of two rigidly joined bodies: equal rotations, and one common point (3, 1) at home, length."""
     turn = one.rotation.T @ other.rotation
     apart = one.rotation.T @ (other.point(place) - one.point(place))
     path.equations += loop_equations(ca.inv_skew(turn - turn.T) / 2) + loop_equations(apart, frame.size)

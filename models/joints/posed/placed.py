@@ -28,9 +28,9 @@ SLIDING = (JointKind.PRISMATIC, JointKind.HELICAL, JointKind.CYLINDRICAL, JointK
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """Place or direction, (3, 1) in world coordinates: at any pose, and at home.
+    """Point or direction of a drawing, (3, 1) in world coordinates: at any pose, and at home.
 
-    The drawing is chosen by the places at home, and moves with those at any pose: both are computed alike.
+    The points at home decide how the drawing looks; the points at any pose move it. Both are computed alike.
     """
 
     now: SX
@@ -164,7 +164,7 @@ def _axes(path: OpenedPath, j: int, frame: PathFrame) -> tuple[Place, ...]:
 
 
 def arc_between(one: PlacedJoint, other: PlacedJoint, frame: PathFrame) -> list[Place]:
-    """Return places on an arc between two hinges with intersecting axes, for a spherical link.
+    """Return points on an arc between two hinges with intersecting axes, for a spherical link.
 
     The list is empty if the axes do not intersect, or intersect at one of the hinges.
     """

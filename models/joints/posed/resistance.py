@@ -1,4 +1,4 @@
-"""Rows and members of a path of joints: its wrenches on the platform with locked actuators."""
+"""Rows of J and members of a path of joints: its wrenches on the platform with locked actuators."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def path_ranks(frame: PathFrame, joints: Sequence[Joint], cut: Cut) -> Ranks:
 
 
 def resistance(limb: str, path: OpenedPath, ranks: Ranks, given: SX | None) -> tuple[list[Wrench], Member | None]:
-    """Return the rows of a path, and its member unless its wrenches are a few single rows.
+    """Return the rows of J of a path, and its member; no member if the path resists by a few single rows.
 
     Args:
         limb: name of the limb.

@@ -84,14 +84,14 @@ def two_angles(axes: tuple[SX, SX], before: SX, after: SX, sign: float) -> tuple
 
 
 class _Coordinates(NamedTuple):
-    """Coordinates of all axes of a joint in order; empty with a reason if they are not known."""
+    """Coordinates of all axes of a joint in order; empty if they are not known, with the reason."""
 
     values: Sequence[JointCoordinate]
     unknown: str = ""
 
 
 class PathJoints:
-    """Joints of an opened path.
+    """Coordinates and cone directions of the joints of an opened path, for limits.
 
     Args:
         limb: the limb.
@@ -104,7 +104,7 @@ class PathJoints:
         self._limb, self._path, self._known, self._frame = limb, path, known, frame
 
     def states(self, labels: Mapping[int, str]) -> list[LimbJoint]:
-        """Return the path's written joints, with labels by identity."""
+        """Return the states of the path's joints as they are written; ``labels`` has a label by a joint's identity."""
         found = []
         for j, joint in enumerate(self._path.joints):
             coordinates = self._coordinates(j)
@@ -229,7 +229,7 @@ class PathJoints:
 
 
 def _cone(link: SX, home: SX, other: Motion, turn: FloatArray) -> JointCone:
-    """Return the cone directions from vectors along a link, now and at home."""
+    """Return the directions of a cone limit from vectors along a link, at the pose and at home."""
     return JointCone(link / ca.norm_2(link), home / ca.norm_2(home), other.rotation, turn)
 
 
@@ -247,8 +247,8 @@ def _coordinate(axis: JointAxis, value: SX) -> JointCoordinate:
 def limb_links(path: OpenedPath, labels: Mapping[int, str], frame: PathFrame) -> list[LimbLink]:
     """Return the links of a path, from the base on.
 
-    Of joints with a common centre at home, the one nearest the base is the end of links. A slide along the line
-    between its neighbours is not an end of a link: the link includes the travel of the slide.
+    Links end at joints; of several joints with a common centre at home, only at the joint nearest the base. A slide
+    along the line between its neighbours is not an end of a link: the link includes the travel of the slide.
 
     Args:
         path: the path.

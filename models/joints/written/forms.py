@@ -1,4 +1,4 @@
-"""Form checks of the values in a robot file; a fault is refused with its place."""
+"""Checks of the form of each value in a robot file; an error names the place of the value in the file."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ class RobotError(ModelError):
     """Error in a robot given joint by joint.
 
     Attributes:
-        place: limb, joint and key, such as ``limb 2, joint 1 (R), axis``; empty for the whole robot.
+        place: place in the robot file: limb, joint and key, such as ``limb 2, joint 1 (R), axis``; empty for the whole
+            robot.
         fault: description of the fault, with the value read and the values allowed.
     """
 
@@ -54,13 +55,13 @@ def plain(value: object) -> object:
 
 
 def check_names(names: Sequence[str] | Mapping[str, object], what: str, place: str = "") -> None:
-    """Refuse names that are not identifiers, or that expressions use for something else."""
+    """Refuse names that are not identifiers, or that are functions or constants of expressions."""
     for name in names:
         where = f"{place}, {name}" if place else name
         if not NAME.fullmatch(name):
-            raise RobotError(where, f"is not a name for {what}: letters, digits and _ are allowed, a letter first")
+            raise RobotError(where, f"cannot be the name of {what}: letters, digits and _ are allowed, a letter first")
         if name in CONSTANTS or name in FUNCTIONS:
-            raise RobotError(where, f"is not a name for {what}: expressions use it for something else")
+            raise RobotError(where, f"cannot be the name of {what}: it is a function or a constant of expressions")
         if list(names).count(name) > 1:
             raise RobotError(where, "is given twice")
 
@@ -101,7 +102,7 @@ def name_of(place: str, value: object) -> str:
     text = text_of(place, value)
     for letter in text:
         if not letter.isprintable():
-            raise RobotError(place, f"has the character {letter!r}; allowed are letters, digits, signs and spaces")
+            raise RobotError(place, f"has the character {letter!r}; only printable characters are allowed")
     return text
 
 

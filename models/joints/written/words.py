@@ -1,4 +1,4 @@
-"""Contents of a robot file, with checked form: dimensions and points; limbs and joints, or links and joints.
+"""Contents of a robot file as text and numbers of a checked form: dimensions, points, limbs or links, and joints.
 
 The tables of a robot file and the arguments of :func:`~screwsynth.models.joints.model.robot.robot` have the same keys.
 Links and joints describe shapes that limbs with branches cannot. :mod:`.chain` evaluates the expressions.
@@ -61,7 +61,7 @@ _COUPLED = ("R", "P", "H")
 
 @dataclass(frozen=True)
 class DimensionWords:
-    """Dimension: typical value (degrees for an angle), kind and description."""
+    """Dimension as written: typical value (degrees for an angle), kind and description."""
 
     typical: float
     kind: Dimension
@@ -70,7 +70,7 @@ class DimensionWords:
 
 @dataclass(frozen=True)
 class JointWords:
-    """Joint: type, place, axes and further values, as expressions; None for keys that its type does not have."""
+    """Joint as written: type, place in the robot file, point, axes and further values; None for missing keys."""
 
     place: str
     type: str
@@ -93,7 +93,7 @@ class RepeatWords:
 
 @dataclass(frozen=True)
 class LimbWords:
-    """Limb: names and arrangement of its copies, points, joints of the stem and of each branch."""
+    """Limb as written: names and arrangement of its copies, points, joints of the stem and of each branch."""
 
     place: str
     names: tuple[str, ...]
@@ -116,7 +116,7 @@ class LinkJointWords:
 
 @dataclass(frozen=True)
 class CouplingWords:
-    """Linear relation of joint coordinates: place, and factors by joint name."""
+    """Linear relation of joint coordinates: its place in the robot file, and the factor of each joint by name."""
 
     place: str
     factors: Mapping[str, Expression]
@@ -136,7 +136,7 @@ class GraphWords:
 
 @dataclass(frozen=True)
 class RobotWords:
-    """Robot as it is written."""
+    """Robot as it is written in a robot file, with limbs or with links and joints."""
 
     name: str
     description: str
@@ -212,12 +212,12 @@ def _head(tables: Mapping[str, object]) -> RobotWords:
 
 
 def _limb(place: str, table: Mapping[str, object], before: int) -> LimbWords:
-    """Return a limb.
+    """Return a limb from its table in a robot file.
 
     Args:
         place: place of the limb, for messages.
         table: keys of the limb.
-        before: number of limbs before it, with all copies.
+        before: number of the limbs stated before this limb, with all copies.
     """
     refuse_other_keys(place, table, ("name", "repeat", "points", "joints", "branch", "centre"))
     repeat = None if table.get("repeat") is None else _repeat(f"{place}, repeat", table["repeat"])
@@ -262,7 +262,7 @@ def _check_path(place: str, joints: Sequence[JointWords]) -> None:
 
 
 def _only_joints(place: str, branch: object) -> object:
-    """Return the joints of a branch, which has no other key."""
+    """Return the joints of a branch; refuse a branch with other keys."""
     table = table_of(place, branch)
     if "branch" in table:
         raise RobotError(f"{place}, branch", NESTED_BRANCH)

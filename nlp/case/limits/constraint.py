@@ -175,7 +175,7 @@ class Constraint:
         pose: index of the pose.
         exact: (1, 1) limited quantity, if the expression follows it only near the limit; otherwise None.
         measure: function that computes the limited quantity, if the expression is an estimate of it; otherwise None.
-        spectral: matrix of the estimate, if the expression estimates eigenvalues; otherwise None.
+        spectral: matrix whose eigenvalues the expression estimates; None for other expressions.
         call: call with the expression as value, if the function is called for several legs, joints, tasks or poses.
         stated: lower and upper bound of the case, if the program's bounds are tighter; otherwise None.
     """
@@ -237,7 +237,7 @@ def between(
         upper: upper limit, radians for an angle; None for no upper limit.
         exact: (1, 1) limited quantity, if the expression follows it only near the limit.
         measure: function that computes the limited quantity, if the expression is an estimate of it.
-        spectral: matrix of the estimate, if the expression estimates eigenvalues.
+        spectral: matrix whose eigenvalues the expression estimates; None for other expressions.
     """
     if isinstance(key, str):
         key = ("" if lower is None else f"{key}.min", "" if upper is None else f"{key}.max")

@@ -29,7 +29,7 @@ from .limit import Limit, LimitedCase, NumberRange, PosedRobot, Ranges, TableT, 
 
 
 def _kind(value: object) -> str:
-    """Return the branch of a union for one table for all actuators, or for a table for each actuator by name."""
+    """Return the form of a limit: ``<range>`` for one table for all actuators, ``<list>`` for one table for each."""
     is_each = isinstance(value, dict) and any(isinstance(part, dict | Table) for part in value.values())
     return "<list>" if is_each else "<range>"
 

@@ -8,29 +8,54 @@ from collections.abc import Iterator
 from dataclasses import KW_ONLY, dataclass
 from typing import ClassVar, Self
 
-from pydantic import Field, FiniteFloat
+from pydantic import Field, FiniteFloat, model_validator
 
 from ....models import Dimension, Model, Quantity
 from ...units import Units
-from ..table import Table
+from ..table import Table, fault_of
 from .constraint import BoundedConstraint, Reading, between
 from .limit import Limit, NumberRange, PosedRobot, Ranges, TableField, Written
 
 
-class IntervalTable(Table):
+class LimitTable(Table):
+    """Table of a limit; a value of another type is refused with an example of the table."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _refuse_no_table(cls, table: object) -> object:
+        """Refuse a value that is not a table."""
+        if isinstance(table, dict | Table):
+            return table
+        raise fault_of("", f"must be a table, such as {cls.example(table)}")
+
+    @classmethod
+    def example(cls, value: object = None) -> str:
+        """Return an example of the table: with its required keys; without any, with min and max, or with all keys.
+
+        Args:
+            value: value in place of the table; a number becomes the value of ``min`` or ``max`` if one is required.
+        """
+        required = [name for name, field in cls.model_fields.items() if field.is_required()]
+        keys = required or [key for key in cls.allowed_keys() if key in ("min", "max")] or cls.allowed_keys()
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        texts = {key: str(value) if is_number and key in ("min", "max") and required else "..." for key in keys}
+        return f"{{ {', '.join(f'{key} = {text}' for key, text in texts.items())} }}"
+
+
+class IntervalTable(LimitTable):
     """Limit with a smallest value, a largest value, or both."""
 
     min: FiniteFloat | None = Field(default=None, description="smallest allowed value")
     max: FiniteFloat | None = Field(default=None, description="largest allowed value")
 
 
-class AtLeast(Table):
+class AtLeast(LimitTable):
     """Limit with a smallest value."""
 
     min: FiniteFloat = Field(description="smallest allowed value")
 
 
-class AtMost(Table):
+class AtMost(LimitTable):
     """Limit with a largest value."""
 
     max: FiniteFloat = Field(description="largest allowed value")

@@ -20,7 +20,7 @@ from pydantic import Field, FiniteFloat
 from ....models import Dimension, Model, RobotInstance
 from ..table import Table
 from .constraint import POSITIVE_LENGTH, SQUARED_LENGTH, BoundedConstraint, Call, Form, PairFamily, between
-from .interval import IntervalLimit, QuantityLimit, quantity_named
+from .interval import IntervalLimit, LimitTable, QuantityLimit, quantity_named
 from .limit import Design, Limit, Measures, NumberRange, PosedRobot, Ranges
 
 
@@ -54,7 +54,7 @@ class LegLength(IntervalLimit):
             yield between(name, squared, SQUARED_LENGTH, "leg_length", lower=self.min, upper=self.max)
 
 
-class ActuatorTable(Table):
+class ActuatorTable(LimitTable):
     """Telescoping leg over all poses; its stroke is longest minus shortest length."""
 
     stroke_max: FiniteFloat | None = Field(

@@ -215,6 +215,7 @@ class Limit(abc.ABC, Generic[TableT]):
         numbers: allowed range of each value of the limit; names are those in its table.
         needs_legs: If true, only robots with legs between joint centres can have the limit.
         needs_joints: If true, only robots given joint by joint can have the limit.
+        needs_loads: If true, the limited quantity depends on the loads of the case.
         needs_motion: If true, the limited quantity depends on the platform's speeds, from the case or from a path.
         order: position of the constraints among constraints of other limits at the same place: lower first, then in the
             registry's order.
@@ -227,6 +228,7 @@ class Limit(abc.ABC, Generic[TableT]):
     needs_legs: ClassVar[bool] = False
     needs_joints: ClassVar[bool] = False
     needs_motion: ClassVar[bool] = False
+    needs_loads: ClassVar[bool] = False
     order: ClassVar[int] = 0
 
     @classmethod

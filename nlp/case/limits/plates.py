@@ -18,7 +18,7 @@ from pydantic import Field, FiniteFloat
 from ....models import Dimension
 from ..table import Table
 from .constraint import SQUARED_LENGTH, SQUARED_NUMBER, BoundedConstraint, Call, Form, between
-from .interval import IntervalLimit, LowerLimit, two_sided
+from .interval import IntervalLimit, LimitTable, LowerLimit, two_sided
 from .limit import Design, Limit, NumberRange, Plate, Ranges
 
 
@@ -43,7 +43,7 @@ class JointSpacing(LowerLimit):
             yield between(name, apart, SQUARED_LENGTH, "joint_spacing", lower=self.min)
 
 
-class FootprintTable(Table):
+class FootprintTable(LimitTable):
     """Largest distance of joint centres from the z axis of base or platform."""
 
     base: FiniteFloat | None = Field(

@@ -227,14 +227,17 @@ def _shifted(rows: Rows, by: SX) -> Rows:
 
 
 def _root_of_inverse(rows: Rows) -> SX:
-    """Return ``(tr A^-m)^(-1/m)`` of a positive definite matrix."""
+    """Return ``(tr A^-m)^(-1/m)`` of a positive definite matrix A; ``m = 2^_SQUARINGS``."""
     inverse = _inverse(rows)
     size = sum((row[0] for row in inverse), SX(0))
     return 1 / (size * _root_of_trace([[each / size for each in row] for row in inverse]))
 
 
 def _root_of_trace(rows: Rows) -> SX:
-    """Return ``(tr A^m)^(1/m)``; the trace of the last square is the sum of all squared entries."""
+    """Return ``(tr A^m)^(1/m)`` of a symmetric matrix A by squaring; ``m = 2^_SQUARINGS``.
+
+    The trace of the last square is the sum of the squared entries of the matrix before it.
+    """
     for _ in range(_SQUARINGS - 1):
         rows = _square(rows)
     value = sum((row[0] ** 2 + 2 * sum((each**2 for each in row[1:]), SX(0)) for row in rows), SX(0))

@@ -17,7 +17,7 @@ from ...errors import InputError
 from ..extra import required
 from ..frames import Frame, rotation_from_quaternion
 from .description import Body, Closing, Description, LoopClosure, common_name, unique_name
-from .mjcfclean import clean_model
+from .mjcfclean import CleanModel, clean_model
 
 if TYPE_CHECKING:
     from ....models.mechanism.graph import ElementaryKind
@@ -51,7 +51,7 @@ def read_mjcf(root: Element, path: Path, keyframe: str = "") -> Description:
     finally:
         mujoco.set_mju_user_warning(None)
     name, notes = root.get("model") or path.stem, (*clean.notes, *warnings)
-    return _Reader(mujoco, model, data, str(path)).description(name, clean.driven, clean.keyframes, notes)
+    return _Reader(mujoco, model, data, str(path)).description(name, clean, notes)
 
 
 @contextmanager
@@ -93,14 +93,13 @@ class _Reader:
             names.append(chosen)
         return names
 
-    def description(
-        self, name: str, driven: tuple[str, ...], keyframes: tuple[str, ...], notes: tuple[str, ...]
-    ) -> Description:
+    def description(self, name: str, clean: CleanModel, notes: tuple[str, ...]) -> Description:
         """Return the description of the robot."""
         self.bodies.append(Body(self.body_names[0], "", Frame()))
         for k in range(1, self.model.nbody):
             self._add_body(k)
         closures, couplings, offsets = self._equalities()
+        driven = [*clean.driven, *(self._tendon_motor(each, couplings) for each in clean.tendons)]
         known = {joint.name for joint in self.joints}
         for joint in driven:
             if joint not in known:
@@ -118,7 +117,7 @@ class _Reader:
             offsets=offsets,
             driven=frozenset(driven),
             frames=self._sites(),
-            keyframes=keyframes,
+            keyframes=clean.keyframes,
             notes=(*notes, *self.notes),
         )
 
@@ -178,8 +177,8 @@ class _Reader:
         taken = set(self.joint_names)
         for k in range(model.neq):
             name = unique_name(self._name_of_equality(k), taken)
-            is_joint = model.eq_type[k] == int(kinds.mjEQ_JOINT)
-            closure = None if is_joint else self._closure(k, name)
+            is_coupling = model.eq_type[k] in (int(kinds.mjEQ_JOINT), int(kinds.mjEQ_TENDON))
+            closure = None if is_coupling else self._closure(k, name)
             if not model.eq_active0[k]:
                 self.notes.append(f"equality {name} was omitted: it is not active")
             elif closure is not None and {closure.first, closure.second} & self.mocap:
@@ -221,17 +220,57 @@ class _Reader:
         return LoopClosure(name, closing, one, other, one_frame, other_frame)
 
     def _coupling(self, k: int, name: str) -> tuple[Coupling, float]:
-        """Return the linear relation of a joint equality, and its value at the configuration.
+        """Return the linear relation of an equality of joints or fixed tendons, and its value at the configuration.
 
         Coordinates of the relation are relative to the configuration; those of MuJoCo's polynomial to ``qpos0``.
         """
         model = self.model
-        joints = [int(each) for each in (model.eq_obj1id[k], model.eq_obj2id[k]) if each >= 0]
-        constant, factor, *higher = (float(each) for each in model.eq_data[k][:5])
-        if any(higher) and len(joints) == 2:
+        is_tendon = model.eq_type[k] == int(self.mujoco.mjtEq.mjEQ_TENDON)
+        sides = [int(each) for each in (model.eq_obj1id[k], model.eq_obj2id[k]) if each >= 0]
+        constant, slope, *higher = (float(each) for each in model.eq_data[k][:5])
+        if any(higher) and len(sides) == 2:
             fault = "must be linear: its polycoef may have a constant and a factor, followed by zeros"
-            raise InputError(f"{self.source}: equality {name} of joints: {fault}")
-        factors = tuple((self.joint_names[j], value) for j, value in zip(joints, (1.0, -factor), strict=False))
-        places = [model.jnt_qposadr[j] for j in joints]
-        moved = [float(self.data.qpos[at] - model.qpos0[at]) for at in places]
+            raise InputError(f"{self.source}: equality {name} of {'tendons' if is_tendon else 'joints'}: {fault}")
+        total: dict[int, float] = {}
+        for side, sign in zip(sides, (1.0, -slope), strict=False):
+            for joint, factor in self._pulls(side) if is_tendon else [(side, 1.0)]:
+                total[joint] = total.get(joint, 0.0) + sign * factor
+        if is_tendon:
+            total = {joint: factor for joint, factor in total.items() if factor}
+        factors = tuple((self.joint_names[j], value) for j, value in total.items())
+        moved = [float(self.data.qpos[at] - model.qpos0[at]) for at in (model.jnt_qposadr[j] for j in total)]
         return Coupling(name, factors), sum(f * q for (_, f), q in zip(factors, moved, strict=True)) - constant
+
+    def _pulls(self, tendon: int) -> list[tuple[int, float]]:
+        """Return the joints of a fixed tendon, each with the tendon's length per unit of its coordinate."""
+        start = int(self.model.tendon_adr[tendon])
+        steps = range(start, start + int(self.model.tendon_num[tendon]))
+        return [(int(self.model.wrap_objid[k]), float(self.model.wrap_prm[k])) for k in steps]
+
+    def _tendon_motor(self, name: str, couplings: list[Coupling]) -> str:
+        """Return the name of the joint that the actuator of a fixed tendon drives.
+
+        A tendon of several joints has its motor on the link before the first of them. A coupling makes the length of
+        the tendon the coordinate of the motor.
+
+        Args:
+            name: name of the tendon.
+            couplings: couplings of the robot; that of the motor is added.
+        """
+        pulls = [(joint, factor) for joint, factor in self._pulls(self.model.tendon(name).id) if factor]
+        if len(pulls) == 1:
+            only = self.joint_names[pulls[0][0]]
+            self.notes.append(f"{only} is driven through the tendon {name}; its rate is that of the joint itself")
+            return only
+        names = {each.name: each for each in self.joints}
+        first = names[self.joint_names[pulls[0][0]]]
+        taken = {*names, *(each.name for each in couplings)}
+        motor = unique_name(name, taken)
+        rotor = unique_name(f"{motor} rotor", {body.name for body in self.bodies})
+        inner = next(body for body in self.bodies if body.name == first.inner)
+        self.bodies.append(Body(rotor, inner.name, inner.place))
+        self.joints.append(MechanismJoint(motor, first.kind, inner.name, rotor, first.point, first.axis))
+        factors = ((motor, 1.0), *((self.joint_names[joint], -factor) for joint, factor in pulls))
+        couplings.append(Coupling(unique_name(f"{motor} tendon", taken), factors))
+        self.notes.append(f"actuator of tendon {name}: joint {motor}, whose coordinate is the length of the tendon")
+        return motor

@@ -11,12 +11,16 @@ from .xmltext import LARGEST_FILE, read_xml
 
 #: Elements that are kept, by their parent element.
 _KEPT = {
-    "mujoco": ("compiler", "default", "worldbody", "equality"),
+    "mujoco": ("compiler", "default", "worldbody", "tendon", "equality"),
     "default": ("default", "joint", "site", "equality"),
     "worldbody": ("body", "frame", "site", "replicate"),
     "body": ("body", "frame", "site", "replicate", "joint", "freejoint"),
-    "equality": ("connect", "weld", "joint"),
+    "tendon": ("fixed",),
+    "fixed": ("joint",),
+    "equality": ("connect", "weld", "joint", "tendon"),
 }
+#: Attributes that remain of fixed tendons and of their joints.
+_TENDON = {"fixed": ("name",), "joint": ("joint", "coef")}
 #: Settings of the compiler that affect the poses of bodies and joints.
 _COMPILER = ("angle", "eulerseq", "coordinate", "autolimits")
 #: Attributes that refer to omitted elements.
@@ -46,12 +50,14 @@ class CleanModel(NamedTuple):
     Attributes:
         root: root element of a model that MuJoCo compiles without other files, with only the requested keyframe.
         driven: names of the actuated joints, in order.
+        tendons: names of the actuated fixed tendons, in order.
         keyframes: names of all keyframes of the model, or their numbers from 1.
         notes: notes about omitted elements.
     """
 
     root: Element
     driven: tuple[str, ...]
+    tendons: tuple[str, ...]
     keyframes: tuple[str, ...]
     notes: tuple[str, ...]
 
@@ -73,13 +79,16 @@ def clean_model(main: Element, path: Path, keyframe: str = "") -> CleanModel:
         fault = f"attaches {element.get('model', 'another model')!r}, which is not supported"
         raise InputError(f"{source}: {fault}; save the model as a single file first")
     notes: list[str] = []
-    driven = _driven_joints(root, notes)
+    fixed = _without_other_tendons(root)
+    driven, tendons = _driven(root, fixed, notes)
     for element in root.iter("equality"):
-        other = [each for each in element if each.tag not in _KEPT["equality"]]
+        other = [each for each in element if each.tag not in _KEPT["equality"] or not _is_read(each, fixed)]
         notes += [
             f"equality {each.get('name', '(unnamed)')} was omitted: the kind {each.tag} is not supported"
             for each in other
         ]
+        for each in other:
+            element.remove(each)
     if any(True for tag in ("composite", "flexcomp", "flex") for _ in root.iter(tag)):
         notes.append("soft bodies were omitted")
     result = Element("mujoco", {key: value for key, value in root.attrib.items() if key == "model"})
@@ -91,7 +100,7 @@ def clean_model(main: Element, path: Path, keyframe: str = "") -> CleanModel:
             raise InputError(f"{source}: --keyframe {keyframe}: no such keyframe; {hint}")
         attributes = {key: value for key, value in keys[keyframe].attrib.items() if key in _KEYFRAME}
         SubElement(SubElement(result, "keyframe"), "key", attributes)
-    return CleanModel(result, driven, tuple(keys), tuple(dict.fromkeys(notes)))
+    return CleanModel(result, driven, tendons, tuple(keys), tuple(dict.fromkeys(notes)))
 
 
 class _Files:
@@ -135,21 +144,45 @@ class _Files:
         return list(self.expanded(root, (*chain, path)))
 
 
-def _driven_joints(root: Element, notes: list[str]) -> tuple[str, ...]:
-    """Return the names of the actuated joints; actuators of other elements become notes."""
+def _without_other_tendons(root: Element) -> set[str]:
+    """Remove fixed tendons without a name, or of a joint that the model lacks; return the names of the others."""
+    sections = [*root.iter("worldbody")]
+    joints = {joint.get("name") for section in sections for joint in section.iter("joint")}
+    kept: set[str] = set()
+    for section in root.iter("tendon"):
+        for each in section.findall("fixed"):
+            name = each.get("name", "")
+            if name and all(joint.get("joint") in joints for joint in each.iterfind("joint")):
+                kept.add(name)
+            else:
+                section.remove(each)
+    return kept
+
+
+def _is_read(equality: Element, fixed: set[str]) -> bool:
+    """Return whether an equality is none of tendons, or one of fixed tendons alone."""
+    names = [equality.get(key) for key in ("tendon1", "tendon2")]
+    return equality.tag != "tendon" or all(name in fixed for name in names if name is not None)
+
+
+def _driven(root: Element, fixed: set[str], notes: list[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the joints, and the fixed tendons, that actuators drive; actuators of other elements become notes."""
     driven: list[str] = []
+    tendons: list[str] = []
     for section in root.iter("actuator"):
         for each in section:
             joint = each.get("joint") or each.get("jointinparent")
             if joint:
                 driven.append(joint)
+            elif each.get("tendon") in fixed:
+                tendons.append(each.get("tendon", ""))
             else:
                 on = next((f"{words} {each.get(key)!r}" for key, words in _TRANSMISSIONS.items() if each.get(key)), "")
                 fault = f"acts on {on}" if on else "does not act on a joint"
                 notes.append(
                     f"actuator {each.get('name', '(unnamed)')!r} was omitted: it {fault}; name a joint by --actuated"
                 )
-    return tuple(dict.fromkeys(driven))
+    return tuple(dict.fromkeys(driven)), tuple(dict.fromkeys(tendons))
 
 
 def _copy_children(given: Element, result: Element, kind: str, copies: int, source: str) -> None:
@@ -158,6 +191,8 @@ def _copy_children(given: Element, result: Element, kind: str, copies: int, sour
         if child.tag not in _KEPT[kind]:
             continue
         attributes = {key: value for key, value in child.attrib.items() if key not in _DROPPED}
+        if kind in ("tendon", "fixed"):
+            attributes = {key: value for key, value in attributes.items() if key in _TENDON[child.tag]}
         if child.tag == "compiler":
             attributes = {key: value for key, value in attributes.items() if key in _COMPILER}
         inner_copies = copies

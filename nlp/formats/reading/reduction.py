@@ -110,7 +110,10 @@ def reduce(given: Description, ends: Ends) -> Reduced:
         )
     edges = [(leader[each.inner], leader[each.outer]) for each in moving]
     kept = [moving[k] for k in between(edges, start, end)]
-    _refuse_open(given, ends, kept, leader, (start, end))
+    motors = _coupled_motors(given, moving, kept, leader)
+    if not motors:
+        _refuse_open(given, ends, kept, leader, (start, end))
+    kept += motors
     driven, notes = _driven(given, ends, kept)
     names = _link_names(given, kept, leader, {start: base, end: ends.platform})
     couplings, driven, more = _couplings(given, kept, driven)
@@ -207,6 +210,36 @@ def _refuse_open(
         raise InputError(
             f"{where} {fault} of {len(kept)} joints from the base {base}; a parallel robot has two or more chains"
         )
+
+
+def _coupled_motors(
+    given: Description, moving: list[MechanismJoint], kept: list[MechanismJoint], leader: dict[str, str]
+) -> list[MechanismJoint]:
+    """Return joints beside the mechanism that couplings tie to several of its joints, such as motors of a differential.
+
+    Such a coupling closes a loop. A joint counts that has a link of the mechanism; a coupling does whose other joints
+    all count.
+
+    Args:
+        given: the description.
+        moving: all joints that move.
+        kept: joints between base and platform.
+        leader: body that stands for each rigid group.
+    """
+    own = {each.name for each in kept}
+    links = {leader[name] for each in kept for name in (each.inner, each.outer)}
+    beside = {
+        each.name: each
+        for each in moving
+        if each.name not in own and each.kind != "S" and {leader[each.inner], leader[each.outer]} & links
+    }
+    found: dict[str, MechanismJoint] = {}
+    for coupling in given.couplings:
+        names = {name for name, _ in coupling.factors}
+        others = names - own
+        if len(names & own) > 1 and others and others <= beside.keys():
+            found |= {name: beside[name] for name, _ in coupling.factors if name in others}
+    return list(found.values())
 
 
 def _driven(given: Description, ends: Ends, kept: list[MechanismJoint]) -> tuple[set[str], list[str]]:

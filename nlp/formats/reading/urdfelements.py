@@ -24,7 +24,7 @@ def name_of(element: Element, source: str) -> str:
     """
     name = element.get("name", "")
     if not name:
-        raise InputError(f"{source}: an element <{element.tag}> has no name; give it an attribute name")
+        raise InputError(f'{source}: an element <{element.tag}> has no attribute name; add name="..."')
     return name
 
 

@@ -86,7 +86,10 @@ def given_mechanism(robot: GivenRobot) -> RobotMechanism:
 
 
 def _closed(robot: GivenRobot, at_home: Mechanism, words: Sequence[ExportedJoint], size: float) -> ClosedMechanism:
-    """Return a mechanism at the program's pose: closed near its joint coordinates, or by actuator motions from home."""
+    """Return the mechanism with closed loops at the solved pose.
+
+    The loops are closed near the solved joint coordinates, or else by moving the actuators from home.
+    """
     wanted = {}
     for joint, each in zip(at_home.joints, words, strict=True):
         value = robot.coordinates.get((each.label, each.part))
@@ -104,7 +107,7 @@ def _closed(robot: GivenRobot, at_home: Mechanism, words: Sequence[ExportedJoint
 
 
 def _apart(robot: GivenRobot, closed: ClosedMechanism, wanted: Mapping[str, float], size: float) -> float:
-    """Return the largest difference from the program's pose and coordinates, radians or relative to the size."""
+    """Return the largest difference from the solved pose and joint coordinates, in radians or relative to the size."""
     found = closed.mechanism
     platform = found.link(found.platform)
     apart = [

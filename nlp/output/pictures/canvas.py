@@ -182,7 +182,7 @@ def draw_edges(axes: Axes, size: float = 9) -> None:
 
 
 def arc(centre: FloatArray, through: FloatArray, normal: FloatArray, last: FloatArray | None = None) -> FloatArray:
-    """Return points (k, 3) of a circle, or of its arc up to the direction ``last`` (3,)."""
+    """Return points (k, 3) of a circle, or of its arc from ``through`` to the direction ``last`` (3,)."""
     axis, ray = normal / np.linalg.norm(normal), through - centre
     across = np.cross(axis, ray)
     turn = 2 * math.pi if last is None else math.atan2(float(last @ across), float(last @ ray))

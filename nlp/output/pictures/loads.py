@@ -11,6 +11,7 @@ from ....models import Dimension, FloatArray, JointKind, Model, frozen_array
 from ....models.statics import driven_joints
 from ...case.forces import dimension_of_force
 from ...case.loads import LoadCase
+from ...errors import load_words
 from ...evidence.loads import HeldLoad, loads_at
 from ...evidence.state import RobotState, legs_at
 from ...program.nlp import Nlp
@@ -104,7 +105,7 @@ def drawn_forces(
     scales = [f"longest arrow {largest:.4g} {units.label(Dimension.FORCE)}"] if largest > 0 else []
     scales += [f"longest with two heads {turning:.4g} {units.label(Dimension.TORQUE)}"] if turning > 0 else []
     of_scales = f": {', '.join(scales)}" if scales else ""
-    whole = f"load {held.name}"
+    whole = load_words(held.name)
     shown = " and ".join(part.words for part in given if part.force.any() or part.moment.any()) or whole
     under = "" if shown == whole else f", actuator forces under {whole}"
     words = f"{shown}{under}{more}{of_scales}{_any_words(held)}"
@@ -150,7 +151,7 @@ def _parts(case: LoadCase, state: RobotState) -> Iterator[_Part]:
         turn = state.rotation if load.in_platform else np.eye(3)
         force = sign * (turn @ np.array(load.force) + load.mass * np.array(case.gravity))
         point = state.position + state.rotation @ np.array(load.point)
-        words = f"weight of {load.name}" if load.mass else f"load {load.name}"
+        words = f"weight of {load.name}" if load.mass else load_words(load.name)
         yield _Part(load.name, words, point, force, sign * (turn @ np.array(load.moment)))
 
 

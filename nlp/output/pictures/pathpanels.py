@@ -14,6 +14,7 @@ from ....models.statics import driven_joints
 from ...case.forces import dimension_of_speed
 from ...case.motors import ActuatorQuantity
 from ...case.task import Sense
+from ...errors import load_words
 from ...path.sampling import Progress, ProgressKind, progress_of
 from ...proof.workspace.judgement import Judgement
 from ...proof.workspace.path_samples import PathSamples, SampledNumber, motor_numbers
@@ -174,7 +175,7 @@ class PathPicture:
         if unplaced:
             notes.append(f"Undecided without a known segment: {', '.join(unplaced)}.")
         if self.judged.case.joint_centre_tolerance:
-            notes.append("The curves are for the nominal design, without the tolerance.")
+            notes.append("The curves are for the nominal robot, without the tolerance.")
         if any(each.is_cut for each in self.panels):
             notes.append("Curves have gaps where forces or speeds are more than ten times their usual size.")
         if self.samples.left_out:
@@ -243,7 +244,7 @@ def _forces(judged: Judgement, samples: PathSamples) -> Iterator[PathPanel]:
     """Yield charts of the actuator forces under each load."""
     found = motor_numbers(samples.numbers, ActuatorQuantity.FORCE)
     for load, every in list(found.items())[:_LOADS]:
-        yield from _of_motors(judged, every, f"forces, load {load}")
+        yield from _of_motors(judged, every, f"forces, {load_words(load)}")
 
 
 def _of_motors(judged: Judgement, every: Sequence[SampledNumber], title: str) -> Iterator[PathPanel]:

@@ -39,7 +39,7 @@ _BANDS: dict[bool, dict[str, Any]] = {
 
 
 def path_figure(picture: PathPicture) -> Figure:
-    """Return charts along a path as a Matplotlib figure, below each other.
+    """Return a Matplotlib figure of charts along a path, one below another.
 
     The ``gid`` of artists: ``TITLE ACTUATOR`` for a curve, with the prefix ``smallest`` for the smaller of two values;
     ``limit`` for a limit; ``margin KEY`` for the smallest margin where this limit is nearest; ``fault LINE`` for a

@@ -1,4 +1,4 @@
-"""F over one or two varied names of a grid, with numbered regions of equal active limits."""
+"""F over one or two varied names of a grid, with numbered regions that have the same active limits."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ def _draw_map(
     sets: NDArray[np.intp],
     label: str,
 ) -> None:
-    """Draw F over two varied names in colours, one cell per point, with lines around regions of equal active sets."""
+    """Draw F over two varied names in colours, a cell per point; lines divide regions with different active limits."""
     sorting = [np.argsort(axis) for axis in at]
     F, sets = F[np.ix_(*sorting)], sets[np.ix_(*sorting)]
     x, y = (_edges(axis[by_value]) for axis, by_value in zip(at, sorting, strict=True))

@@ -55,7 +55,7 @@ def drawing_at(case: Case, claim: PosedClaim) -> Drawing:
     except CaseError:
         if case.joint_centre_tolerance is None:
             raise
-        # Dependent coordinates of the pose belong to the other robot: the nominal design's loops do not close there.
+        # Dependent coordinates of the pose belong to the other robot: the nominal robot's loops do not close there.
         raise EvaluationError(
             "the worst pose was found for joint centres displaced within the tolerance, and the "
             "nominal robot does not reach it"
@@ -93,7 +93,7 @@ class Kind(NamedTuple):
 
 
 def slices_figure(case: Case, slices: Sequence[Slice]) -> Figure:
-    """Return the slices as a Matplotlib figure; the ``gid`` of boxes is the text of their kind."""
+    """Return the slices as a Matplotlib figure; the ``gid`` of a box is the text of its verdict."""
     columns = min(_COLUMNS, len(slices))
     rows = -(-len(slices) // columns)
     entries, notes = slices_legend(case, slices), slices_notes(slices)
@@ -105,7 +105,7 @@ def slices_figure(case: Case, slices: Sequence[Slice]) -> Figure:
     for k, each in enumerate(slices):
         _paint(figure.add_subplot(rows, columns, k + 1), case, each, kinds)
     title = textwrap.wrap(legible(case.title or case.name), 30 * columns, max_lines=2, placeholder=" …")
-    whose = " for the nominal design, without the tolerance" if case.joint_centre_tolerance else ""
+    whose = " for the nominal robot, without the tolerance" if case.joint_centre_tolerance else ""
     words = [*title, f"slices through the centre of the workspace{whose}"]
     figure.suptitle("\n".join(words), fontsize=10, color=INK, parse_math=False)
     handles = [
@@ -230,7 +230,12 @@ def _frame(axes: Axes, case: Case, each: Slice) -> None:
     """Draw the outline of the workspace, and name the axes of a slice."""
     inner, outer = (_shown(case, each, end) for end in each.workspace)
     outline: dict[str, Any] = {"fill": False, "edgecolor": INK, "linewidth": 1.6, "gid": "workspace"}
-    if each.ball is None:
+    if each.outside is not None:
+        low, high = (_shown(case, each, end) for end in each.whole)
+        x, y = (np.linspace(*ends, len(each.outside)) for ends in zip(low, high, strict=True))
+        drawn = axes.contour(x, y, each.outside.T, [0.0], colors=[INK], linewidths=1.6)
+        drawn.set_gid("workspace")
+    elif each.ball is None:
         low, high = (_shown(case, each, end) for end in each.whole)
         axes.add_patch(Rectangle((inner[0], inner[1]), *(outer - inner), **outline))
     else:

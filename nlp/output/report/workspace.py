@@ -134,7 +134,7 @@ def _slices(report: WorkspaceReport) -> Markup:
         "The colour of a box is proved for all its poses."
     )
     if report.case.joint_centre_tolerance:
-        words += " The slices are for the nominal design, without the tolerance."
+        words += " The slices are for the nominal robot, without the tolerance."
     legend = [tag("li", _swatch(kind), kind.words) for kind in slices_legend(report.case, slices)]
     legend.append(tag("li", tag("span", class_="swatch outline"), "workspace"))
     notes = [f"{note[0].upper()}{note[1:]}." for note in slices_notes(slices)]

@@ -87,22 +87,24 @@ class BoxState(enum.IntEnum):
     """State of a box: open, or closed by a rule. The values are those of ``kernel/examination.h``."""
 
     OPEN = 0
-    BOUNDED = 1  # its bound does not exceed the threshold
-    INFEASIBLE = 2  # a condition is violated everywhere in it
+    BOUNDED = 1  # the bound of the box does not exceed the threshold
+    INFEASIBLE = 2  # a condition is violated everywhere in the box
     MONOTONE = 3  # the functions increase along a variable, towards a neighbouring part of the whole box
-    EMPTIED = 4  # contraction along a variable made it empty
+    EMPTIED = 4  # contraction along a variable made the box empty
 
 
 @dataclass(frozen=True, eq=False)
 class Examination:
-    """Results for B boxes.
+    """Results of the examination of B boxes.
 
     Attributes:
         verdict: (B,) :class:`BoxState`.
-        reason: (B,) index of the violated condition, or of the variable that is monotone or emptied.
+        reason: (B,) index of the violated condition, or of the variable along which the functions increase or the
+            contraction left nothing.
         bound: (B,) upper bound over the feasible part of the box; infinite where a value may be undefined.
         lower, upper: (n, B) bounds of the contracted box, or of the face to which the box collapsed.
-        cut_lower, cut_upper: (n, B) index of the expression that moved the bound, or ``UNMOVED`` or ``COLLAPSED``.
+        cut_lower, cut_upper: (n, B) index of the expression that moved this end of the box, or ``UNMOVED`` or
+            ``COLLAPSED``.
         split: (B,) index of the variable to bisect next.
         value: (B,) lower bound of the maximised value at the centre; -inf where a condition may be violated.
         centre: (n, B) centres of the boxes.
@@ -148,10 +150,10 @@ class LimbModels(Examination):
 
 
 class Engine:
-    """The C kernel on several threads. The results do not depend on the number of threads.
+    """Examination of boxes by the C kernel, on several threads. The results do not depend on the number of threads.
 
     Args:
-        form: form of the search.
+        form: standard form of the program, or the form of one limb.
         jobs: number of threads; if left out, one for each processor.
         shared: number of variables that a limb's form shares with other limbs; these come first. None for a whole form.
         tangents: If true, the first pass of a minimum uses tangents to squares.
@@ -191,7 +193,7 @@ class Engine:
     def examine(
         self, lower: FloatArray, upper: FloatArray, threshold: float, models: Sequence[Any] = (None,) * 3
     ) -> Examination:
-        """Examine boxes, and close boxes with bounds of at most a threshold.
+        """Examine boxes, and close the boxes whose bound is at most a threshold.
 
         Args:
             lower: (n, B) lower ends.
@@ -221,7 +223,7 @@ class Engine:
         tilts: FloatArray | None = None,
         threshold: float = -np.inf,
     ) -> LimbModels:
-        """Return upper models of a limb over boxes, or of the common part with the limbs' tilts.
+        """Return quadratic upper models of a limb over boxes, or of the common part plus the limbs' tilts.
 
         Boxes of shared variables are contracted to the part where the conditions may be satisfied and the sum can
         exceed the threshold. A box is empty if a lower end is above its upper end.
@@ -260,7 +262,7 @@ class Engine:
 
 
 def search_tape(form: StandardForm, rows: Rows | None = None, *, is_short: bool = True) -> Tape:
-    """Compile the rows of a form, then the derivatives of these rows, row by row.
+    """Return the tape of the rows of a form, then of the derivatives of these rows, row by row.
 
     The default rows are its R expressions.
 
@@ -281,7 +283,7 @@ def search_tape(form: StandardForm, rows: Rows | None = None, *, is_short: bool 
 
 
 def value_tape(form: StandardForm, rows: Rows | None = None) -> Tape | None:
-    """Compile a form's R expressions without derivatives for the first pass, then the rows for tangents.
+    """Return a tape of a form's R expressions without derivatives, for the first pass, then of the rows for tangents.
 
     Returns:
         The tape; None for a form with too many variables for a first pass.
@@ -298,7 +300,10 @@ def without_conditions(form: StandardForm) -> StandardForm:
 
 
 def objective_tape(form: StandardForm, length: int) -> Tape | None:
-    """Compile the functions and their derivatives; None if this tape would be a large part of the given length."""
+    """Return the tape of a form's functions and their derivatives.
+
+    None if the tape is not much shorter than ``length``.
+    """
     if form.n > MOST_VARIABLES or not form.conditions:
         return None
     # The tape without derivatives is shorter, and often already too long.

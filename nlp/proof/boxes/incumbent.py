@@ -1,4 +1,4 @@
-"""Incumbent of a search: the best known feasible point, of the whole box or of limbs."""
+"""Incumbent of a search: the best known feasible point of the whole form, or of one limb."""
 
 from __future__ import annotations
 
@@ -71,11 +71,11 @@ class Incumbent:
         return None if self.x is None else self._with_level(self.x, self.value)
 
     def start(self, x: FloatArray | None, claimed: float | None) -> None:
-        """Start with a given point, or with the best of a few points.
+        """Set the first incumbent: a given point, or the best of a few points.
 
         Args:
             x: (n,) point in the program's variables; None without one.
-            claimed: claimed objective at the point.
+            claimed: claimed objective at the given point; None without a claim.
 
         Raises:
             IncumbentError: the point violates a limit, or has a worse value.
@@ -147,9 +147,9 @@ class Incumbent:
             self._best = _Point(np.array(point), value)
 
     def with_part(self, limbs: Sequence[Limb], part: FloatArray) -> FloatArray | None:
-        """Return the incumbent with a new part (d,) of limbs.
+        """Return the incumbent with new values (d,) of the variables of a limb and of its copies.
 
-        Without an incumbent, combine the parts of all limbs once these are known.
+        Without an incumbent, combine the points of all limbs once these are known.
         """
         given, whole = {each.own: part for each in limbs}, self.x
         if whole is None:
@@ -166,7 +166,7 @@ class LimbPoint:
 
     Args:
         limbs: the limb and its copies.
-        whole: incumbent of the whole form, which a better part improves.
+        whole: incumbent of the whole form, which a better point of the limb improves.
     """
 
     def __init__(self, limbs: Sequence[Limb], whole: Incumbent) -> None:
@@ -186,13 +186,13 @@ class LimbPoint:
         return self._value
 
     def consider(self, point: FloatArray) -> None:
-        """Improve the incumbent by a part (d,) if the result is feasible and better."""
+        """Improve the incumbent by a point (d,) of the limb if the result is feasible and better."""
         whole = self._whole.with_part(self._limbs, point)
         if whole is not None:
             self._whole.consider(whole)
 
     def improve_near(self, point: FloatArray) -> None:
-        """Improve the incumbent from a part (d,) that need not be feasible."""
+        """Improve the incumbent from a point (d,) of the limb that need not be feasible."""
         whole = self._whole.with_part(self._limbs, point)
         if whole is not None:
             self._whole.improve_near(whole)

@@ -76,7 +76,7 @@ class OptimumRule(Rule[tuple[()]]):
         return BoxResults(left, closed, len(boxes.split), moved, reasons=(found, rest))
 
     def record(self, boxes: Boxes[tuple[()]], found: BoxResults[tuple[()]], split: NDArray[np.intp]) -> None:
-        """Record a block of boxes. A contraction closes the part of the box that is cut off."""
+        """Record a block of examined boxes for a proof. A contraction closes the part of a box that is cut off."""
         if self._recorder is None:
             return
         (examined, rest), left = found.reasons, found.left
@@ -112,7 +112,10 @@ class OptimumRule(Rule[tuple[()]]):
 
 
 def _node_of(found: Examination, k: int, upper: FloatArray, functions: int) -> bytes:
-    """Return the bytes of the node of box ``k``, without those of its bisection and sub-boxes; ``upper`` is (n,)."""
+    """Return the bytes of the proof's node for box ``k``, without its bisection and sub-boxes.
+
+    ``upper`` (n,) has the upper ends of the box.
+    """
     verdict, reason = int(found.verdict[k]), int(found.reason[k])
     if verdict == BoxState.BOUNDED:
         return bytes([Node.BOUNDED])
@@ -123,7 +126,7 @@ def _node_of(found: Examination, k: int, upper: FloatArray, functions: int) -> b
 
 
 def _contraction(found: Examination, k: int, i: int, upper: float, functions: int) -> bytes:
-    """Return the nodes of the contraction of box ``k`` along variable ``i``."""
+    """Return the bytes of the proof's nodes for the contraction of box ``k`` along variable ``i``."""
     below, above = int(found.cut_lower[i, k]), int(found.cut_upper[i, k])
     low, high = float(found.lower[i, k]), float(found.upper[i, k])
     if COLLAPSED in (below, above):
@@ -137,5 +140,5 @@ def _contraction(found: Examination, k: int, i: int, upper: float, functions: in
 
 
 def _reason(why: int, functions: int) -> bytes:
-    """Return the reason why a part of a box is cut off, from the index of the expression that excludes this part."""
+    """Return the bytes that state why a part of a box is cut off, from the index of the expression that excludes it."""
     return bytes([Node.BOUNDED]) if why < functions else node_bytes(Node.INFEASIBLE, why)

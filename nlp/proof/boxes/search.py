@@ -47,11 +47,11 @@ Rows = TypeVar("Rows")
 
 
 class Boxes(NamedTuple, Generic[Columns]):
-    """B boxes.
+    """B boxes with their bounds.
 
     Attributes:
-        lower, upper: (B, n) ends.
-        bound: (B,) upper bounds.
+        lower, upper: (B, n) ends of the boxes.
+        bound: (B,) upper bound of the maximised value over each box.
         split: (B,) index of the coordinate to bisect; ``WHOLE`` for no bisection.
         more: data of the rule for each box: arrays (B, ...), or tuples of them.
     """
@@ -87,7 +87,7 @@ def joined(parts: Sequence[Rows]) -> Rows:
 
 
 def _alike(pattern: Any, columns: Sequence[Any]) -> Any:  # noqa: ANN401 - any kind of tuple
-    """Return columns as a tuple of the same type as a pattern."""
+    """Return columns as a tuple of the type of ``pattern``, such as a named tuple."""
     return getattr(type(pattern), "_make", tuple)(columns)
 
 
@@ -109,7 +109,7 @@ class Order(enum.Enum):
 
 
 class BoxResults(NamedTuple, Generic[Columns]):
-    """Results for boxes.
+    """Results of a rule's examination of boxes.
 
     Attributes:
         left: (O,) remaining sub-boxes of the open boxes, with ``WHOLE`` or ``SMALL`` as in :meth:`Rule.record`.
@@ -130,7 +130,7 @@ class BoxResults(NamedTuple, Generic[Columns]):
 
 
 class Rule(ABC, Generic[Columns]):
-    """Examination of boxes for a kind of claim.
+    """Rule by which a search examines boxes, for one kind of claim.
 
     Attributes:
         target: largest bound of a box that may be closed.
@@ -148,7 +148,7 @@ class Rule(ABC, Generic[Columns]):
 
     @abstractmethod
     def examine(self, boxes: Boxes[Columns]) -> BoxResults[Columns]:
-        """Return the results for boxes."""
+        """Examine boxes; return the open sub-boxes and the bounds of the closed boxes."""
 
     def record(self, boxes: Boxes[Columns], found: BoxResults[Columns], split: NDArray[np.intp]) -> None:
         """Record a step for a proof.
@@ -166,7 +166,7 @@ _Chunk = tuple[float, int, Boxes[Columns]]
 
 
 class State(NamedTuple, Generic[Columns]):
-    """A search after a step.
+    """State of a search after a step.
 
     Attributes:
         waiting: examined boxes, or sub-boxes, that are still to be bisected, in the order of the search.
@@ -190,7 +190,7 @@ AnyRule = TypeVar("AnyRule", bound=Rule[Any])
 
 
 class Search(Generic[AnyRule]):
-    """A search of a box.
+    """Branch and bound over a box, step by step.
 
     Args:
         rule: rule for the examination of boxes.
@@ -296,7 +296,7 @@ class Search(Generic[AnyRule]):
         return np.where(is_small & (split >= 0), np.where(once, WHOLE, SMALL), split)
 
     def _put(self, waiting: list[_Chunk[Any]], boxes: Boxes[Any]) -> None:
-        """Add boxes."""
+        """Add examined boxes to the waiting boxes."""
         if len(boxes.split):
             key = 0.0 if self._order is Order.NEWEST else float(boxes.bound.max())
             self._newest += 1
@@ -376,7 +376,7 @@ class Effort:
         return reason_of(lambda: self._run(search, ending, target))
 
     def _run(self, search: Steps, ending: Callable[[], str | None], target: Callable[[], float]) -> str:
-        """Run a search that may be interrupted."""
+        """Run a search until it ends; an interrupt may raise an exception between two steps."""
         reported = -math.inf
         reached(Milestone.BOUND)
         while True:

@@ -1,6 +1,6 @@
-"""Record of a search as the tree of a proof; :mod:`screwsynth.nlp.proof.checker.tree` defines the nodes.
+"""Recorder of a search: the tree of boxes for a proof file; :mod:`screwsynth.nlp.proof.checker.tree` defines the nodes.
 
-The bounds of a node's box are the key of the node.
+A node of the tree is found by a key: the ends of its box as bytes.
 """
 
 from __future__ import annotations
@@ -24,23 +24,23 @@ _OUTWARDS = 5e-13
 
 
 class TreeRecord:
-    """Tree of a search.
+    """Tree of the boxes of a search, recorded for a proof file.
 
     Attributes:
-        begin: bytes before the root's node.
+        begin: bytes of the tree before the node of the whole box.
     """
 
     def __init__(self) -> None:
         self.clear()
 
     def clear(self) -> None:
-        """Delete the record: the search begins again."""
+        """Delete all recorded nodes, because the search begins again."""
         self.begin, self._root = b"", b""
         self._nodes: dict[bytes, tuple[bytes, tuple[bytes, ...]]] = {}
         self._limbs: list[tuple[TreeRecord, Callable[[], float]]] = []
 
     def limb(self, bound: Callable[[], float]) -> TreeRecord:
-        """Return the record of the next limb's tree. The whole tree then consists of the trees of the limbs.
+        """Return the recorder for the tree of the next limb. The whole tree then consists of the trees of the limbs.
 
         Args:
             bound: function that returns the limb's bound at the end of the search; -inf without a feasible point.
@@ -50,7 +50,13 @@ class TreeRecord:
         return record
 
     def add(self, key: bytes, text: bytes, *parts: bytes) -> None:
-        """Record a node: its bytes, and the keys of the sub-boxes in the order of their trees."""
+        """Record a node of the tree.
+
+        Args:
+            key: ends of the node's box, as bytes.
+            text: bytes of the node.
+            parts: keys of the sub-boxes, in the order of their trees.
+        """
         # The first box of a search is the whole box.
         self._root = self._root or key
         self._nodes[key] = text, parts
@@ -86,14 +92,14 @@ class TreeRecord:
         return self.begin + self.tree_below(self._root, with_open=with_open)
 
     def tree_below(self, key: bytes, *, with_open: bool = False) -> bytes:
-        """Return the tree of a box with a key; see :meth:`tree`."""
+        """Return the part of the tree for one box, by the key of the box; see :meth:`tree`."""
         parts, waiting = list[bytes](), [key]
         # A leaf of shared variables has additional values, and an open box has none.
         missing = bytes([Node.BOUNDED]) if with_open and not self.begin else None
         while waiting:
             text, following = self._nodes.get(waiting.pop(), (missing, ()))
             if text is None:
-                raise ProofError("the search did not close every box: there is no proof to write")
+                raise ProofError("the search left undecided boxes: there is no proof to write")
             parts.append(text)
             waiting += reversed(following)
         return b"".join(parts)

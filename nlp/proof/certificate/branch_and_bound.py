@@ -149,7 +149,7 @@ class _Search:
         self._boxes_before = 0
 
     def run(self, recorder: TreeRecord | None) -> str:
-        """Search until no box is open; return the reason for stopping earlier, or an empty text.
+        """Run the search until no box is open; return the reason for an earlier stop, or an empty text.
 
         A worse incumbent may have closed limbs with too large a part of the gap, or may have caused boxes to be
         bisected until they were too small. The search then begins again with the better point.
@@ -166,7 +166,7 @@ class _Search:
         return reason
 
     def _new_method(self, recorder: TreeRecord | None) -> Search[Any] | IndependentSearch:
-        """Return the search for the form: by limbs if the form separates, otherwise of the whole box.
+        """Return a new search of the form: by limbs if the form separates into limbs, otherwise of the whole box.
 
         A proof covers the whole box, without the use of mirror symmetries.
         """
@@ -218,7 +218,7 @@ class _Search:
         return known + _FOLDED * abs(known) if math.isfinite(known) else known
 
     def _is_met(self) -> bool:
-        """Return whether the bound reaches the requested gap once no box is open."""
+        """Return whether the bound meets the requested gap; tested when no box is open."""
         if self._above is not None:
             return self._bound_of_tree < self._form.value_of(self._above)
         return self._method.bound <= self._threshold + _GAP_ROUNDING * self._allowed_gap()[0]
@@ -234,7 +234,7 @@ class _Search:
         return None
 
     def _report(self, seconds: float) -> None:
-        """Report progress, and add to the history."""
+        """Call the progress function, and add the present bound and incumbent to the history."""
         bound, incumbent = self._noted(seconds)
         if self._progress is not None:
             self._progress(seconds, bound, incumbent, self._boxes_before + self._method.boxes, self._method.left)

@@ -120,7 +120,7 @@ class Certificate(Whole, Shown):
 
     @property
     def _bound_statement(self) -> str:
-        """Statement of a bound."""
+        """Sentence about the bound, for a certificate with a bound."""
         word = "larger" if self.nlp.sense is Sense.MAX else "smaller"
         value = 0.0 if abs(self.incumbent) <= ZERO_F * self.nlp.objective_size else self.incumbent
         best = "" if math.isnan(value) else f"; the best known point has {value:.10g}"

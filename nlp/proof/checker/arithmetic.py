@@ -85,7 +85,7 @@ _BINARY: dict[int, Callable[[Polynomial, Polynomial], Polynomial]] = {
 
 
 class PolynomialArithmetic:
-    """Polynomials of a function of one vector, from its operations in order.
+    """Evaluation of a CasADi function with polynomials over boxes, one operation after the other.
 
     Args:
         function: function of ``SX`` with one dense input (n, 1) and dense outputs.

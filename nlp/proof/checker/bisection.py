@@ -22,7 +22,7 @@ _WIDEST = 5
 
 @dataclass(eq=False)
 class Shown:
-    """Results on N pieces of n variables.
+    """Results of a rule on N pieces (boxes) of n variables.
 
     Attributes:
         holds: (N,) whether the claim is proved on the piece.
@@ -39,7 +39,7 @@ class Shown:
     is_wrong: NDArray[np.bool_] | None = None
 
     def keep(self, which: NDArray[np.intp], holds: NDArray[np.bool_], change: FloatArray) -> None:
-        """Store the results on some pieces."""
+        """Store whether the claim holds on some pieces, and the estimated improvement of their bounds."""
         self.holds[which] |= holds
         self.change[:, which] = np.fmax(self.change[:, which], change)
 
@@ -122,7 +122,7 @@ def show(rule: Rule, lower: FloatArray, upper: FloatArray) -> int:
 def _variables_to_bisect(
     found: Shown, lower: FloatArray, upper: FloatArray, width: FloatArray, depth: NDArray[np.intp]
 ) -> NDArray[np.intp]:
-    """Return the variable (N,) to bisect in the rest of each piece, with bounds (n, N) and a depth (N,)."""
+    """Return the index (N,) of the variable along which the open part of each piece is bisected next."""
     wide = found.upper - found.lower
     score = found.change * (wide / np.where(upper > lower, upper - lower, 1.0))
     relative = wide / np.where(width > 0, width, np.inf)[:, None]

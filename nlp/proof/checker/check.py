@@ -37,7 +37,7 @@ class VerifiedProof:
     """Result of the check of a valid proof.
 
     Attributes:
-        leaves: number of leaves and faces of the tree.
+        leaves: number of final boxes (leaves) and faces of the tree.
         pieces: number of boxes evaluated in the check.
         bound: upper bound of the maximised value over the feasible part of the root box; at most 0 if the value is
             minus a sum of squares, and -inf without a feasible point.

@@ -1,4 +1,4 @@
-"""Exact fractions: bounds of tangents of half angles, and signs of determinants.
+"""Exact fractions: bounds of tangents of half angles, of sine and cosine, and signs of determinants.
 
 Doubles are fractions. Sine and cosine of a half angle lie between two partial sums of their series, whose terms
 alternate and decrease for angles up to 150 degrees.
@@ -25,10 +25,27 @@ def tangent_ends(angle: float) -> tuple[Fraction, Fraction]:
     return (low, high) if angle >= 0 else (-high, -low)
 
 
+def sine_cosine_ends(angle: float) -> tuple[tuple[Fraction, Fraction], tuple[Fraction, Fraction]]:
+    """Return two fractions that bound the sine of an angle, and two that bound its cosine.
+
+    Args:
+        angle: angle as a double, radians, at most two whole turns.
+    """
+    # Sixteenths of the angle are small enough for the series; doublings multiply the width of the ends.
+    x, doublings = abs(Fraction(angle)) / 16, 4
+    sine, cosine = _partial_sums(x, x, 1), _partial_sums(Fraction(1), x, 0)
+    for _ in range(doublings):
+        products = [2 * a * b for a in sine for b in cosine]
+        squares = [a * a for a in sine]
+        least = Fraction(0) if sine[0] <= 0 <= sine[1] else min(squares)
+        sine, cosine = (min(products), max(products)), (1 - 2 * max(squares), 1 - 2 * least)
+    return (sine if angle >= 0 else (-sine[1], -sine[0])), cosine
+
+
 def _partial_sums(first: Fraction, x: Fraction, order: int) -> tuple[Fraction, Fraction]:
     """Return a lower and an upper bound of sin x (first = x, order 1) or cos x (first = 1, order 0).
 
-    They are consecutive partial sums of the Taylor series.
+    The bounds are consecutive partial sums of the Taylor series.
     """
     term, total, before = first, first, first
     for k in range(_TERMS):

@@ -41,7 +41,7 @@ class Claims:
     Attributes:
         form: the form.
         kind: ``BOUNDED``, ``INFEASIBLE``, ``MONOTONE`` or the kind of a face.
-        index: index of the condition or variable; 0 where the kind has none.
+        index: index of the condition or variable that the kind names; 0 for a kind without one.
         lower, upper: (n, L) ends of the boxes.
         bounds: (L,) bounds of the value of the form minus its tilt; -inf for boxes without a feasible point.
         tilts: tilts of the claims about a limb, over the shared variables, which come first; None without any.
@@ -57,7 +57,7 @@ class Claims:
 
 
 class FormRule:
-    """Rule for some claims, in the loop of the checker.
+    """Base class of the rules that prove claims about boxes of a form, in the loop of the checker.
 
     Args:
         claims: the claims.
@@ -130,7 +130,7 @@ class BoundRule(FormRule):
         self._gradient = PolynomialArithmetic(ca.Function("slopes", [form.x], [ca.cse(self._slopes.expressions)]))
 
     def examine(self, lower: FloatArray, upper: FloatArray, of: NDArray[np.intp]) -> Shown:
-        """Examine pieces with ends (n, N); ``of`` has the number of the claim of each piece."""
+        """Examine pieces with ends (n, N); ``of`` (N,) has the index of the claim to which each piece belongs."""
         J, bound, values = self._J, self._claims.bounds[of], self._arithmetic(lower, upper)
         if self._claims.tilts is not None:
             values[0] = values[0] - self._claims.tilts.select(of).polynomial(lower, upper)
@@ -252,5 +252,5 @@ class MonotoneRule(FormRule):
 
 
 def rule_of(claims: Claims) -> BoundRule | MonotoneRule:
-    """Return the rule for some claims."""
+    """Return the rule that proves claims of their kind."""
     return BoundRule(claims) if claims.kind in (Node.BOUNDED, Node.INFEASIBLE) else MonotoneRule(claims)

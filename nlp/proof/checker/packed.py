@@ -29,11 +29,11 @@ class TreeBudget:
         self._counted: dict[int, int] = {}
 
     def most_of(self, number: int) -> int:
-        """Return the largest allowed size of a tree, by its number in the file."""
+        """Return the largest allowed size, in bytes, of the tree with a number in the file."""
         return self._counted.get(number, self.left)
 
     def count(self, number: int, size: int) -> None:
-        """Count the size of a tree."""
+        """Subtract the size of a tree from the remaining bytes, once for each tree."""
         if number not in self._counted:
             self._counted[number] = size
             self.left -= size
@@ -59,7 +59,7 @@ class PackedTree:
     budget: TreeBudget = field(compare=False, repr=False)
 
     def unpacked(self) -> bytes:
-        """Return the nodes in bytes.
+        """Return the unpacked bytes of the tree: its nodes.
 
         Raises:
             DamagedProofError: the text is no compressed tree, its digest differs, or the trees of the file exceed

@@ -53,11 +53,11 @@ class Forms(NamedTuple):
         return Forms(self.values[r : r + 1], self.low[r : r + 1], self.high[r : r + 1], self.share)
 
     def centres(self) -> FloatArray:
-        """Return the constants (R, N)."""
+        """Return the constant coefficients (R, N) of the polynomials, their values at the centres."""
         return np.array([np.broadcast_to(each.P[0], self.low[0].shape) for each in self.values])
 
     def gradients(self) -> FloatArray:
-        """Return the linear parts (R, n, N)."""
+        """Return the linear coefficients (R, n, N) of the polynomials."""
         G = np.zeros((len(self.values), *self.share.shape))
         for row, each in zip(G, self.values, strict=True):
             row[list(each.on)] = each.P[places(len(each.on)).linear]
@@ -107,7 +107,7 @@ class SumModel:
         return np.asarray(self.fixed + _largest(self.b, self.H, side) + _TINY)
 
     def change(self) -> FloatArray:
-        """Return the gain (n, N) of the bound from halving each variable; error balls are of third order."""
+        """Return the estimated gain (n, N) of the bound when each variable is halved. Error balls are cubic."""
         return np.asarray(self.reach + _SLOPE * np.abs(self.b) + 2 * self.balls)
 
 

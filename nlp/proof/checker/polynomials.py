@@ -305,11 +305,12 @@ def _taylor(
 ) -> Polynomial:
     """Return ``f(c + Y) = f(c) + f'(c) Y + curve Y^2 +- third |Y|^3``, Y being u without its constant c.
 
-    u: the value.
-    V: (2, N) range of ``f(u)``.
-    terms: ``f(c)``, ``f'(c)`` and ``curve``, half of ``f''(c)``, (N,) each.
-    third: bound of the remainder relative to ``|Y|^3``.
-    error: relative error of the three terms beyond that of arithmetic.
+    Args:
+        u: the argument of f.
+        V: (2, N) range of ``f(u)``.
+        terms: ``f(c)``, ``f'(c)`` and ``curve``, half of ``f''(c)``, (N,) each.
+        third: bound of the remainder relative to ``|Y|^3``.
+        error: relative error of the three terms in addition to that of arithmetic.
     """
     value, slope, curve = terms
     at, moved = places(len(u.on)), u.rad + u.curved

@@ -92,7 +92,8 @@ def fingerprint(nlp: Nlp) -> str:
     """Return a text that distinguishes programs: sizes, and sums of their values at a few points.
 
     The same case may give graphs whose constants differ in the last bit between processes, so that a hash of the graph
-    is not suitable. A proof does not depend on it: the check proves every claim for the program that it builds itself.
+    is not suitable. A proof does not depend on the fingerprint: the check proves every claim for the program that it
+    builds itself.
     """
     nlp = with_all_pairs(nlp)
     program = nlp.program
@@ -162,7 +163,7 @@ def claim_words(case: Case, statement: Statement, bound: float | None, unit: str
         bound: upper bound of the maximised value, which is minus F for a minimum; None without a feasible point.
         unit: unit of the objective.
     """
-    where = f"within the limits of {case.name}"
+    where = f"within the limits of case '{case.name}'"
     if case.limits_over:
         where += ", taken at the stated pose only,"
     if has_modes(case.model):

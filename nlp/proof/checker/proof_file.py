@@ -2,8 +2,8 @@
 
 A file has the case as text, the premises of the proof, and its claims. A claim has a name, a reason, and the data of
 the reason: a bound, a tree of boxes (compressed, in base64, with its digest), or single points. The check takes all
-premises from the case and from its own arguments; premises in the file only serve to refuse a proof for other ones at
-once. Reading a file unpacks no tree: see :mod:`.packed`.
+premises from the case and from its own arguments; premises in the file only serve to refuse at once a proof with other
+premises. Reading a file unpacks no tree: see :mod:`.packed`.
 
 A proof of a program's optimum has one claim. A claim is proved by one of
 
@@ -82,12 +82,12 @@ class ProofClaim:
             the first-order part for leg-length errors of one unit. None without a quantity, and for a nonlinear
             program without a feasible point.
         graph: fingerprint of the program; empty for other reasons.
-        tree: nodes in bytes; empty for a claim without a tree, and for one with a packed tree.
+        tree: bytes of the tree of boxes; empty for a claim without a tree, or with a packed tree.
         sides: two poses (6,) with determinants of opposite signs. Each pose is followed by the m joint-centre errors
             (3 m,) of its robot if these are not 0. For a leg length of one robot: two directions (3,) of the leg, in
             the world frame and in the platform frame. Empty for other reasons.
-        packed: tree of a file, to be unpacked when the claim is checked; None for a claim that was not read from a
-            file.
+        packed: compressed tree from a proof file, unpacked when the claim is checked; None for a claim that was not
+            read from a file.
     """
 
     name: str
@@ -100,7 +100,7 @@ class ProofClaim:
     packed: PackedTree | None = None
 
     def unpacked(self) -> bytes:
-        """Return the nodes in bytes.
+        """Return the unpacked bytes of the claim's tree: its nodes.
 
         Raises:
             DamagedProofError: the nodes of a file cannot be unpacked.
@@ -130,7 +130,8 @@ class Premises:
         legs: (12, 3) joint centres of six straight legs, base before platform; empty for other robots.
         quantities: names of the requested quantities.
         leg_error: largest error of a leg's length.
-        joint_centre: largest error of each joint centre in the claims; 0 for the nominal design.
+        joint_centre: largest error of each joint centre in the claims; 0 for the nominal robot.
+        position_set: set of positions, from :func:`set_premise`; empty for all positions of the box.
     """
 
     workspace: Poses
@@ -138,6 +139,7 @@ class Premises:
     quantities: tuple[str, ...]
     leg_error: float
     joint_centre: float = 0.0
+    position_set: Poses = ()
 
 
 @dataclass(frozen=True)
@@ -148,8 +150,8 @@ class PathPremises:
         file: name of the path's file; its ending distinguishes tables from G-code programs.
         text: text of the file.
         of_case: If true, the path is that of the case; otherwise it was given separately.
-        between, angles, unit, start, offsets: options of reading that the file leaves open, see
-            :class:`~screwsynth.nlp.path.options.PathOptions`; ``between`` by its value.
+        between, angles, unit, start, offsets, flavour, end_of_file, part, macros: options for reading the path, which
+            its file leaves open, see :class:`~screwsynth.nlp.path.options.PathOptions`; ``between`` by its value.
         legs, joint_centre: joint centres and their largest error, see :class:`Premises`.
         with_angles: If true, closed forms replace joint angles. This is not a premise, but a help for the check.
     """
@@ -165,6 +167,10 @@ class PathPremises:
     legs: tuple[tuple[float, ...], ...]
     joint_centre: float
     with_angles: bool
+    flavour: str = "linuxcnc"
+    end_of_file: bool = False
+    part: int | None = None
+    macros: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         # The mapping of read offsets cannot be copied.
@@ -220,9 +226,22 @@ class Proof:
 
 
 def workspace_premise(workspace: Workspace) -> Poses:
-    """Return a workspace as texts and numbers: ranges of the position, kind, ranges of the angles, axis."""
+    """Return a workspace as stored in proof files: ranges of the position, kind, ranges of the angles, axis."""
     position, angles = (tuple(map(ends_of, values)) for values in (workspace.position, workspace.turns.angles))
     return position, workspace.turns.kind.value, angles, tuple(workspace.turns.axis)
+
+
+def set_premise(workspace: Workspace) -> Poses:
+    """Return the set of positions of a workspace as text and numbers; empty for all positions of the box.
+
+    These are shape, radii, points, directions and displacement, then normal and point of each half space.
+    """
+    given = workspace.position_set
+    if given is None:
+        return ()
+    sizes = given.radius, given.inner
+    halves = ((*each.normal, *each.point) for each in given.half_spaces)
+    return (given.kind.value, sizes, given.centre, given.end, given.angles, given.shift, *halves)
 
 
 @dataclass(frozen=True)
@@ -295,7 +314,9 @@ def read_proof(text: str | bytes, source: str) -> Proof:
 
 
 def _check_texts(found: _File, quantities: tuple[str, ...]) -> None:
-    """Refuse texts that are longer than in any proof written by this package, and names that occur twice.
+    """Refuse a proof file with overlong texts or with names that occur twice.
+
+    Texts are overlong if no proof written by this package has texts of this length.
 
     Raises:
         ValueError: there is such a text or name.

@@ -87,7 +87,7 @@ Block = TypeVar("Block")
 
 
 def node_bytes(kind: Node, *indices: int, value: float | None = None) -> bytes:
-    """Return the bytes of a node, which precede those of its children."""
+    """Return the bytes of a node without the bytes of its sub-boxes, which follow."""
     return bytes([kind, *indices]) + (b"" if value is None else _VALUE.pack(value))
 
 
@@ -111,7 +111,7 @@ class TreeReader:
         self._tree, self.at = tree, at
 
     def read(self, count: int) -> bytes:
-        """Return the next bytes.
+        """Read the given number of bytes.
 
         Raises:
             ProofError: fewer bytes remain.
@@ -122,7 +122,7 @@ class TreeReader:
         return self._tree[self.at - count : self.at]
 
     def index(self, allowed: range, kind: str) -> int:
-        """Return the next byte, an index.
+        """Read the next byte as the index of a variable or condition.
 
         Raises:
             ProofError: the index is not allowed.
@@ -133,11 +133,11 @@ class TreeReader:
         return int(number)
 
     def number(self) -> float:
-        """Return the next double."""
+        """Read the next eight bytes as a double."""
         return float(_VALUE.unpack(self.read(_VALUE.size))[0])
 
     def finish(self) -> None:
-        """Refuse further bytes.
+        """Refuse a tree with further bytes after its last node.
 
         Raises:
             ProofError: further bytes remain.
@@ -301,7 +301,7 @@ def read_shared(tree: bytes, lower: FloatArray, upper: FloatArray, limbs: int) -
 
 
 def _numbers_of_leaf(reader: TreeReader | None, K: int, m: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return bounds and tilts of a bounded leaf from the next bytes, or the values of an infeasible leaf.
+    """Read the bounds and polynomial coefficients of a final box from the next bytes, or those of an infeasible box.
 
     Raises:
         ProofError: a number is NaN, or infinite where this is not allowed.
@@ -318,5 +318,5 @@ def _numbers_of_leaf(reader: TreeReader | None, K: int, m: int) -> tuple[FloatAr
     is_empty = bool((bounds == -np.inf).any())
     known = np.isinf(bounds) if is_empty else np.isfinite(bounds)
     if not (known.all() and np.isfinite(g).all() and np.isfinite(Q).all()):
-        raise ProofError("a leaf of the tree has a bound or a tilt that is NaN, or infinite where it must be finite")
+        raise ProofError("a final box of the tree has a bound or a polynomial coefficient that is not a finite number")
     return bounds, g, Q

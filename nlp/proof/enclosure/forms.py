@@ -31,7 +31,7 @@ TINY = 1e-300
 
 
 class Forms(NamedTuple):
-    """R expressions over B boxes, each in ``c + a.e + [-r, r]``.
+    """Affine forms of R expressions over B boxes: each value is in ``c + a.e + [-r, r]``.
 
     Attributes:
         c: (B, R) values at the centres, plus the middles of the second-order terms.
@@ -54,7 +54,7 @@ class Forms(NamedTuple):
 
 
 class Encloser:
-    """Forms of expressions.
+    """Function that computes forms of expressions over boxes, by the C kernel.
 
     Args:
         z: (n, 1) symbols of the coordinates.
@@ -138,6 +138,6 @@ class QuadraticModel:
         return Ends(low, high)
 
     def _call(self, *results: FloatArray | None) -> None:
-        """Call the kernel, which writes the results."""
+        """Call the kernel, which writes into the arrays ``results``; None for a result that is not needed."""
         arrays = (self.middle, self.b, self.H, self.w, self.slope_lo, self.slope_hi, self.rounding)
         kernel().models(len(self.b), (*(np.ascontiguousarray(each) for each in arrays), *results), self.middle.size)

@@ -58,7 +58,7 @@ class Rows(NamedTuple):
 
 
 def _taken_apart(form: StandardForm, signs: tuple[int, ...], more: tuple[SX, ...] = ()) -> Rows | None:
-    """Return the functions of a form with squared quotients of given signs split off; None if there are none."""
+    """Return a form's functions with squared quotients of given signs split off; None without such a quotient."""
     rests, found = [SX(0) for _ in form.functions], list[Quotient]()
     for j, function in enumerate(form.functions):
         for term in terms_of(function):

@@ -83,7 +83,7 @@ class Tape:
 
     @cached_property
     def head(self) -> tuple[tuple[NDArray[np.int32], FloatArray], int, int, int]:
-        """Tape for the C kernel: code, constants, and numbers of instructions, registers and results."""
+        """Tape as the C kernel reads it: code, constants, and the numbers of instructions, registers and results."""
         code = np.stack([self.op, self.to, self.a, self.b, self.first, self.last], axis=1).astype(np.int32)
         return (np.ascontiguousarray(code), self.k), len(self), self.registers, self.outputs
 
@@ -200,7 +200,7 @@ _FORMULAS: dict[int, Callable[[_Value, _Value], _Value]] = {
 
 
 class _TapeWriter:
-    """A tape under construction.
+    """Writer of a tape, instruction by instruction.
 
     Args:
         registers: number of registers of the CasADi function; higher registers are free.
@@ -267,7 +267,7 @@ class _TapeWriter:
 
 
 def compile_tape(function: ca.Function) -> Tape:
-    """Compile a function of one vector.
+    """Compile a CasADi function of one vector into a tape.
 
     Args:
         function: function of ``SX``, with one dense input (n, 1) and any number of dense outputs; their elements,

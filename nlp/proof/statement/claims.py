@@ -1,4 +1,4 @@
-"""Claims about a workspace: ranks, limits of a case, leg lengths, F of each task, measures of the robot."""
+"""Claims about a workspace: ranks, limits of a case, leg lengths, F of each task, quantities of the robot."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class Claim:
         weights: factors of the longest and of the shortest length of the leg, if they are combined.
         length: length that divides moments in a singular value or condition number.
         motor: actuator and its quantity, for a claim about an actuator.
-        uncovered: reason why a claim covers only the nominal design instead of all robots within the tolerance;
+        uncovered: reason why a claim covers only the nominal robot instead of all robots within the tolerance;
             otherwise empty.
         is_coordinate: whether the quantity is a dependent coordinate of the pose; such quantities are often 0.
     """
@@ -107,12 +107,12 @@ ERRORS = (
 
 
 def one_robot_name(claim: str) -> str:
-    """Return the name of the lemmas for a claim about one robot at two poses."""
+    """Return the name of the lemmas that prove a claim about the lengths of one robot at two poses."""
     return f"{claim}, lengths of one machine"
 
 
 def dependent_claims(robot: RobotInstance, workspace: Workspace) -> Iterator[Claim]:
-    """Yield the smallest and the largest value of each dependent coordinate of the pose, with its stated range.
+    """Yield the claims about the smallest and the largest value of each dependent coordinate, with its stated range.
 
     Args:
         robot: robot at one pose of the workspace.
@@ -193,11 +193,11 @@ def claims_of(layout: Layout, quantities: Sequence[str] = (), *, with_objective:
 
     Args:
         layout: the case as expressions of the pose.
-        quantities: names of requested measures of the robot, in addition to the case's limits.
+        quantities: names of requested quantities of the robot, in addition to the case's limits.
         with_objective: If true, include F of each task.
 
     Raises:
-        InputError: the robot has no measure of a given name.
+        InputError: the robot has no quantity of a given name.
     """
     found = [*_of_limits(layout), *_of_legs(layout, quantities)]
     # A measure with a limit has one claim.
@@ -207,7 +207,7 @@ def claims_of(layout: Layout, quantities: Sequence[str] = (), *, with_objective:
 
 
 def _of_limits(layout: Layout) -> Iterator[Claim]:
-    """Yield a claim for each side of each limit at a pose."""
+    """Yield a claim for the lower and for the upper bound of each limit of the case that applies to one pose."""
     # The limit on a leg's dead length is stronger over all poses than at one pose.
     own = (*_OWN_SEARCHES, "leg_length", f"{Actuator.key}.") if layout.robots[0].legs else _OWN_SEARCHES
     for item in (*layout.constraints, *layout.constant_limits):
@@ -220,7 +220,7 @@ def _of_limits(layout: Layout) -> Iterator[Claim]:
 
 
 def _of_legs(layout: Layout, names: Sequence[str]) -> Iterator[Claim]:
-    """Yield the smallest and the largest length of each leg, with their limits: the stroke that its actuator needs."""
+    """Yield the claims about the smallest and the largest length of each leg, which show the needed stroke."""
     limit = next((each for each in layout.case.limits if isinstance(each, LegLength)), None)
     # A robot given joint by joint also has measures of its robot file.
     is_asked = LegLength.key in names or any(isinstance(each, LegLength | Actuator) for each in layout.case.limits)
@@ -233,7 +233,7 @@ def _of_legs(layout: Layout, names: Sequence[str]) -> Iterator[Claim]:
 
 
 def _of_quantities(layout: Layout, names: Sequence[str]) -> Iterator[Claim]:
-    """Yield the smallest and the largest value of measures of the robot, for each limb or joint that has them."""
+    """Yield the claims about the smallest and the largest value of named quantities, for each limb or joint."""
     known = {quantity.name: k for k, quantity in enumerate(layout.case.model.quantities)}
     # Loads and motions also request the ranges of the actuators.
     loading = layout.case.loading
@@ -242,7 +242,7 @@ def _of_quantities(layout: Layout, names: Sequence[str]) -> Iterator[Claim]:
         if name == LegLength.key and layout.robots[0].legs:
             continue  # already among the claims
         if name not in known:
-            raise InputError(f"--quantity {name}: no measure of this robot; {nearest(name, known)}")
+            raise InputError(f"--quantity {name}: this robot has no such quantity; {nearest(name, known)}")
         quantity, values = layout.case.model.quantities[known[name]], layout.robots[0].quantities[known[name]]
         for i, owner in enumerate(quantity.owners):
             for sense in (Sense.MIN, Sense.MAX):
@@ -250,7 +250,7 @@ def _of_quantities(layout: Layout, names: Sequence[str]) -> Iterator[Claim]:
 
 
 def _of_tasks(layout: Layout) -> Iterator[Claim]:
-    """Yield the smallest and the largest F of each task."""
+    """Yield the claims about the smallest and the largest F of each task."""
     for j, task in enumerate(layout.case.tasks):
         if task.measure:
             continue  # a motion is not an objective of the case

@@ -27,7 +27,7 @@ class Legs(NamedTuple):
     Attributes:
         base: (k, 3) base joint centres in the world frame, length.
         platform: (k, 3) platform joint centres in the platform frame, length.
-        tolerance: joint-centre tolerance, length; 0 for the design.
+        tolerance: joint-centre tolerance, length; 0 for the nominal robot.
     """
 
     base: FloatArray

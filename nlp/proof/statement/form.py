@@ -91,13 +91,13 @@ class Lift(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StandardForm:
-    """A maximisation over a box.
+    """Standard form of a nonlinear program: a maximisation over a box under conditions.
 
     Attributes:
         nlp: the nonlinear program; the form does not have its epigraph variable.
         x: (n,) symbols of the variables.
         lower, upper: (n,) ends of the box.
-        functions: functions ``phi_j``; the smallest is maximised.
+        functions: functions ``phi_j``; the smallest function value is maximised.
         conditions: conditions ``h_k``; in a common numbering they follow the functions.
         places: indices of the form's variables in the program; None if the form has the first variables of the program.
         lift: closed forms of the program variables that this form omits; None if it omits none.
@@ -133,19 +133,22 @@ class StandardForm:
         return float(self.nlp.objective_size**self.power)
 
     def objective_of(self, value: float) -> float:
-        """Return the program's objective for a maximised value; a square root is rounded down."""
+        """Return the program's objective that belongs to a value of the maximised expression.
+
+        Inverse of :meth:`value_of`; a square root is rounded down.
+        """
         found = self.sign * value + 0.0  # no negative zero
         if self.power == 1 or not math.isfinite(found):
             return found
         return math.nextafter(math.sqrt(max(found, 0.0)), 0.0)
 
     def value_of(self, objective: float) -> float:
-        """Return the maximised value for the program's objective."""
+        """Return the value of the maximised expression that belongs to a value of the program's objective."""
         return self.sign * objective**self.power
 
     @cached_property
     def ceiling(self) -> float:
-        """Bound of the maximised value without a search: 0 for a negative sum of squares, else infinite."""
+        """Bound of the maximised value without a search: 0 for minus a sum of squares, infinite for other functions."""
         return 0.0 if any(is_nowhere_positive(each, self.x) for each in self.functions) else math.inf
 
     @property
@@ -170,7 +173,7 @@ class StandardForm:
 
     @cached_property
     def jacobian(self) -> SX:
-        """Derivatives (R, n), dense: structural zeros are written out."""
+        """Derivatives (R, n) of the R expressions with respect to the variables; a dense matrix."""
         return ca.densify(without_ties(ca.jacobian(self.expressions, self.x), self.x))
 
     @cached_property

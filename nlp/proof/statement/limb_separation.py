@@ -26,7 +26,7 @@ _MOST_TERMS = 4096
 
 @dataclass(frozen=True, eq=False)
 class Limb:
-    """A part of a separated form.
+    """A limb of a separated form: the terms and conditions with variables that no other limb has.
 
     Attributes:
         own: indices, in the whole form, of the variables that only this limb has.
@@ -79,7 +79,14 @@ def separate(form: StandardForm) -> Separation | None:
 
 
 def _part(form: StandardForm, terms: Sequence[SX], places: Sequence[int], chosen: Sequence[bool]) -> StandardForm:
-    """Return the part of a form over some of its variables with chosen terms, then conditions."""
+    """Return the form of one limb, or of the common part.
+
+    Args:
+        form: the whole form.
+        terms: terms of the sum that belong to the result.
+        places: indices of the variables of the result in the whole form.
+        chosen: for each term, then for each condition, whether it belongs to the result.
+    """
     index = list(places)
     return StandardForm(
         nlp=form.nlp,

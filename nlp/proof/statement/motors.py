@@ -32,7 +32,10 @@ def motor_claims(case: Case) -> Iterator[Claim]:
 
 
 def in_motion(case: Case) -> Case:
-    """Return a case with a motion, for limits on speeds and powers along a path, which defines the actual motion."""
+    """Return a case with a placeholder motion, so that limits on speeds and powers along a path are claimed.
+
+    The path defines the actual motion.
+    """
     return replace(case, loading=case.loading._replace(motion=case.loading.motion or Motion(1.0)))
 
 
@@ -47,7 +50,10 @@ def actuator_coordinates(layout: Layout) -> dict[str, SX]:
 
 
 def in_path_motion(case: Case) -> Case:
-    """Return a case with actuator powers in the motion of a path, if forces are known."""
+    """Return the case with a motion, so that powers along a path are claimed.
+
+    The case is unchanged if its loads do not determine the actuator forces.
+    """
     return case if statics_hindrance(case.model) else in_motion(case)
 
 
@@ -58,7 +64,7 @@ def speed_claims(case: Case) -> Iterator[Claim]:
 
 
 def _tightest(claims: Iterable[Claim]) -> Iterator[Claim]:
-    """Yield claims; among claims with the same label only the one with the tightest limit."""
+    """Yield claims; of several claims with the same label, yield only the claim with the tightest limit."""
     found: dict[tuple[str, str], Claim] = {}
     for each in claims:
         known = found.setdefault(each.label, each)
@@ -68,7 +74,7 @@ def _tightest(claims: Iterable[Claim]) -> Iterator[Claim]:
 
 
 def _claims(case: Case) -> Iterator[Claim]:
-    """Yield the claims for each limit on an actuator, and for quantities without a limit."""
+    """Yield the claims about force, speed and power of each actuator: one for each limit, or one without a limit."""
     loading = case.loading
     for k, joint in enumerate(driven_joints(case.model) if loading.loads or loading.motion else ()):
         kinds = ActuatorForce, ActuatorPower

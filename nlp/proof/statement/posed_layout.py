@@ -36,7 +36,7 @@ _SEED = 0
 
 
 def at_one_pose(case: Case, position: Sequence[Value], rotation: Rotation) -> Case:
-    """Return the case of the design at one pose, without a workspace."""
+    """Return a case with one stated pose instead of its poses and its workspace."""
     return replace(
         case,
         position=position,
@@ -89,7 +89,7 @@ def extreme_program(layout: Layout, expression: SX, sense: Sense) -> Nlp:
 
 
 def varies(layout: Layout, expressions: Sequence[SX]) -> list[bool]:
-    """Return whether each expression depends on the pose."""
+    """Return whether each expression depends on the pose coordinates of the layout."""
     x = layout.table.variables_vector
     return [bool(x.numel()) and any(ca.which_depends(each, x, 1, True)) for each in expressions]
 
@@ -144,7 +144,7 @@ def without_loops(model: Model) -> Model:
 
 
 def _on(layout: Layout, expressions: list[SX]) -> list[SX]:
-    """Return expressions of a model's symbols in the symbols of a layout."""
+    """Return expressions of the model's symbols, rewritten in the symbols of a layout of the model."""
     robot, own = layout.robots[0], Substitution.identity(layout.case.model)
     unknowns = ca.vertcat(
         SX(0, 1), *[layout.table.variables_vector[k] for at_pose in layout.places.unknowns for k in at_pose]

@@ -105,7 +105,7 @@ def standard_form(nlp: Nlp) -> StandardForm:
 
 
 def is_in_home_mode(nlp: Nlp, x: FloatArray) -> bool | None:
-    """Return whether a robot is in the home working mode at a point (n,); None if no sign tells the mode."""
+    """Return whether a robot is in the home working mode at a point (n,); None if no sign distinguishes its modes."""
     if not nlp.n or not any(each.is_mode for each in nlp.program.model.signs):
         return None
     return standard_form(replace(nlp, in_home_mode=True)).keeps_signs(x)
@@ -130,7 +130,7 @@ def _function_of_epigraph(expression: SX, level: SX, sign: float) -> SX:
 
 
 def _conditions(name: str, expression: SX, low: float, high: float, kind: Kind) -> Iterator[Condition]:
-    """Yield an equation for equal bounds, else an inequality for each finite bound."""
+    """Yield the conditions of a constraint: an equation for equal bounds, or an inequality for each finite bound."""
     if low == high:
         yield Condition(name, expression - low, is_equation=True, kind=kind)
         return
@@ -208,7 +208,7 @@ def _principal_minors(A: SX, orders: Sequence[int]) -> Iterator[tuple[tuple[int,
 
 
 class _Replaced(NamedTuple):
-    """Closed forms for variables of a form.
+    """Closed forms for unknowns of a form, with the conditions that replace their loop equations.
 
     Attributes:
         solved: closed forms, by index of the variable.
@@ -351,7 +351,7 @@ def _numbers(expression: SX) -> tuple[float, ...] | None:
 
 
 def _idle(form: StandardForm, may_go: Sequence[int], reaches: SX) -> set[int]:
-    """Return indices of conditions that are satisfied at all random points within reach (r, 1).
+    """Return the indices of conditions that hold at all random points within reach, where ``reaches`` (r, 1) are >= 0.
 
     A condition that is left out by mistake makes the feasible set larger and the bound weaker, but not wrong.
     """

@@ -1,7 +1,7 @@
 """Robots within the joint-centre tolerance: their model, their expressions of pose and joint-centre errors, and claims.
 
-A robot within the tolerance is the design with each joint centre displaced by a vector of at most the tolerance. Its
-quantities are expressions of these errors and of the pose. The pose has the coordinates of a search: three for the
+A robot within the tolerance is the nominal robot with each joint centre displaced by a vector of at most the tolerance.
+Its quantities are expressions of these errors and of the pose. The pose has the coordinates of a search: three for the
 position and three for the rotation.
 """
 
@@ -145,7 +145,7 @@ class ToleranceLayout(NamedTuple):
     """All robots within the tolerance of a case, as expressions of one pose and of joint-centre errors.
 
     Attributes:
-        layout: the case. Its variables are the joint-centre errors, 3 for each centre, followed by the pose
+        layout: the case as expressions; the variables are the joint-centre errors, 3 for each centre, then the pose
             coordinates.
         built: the robot with joint-centre errors.
         tolerance: largest norm of each joint-centre error, length.
@@ -178,7 +178,7 @@ class ToleranceLayout(NamedTuple):
         The derivative g_j is with respect to the error of joint centre j.
 
         ``sqrt(|g_j|^2 + term^2)`` is at least ``|g_j|``, close to ``|g_j|`` where that is large, and smooth where
-        ``|g_j|`` is 0. Each term is a small part of ``|g_j|`` at one pose of the design.
+        ``|g_j|`` is 0. Each term is a small part of ``|g_j|`` at one pose of the nominal robot.
         """
         at = ca.DM([each.lower + _PLACE * (each.upper - each.lower) for each in design.table.bounds])
         slopes = ca.densify(ca.gradient(expression, self.errors))
@@ -189,7 +189,7 @@ class ToleranceLayout(NamedTuple):
         """Return the claims that limbs reach every pose, and the claims about quantities that depend on this reach.
 
         Raises:
-            InputError: the robot has no measure of a given name.
+            InputError: the robot has no quantity of a given name.
         """
         reaches = reach_claims_on(self.layout, self.built.reaches)
         return list(reaches), claims_of(self.layout, quantities, with_objective=with_objective)
@@ -200,14 +200,14 @@ def tolerance_layout(case: Case, built: BuiltModel, tolerance: float, at: PoseCo
     parameters = {name: case.parameters[name] for name in case.parameters}
     size = Free(-tolerance, tolerance)
     own = {item.name: (size, size, size) for item in built.model.parameters if item.name not in parameters}
-    # Joints keep the mounting axes of the design.
+    # Joints keep the mounting axes of the nominal robot.
     limits = Limits(*(_mounted(case, each) for each in case.limits))
     robots = replace(case, model=built.model, parameters=parameters | own, limits=limits, joint_centre_tolerance=None)
     return ToleranceLayout(coordinate_layout(robots, at), built, tolerance)
 
 
 def _mounted(case: Case, limit: Limit[Any]) -> Limit[Any]:
-    """Return a limit on joint angles with the design's mounting axes as constants; other limits unchanged."""
+    """Return a limit on joint angles with the nominal robot's mounting axes as constants; other limits unchanged."""
     if not (case.model.legs and isinstance(limit, JointAngle) and isinstance(limit.about, MountingPose)):
         return limit
     home, legs = limit.about, joint_centres(case)
@@ -220,7 +220,7 @@ def _mounted(case: Case, limit: Limit[Any]) -> Limit[Any]:
 
 
 def design_layout(case: Case, model: Model, at: PoseCoordinates) -> Layout:
-    """Return the nominal design as expressions of one pose, from a model without unknowns.
+    """Return the nominal robot as expressions of one pose, from a model without unknowns.
 
     Loop equations that hold at every pose are left out; a bound without an equation covers more poses.
     """

@@ -62,7 +62,7 @@ class AxisRanges:
         case: the case, its dimensions fixed.
         start: (6,) the pose: position, length, and roll, pitch and yaw, radians.
         most: largest displacement of a coordinate: a length, and an angle in radians.
-        stops: claims that are not proved at the pose itself; if there are any, there are no ranges.
+        stops: claims that are not proved at the pose itself; without such claims empty, otherwise there are no ranges.
         axes: ranges of the independent coordinates.
         pairs: ranges of pairs of independent coordinates.
         others: names of the dependent coordinates.
@@ -80,7 +80,7 @@ class AxisRanges:
 
 
 class _Found(NamedTuple):
-    """Largest proved fraction of a range, smallest fraction that is not proved, and the claim that fails there."""
+    """Largest proved fraction of a range, smallest fraction that is not proved, and the claim that fails at it."""
 
     proved: float
     failed: float | None
@@ -112,6 +112,7 @@ def axis_ranges(
     *,
     axes: Sequence[str] = AXES,
     most: tuple[float, float] | None = None,
+    with_pairs: bool = True,
     time_limit: float | None = TIME_LIMIT,
     progress: Callable[[str], None] | None = None,
 ) -> AxisRanges:
@@ -123,6 +124,7 @@ def axis_ranges(
         axes: names of the requested coordinates; dependent coordinates are left out.
         most: largest displacement of a coordinate: a length, and an angle in radians; if left out, the size of the
             robot and 90 degrees.
+        with_pairs: If true, also prove the travel along pairs of coordinates.
         time_limit: seconds for all judgements together; None for no limit.
         progress: function that is called with the name of the next step.
 
@@ -158,8 +160,8 @@ def axis_ranges(
         for k in _until_requested(k for k in alone if AXES[k] in axes):
             report(AXES[k])
             found.append(_range(case, here, k, most[k // 3], has_whole=has_whole))
-        pairs, samples = [], _samples(case, here, found)
-        for one, other in _until_requested(itertools.combinations(found, 2)):
+        pairs, samples = [], _samples(case, here, found) if with_pairs else None
+        for one, other in _until_requested(itertools.combinations(found if with_pairs else (), 2)):
             report(f"{one.axis} and {other.axis}")
             pairs.append(_pair(case, here, samples, one, other))
         reason = why_stopped() if is_requested() else ""
@@ -167,7 +169,7 @@ def axis_ranges(
 
 
 def _until_requested(items: Iterable[_T]) -> Iterator[_T]:
-    """Yield items until the work is requested to stop."""
+    """Yield items until an interrupt or a time limit requests a stop."""
     return itertools.takewhile(lambda _: not is_requested(), items)
 
 
@@ -181,7 +183,8 @@ def _check(start: FloatArray, axes: Sequence[str]) -> None:
         raise InputError("the pose must be six finite numbers: x, y, z, roll, pitch, yaw")
     for name, value in zip(AXES[3:], start[3:].tolist(), strict=True):
         if abs(value) >= _WIDEST:
-            raise InputError(f"{name} = {math.degrees(value):g} deg: must be within {math.degrees(_WIDEST):g} degrees")
+            most = f"{math.degrees(_WIDEST):g}"
+            raise InputError(f"{name} = {math.degrees(value):g} deg: must be above -{most} and below {most} degrees")
     for name in axes:
         if name not in AXES:
             raise InputError(f"axis {name!r}: no such coordinate; {nearest(name, AXES)}")
@@ -362,5 +365,5 @@ def _failures(judged: Judgement) -> Iterator[_Failed]:
 
 
 def _is_over_poses(each: Verdict) -> bool:
-    """Return whether a limit concerns several poses together, such as a stroke."""
+    """Return whether the limit of a verdict concerns several poses together, such as a stroke."""
     return each.key.startswith(f"{Actuator.key}.")

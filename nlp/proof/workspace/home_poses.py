@@ -41,13 +41,13 @@ _SAME, _SMALL = 1e-6, 1e-6
 
 
 class Homes:
-    """Design of a case, and robots within its tolerance, at single poses in the home assembly mode.
+    """Nominal robot of a case, and robots within its tolerance, at single poses in the home assembly mode.
 
     Args:
         case: case with fixed dimensions.
         box: box of poses.
-        quantities: names of measures of the robot.
-        robots: robots within the tolerance; None if only the design is judged.
+        quantities: names of quantities of the robot.
+        robots: robots within the tolerance; None if only the nominal robot is judged.
 
     Attributes:
         case, box, robots: arguments of the constructor.
@@ -87,7 +87,7 @@ class Homes:
 
         Args:
             y: coordinates of the pose.
-            errors: joint-centre errors of a robot within the tolerance; None for the design.
+            errors: joint-centre errors of a robot within the tolerance; None for the nominal robot.
             constraints: If true, test the constraint wrenches instead of J.
         """
         if not self.case.model.unknowns:
@@ -110,7 +110,7 @@ class Homes:
     def shown(self, each: Verdict) -> Verdict:
         """Return a verdict with the value in the home assembly mode.
 
-        Open if only another assembly mode refutes the claim.
+        The verdict becomes open if only another assembly mode refutes the claim.
         """
         if not self.case.model.unknowns or each.pose is None or each.key == REACH:
             return each

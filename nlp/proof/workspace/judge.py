@@ -10,6 +10,10 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
+import casadi as ca
+import numpy as np
+
+from ....models import FloatArray
 from ....models.joints.model.closedform import closed_form
 from ...case.case import Case
 from ...case.workspace import Workspace
@@ -23,7 +27,8 @@ from .home_poses import Homes
 from .judgement import Judgement
 from .judging import Judging
 from .numbers.bound_search import Minimum
-from .numbers.extremes import GAP, NumberSearch, prove_extreme, verdict_of
+from .numbers.expressions import Expressions
+from .numbers.extremes import GAP, NumberSearch, goal_of, prove_extreme, verdict_of
 from .numbers.pose_error import pose_errors
 from .numbers.searched import Subject, motor_extremes
 from .numbers.within_tolerance import RobotsWithinTolerance
@@ -42,6 +47,8 @@ TIME_LIMIT = 60.0
 _PART = 0.5
 #: First gap of the recorded search of a limit that is known to be satisfied; the search reduces it if necessary.
 _AS_NEEDED = 1.0
+#: Number of sampled poses, of random corners as well.
+_SAMPLES, _SEED = 1000, 0
 #: Reason for quantities of a robot that may not reach all poses.
 _OUT_OF_REACH = "not proved: a robot within the joint-centre tolerance may not reach every pose"
 #: Function that is called before each quantity, with the name of the quantity, the number of completed quantities of
@@ -71,7 +78,7 @@ def judge_workspace(
     Args:
         case: case with fixed dimensions.
         workspace: box of poses; the workspace of the case if left out.
-        quantities: names of measures of the robot whose smallest and largest values are requested.
+        quantities: names of quantities of the robot whose smallest and largest values are requested.
         gap: largest relative gap between the bound and the best known value.
         time_limit: seconds for all searches together; None for no limit. At the limit, searches stop with their present
             bounds. A search takes at most half of the time left; searches of actuators take equal shares of it.
@@ -83,12 +90,12 @@ def judge_workspace(
             ``with_objective`` is true, pose errors are bounded.
         rank_progress: function that is called during the search for singular poses.
         progress: function that is called before each quantity.
-        record: record of the searches for a proof.
+        record: recorder of the searches for a proof file.
 
     Raises:
         CaseError: the case has no workspace, or a free dimension.
-        InputError: the robot has no measure of a given name, the leg error is negative or does not apply to this robot,
-            or there is no C kernel.
+        InputError: the robot has no quantity of a given name, the leg error is negative or does not apply to this
+            robot, or there is no C kernel.
     """
     workspace = workspace_of_case(case if workspace is None else replace(case, workspace=workspace))
     kernel()  # fails at once if it is missing
@@ -102,7 +109,7 @@ def judge_workspace(
 
 
 class _OverBox(Judging):
-    """A judgement over a box of poses.
+    """Judgement of a robot over a box of poses, in progress.
 
     Attributes:
         with_objective, leg_error, progress, rank_progress: arguments of :func:`judge_workspace`.
@@ -121,6 +128,8 @@ class _OverBox(Judging):
         # Robots within the tolerance; None without a tolerance.
         self._robots: RobotsWithinTolerance | None = None
         self._problem: Problem | None = None
+        # The design; made when it is needed.
+        self._exact: RobotsWithinTolerance | None = None
         self._reason = ""
         try:
             design = build_problem(case, self._closed.model, self._box)
@@ -132,6 +141,45 @@ class _OverBox(Judging):
         self._homes = Homes(case, self._box, self._names, self._robots)
         # Function that proves a claim about a leg length with a smaller gap; the search of the leg lengths sets it.
         self._prove: Callable[[Claim, NumberSearch], Verdict] | None = None
+
+    def sampled_fault(self) -> Verdict | None:
+        """Return the first limit that a sampled pose violates; None if none is found, or for loops without closed form.
+
+        Where limbs do not reach some poses, ranks have no bound, and their search would not end.
+        """
+        design = None if self._problem is None else self._problem.problem
+        if design is None or design.dependent:
+            return None
+        robots = self._robots or self._design_robots(design)
+        reaches, claims = robots.symbols.claims([], with_objective=False)
+        limited = [each for each in (*reaches, *claims) if each.limit is not None]
+        if not limited:
+            return None
+        family, rng = robots.family, np.random.default_rng(_SEED)
+        poses = self._box.random(_SAMPLES, rng)
+        y = np.concatenate([poses, self._box.clipped(np.where(rng.uniform(size=poses.shape) < 0.5, *self._ends))])
+        points, goals = family.exact(y[:, list(family.free)]), [goal_of(each) for each in limited]
+        with np.errstate(all="ignore"):
+            values = Expressions(family, ca.vertcat(*map(robots.number, limited))).values(points)
+        beyond = np.array([(goal.limit or 0.0) - goal.slack for goal in goals]) - values
+        beyond = np.where(np.isfinite(beyond), beyond, -np.inf)
+        for k, claim in enumerate(limited):
+            at = int(beyond[:, k].argmax())
+            if beyond[at, k] > 0:
+                found = Minimum(value=float(values[at, k]), at=points[at])
+                return verdict_of(claim, found, family.box.pose(family.pose_of(points[at])))
+        return None
+
+    def _design_robots(self, design: Problem) -> RobotsWithinTolerance:
+        """Return the design as robots without errors."""
+        if self._exact is None:
+            self._exact = RobotsWithinTolerance(self.case, self._closed, design)
+        return self._exact
+
+    @property
+    def _ends(self) -> tuple[FloatArray, FloatArray]:
+        """Ends of the box."""
+        return self._box.lower, self._box.upper
 
     def ranks(self) -> Iterator[Verdict]:
         """Yield the verdicts on ranks."""
@@ -152,7 +200,7 @@ class _OverBox(Judging):
         return Subject(self.case, self._closed.model, self._problem, self._reason, shortest)
 
     def actuators(self, subject: Subject) -> Iterator[Verdict]:
-        """Yield the verdicts on actuators, and on pose errors."""
+        """Yield the verdicts on actuator forces, speeds and powers, and on pose errors."""
         yield from motor_extremes(subject, with_all=self.with_objective, record=self.search.record)
         if has_straight_legs(self.case.model) and self.with_objective:
             yield from pose_errors(subject, self.leg_error, self.search.record)
@@ -161,7 +209,8 @@ class _OverBox(Judging):
         """Yield the verdicts on expressions of the pose."""
         if self._robots is not None:
             yield from self._within_tolerance(self._robots)
-        elif self.workspace.dependent:
+        elif self.workspace.dependent or self.workspace.position_set is not None:
+            # Only the search of boxes follows loops to dependent coordinates, and contracts boxes to a set.
             yield from self._followed(self._problem)
         else:
             yield from self._of_design()
@@ -177,7 +226,7 @@ class _OverBox(Judging):
             yield from self._proved(claims, robots.extreme)
 
     def _of_design(self) -> Iterator[Verdict]:
-        """Yield the verdicts on expressions of the design."""
+        """Yield the verdicts on expressions of the nominal robot."""
         case, closed, workspace = self.case, self._closed, self.workspace
         if closed.reaches:
             layout, reaches = reach_claims(case, closed, workspace)
@@ -193,7 +242,7 @@ class _OverBox(Judging):
         yield from self._proved(claims, partial(prove_extreme, layout), decided)
 
     def _followed(self, design: Problem | None) -> Iterator[Verdict]:
-        """Yield the verdicts on expressions of a design with dependent coordinates, in the home assembly mode.
+        """Yield the verdicts on expressions of a robot with dependent coordinates, in the home assembly mode.
 
         Only this search is restricted to poses that the robot can reach.
         """
@@ -205,7 +254,7 @@ class _OverBox(Judging):
             ]
             yield from (verdict_of(claim, Minimum(reason=self._reason)) for claim in claims)
             return
-        robots = RobotsWithinTolerance(self.case, self._closed, design)
+        robots = self._design_robots(design)
         reaches, claims = robots.symbols.claims(self._names, with_objective=self.with_objective)
         # The range of a dependent coordinate is a result, however wide its limits are.
         every = [*reaches, *dependent_claims(robots.symbols.layout.robots[0], self.workspace), *claims]
@@ -214,12 +263,12 @@ class _OverBox(Judging):
         yield from self._proved(every, robots.extreme, decided)
 
     def _in_home(self, design: Problem, *, is_reached: bool) -> Iterator[Verdict]:
-        """Yield the verdicts on expressions of a design with loops, decided in the home assembly mode.
+        """Yield the verdicts on expressions of a robot with loops, decided in the home assembly mode.
 
         In a nonlinear program, loop equations as constraints admit every assembly mode, and F is unbounded if one of
         these modes is singular. This search follows the loops in the home assembly mode only.
         """
-        robots = RobotsWithinTolerance(self.case, self._closed, design)
+        robots = self._design_robots(design)
         claims = robots.symbols.claims(self._names, with_objective=self.with_objective)[1]
         limited = robots.followed([claim for claim in claims if claim.limit is not None], self.search.gap)
         yield from (each for each in limited if each.outcome is not Outcome.OPEN)
@@ -230,9 +279,9 @@ class _OverBox(Judging):
     def _proved(
         self, claims: Sequence[Claim], prove: Callable[[Claim, NumberSearch], Verdict], decided: Iterable[Verdict] = ()
     ) -> Iterator[Verdict]:
-        """Yield the verdicts on claims. Decided claims are searched again only for the proof record."""
+        """Yield the verdicts on claims. Claims that are already decided are searched again only for a proof file."""
         self._prove = prove
-        # A proof for the design does not cover other robots within the tolerance.
+        # A proof for the nominal robot does not cover other robots within the tolerance.
         uncovered = self._reason if self.case.joint_centre_tolerance else ""
         known = {(each.name, each.sense, each.key): each for each in decided}
         for done, claim in enumerate(replace(each, uncovered=uncovered) for each in claims):

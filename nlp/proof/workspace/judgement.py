@@ -20,7 +20,8 @@ class Judgement:
     Attributes:
         case: the case, its dimensions fixed.
         workspace: box of poses, with its dependent coordinates; for a tool path, a box that contains the path.
-        verdicts: verdicts on ranks, then on quantities: reach of limbs, limits, leg lengths, measures, F, actuators.
+        verdicts: verdicts on ranks, then on quantities: reach of limbs, limits, leg lengths,
+            requested quantities, F, actuators.
         tool_path: the tool path; None for a box of poses.
         knots: knots of the path with the robot's joint coordinates; None if none were requested.
     """

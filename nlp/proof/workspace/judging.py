@@ -10,29 +10,31 @@ from typing import TYPE_CHECKING
 from ...case.case import Case
 from ...case.task import Sense
 from ...interruption import is_requested
-from ..statement.claims import Claim
+from ..statement.claims import REGULAR, Claim
 from ..statement.tolerance import Directions
 from .judgement import Judgement
 from .numbers.extremes import DEFAULT, NumberSearch
 from .numbers.searched import Subject, searched_extremes
 from .numbers.strokes import stroke_verdicts
-from .verdict import Verdict
+from .verdict import Outcome, Verdict, not_judged
 
 if TYPE_CHECKING:
     from ...case.workspace import Workspace
 
 #: Beginning of the names of leg lengths.
 _LENGTH = "leg_length limb "
+#: Reason for ranks that are not judged.
+_SAMPLED = "a sampled pose violates a limit"
 
 
 class Judging(ABC):
-    """A judgement in progress, of a robot over a domain.
+    """Judgement of a robot over a domain (a box of poses or a tool path), in progress.
 
     Args:
         case: the case, its dimensions fixed.
         workspace: box that contains the domain's poses, with the dependent coordinates.
-        measures: names of measures of the robot whose smallest and largest values are requested.
-        search: gap, threads and record of the searches.
+        measures: names of quantities of the robot whose smallest and largest values are requested.
+        search: requested gap, threads, and recorder for a proof file.
         until_fault: If true, stop at the first claim about a rank or limit that is not proved.
 
     Attributes:
@@ -57,6 +59,9 @@ class Judging(ABC):
 
     def judgement(self, *, with_numbers: bool = True) -> Judgement:
         """Return the judgement; with ``with_numbers`` false it has only the verdicts on ranks."""
+        sampled = self.sampled_fault() if with_numbers and self.until_fault else None
+        if sampled is not None and (fault := self.shown(sampled)).outcome is Outcome.REFUTED:
+            return Judgement(self.case, self.workspace, (not_judged(REGULAR, _SAMPLED), fault))
         for each in self.ranks():
             self.verdicts[each.claim] = each
         if with_numbers and self.has_numbers and not self._is_over():
@@ -91,13 +96,17 @@ class Judging(ABC):
         claim = next(each for each in claims if each.legs == (leg,) and each.sense is sense)
         return self.finer(claim, gap, about)
 
+    def sampled_fault(self) -> Verdict | None:
+        """Return a limit that a sampled pose violates; None if none is found, or without samples."""
+        return None
+
     @abstractmethod
     def ranks(self) -> Iterator[Verdict]:
         """Yield the verdict on the rank of J, and on the rank of the constraint wrenches if the robot has any."""
 
     @abstractmethod
     def expressions(self) -> Iterator[Verdict]:
-        """Yield the verdicts on expressions of the pose: reach, limits, leg lengths, measures, F of the tasks."""
+        """Yield the verdicts on expressions of the pose: reach, limits, leg lengths, requested quantities, F."""
 
     @abstractmethod
     def subject(self, shortest: float) -> Subject:

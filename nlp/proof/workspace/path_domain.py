@@ -68,7 +68,7 @@ def covered(path: ProgrammedPath, size: float) -> tuple[PathCover, PoseBox, Work
 
 
 def design_along(case: Case, closed: ClosedForm, box: PoseBox, cover: PathCover) -> Problem:
-    """Return the design along a path.
+    """Return the nominal robot with its loop equations and matrices along a path.
 
     Raises:
         NotJudgedError: the robot cannot be judged, or its loops are not closed at the first point.

@@ -23,7 +23,7 @@ _STEPS = 80
 
 
 def pose_at(problem: Problem, cover: PathCover, place: Place) -> PoseNumbers:
-    """Return the pose at a place of a path; for a robot with dependent coordinates, the pose of the design."""
+    """Return the pose at a point of a path; with dependent coordinates, the pose of the nominal robot."""
     piece = np.array([[place.segment, place.parameter, place.parameter]])
     if not problem.box.dependent:
         return problem.box.pose(cover.points(piece, 0.0)[0])
@@ -36,12 +36,12 @@ def pose_at(problem: Problem, cover: PathCover, place: Place) -> PoseNumbers:
 
 
 def refuted(verdicts: Sequence[Verdict]) -> dict[int, Verdict]:
-    """Return the refuted verdicts, by index."""
+    """Return the refuted verdicts among ``verdicts``, by their index."""
     return {k: each for k, each in enumerate(verdicts) if each.outcome is Outcome.REFUTED}
 
 
 def first_faults(numbers: Number, wrong: Mapping[int, Verdict], cover: PathCover) -> dict[Claim, Fault]:
-    """Return the first known points where the design violates limits, if they precede the points of worst values.
+    """Return the first known points where the nominal robot violates limits, if before the points of worst values.
 
     Args:
         numbers: quantities of claims.
@@ -70,12 +70,12 @@ def first_faults(numbers: Number, wrong: Mapping[int, Verdict], cover: PathCover
 
 
 class _Sampled:
-    """Values of the design at points of segments, with loops closed from the middle of each segment to its ends.
+    """Values of the nominal robot at points of segments, with loops closed from the middle of each segment to its ends.
 
     Args:
         numbers: quantities to evaluate.
         cover: boxes of the path.
-        pieces: (B, 3) segments.
+        pieces: (B, 3) whole segments: index, and both ends of the parameter.
         near: (B, n) points with closed loops in the middles of the segments.
     """
 

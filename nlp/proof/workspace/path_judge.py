@@ -74,7 +74,7 @@ def judge_path(
         sampling: rule for the knots of the path; None for no knots.
         limits_only: If true, omit quantities of actuators without a limit.
         progress: function that is called with the name of the next step.
-        record: record of the searches for a proof.
+        record: recorder of the searches for a proof file.
 
     Raises:
         CaseError: a dimension of the robot is free, or limits need a motion that neither the case nor the path states.
@@ -114,14 +114,14 @@ def judge_path(
 
 
 class _AlongPath(Judging):
-    """A judgement along a path.
+    """Judgement of a robot along a tool path, in progress.
 
     Args:
         case: the case, with a motion.
         workspace: box that contains the path.
         robots: robots within the tolerance; None if these robots are not judged.
         cover: boxes of the path.
-        search: gap, threads and record of the searches.
+        search: requested gap, threads, and recorder for a proof file.
 
     Attributes:
         is_timed: whether the path states times.
@@ -231,11 +231,11 @@ class _AlongPath(Judging):
         return replace(verdict, fault=self._faults.get(verdict.claim))
 
     def _keep_faults(self, numbers: Number, wrong: Mapping[int, Verdict]) -> None:
-        """Keep the first known points that refute limits."""
+        """Store the first known points of the path that refute limits."""
         self._faults |= first_faults(numbers, wrong, self._cover)
 
     def _motors(self, subject: Subject, speeds: Mapping[str, float] | None = None) -> Iterator[Verdict]:
-        """Yield the verdicts on actuator forces, powers and speeds in any direction, and keep their faults."""
+        """Yield the verdicts on actuator forces, powers and speeds in any direction, and store violations."""
         found = list(motor_extremes(subject, with_all=self.with_all, speeds=speeds, record=self.search.record))
         yield from found
         for _, group in itertools.groupby(refuted(found).values(), lambda each: each.motor and each.motor.place):

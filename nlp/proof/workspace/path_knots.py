@@ -56,11 +56,11 @@ _TURN = np.radians(1.0)
 
 
 class Knots(NamedTuple):
-    """Places of a path in order: the start of the first segment, and at least the end of every segment.
+    """Knots of a path in order: points at the start of the first segment and at least at the end of every segment.
 
     Attributes:
-        segments: (K,) segment that ends at, or contains, each place.
-        parameters: (K,) parameter of each place on its segment.
+        segments: (K,) index of the segment that ends at, or contains, each knot.
+        parameters: (K,) parameter, from 0 to 1, of each knot on its segment.
         coordinates: (K, a) actuator coordinates, radians or length, without jumps by full turns; NaN where the robot
             does not reach the pose.
         actuators, measures: (a,) names of the actuators, and names of their coordinates' quantities.
@@ -139,7 +139,7 @@ def stepped_knots(case: Case, path: ProgrammedPath, step: float) -> Knots:
 
 
 def _with_joints(case: Case, path: ProgrammedPath, segments: NDArray[np.intp], ends: FloatArray) -> Knots:
-    """Return knots at the start and at the ends (P,) of pieces."""
+    """Return knots with joint positions: the start of the path, and the ends (P,) of pieces."""
     segments, ends = np.concatenate([segments[:1], segments]), np.concatenate([[0.0], ends])
     # Loops are closed from one pose to the next. With closed forms, blocks of poses need less memory.
     block = len(ends) if closed_form(case.model).model.unknowns else _JOINTS
@@ -184,7 +184,7 @@ def knots_within(case: Case, path: ProgrammedPath, cover: PathCover, workspace: 
 
 
 def _robot_about(case: Case, cover: PathCover, workspace: Workspace) -> tuple[Problem, SX]:
-    """Return the design near a path, with all six coordinates of the pose, and its actuator coordinates.
+    """Return the nominal robot near a path, with all six coordinates of the pose, and its actuator coordinates.
 
     Raises:
         NotJudgedError: the actuator coordinates are not known, or there are not as many as degrees of freedom.
@@ -238,7 +238,7 @@ class _Pieces(NamedTuple):
 
 
 class _Proved(NamedTuple):
-    """Proved pieces, with their indices among the examined pieces."""
+    """Pieces with a proved distance, and their indices among the examined pieces."""
 
     which: NDArray[np.intp]
     pieces: _Pieces

@@ -52,7 +52,7 @@ def speeds_on_path(
         robots: robots within the tolerance.
         cover: boxes of the path.
         gap: allowed relative gap of a speed.
-        record: record of the search for a proof.
+        record: recorder of the search for a proof file.
     """
     claims, number = list(speed_claims(robots.case)), None
     recorder = None if record is None else TreeRecord()
@@ -76,7 +76,9 @@ def speeds_on_path(
 
 
 def _wider(number: PathSpeeds, cover: PathCover) -> FloatArray:
-    """Return the excess (K,) of bounds over all robots within the tolerance over values of the design at one place.
+    """Return the differences (K,) of bounds for all robots within the tolerance and values of the nominal robot.
+
+    The differences are those at a single point of the path.
 
     Smaller boxes do not reduce this difference.
     """

@@ -1,4 +1,4 @@
-"""Proof file of a judgement along a path: the claims that the records of its searches prove."""
+"""Proof file of a judgement along a path: the claims that the recorded searches prove."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ _COMPUTED = "a pose that is only computed in floating point has no proof"
 
 
 def path_proof_of(case: Case, judged: Judgement, record: ProofRecord, text: str, premises: PathPremises) -> Proof:
-    """Return the proof of the claims along a path that are proved, or refuted by two places; and the other claims.
+    """Return the proof of all claims along a path that are proved, or refuted by two points; and the other claims.
 
     Args:
         case: the case before the judgement, as read from its file.
         judged: the verdicts.
-        record: record of the searches.
+        record: recorder of the searches.
         text: text of the case file.
         premises: premises about the path.
     """
@@ -51,7 +51,7 @@ class _Writer:
 
     Args:
         judged: the verdicts.
-        record: record of the searches.
+        record: recorder of the searches.
 
     Attributes:
         ranks, numbers: verdicts by label; of two verdicts with the same label, the first one is kept.

@@ -75,7 +75,7 @@ def rank_along(
 
 
 def rank_at_start(problem: Problem, matrix: RankMatrix, cover: PathCover) -> Verdict:
-    """Return the verdict on J of a structure that is singular everywhere, from the first point of the path."""
+    """Return the verdict on J of a robot that is singular at every pose, from the first point of the path."""
     place = Place(int(cover.pieces[0, 0]), 0.0)
     is_singular = SingularPose(problem, matrix).smallest(problem.start) <= _SINGULAR
     outcome = Outcome.REFUTED if is_singular else Outcome.OPEN
@@ -116,7 +116,7 @@ def _sign_change(problem: Problem, matrix: RankMatrix, cover: PathCover) -> tupl
 def _most_singular(
     problem: Problem, matrix: RankMatrix, cover: PathCover, piece: FloatArray, box: LoopBoxes
 ) -> tuple[Place, float]:
-    """Return the place in or near a piece with the smallest singular value, and this value."""
+    """Return the point in or near a piece of the path with the smallest singular value, and this value."""
     newton, stated = SingularPose(problem, matrix), problem.stated
     chosen = [problem.free[j] for j in stated]
 

@@ -1,6 +1,6 @@
 """Quantities of a robot at sampled points of a tool path, for pictures; they prove nothing.
 
-With a joint-centre tolerance, the nominal design is shown. Limits on strokes concern the whole path and have no value
+With a joint-centre tolerance, the nominal robot is shown. Limits on strokes concern the whole path and have no value
 at a point.
 """
 
@@ -67,7 +67,7 @@ class SampledNumber(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PathSamples:
-    """A robot at P points of a path.
+    """Positions, speeds, quantities and margins of a robot at P points of a path.
 
     Attributes:
         points: points of the path.
@@ -120,7 +120,7 @@ class PathSamples:
 
 
 def samples_of(judged: Judgement, most: int = MOST_POINTS) -> PathSamples:
-    """Return a robot at points of its path, which include all places of the verdicts.
+    """Return samples of a robot along its path, with the points at which claims are not proved.
 
     Args:
         judged: the verdicts along the path.
@@ -148,7 +148,7 @@ def samples_of(judged: Judgement, most: int = MOST_POINTS) -> PathSamples:
 
 
 def places_of(judged: Judgement) -> list[Place]:
-    """Return the places of the verdicts on ranks and limits that are not proved."""
+    """Return the points of the path at which ranks and limits are not proved."""
     found = [each.place for each in judged.verdicts if each.fails]
     found += [each.place for each in judged.faults.values()]
     return sorted({each for each in found if each is not None})

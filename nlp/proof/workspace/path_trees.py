@@ -28,7 +28,7 @@ def tree_of_path(record: TreeRecord, pieces: FloatArray) -> bytes:
     """Return the trees of a search along a path as bytes, one after the other.
 
     Args:
-        record: record of the search.
+        record: recorder of the search's tree.
         pieces: (M, 3) first pieces of the search: equal parts of each segment, in the order of the path.
     """
     parts = list[bytes]()
@@ -42,7 +42,7 @@ def tree_of_path(record: TreeRecord, pieces: FloatArray) -> bytes:
 
 
 def _node(low: float, high: float, at: float) -> bytes:
-    """Return the node of a range of places that is cut at one of them."""
+    """Return the bytes of the node that cuts a range of places, from ``low`` to ``high``, at ``at``."""
     if 0.5 * low + 0.5 * high == at:
         return node_bytes(Node.HALF, 0)
     return node_bytes(Node.CUT, 0, value=at)

@@ -1,4 +1,4 @@
-"""Records of the searches of a judgement, from which its proof is written."""
+"""Recorder of the searches of a judgement: bounds and trees of boxes from which a proof file is written."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ _ROOM, _OUTWARDS = 0.25, 1e-6
 
 @dataclass(eq=False)
 class ProofRecord:
-    """Records of the searches of one judgement.
+    """Bounds and trees of the searches of one judgement, recorded for a proof file.
 
     Attributes:
         programs: bounds of quantities that the search of ``certify`` proved, with their trees.
         boxes: trees of searches of boxes, by name of the claim.
         firsts: bounds of the first-order pose error for leg-length errors of one unit, by name of the claim.
-        rests: bounds of the second-order terms of quantities of all robots within the tolerance.
+        rests: for quantities of all robots within the tolerance, bounds of their second-order terms.
         directions: fixed directions of a leg, by the name of the leg lengths of one robot at two poses.
         pieces: (M, 3) first pieces of the searches along a path; None for a box of poses.
     """
@@ -54,7 +54,7 @@ class ProofRecord:
         return self._nodes[tree]
 
     def tree(self, name: str) -> TreeRecord:
-        """Return the tree of the search of a claim."""
+        """Return the recorder for the tree of a claim's search, by the name of the claim."""
         return self.boxes.setdefault(name, TreeRecord())
 
     def constant(self, claim: Claim, nlp: Nlp, value: float) -> None:
@@ -84,7 +84,7 @@ class ProofRecord:
         self.programs.setdefault(key, ProofClaim(*key, "boxes", bound, tree=self.nodes(tree)))
 
     def _keep(self, claim: Claim, nlp: Nlp, bound: float, tree: bytes) -> None:
-        """Keep the best bound of a nonlinear program; of two programs with the same name, keep the first one."""
+        """Store the bound and the tree of a claim, if the bound is better than the stored bound of the same program."""
         found = ProofClaim(claim.name, claim.sense.value, "program", bound, fingerprint(nlp), tree)
         before = self.programs.setdefault((found.name, found.sense), found)
         if before.graph == found.graph and bound <= (before.bound or 0.0):

@@ -1,4 +1,4 @@
-"""Proof file of a judgement: the claims that the records of its searches prove."""
+"""Proof file of a judgement: the claims that the recorded searches prove."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..checker.proof_file import Premises, Proof, ProofClaim, ProofError, Unproved, workspace_premise
+from ..checker.proof_file import Premises, Proof, ProofClaim, ProofError, Unproved, set_premise, workspace_premise
 from ..checker.workspace.statement import expected_claims, legs_premise, robot_claims
 from ..statement.claims import ERRORS, REACH, REGULAR, Claim, ClaimKind, one_robot_name
 from ..statement.fixed_robot import INSIDE, legs_of, workspace_of_case
@@ -44,9 +44,9 @@ def proof_of(
 
     Args:
         judged: the verdicts.
-        record: record of the searches.
+        record: recorder of the searches.
         text: text of the case file.
-        quantities: names of the requested measures.
+        quantities: names of the requested quantities.
         leg_error: largest leg-length error, length.
     """
     writer = _Writer(judged, record)
@@ -57,12 +57,14 @@ def proof_of(
     for other in ERRORS if len(missing) == 1 else ():
         if writer.proved.pop(other.label, None):
             unproved.append(Unproved(*other.label, f"the {missing[0].name} has no proof"))
+    workspace = workspace_of_case(judged.case)
     premises = Premises(
-        workspace=workspace_premise(workspace_of_case(judged.case)),
+        workspace=workspace_premise(workspace),
         legs=legs_premise(legs_of(judged.case)),
         quantities=tuple(quantities),
         leg_error=leg_error,
         joint_centre=judged.case.joint_centre_tolerance or 0.0,
+        position_set=set_premise(workspace),
     )
     claims, lemmas = tuple(writer.proved.values()), tuple(writer.lemmas())
     return Proof(text, judged.case.name, premises, claims, lemmas, tuple(unproved))
@@ -105,11 +107,11 @@ def write_each(writer: ClaimWriter, expected: Sequence[Claim], judged: Iterable[
 
 
 class _Writer:
-    """Builder of one proof for each claim that the records of the searches prove.
+    """Builder of one proof for each claim that the recorded searches prove.
 
     Args:
         judged: the verdicts.
-        record: record of the searches.
+        record: recorder of the searches.
 
     Attributes:
         robot: the robot as the checker models it, with the symbols of the searches.
@@ -174,7 +176,7 @@ class _Writer:
         return ProofClaim(name, "", "singular", sides=tuple(tuple(side.tolist()) for side in sides))
 
     def _program(self, found: Verdict) -> ProofClaim:
-        """Return a claim with a tree of the search of ``certify``."""
+        """Return the proof of a claim by the recorded tree of the search of ``certify``."""
         # Closed forms require the reach of all limbs, in the search and in the proof file.
         is_reached = all(each.outcome is Outcome.PROVED for each in self._reaches) and not self.robot.dependent
         if found.key != REACH and is_reached and any((each.name, "min") not in self.proved for each in self._reaches):
@@ -198,7 +200,7 @@ class _Writer:
         return ProofClaim(found.name, found.sense.value, "one machine", found.bound, sides=sides)
 
     def _boxes(self, each: Claim, found: Verdict) -> ProofClaim:
-        """Return a claim with the tree of its search of boxes."""
+        """Return the proof of a claim by the recorded tree of its search of boxes."""
         if each.name not in self._record.boxes:
             raise ProofError(_ONE_ASSEMBLY)
         record = self._record.tree(each.name)
@@ -252,5 +254,5 @@ def bound_on_record(claim: Claim, found: Verdict) -> float:
 
 
 def words_of(found: Verdict) -> str:
-    """Return an outcome with its reason."""
+    """Return the outcome of a verdict and its reason as text."""
     return f"{found.outcome.value}: {found.reason}" if found.reason else found.outcome.value

@@ -11,11 +11,11 @@ from .verdict import Outcome
 
 
 class RangeStop(JsonObject):
-    """A claim that is not proved at a pose, or on the motion to it.
+    """Claim that is not proved at a pose, or on the motion to this pose.
 
     Attributes:
         name: name of the claim.
-        outcome: outcome of the claim: refuted at the pose, or open on the motion to it.
+        outcome: outcome of the claim: refuted at the pose, or open on the motion to this pose.
         key: dotted key, below ``limits``, of the limit in the case; absent for a rank.
         unit: unit of the limit, empty for a plain number; absent for a rank.
         sense: whether the limit is a smallest or a largest value; absent for a rank.

@@ -31,10 +31,10 @@ class Outcome(enum.Enum):
 
 
 class Fault(NamedTuple):
-    """Point of a path that refutes a limit.
+    """Point of a tool path at which a quantity violates its limit.
 
     Attributes:
-        place: place on the path.
+        place: place on the path: segment and parameter.
         value: value of the quantity.
         pose: pose of the platform.
     """
@@ -62,7 +62,7 @@ class Verdict:
         share: fraction of the domain's volume that is in open boxes, for a rank.
         seconds: wall time.
         place: place of the pose on a path; None over a box of poses.
-        errors: joint-centre errors of the robot with this value, or of the singular robot; None for the design.
+        errors: joint-centre errors of the robot with this value, or of the singular robot; None for the nominal robot.
         sides: proof of a refuted rank: two poses (2, 6), or two places on a path (2, 1) (segment plus parameter), at
             which the determinant provably has opposite signs. None without such a proof.
         fault: first known point of a path that refutes the limit; None if no such point precedes ``place``.

@@ -34,7 +34,7 @@ class OwnBoxes:
 
     Attributes:
         lower, upper: (d, N) ends of the boxes of all lists, one list after the other.
-        of: (N,) index, for each box of own variables, of its shared box; ascending.
+        of: (N,) index of the shared box to which each box of own variables belongs; ascending.
         count: number B of shared boxes.
     """
 
@@ -59,7 +59,7 @@ class OwnBoxes:
         return OwnBoxes(self.lower[:, places], self.upper[:, places], of, chosen.size)
 
     def joined(self, parts: Sequence[OwnBoxes]) -> OwnBoxes:
-        """Return the lists of several objects, one after the other."""
+        """Return the lists of several objects as one object, one after the other."""
         first = np.cumsum([0, *(part.count for part in parts)])
         return OwnBoxes(
             np.concatenate([part.lower for part in parts], axis=1),
@@ -175,7 +175,7 @@ def bound_limb(
 
 
 def tilts_of(limbs: Sequence[LimbBound]) -> FloatArray:
-    """Return the sum of the tilts and best values of all limbs over B boxes, as for :meth:`Engine.limb_models`."""
+    """Return the sum of the tilts and best values of all limbs, for ``tilts`` of :meth:`Engine.limb_models`."""
     best = np.array([limb.best for limb in limbs])
     g, Q = (np.array(each) for each in zip(*[limb.tilt for limb in limbs], strict=True))
     lost = 64 * ULP * (np.abs(g).sum(axis=(0, 1)) + np.abs(Q).sum(axis=(0, 1, 2)))
@@ -185,7 +185,7 @@ def tilts_of(limbs: Sequence[LimbBound]) -> FloatArray:
 
 
 def _add(L: QuadraticModel, tilt: Tilt) -> QuadraticModel:
-    """Return the models plus a function of their first variables."""
+    """Return the models of a limb plus a tilt of their first variables."""
     m = len(tilt.g)
     b, H = L.b.copy(), L.H.copy()
     across = np.abs(tilt.Q).sum(axis=1)

@@ -95,11 +95,11 @@ class LeftOwn(NamedTuple):
 
 
 class SharedColumns(NamedTuple):
-    """Data of shared boxes.
+    """Data that the search keeps for each shared box.
 
     Attributes:
-        own: lists of own boxes of each limb.
-        good: (B, d) best known point of the own variables of each limb.
+        own: for each limb, the lists of boxes of its own variables.
+        good: for each limb, the best known point (B, d) of its own variables.
     """
 
     own: tuple[OwnBoxes, ...]
@@ -188,9 +188,9 @@ class SharedRule(Rule[SharedColumns]):
         return BoxResults(left, self.target, examined, is_better=self._incumbent.value > before, reasons=reasons)
 
     def record(self, boxes: Boxes[SharedColumns], found: BoxResults[SharedColumns], split: NDArray[np.intp]) -> None:
-        """Record bisections and leaves.
+        """Record bisections and closed boxes for a proof.
 
-        In a leaf, the difference between target and bound is divided equally among the limbs and the common part.
+        In a closed box, the difference between target and bound is divided equally among the limbs and the common part.
         """
         if self._recorder is None or found.reasons is None:
             return
@@ -301,7 +301,7 @@ class SharedRule(Rule[SharedColumns]):
     def _shared_change(
         self, boxes: Boxes[SharedColumns], sums: SharedSums, lower: FloatArray, upper: FloatArray
     ) -> FloatArray:
-        """Return the possible change (m, B) of the bound along each shared variable of the remaining sub-box."""
+        """Return the possible change (m, B) of the bound along each shared variable within the remaining sub-boxes."""
         m, M = self._m, sums.common.L
         change = _LINEAR * np.abs(M.b) + np.abs(M.H).sum(axis=0) + M.w
         for limb in sums.limbs:
@@ -313,7 +313,7 @@ class SharedRule(Rule[SharedColumns]):
 
 
 def _leaf(sums: SharedSums, k: int, emptied: NDArray[np.bool_], target: float) -> bytes:
-    """Return the node of closed box k; ``emptied`` marks the limbs (K,) without a feasible point."""
+    """Return the bytes of the proof's node for closed box k; ``emptied`` (K,) marks limbs without a feasible point."""
     limbs = sums.limbs
     if emptied.any():
         zero = np.zeros((len(limbs), len(limbs[0].tilt.g)))

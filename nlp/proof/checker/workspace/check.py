@@ -78,14 +78,14 @@ _WITHOUT_TOLERANCE = "the proof of this claim needs a tolerance, and the claim i
 
 @dataclass(frozen=True)
 class CheckedClaim:
-    """A valid claim.
+    """Claim that the checker accepted.
 
     Attributes:
         name, sense: name and sense of the claim.
         bound: proven bound of the quantity as shown in results, radians for angles; None without a quantity.
         limit: limit of the case that the quantity satisfies, in the unit of ``bound``; None without a limit.
-        is_refuted: whether the opposite of the claim is proved: a singular pose.
-        by_machine: whether the singular pose belongs to another robot within the tolerance, not to the nominal design.
+        is_refuted: whether the opposite of a rank claim is proved: there is a singular pose.
+        by_machine: whether the singular pose belongs to another robot within the tolerance, not to the nominal robot.
         dimension: length, angle, or another dimension of the quantity.
     """
 
@@ -152,7 +152,7 @@ def check_path_proof(proof: Proof, case: Case, path: ProgrammedPath) -> Verified
 
 
 def _check(proof: Proof, begun: Callable[[], _Checker]) -> VerifiedWorkspace:
-    """Check a proof with a checker."""
+    """Check all claims of a proof, with a checker that ``begun`` creates."""
     if not proof.claims:
         raise ProofError("the proof has no claims")
     checker = begun()
@@ -191,7 +191,7 @@ class _Checker:
             raise ProofError(f"the proof names a quantity that the case does not have: {error}") from None
 
     def _begin(self, proof: Proof, case: Case, root: Root, robot: RobotClaims, workspace: Workspace) -> None:
-        """Begin the check of a proof about the poses of a root."""
+        """Store the case, the box of poses, the robot, and the claims and lemmas of the proof, before any check."""
         self.robot, self.workspace, self._case, self._root = robot, workspace, case, root
         self._tolerance = case.joint_centre_tolerance or 0.0
         self._given = {(each.name, each.sense): each for each in proof.claims}
@@ -232,7 +232,7 @@ class _Checker:
         return CheckedClaim(*each.label, each.reading.dimension, read(bound), kept)
 
     def _show(self, claim: BoxClaim, tree: bytes) -> None:
-        """Prove a claim on every leaf of a tree."""
+        """Prove a claim on every final box (leaf) of a tree."""
         leaves, pieces = self._root.show_on_leaves(claim, tree)
         self.leaves += leaves
         self.pieces += pieces
@@ -256,7 +256,14 @@ class _Checker:
         return CheckedClaim(*each.label, is_refuted=is_refuted, is_within_tolerance=is_within_tolerance)
 
     def _program(self, expression: SX, sense: Sense, given: ProofClaim, layout: Layout) -> float:
-        """Return the bound of an expression in the symbols of a layout, from a tree of ``certify``."""
+        """Check a tree of boxes in the format of ``certify``; return the bound that it proves.
+
+        Args:
+            expression: (1, 1) expression in the symbols of ``layout``.
+            sense: whether the tree bounds the largest or the smallest value.
+            given: claim of the proof file, with the tree.
+            layout: robot over the poses, with the symbols of the expression.
+        """
         nlp = extreme_program(layout, expression, sense)
         _stated(given)
         checked = check_proof(given, nlp)
@@ -265,7 +272,10 @@ class _Checker:
         return -nlp.sign * checked.bound
 
     def _number(self, claim: Claim, given: ProofClaim) -> float:
-        """Return the bound of a quantity from a tree of ``certify`` and, within a tolerance, from a lemma."""
+        """Return the proved bound of a quantity, from a tree of boxes in the format of ``certify``.
+
+        With a joint-centre tolerance, the proof has a lemma, too.
+        """
         layout = self.robot.place if claim.key == REACH else self.robot.layout
         if self.robot.dependent:
             raise ProofError("the proof has no tree of boxes, which a quantity with dependent pose coordinates needs")
@@ -276,7 +286,7 @@ class _Checker:
         return self._within_tolerance(self.robot.within_tolerance, claim, given)
 
     def _followed(self, claim: Claim, given: ProofClaim) -> float:
-        """Return the bound of a quantity from a tree of boxes in which the loops are followed."""
+        """Return the proved bound of a quantity from a tree of boxes in which the checker closes the loops itself."""
         symbols = self.robot.followed
         if symbols is None:
             raise ProofError("'boxes' is not a valid reason for this claim")
@@ -303,7 +313,7 @@ class _Checker:
         return bound
 
     def _lemma(self, name: str, sense: Sense) -> ProofClaim:
-        """Return a lemma, or refuse a proof without it."""
+        """Return the lemma of the proof with a name and a sense; refuse a proof without this lemma."""
         if (name, sense.value) not in self._lemmas:
             raise ProofError(f"{name}: has no proof")
         return self._lemmas[name, sense.value]
@@ -323,7 +333,7 @@ class _Checker:
         return self.robot.legs, min(self._length(leg.name, Sense.MIN) for leg in self._case.model.legs)
 
     def _lengths(self, each: Claim, given: ProofClaim) -> float:
-        """Return the bound of a quantity from the longest and the shortest length of a leg."""
+        """Return the bound of a quantity, such as a stroke, from the proved longest and shortest length of a leg."""
         senses, robots = (Sense.MAX, Sense.MIN), self.robot.within_tolerance
         left, (leg,) = 0.0, each.legs
         if given.reason == "lengths":
@@ -353,7 +363,7 @@ class _Checker:
         return bound
 
     def _singular(self, each: Claim, given: ProofClaim) -> float:
-        """Return the bound of the smallest singular value of J, or of its condition number."""
+        """Check the bound of the smallest singular value of J, or of its condition number; return the bound."""
         bound, change = _stated(given), 0.0
         if self._tolerance:
             legs, shortest = self._of_legs()
@@ -372,7 +382,7 @@ class _Checker:
         is_rotation = each.reading is not LENGTH
         self._show(ErrorClaim(self._posed, self._firsts[each.name], is_rotation=is_rotation), given.unpacked())
         legs, shortest = self._of_legs()
-        # The reach of the nominal design.
+        # The reach of the nominal robot.
         shortest = (shortest + 2 * self._tolerance) * (1 - _ROUNDING)
         reach = float(np.linalg.norm(legs.platform, axis=1).max()) * (1 + _ROUNDING)
         whole = whole_errors(position, rotation, self._eps * (1 + _ROUNDING), shortest, reach)[is_rotation]
@@ -450,7 +460,8 @@ class _PathChecker(_Checker):
             return None
         known, robot = actuator_coordinates(symbols.layout), self._loops.robot
         if motor.actuator not in known:
-            raise ProofError("the robot has no expressions for its actuator coordinates")
+            fault = f"the checker knows no formula for the coordinate of actuator {motor.actuator}"
+            raise ProofError(f"{fault}, so its speed along the path cannot be checked")
         return symbols.of(known[motor.actuator], robot.of_errors, robot.varying)
 
 

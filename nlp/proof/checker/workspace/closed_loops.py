@@ -55,10 +55,11 @@ _BLOCK, _ENDS = 512, 2**22
 
 
 class LoopPoints:
-    """Points that satisfy selected loop equations (k, 1) of a robot."""
+    """Newton's method for closed points: points that satisfy selected loop equations (k, 1) of a robot."""
 
     def __init__(self, robot: PosedRobot, equations: SX) -> None:
         self._size, self._values, self._slopes = robot.size, robot.function(equations), robot.slopes(equations)
+        self._count = int(equations.numel())
 
     def at(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return left sides (B, k) at points (B, n), and derivatives (B, k, n) with respect to scaled coordinates."""
@@ -76,7 +77,9 @@ class LoopPoints:
     ) -> FloatArray:
         """Return closed points (B, n) at the ends of paths along which the left sides decrease to 0.
 
-        The result is NaN where a path fails. Args:
+        The result is NaN where a path fails.
+
+        Args:
             z: (B, n) points where the paths begin.
             moving: indices of the coordinates that Newton's method computes from the other coordinates.
             to: (B, f) final values of the other coordinates; None keeps the values of these coordinates.
@@ -86,6 +89,10 @@ class LoopPoints:
         """
         z, others = z.copy(), [k for k in range(z.shape[1]) if k not in moving]
         to = z[:, others] if to is None else to
+        if not self._count:
+            # Every point is closed.
+            z[:, others] = to
+            return z
         first, way = self.at(z)[0], to - z[:, others]
         size = np.abs(first).max(axis=1, initial=0.0)
         for k in range(1, steps + 1):
@@ -118,7 +125,7 @@ def start_of(robot: PosedRobot) -> FloatArray:
         (found,) = centre if is_closed else points.closed(centre, moving, steps=_FROM_HOME, zero=_ZERO)
         if is_home(robot, found):
             return np.asarray(found)
-    raise ProofError("no solution of the loop equations in the home assembly mode at the workspace centre")
+    raise ProofError("found no solution of the loop equations in the home assembly mode at the workspace centre")
 
 
 def is_home(robot: PosedRobot, z: FloatArray) -> bool:
@@ -128,7 +135,7 @@ def is_home(robot: PosedRobot, z: FloatArray) -> bool:
 
 
 def needed_equations(robot: PosedRobot, start: FloatArray) -> list[int]:
-    """Return the indices of independent equations, chosen by rank at a few closed points."""
+    """Return the indices of independent loop equations, chosen by their rank at a few closed points."""
     if not robot.equations.numel():
         return []
     points, count, n = LoopPoints(robot, robot.equations), len(robot.free), len(start)
@@ -142,7 +149,7 @@ def needed_equations(robot: PosedRobot, start: FloatArray) -> list[int]:
 
 @dataclass(frozen=True, eq=False)
 class Enclosed:
-    """Closed points over B boxes.
+    """Bounds of the closed points over B boxes of the independent coordinates.
 
     Attributes:
         lower, upper: (B, n) bounds of all coordinates; NaN without a proved closed point.
@@ -166,7 +173,7 @@ class Enclosed:
         return Enclosed(*(each[which] for each in vars(self).values()))
 
     def boxes(self, which: NDArray[np.bool_]) -> ClosedBoxes:
-        """Return some of the boxes, with closed points that tell whether these boxes belong to one assembly mode."""
+        """Return some boxes with their computed closed points, to test whether they are in one assembly mode."""
         return ClosedBoxes(self.lower[which], self.upper[which], self.near[which])
 
 
@@ -223,7 +230,7 @@ class Assembly:
         return self.moved(np.broadcast_to(self.start, (len(to), len(self.start))), to)
 
     def followed(self, forms: Forms, closed: Enclosed) -> Forms:
-        """Return forms of all coordinates in terms of the independent coordinates, along closed points."""
+        """Return forms in the independent coordinates only: bounds of closed points replace the dependent ones."""
         dependent, slopes = forms.a[:, :, self.dependent], forms.a[:, :, self.independent]
         size, most = np.abs(dependent), np.abs(closed.off) + np.abs(closed.T).sum(axis=2)
         terms = np.abs(forms.c) + np.abs(slopes).sum(axis=2) + (size @ most[:, :, None])[:, :, 0]

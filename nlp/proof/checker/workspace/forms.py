@@ -52,7 +52,10 @@ class AffineMatrix(NamedTuple):
         return AffineMatrix(self.M[:, rows, columns], self.A[:, :, rows, columns], self.E[:, rows, columns])
 
     def corners(self, count: int | None = None) -> FloatArray:
-        """Return the centres plus linear parts in the first coordinates, at corners of boxes (B, corners, m, c)."""
+        """Return the matrices without remainder at the corners of the boxes, (B, corners, m, c).
+
+        With ``count``, only the first coordinates are at their ends; the other coordinates are at the centre.
+        """
         A = self.A[:, :count]
         signs = np.array(list(itertools.product((-1.0, 1.0), repeat=A.shape[1])))
         moved = A.transpose(0, 2, 3, 1) @ signs.T

@@ -1,4 +1,4 @@
-"""Claims about a robot's expressions over boxes, with closed loops, for the nominal design or within a tolerance.
+"""Claims about expressions of a robot with closed loops over boxes, for the nominal robot or within a tolerance.
 
 Joint-centre errors are coordinates of the forms, and are never bisected.
 """
@@ -45,7 +45,7 @@ class PosedLoops(NamedTuple):
         robot: expressions of the robot.
         start: (n,) closed point near the workspace centre, or at the first point of the path.
         assembly: closed loops connected continuously with the start.
-        tolerance: largest error of each joint centre; 0 for the nominal design.
+        tolerance: largest error of each joint centre; 0 for the nominal robot.
         needed: indices of the independent loop equations.
     """
 
@@ -59,7 +59,7 @@ class PosedLoops(NamedTuple):
 def posed_loops(
     case: Case, model: Model, root: Root, tolerance: float = 0.0, built: BuiltModel | None = None
 ) -> PosedLoops:
-    """Return a robot with closed loops.
+    """Return the expressions of a robot with its closed loops over a box, from the home assembly mode.
 
     Loop equations that follow from the others are omitted, by their ranks at a few points. If an equation is omitted
     by mistake, claims cover more than the closed points, and are only stronger.
@@ -68,8 +68,8 @@ def posed_loops(
         case: case with fixed dimensions.
         model: model of its robot without the unknowns in closed form.
         root: box of coordinates.
-        tolerance: largest error of each joint centre; 0 for the nominal design.
-        built: model with joint-centre errors as coordinates; None for the nominal design.
+        tolerance: largest error of each joint centre; 0 for the nominal robot.
+        built: model with joint-centre errors as coordinates; None for the nominal robot.
 
     Raises:
         ProofError: the loops cannot be closed at the workspace centre, are singular there or leave a joint free;
@@ -95,7 +95,7 @@ def posed_loops(
 
 
 def _along_path(case: Case, model: Model, root: PathRoot, about: PosedLoops, built: BuiltModel | None) -> PosedLoops:
-    """Return a robot with closed loops along a path, from the closed loops in a box about the path."""
+    """Return a robot whose loops are solved along a path, given the solved loops over a box around the path."""
     robot, poses = PosedRobot(case, model if built is None else built.model, root), len(about.robot.free)
     following = [about.robot.free.index(k) for k in root.box.dependent]
     start = np.concatenate([[0.0], about.start[following], about.start[poses:]])
@@ -178,7 +178,7 @@ class LoopClaim(ABC):
 
     @abstractmethod
     def examined(self, closed: Enclosed) -> Attempt:
-        """Try to prove the claim over known closed loops."""
+        """Try to prove the claim on boxes whose closed loops are already enclosed."""
 
     def finish(self) -> None:
         """Refuse boxes whose closed loops are not proved to belong to one assembly mode, at the end of the check."""
@@ -206,5 +206,5 @@ class LoopClaim(ABC):
         return self.assembly.enclosed(lower[:, own], upper[:, own])
 
     def values(self, closed: Enclosed) -> Values:
-        """Return the expressions of all coordinates over closed loops."""
+        """Return polynomials of the claim's expressions over boxes with enclosed loops."""
         return self._entries(closed.lower, closed.upper)

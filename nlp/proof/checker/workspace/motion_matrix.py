@@ -1,7 +1,7 @@
 """Matrices of motion conditions as expressions of the pose. Their null space consists of the unresisted motions.
 
-They are built for the check from the model and the case only. A motion consists of the velocity v of the platform's
-origin and its angular velocity, here ``x = (v, length omega)``, and of joint rates. Each row is a condition:
+The matrices are built for the check from the model and the case only. A motion consists of the velocity v of the
+platform's origin and its angular velocity, here ``x = (v, length omega)``, and of joint rates. Each row is a condition:
 
 * the force f and moment m of a limb's row, about the platform's origin, do no work: ``f.v + m.omega = 0``;
 * the passive joints of a member can follow the motion, ``x - sum_j w_j S_j = 0`` with rates w; for a pinned member only
@@ -200,7 +200,9 @@ def turned_rotation(root: Root, turn: list[SX]) -> tuple[SX, SX]:
 
 
 def motion_matrix(robot: PosedRobot, start: FloatArray, *, is_locked: bool) -> tuple[SX, int]:
-    """Return the matrix (m, c), and the claimed dimension of its null space: degrees of freedom and idle rates.
+    """Return the matrix of motion conditions (m, c), and the claimed dimension of its null space.
+
+    The dimension is the number of degrees of freedom and idle rates.
 
     With locked actuators the dimension is 0. With free actuators, the matrix of a robot given by rows has only couples.
 
@@ -246,7 +248,10 @@ def driven_matrices(robot: PosedRobot, start: FloatArray) -> tuple[SX, SX]:
 
 
 def _whole_matrix(robot: PosedRobot, start: FloatArray, actuators: Sequence[Actuator]) -> SX:
-    """Return the matrix (m, c), with columns of the platform, of passive joints, of actuators and of nested loops."""
+    """Return the matrix of motion conditions (m, c).
+
+    Its columns belong to the platform, to the passive joints, to the actuators and to the nested loops.
+    """
     relations, loops = rate_relations(actuators), []
     motions = _motion_rows(robot, start, actuators)
     passive = motions.shape[1] - relations.shape[1]
@@ -284,7 +289,10 @@ def _motion_rows(robot: PosedRobot, start: FloatArray, actuators: Sequence[Actua
 
 
 def _independent(rows: FloatArray, rank: int, whose: str) -> list[int]:
-    """Return independent rows, as many as the rank. Rows of joints that loops lock are only rounding errors."""
+    """Return the indices of independent rows, as many as the rank; refuse rows of a smaller rank.
+
+    Rows of joints that loops lock are only rounding errors.
+    """
     chosen = sorted(independent_rows([rows])) if rank else []
     if len(chosen) != rank:
         raise ProofError(f"{whose} are singular at the workspace centre")

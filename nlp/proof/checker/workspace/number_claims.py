@@ -10,8 +10,8 @@ columns of ``P = A^-1 F`` are the platform's motions for unit changes of the leg
 * Two legs, as segments between their joints, have at least the distance of the least ``n.(x - y) / |n|`` over their
   ends x and y, for any vector n.
 
-A joint-centre tolerance changes every singular value by at most a known number; so the claims about the design have
-margins: a larger smallest value, and a smaller largest value.
+A joint-centre tolerance changes every singular value by at most a known number; so the claims about the nominal robot
+have margins: a larger smallest value, and a smaller largest value.
 """
 
 from __future__ import annotations
@@ -158,7 +158,7 @@ class LegInverse:
     def inverse(
         self, lower: FloatArray, upper: FloatArray
     ) -> tuple[AffineMatrix, NDArray[np.bool_], FloatArray, AffineMatrix]:
-        """Return P over boxes (B, 6), whether P is known, shares (B, n) of coordinates in the remainder, and J or A."""
+        """Return P over boxes (B, 6), whether P is known, shares (B, n) of coordinates in its remainder, J or A."""
         values = self._forms(lower[:, self.free], upper[:, self.free])
         sizes, matrix = values.forms(slice(0, 6)), values.forms(slice(6, 42)).matrix(_DENSE, (6, 6))
         inverse, known, shares = solved(matrix, sizes.matrix(_DIAGONAL, (6, 6)))
@@ -211,7 +211,7 @@ class ErrorClaim(LegInverse):
 
     @np.errstate(all="ignore")
     def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
-        """Try to prove the claim on boxes (B, 6), at all corners of the boxes and of the errors."""
+        """Try to prove the claim on boxes (B, 6), at all corners of a box and for all signs of the six leg errors."""
         inverse, known, shares, _ = self.inverse(lower, upper)
         moves = np.ascontiguousarray(inverse.part(self._part).corners()) @ _ERRORS
         worst = np.sqrt((moves * moves).sum(axis=2).max(axis=(1, 2)))
@@ -230,8 +230,8 @@ def whole_errors(position: float, rotation: float, eps: float, shortest: float, 
     ``((p + a w)^2 / (l - p - a w) + a w^2) / 2``. Iteration in fractions finds such an r.
 
     Args:
-        position: P, first-order error of the position for leg errors of 1.
-        rotation: Q, first-order error of the rotation for leg errors of 1.
+        position: P, bound of the first-order position error for leg errors of 1.
+        rotation: Q, bound of the first-order rotation error for leg errors of 1.
         eps: largest error of a leg, length.
         shortest: l, lower bound of all leg lengths.
         reach: a, largest distance of a joint from the platform's origin.

@@ -39,7 +39,7 @@ class PathAssembly(Assembly):
         super().__init__(robot, equations, start)
         if not is_home(robot, self.start):
             raise ProofError(
-                "no solution of the loop equations in the home assembly mode at the first point of the path"
+                "found no solution of the loop equations in the home assembly mode at the first point of the path"
             )
         self._known, self._left = dict[bytes, Enclosed](), _MOST_KNOWN
         self._knots: FloatArray = np.tile(self.start, (segments + 1, 1))

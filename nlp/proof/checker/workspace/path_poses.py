@@ -48,7 +48,7 @@ _SAMPLES = 9
 
 
 class PathPoses:
-    """Coordinates of poses along a path.
+    """Pose coordinates along a path, as polynomials over pieces of its segments.
 
     Args:
         path: path with at least one segment.
@@ -163,7 +163,7 @@ class PathPoses:
         return ca.vertcat(*position, *turns), gaps
 
     def _turn(self, s: SX, numbers: Sequence[SX]) -> list[SX]:
-        """Return the coordinates of a rotation in the path's frame, from its data."""
+        """Return the coordinates of a segment's rotation in the path's frame, from the segment's data."""
         if self._is_slerp:
             q_0, q_1, half = numbers[:4], numbers[4:8], numbers[8]
             weights = [(1 - s) * _sine_ratio((1 - s) * half), s * _sine_ratio(s * half)]
@@ -187,7 +187,7 @@ class PathPoses:
         return self._functions[plane]
 
     def _arithmetic(self, plane: int) -> PolynomialArithmetic:
-        """Return the polynomial arithmetic of this function."""
+        """Return the polynomial arithmetic of :meth:`_function`."""
         if plane not in self._arithmetics:
             self._arithmetics[plane] = PolynomialArithmetic(self._function(plane))
         return self._arithmetics[plane]
@@ -271,7 +271,7 @@ class PathPoses:
 
 
 def _number(value: FloatArray, off: FloatArray) -> Polynomial:
-    """Return values (B,) with errors as constants."""
+    """Return values (B,) with their error bounds as constant polynomials."""
     V = np.stack([value - off, value + off])
     return settled((), value[None], off, np.where(off > 0, np.nextafter(V, [[-np.inf], [np.inf]]), V), 0.0)
 

@@ -1,10 +1,10 @@
-"""Premises of a proof about a path: the text of its file, with the options that the file leaves open."""
+"""Premises of a proof about a path: the text of the path's file, with the reading options that the file leaves open."""
 
 from __future__ import annotations
 
 from ....case.case import Case
 from ....errors import CaseError, InputError
-from ....path.options import Between, PathOptions
+from ....path.options import PathOptions
 from ....path.path import ProgrammedPath
 from ....path.reader import in_place_of_case, is_table, path_of_text
 from ...statement.fixed_robot import legs_of
@@ -18,6 +18,10 @@ _OPTIONS = {
     "unit": "--unit",
     "start": "--start",
     "offsets": "--offset",
+    "flavour": "--flavour",
+    "end_of_file": "--end-of-file",
+    "part": "--part",
+    "macros": "--macro",
 }
 
 
@@ -51,19 +55,21 @@ def premises_of(
         legs=legs_premise(legs_of(case)),
         joint_centre=case.joint_centre_tolerance or 0.0,
         with_angles=with_angles,
+        flavour=options.flavour,
+        end_of_file=options.end_of_file,
+        part=options.part,
+        macros=tuple(name.upper() for name in options.macros),
     )
 
 
 def carried_path(case: Case, given: PathPremises) -> ProgrammedPath:
-    """Return the path that a proof contains.
+    """Return the path from the text and the reading options in a proof.
 
     Raises:
         ProofError: the proof has no readable path, or the case has no path.
     """
     try:
-        between = None if given.between is None else Between(given.between)
-        options = PathOptions(between, given.angles, given.unit, given.start, given.offsets)
-        path = path_of_text(given.text, given.file, case.units, options)
+        path = path_of_text(given.text, given.file, case.units, PathOptions.stated_in(given))
     except (InputError, ValueError) as error:
         raise ProofError(f"the path in the proof cannot be read: {error}") from None
     if not given.of_case:

@@ -36,7 +36,7 @@ _STILL = 1e-9
 
 
 class PathRoot:
-    """Poses of a path.
+    """Root of the trees of a path: the box of the place along the path, and its poses.
 
     Args:
         case: case with fixed dimensions.
@@ -56,7 +56,7 @@ class PathRoot:
     """
 
     coordinates = 1
-    is_ball, ball = False, math.inf
+    is_ball, ball, is_convex = False, math.inf, True
 
     def __init__(self, case: Case, path: ProgrammedPath) -> None:
         self.poses, self._is_timed = PathPoses(path), path.is_timed
@@ -156,7 +156,7 @@ class PathRoot:
 class _PieceRule:
     """Rule for a claim about pieces (1, L) of a path."""
 
-    block, most_pieces = 256, 5_000
+    block, most_pieces = 1024, 5_000
     width: FloatArray = np.ones(1)
 
     def __init__(self, claim: BoxClaim, lower: FloatArray, upper: FloatArray) -> None:

@@ -1,8 +1,8 @@
 """Boxes of poses: the box of a workspace's coordinates, the leaves of its tree, and the proof of claims on pieces.
 
 A pose has three position coordinates and three rotation coordinates, tangents of half angles. The bounds of the box
-are fractions; rotations about any axis form a ball in the box. Nodes of a tree are ``cut``, ``bounded`` and
-``outside`` of :mod:`..tree`.
+are fractions; rotations about any axis form a ball in the box, and positions may form a set
+(:mod:`.position_conditions`). Nodes of a tree are ``cut``, ``bounded`` and ``outside`` of :mod:`..tree`.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from ..fractions import tangent_ends
 from ..polynomials import Polynomial
 from ..proof_file import ProofError
 from ..tree import Node, TreeReader, ahead, blocks_of
+from .position_conditions import PositionConditions, position_conditions
 
 #: Number of coordinates of a pose.
 COORDINATES = 6
@@ -33,10 +34,12 @@ POSITION = 3
 #: Relative outward rounding of tangents that multiply an axis: its components have unit length up to rounding. The
 #: coordinate of a fixed angle is a rounded tangent too.
 _AXIS = Fraction(1, 2**50)
+#: Numbers of bisections and of parts at which a box that a tree calls outside must be proved to be outside.
+_OUTSIDE, _MOST_PARTS = 30, 2048
 
 
 class PoseSymbols(NamedTuple):
-    """A pose as symbols and numbers.
+    """Pose of the platform as symbols for varying and numbers for constant coordinates.
 
     Attributes:
         free: indices of the box coordinates that vary.
@@ -68,6 +71,7 @@ class PoseRoot:
         dependent: indices of the dependent coordinates. Their bounds exclude no pose, and the ball has only the other
             components.
         at: (6,) pose from which closed loops are followed; None for the centre.
+        positions: set of positions; None for all positions of the box.
     """
 
     kind: TurnKind
@@ -80,10 +84,11 @@ class PoseRoot:
     inner_ball: Fraction | None
     dependent: tuple[int, ...] = ()
     at: FloatArray | None = None
+    positions: PositionConditions | None = None
 
     @property
     def coordinates(self) -> int:
-        """Number of coordinates."""
+        """Number of coordinates of a box."""
         return len(self.lower)
 
     @property
@@ -92,7 +97,7 @@ class PoseRoot:
         return 0.5 * self.lower + 0.5 * self.upper if self.at is None else self.at
 
     def symbols(self) -> PoseSymbols:
-        """Return the coordinates as symbols, or as numbers where they are constant."""
+        """Return the pose coordinates: symbols for varying coordinates, numbers for constant coordinates."""
         free: list[int] = np.flatnonzero(self.upper > self.lower).tolist()
         pose = [SX.sym(f"y{k}") if k in free else SX(float(each)) for k, each in enumerate(self.middle)]
         own = [pose[k] for k in free]
@@ -118,6 +123,11 @@ class PoseRoot:
         """Whether all three components of a Cayley vector lie in a ball."""
         return math.isfinite(self.ball) and len(self._turns) == 3
 
+    @property
+    def is_convex(self) -> bool:
+        """Whether the workspace contains the line between any two of its poses."""
+        return self.positions is None or self.positions.positions.is_convex
+
     def holds(self, y: FloatArray) -> bool:
         """Return whether a point (6,) is provably a pose of the workspace."""
         at = [Fraction(each) for each in y.tolist()]
@@ -125,6 +135,7 @@ class PoseRoot:
             low <= each <= high or k in self.dependent
             for k, ((low, high), each) in enumerate(zip(self.inner, at, strict=True))
         )
+        inside = inside and (self.positions is None or self.positions.holds(y[:POSITION]))
         return inside and (self.inner_ball is None or sum(at[k] * at[k] for k in self._turns) <= self.inner_ball)
 
     def show_on_leaves(self, claim: BoxClaim, tree: bytes) -> tuple[int, int]:
@@ -137,9 +148,15 @@ class PoseRoot:
         return leaves, pieces
 
     def contracted(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-        """Return boxes (B, 6) contracted to the ball without loss of a pose, and which (B,) may contain poses."""
+        """Return boxes (B, 6) contracted to the sets without loss of a pose, and which (B,) may contain poses."""
+        some = np.ones(len(lower), dtype=bool)
+        if self.positions is not None:
+            *ends, some = self.positions.contracted(lower[:, :POSITION], upper[:, :POSITION])
+            lower, upper = (
+                np.hstack([end, each[:, POSITION:]]) for end, each in zip(ends, (lower, upper), strict=True)
+            )
         if not math.isfinite(self.ball):
-            return lower, upper, np.ones(len(lower), dtype=bool)
+            return lower, upper, some
         turns = self._turns
         least = np.maximum(np.maximum(lower[:, turns], -upper[:, turns]), 0.0)
         squares = least * least
@@ -149,7 +166,24 @@ class PoseRoot:
         most = np.sqrt(room) * (1 + 2.0**-50)
         low, high = lower.copy(), upper.copy()
         low[:, turns], high[:, turns] = np.maximum(lower[:, turns], -most), np.minimum(upper[:, turns], most)
-        return low, high, np.asarray((low <= high).all(axis=1))
+        return low, high, np.asarray((low <= high).all(axis=1) & some)
+
+    def is_outside(self, lower: FloatArray, upper: FloatArray) -> bool:
+        """Return whether a box with ends (6,) provably has no pose; parts of it are examined for a set of positions."""
+        low, high = lower[None], upper[None]
+        for _ in range(1 if self.positions is None else _OUTSIDE):
+            low, high, kept = self.contracted(low, high)
+            if not kept.any():
+                return True
+            if kept.sum() > _MOST_PARTS:
+                break
+            low, high, every = low[kept], high[kept], np.arange(int(kept.sum()))
+            along = (high - low)[:, :POSITION].argmax(axis=1)
+            middle = 0.5 * low[every, along] + 0.5 * high[every, along]
+            below, above = high.copy(), low.copy()
+            below[every, along] = above[every, along] = middle
+            low, high = np.concatenate([low, above]), np.concatenate([below, high])
+        return False
 
 
 def pose_root(workspace: Workspace) -> PoseRoot:
@@ -185,7 +219,24 @@ def pose_root(workspace: Workspace) -> PoseRoot:
     values = (Free(*each) if low < high else low for (low, high), each in zip(spans, ends, strict=True))
     axis = np.array(turns.axis, dtype=float)
     dependent = tuple(each.index for each in workspace.dependent)
-    return PoseRoot(turns.kind, axis, tuple(values), lower, upper, tuple(inner + flat), ball, inner_ball, dependent)
+    positions, at = position_conditions(workspace.position_set, lower[:POSITION], upper[:POSITION]), None
+    if workspace.position_set is not None:
+        at = 0.5 * lower + 0.5 * upper
+        moving = [k for k in range(POSITION) if lower[k] < upper[k] and k not in dependent]
+        at[moving] = np.array(workspace.middle)[moving]
+    return PoseRoot(
+        turns.kind,
+        axis,
+        tuple(values),
+        lower,
+        upper,
+        tuple(inner + flat),
+        ball,
+        inner_ball,
+        dependent,
+        at,
+        positions,
+    )
 
 
 def _down(value: Fraction) -> float:
@@ -233,7 +284,7 @@ def _read_boxes(root: PoseRoot, tree: bytes) -> Iterator[tuple[int, FloatArray]]
                 boxes.append((low, high))
             elif kind != Node.OUTSIDE:
                 raise ProofError(f"the tree has {kind} where a box must be proved or cut")
-            elif root.contracted(low[None], high[None])[2][0]:
+            elif not root.is_outside(low, high):
                 raise ProofError(f"the box {box_words(low, high)} is not outside the workspace")
         yield count, np.array(boxes).reshape(-1, 2, COORDINATES).transpose(1, 2, 0)
     reader.finish()
@@ -268,5 +319,5 @@ class _PoseRule:
 
 
 def box_words(lower: FloatArray, upper: FloatArray) -> str:
-    """Return a box as text."""
+    """Return the ranges of a box as text, for messages."""
     return ", ".join(f"[{low:.6g}, {high:.6g}]" for low, high in zip(lower, upper, strict=True))

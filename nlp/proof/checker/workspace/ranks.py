@@ -53,8 +53,8 @@ def rank_claim(
         model: model of its robot without the unknowns in closed form.
         root: box of coordinates.
         name: name of the claim: ``regular``, or ``constraints regular``.
-        tolerance: largest error of each joint centre; 0 for the nominal design.
-        built: model with joint-centre errors; None for six straight legs, and for the nominal design.
+        tolerance: largest error of each joint centre; 0 for the nominal robot.
+        built: model with joint-centre errors; None for six straight legs, and for the nominal robot.
 
     Raises:
         ProofError: the loops cannot be closed at the workspace centre, are singular there or leave a joint free;
@@ -95,6 +95,8 @@ class RankClaim(LoopClaim):
         # The matrix must be J itself, with rows that are neither normalised nor zero, for a robot without loops.
         if self._shape != (6, 6) or self._nullity or self.assembly.dependent:
             raise ProofError("singular poses can be proved only for robots with six rows and without loops")
+        if not root.is_convex:
+            raise ProofError("singular poses can be proved only in sets that contain the line between two poses")
         points, poses = [np.array(each, dtype=float) for each in sides], self.coordinates
         if len(points) != 2 or any(y.shape != (poses + self.errors,) for y in points):
             raise ProofError("the claim does not have two poses")
@@ -105,7 +107,9 @@ class RankClaim(LoopClaim):
                 raise ProofError("the error of a joint centre exceeds the tolerance")
         signs = self._signs_at(np.stack(points))
         if signs[0] * signs[1] >= 0:
-            raise ProofError("the determinants at the two poses do not have opposite signs")
+            raise ProofError(
+                "det J does not have opposite signs at the two poses, so they do not prove a singular pose between them"
+            )
         for count in _PARTS:
             way = points[0] + np.linspace(0, 1, count + 1)[:, None] * (points[1] - points[0])
             way[[0, -1]] = points

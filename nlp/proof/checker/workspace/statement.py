@@ -50,7 +50,7 @@ from ...statement.tolerance import (
     tolerance_layout,
 )
 from ..premises import exact
-from ..proof_file import PathPremises, Premises, ProofClaim, ProofError, workspace_premise
+from ..proof_file import PathPremises, Premises, ProofClaim, ProofError, set_premise, workspace_premise
 from .motion_matrix import Root, turned_rotation
 from .path_root import PathRoot
 from .pose_boxes import pose_root
@@ -60,10 +60,10 @@ _SAME = 1e-9
 
 
 class RobotsWithinTolerance:
-    """All robots within a joint-centre tolerance, as the check states them.
+    """All robots within a joint-centre tolerance, as the checker models them.
 
     Let g_j be the derivative of a quantity g with respect to the error of centre j, and H_jk the blocks of the second
-    derivatives of g. A robot within the tolerance t differs from the nominal design in this quantity by at most
+    derivatives of g. A robot within the tolerance t differs from the nominal robot in this quantity by at most
 
         t sum_j |g_j| + t^2 / 2 sum_jk |H_jk|
 
@@ -101,7 +101,7 @@ class RobotsWithinTolerance:
         return bool(errors.numel()) and any(ca.which_depends(claim.expression, errors, 1, True))
 
     def number(self, claim: Claim, rest: float) -> SX:
-        """Return a bound (1, 1) of a quantity over all robots as an expression.
+        """Return an expression (1, 1) of the pose that bounds a quantity over all robots within the tolerance.
 
         ``rest`` bounds the second-order terms.
         """
@@ -128,10 +128,10 @@ class RobotClaims:
         numbers_at: assembly modes that claims about quantities cover, in words; claims about actuators under loads are
             excepted. Empty for a robot without unknowns.
         within_tolerance: robots within the tolerance, whose symbols replace those of quantities and ``reaches``. None
-            for the nominal design, or if robots with errors cannot be assembled.
+            for the nominal robot, or if robots with errors cannot be assembled.
         dependent: claims about dependent coordinates of the pose.
         followed: symbols of quantities of a robot whose loops are followed in the home assembly mode: a robot with
-            dependent coordinates, or with a tolerance. None for other robots.
+            dependent coordinates, a set of positions, or a tolerance. None for other robots.
     """
 
     legs: Legs | None
@@ -158,7 +158,7 @@ def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> 
             pass
         else:
             return _followed(legs, closed.model, workspace, robots.symbols, is_open=is_open, within_tolerance=robots)
-    if workspace.dependent:
+    if workspace.dependent or workspace.position_set is not None:
         symbols = tolerance_layout(
             case, BuiltModel(closed.model, (), closed.reaches), 0.0, coordinates_of(pose_root(workspace))
         )
@@ -225,7 +225,7 @@ def _followed(
     is_open: bool,
     within_tolerance: RobotsWithinTolerance | None = None,
 ) -> RobotClaims:
-    """Return the claims about a robot whose loops are followed."""
+    """Return the robot and the claims for a robot whose loops are followed in the home assembly mode."""
     home = "the home assembly mode" if is_open else ""
     reaches, dependent = symbols.claims(())[0], tuple(dependent_claims(symbols.layout.robots[0], workspace))
     whole = RobotClaims(legs, symbols.layout, model, symbols.layout, tuple(reaches), home, within_tolerance)
@@ -314,15 +314,18 @@ def leg_error_of(case: Case, leg_error: float) -> float:
 
 
 def legs_premise(legs: Legs | None) -> tuple[tuple[float, ...], ...]:
-    """Return joint centres (12, 3), base before platform; empty for a robot without six straight legs."""
+    """Return joint centres (12, 3) for proof files, base before platform; empty without six straight legs."""
     return () if legs is None else tuple(map(tuple, [*legs.base.tolist(), *legs.platform.tolist()]))
 
 
 def refuse_other_premises(
     case: Case, workspace: Workspace, legs: Legs | None, leg_error: float, given: Premises
 ) -> None:
-    """Refuse a proof whose file states other premises than the case; the check itself does not use these premises."""
-    if workspace_premise(workspace) != given.workspace:
+    """Refuse a proof whose file states premises that differ from the case.
+
+    The check itself uses only the premises of the case.
+    """
+    if workspace_premise(workspace) != given.workspace or set_premise(workspace) != given.position_set:
         raise ProofError("the proof is for another workspace than this case's")
     if given.leg_error != leg_error:
         stated = f"the proof is for leg errors of at most {exact(given.leg_error)} {case.units.length}"
@@ -331,7 +334,7 @@ def refuse_other_premises(
 
 
 def refuse_other_robot(case: Case, legs: Legs | None, given: Premises | PathPremises) -> None:
-    """Refuse a proof whose file names other joint centres, or another joint-centre tolerance, than the case has."""
+    """Refuse a proof whose file states joint centres or a joint-centre tolerance that differ from the case."""
     numbers = legs_premise(legs)
     same = list(map(len, numbers)) == list(map(len, given.legs))
     if not same or not np.allclose(given.legs, numbers, rtol=0.0, atol=_SAME * np.abs(numbers).max(initial=0.0)):

@@ -57,7 +57,7 @@ class Bounds(NamedTuple):
 
     Attributes:
         lower: (B, K) lower bounds; -inf without one.
-        shares: (B, K, f) shares of the coordinates in the overestimation.
+        shares: (B, K, f) share of each coordinate in the overestimation of each quantity.
     """
 
     lower: FloatArray
@@ -68,14 +68,14 @@ class Number(ABC):
     """K quantities of a robot for branch and bound: lower bounds over boxes, and values at points.
 
     Args:
-        problem: the design, or all robots within the tolerance.
+        problem: the nominal robot, or all robots within the tolerance.
         entries: (E, 1) expressions of the problem's coordinates; bounds are computed from their forms.
         count: number K of quantities.
 
     Attributes:
         problem, entries, count: the arguments.
         unknown: (K,) values that stand for unknown bounds over a box.
-        levels: (K,) levels; a quantity with a larger bound does not influence the bisection.
+        levels: (K,) bounds at which a box is closed; a quantity with a larger bound does not influence the bisection.
     """
 
     def __init__(self, problem: Problem, entries: SX, count: int = 1) -> None:
@@ -113,7 +113,7 @@ class Number(ABC):
         return not_regular((shares * ~(lower >= self.levels)[:, :, None]).sum(axis=1), lower)
 
     def bounds(self, lower: FloatArray, upper: FloatArray) -> FloatArray:
-        """Return lower bounds (B, K) over boxes (B, n) of the design, without dependent coordinates."""
+        """Return lower bounds (B, K) over boxes (B, n) of the nominal robot, without dependent coordinates."""
         tolerance = np.full((len(lower), len(self.problem.of_errors)), self.problem.tolerance)
         ends = np.hstack([lower, -tolerance]), np.hstack([upper, tolerance])
         return self.examiner.examine(LoopBoxes(*ends, ends[0], np.ones(len(lower), dtype=bool))).smallest
@@ -137,7 +137,7 @@ class Minimum(NamedTuple):
         boxes, open: number of examined boxes, and of open boxes at the end.
         seconds: wall time.
         reason: reason why the search stopped before the gap was reached; otherwise empty.
-        place: place of the point on a path; None for a box of poses.
+        place: segment and parameter of the point on a path; None for a box of poses.
     """
 
     bound: float = -math.inf
@@ -184,12 +184,12 @@ class Goal(NamedTuple):
 
 
 class _Best(NamedTuple):
-    """Best known values.
+    """Smallest known values of the quantities of a search.
 
     Attributes:
         value: (K,) smallest known values; infinite if no value is known.
         at: (K, n) points with these values.
-        where: (K, 2) places of the points on a path.
+        where: (K, 2) segments and parameters of the points on a path.
     """
 
     value: FloatArray
@@ -223,7 +223,7 @@ class SmallestValues(LoopRule):
             self._start_from_poses()
 
     def _levels(self) -> FloatArray:
-        """Return the levels (K,) at which boxes are closed; every quantity must reach its level."""
+        """Return the bounds (K,) at which a box is closed: the bound of every quantity must reach its level."""
         known = self._best.value.tolist(), self._sizes.tolist()
         pairs = [goal.levels(*each) for goal, *each in zip(self._goals, *known, strict=True)]
         return np.array(pairs)[:, 1 if len(pairs) > 1 else 0]
@@ -285,7 +285,7 @@ class SmallestValues(LoopRule):
             self._note(z[kept], np.stack([along[kept, 0], s[kept]], axis=1))
 
     def _start_from_poses(self) -> None:
-        """Update the best known values at random poses, at corners, and near the best ones."""
+        """Update the best known values at random poses, at corners, and near the poses with the smallest values."""
         box, free, rng, step = self._problem.box, list(self._problem.free), np.random.default_rng(_SEED), 0.3
         sides = np.array(np.meshgrid(*[[0, 1]] * 6)).reshape(6, -1).T
         points = np.concatenate([box.random(_POINTS, rng), box.clipped(box.lower + sides * (box.upper - box.lower))])

@@ -33,7 +33,7 @@ _PARALLEL = 1e-12
 class Clearance(Number):
     """Distance between two straight legs.
 
-    There are 13 entries: the ends of the first leg and of the second leg, times the scale s of a rotation; and s.
+    The bounds use forms of 13 expressions: the end points of both legs, times the scale s of a rotation; and s.
 
     Args:
         problem: the robot.
@@ -61,7 +61,7 @@ class Clearance(Number):
         return _between(values_at(self._ends, z[:, : len(self.problem.free)])[0][:, :, 0])
 
     def worst(self, y: FloatArray) -> FloatArray | None:
-        """Return the joint-centre errors (m, 3) for which the legs are nearest at a pose (6,); None for the design."""
+        """Return the joint-centre errors (m, 3) with the nearest legs at a pose (6,); None for the nominal robot."""
         if not self._nearer:
             return None
         between = self.between(y[None, list(self.problem.free)])
@@ -93,7 +93,7 @@ class Clearance(Number):
         return Bounds(np.where(np.isfinite(bound), bound, 0.0)[:, None], shares[:, None])
 
     def most(self, lower: FloatArray, upper: FloatArray) -> FloatArray:
-        """Return upper bounds (B,) of the distance over boxes (B, n), of the design; infinite with open loops."""
+        """Return upper bounds (B,) of the nominal robot's distance over boxes (B, n); infinite with open loops."""
         if self.examiner.second is None:
             return np.full(len(lower), np.inf)
         forms = self.examiner.second.second(lower.T, upper.T)

@@ -1,4 +1,4 @@
-"""Lower bounds of expressions over poses, for the design or for all robots within the tolerance.
+"""Lower bounds of expressions over poses, for the nominal robot or for all robots within the tolerance.
 
 Over a box of poses, an expression has a form ``g + a e_I + b e_D + d e_E + [-r, r]`` with errors ``e_E`` of joint
 centres. If the relation replaces the dependent coordinates, the values of the expression are at least
@@ -45,10 +45,10 @@ def ranges(forms: Forms, errors: int = 0) -> tuple[FloatArray, FloatArray]:
 
 
 class Expressions(Number):
-    """Expressions of the design, or of all robots within the tolerance.
+    """Bounds, over boxes, of expressions of the coordinates.
 
     Args:
-        problem: the design, or all robots within the tolerance.
+        problem: the nominal robot, or all robots within the tolerance, over the workspace.
         expressions: (K, 1) expressions of the problem's coordinates.
     """
 
@@ -82,7 +82,10 @@ class Expressions(Number):
         return found
 
     def near(self, boxes: LoopBoxes, which: NDArray[np.intp]) -> FloatArray:
-        """Return points (2, P, n) with errors along the gradient, at the middle of boxes and at a corner."""
+        """Return two points (2, P, n) for each box, both with the worst joint-centre errors.
+
+        The first point is the middle of the box, the second the corner with the smallest value to first order.
+        """
         z = self.closed(boxes.centre)
         slopes = self.slopes(z, which)
         z = self.worst(z, slopes)
@@ -96,7 +99,7 @@ class Expressions(Number):
         return self.problem.with_errors(z, np.where(sizes > _FLAT * _sizes(sizes), -parts, 0.0))
 
     def _at_corner(self, z: FloatArray, slopes: FloatArray, boxes: LoopBoxes) -> FloatArray:
-        """Return points with the pose in the corner of a box that the derivatives point to."""
+        """Return the points moved to the corner of their box with the smallest value to first order."""
         own, free = list(self.problem.independent), list(self.problem.free)
         z = z.copy()
         change = slopes[:, own] * (boxes.upper - boxes.lower)[:, own]

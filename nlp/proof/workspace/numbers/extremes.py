@@ -54,7 +54,7 @@ class NumberSearch:
     Attributes:
         gap: largest relative gap between a bound and the best known value.
         jobs: number of threads; None for all processors.
-        record: record of the searches for a proof; None without a proof.
+        record: recorder of the searches for a proof file; None without a proof.
     """
 
     gap: float = GAP
@@ -87,7 +87,7 @@ def verdict_of(
         outcome = Outcome.REFUTED if found.value < least - slack else outcome
         reason = reason or CLOSE
     if claim.uncovered:
-        # A bound for the design does not cover other robots within the tolerance; a violation refutes the claim.
+        # A bound for the nominal robot does not cover other robots within the tolerance; a violation refutes the claim.
         bound, reason = sign * math.inf, claim.uncovered
         outcome = outcome if outcome is Outcome.REFUTED else Outcome.OPEN
     return Verdict(
@@ -127,9 +127,10 @@ def prove_extreme(
     Args:
         layout: the case as expressions of the pose.
         claim: claim about the quantity.
-        search: gap, threads and record.
+        search: requested gap, threads, and recorder for a proof file.
         time_limit: seconds after which the search stops with its present bound.
-        worst: function that returns the worst robot within the tolerance at a pose; None for a claim about the design.
+        worst: function that returns the worst robot within the tolerance at a pose; None for a claim about the nominal
+            robot.
     """
     sign = claim.sense.sign
     if is_requested():
@@ -184,7 +185,7 @@ def _searched(nlp: Nlp, claim: Claim, search: NumberSearch) -> tuple[Minimum, Fl
 
 
 def _finer_gap(nlp: Nlp, claim: Claim, found: Certificate) -> float | None:
-    """Return the gap that decides a claim's limit; None if it is decided, or if the search was stopped."""
+    """Return the gap with which a search decides a claim's limit; None if decided, or after a requested stop."""
     if claim.limit is None or found.status is not CertificateStatus.PROVED:
         return None
     sign = claim.sense.sign

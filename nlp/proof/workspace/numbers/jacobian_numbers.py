@@ -82,12 +82,12 @@ class _Rows(NamedTuple):
 
 
 class _RowsNumber(Number):
-    """A quantity of J.
+    """Base class of quantities that are bounded from the rows of J.
 
     Args:
-        problem: the design, or all robots within the tolerance.
+        problem: the nominal robot, or all robots within the tolerance.
         length: length that divides moments about the platform's origin.
-        family: robots for which values are computed; if None, the robots of the problem.
+        family: robots for which values at points are computed; if None, the robots of the problem.
     """
 
     def __init__(self, problem: Problem, length: float, family: Problem | None = None) -> None:
@@ -101,9 +101,9 @@ class _RowsNumber(Number):
         return np.asarray(values_at(self._jacobian, z)[0] * self._scale)
 
     def rows(self, forms: Forms, count: int) -> _Rows:
-        """Return the rows over boxes.
+        """Return rows and norms of J over boxes.
 
-        The forms are those of the rows, column by column, followed by those of their norms.
+        ``forms`` has the forms of the rows, column by column, followed by those of their norms.
         """
         m = self.problem.posed.scaled.rows.shape[0]
         c, a, r = forms.part(slice(0, 7 * m))
@@ -126,10 +126,10 @@ class SingularValues(_RowsNumber):
     errors.
 
     Args:
-        problem: the design, or all robots within the tolerance, with errors as coordinates of each entry.
+        problem: the nominal robot, or all robots within the tolerance, where J depends on the joint-centre errors, too.
         length: length that divides moments about the platform's origin.
         is_condition: If true, bound the negative condition number; otherwise the smallest singular value.
-        family: all robots within the tolerance, if the problem covers only the design.
+        family: all robots within the tolerance, if the problem covers only the nominal robot.
         change: largest change of a singular value within the tolerance.
     """
 
@@ -157,7 +157,7 @@ class SingularValues(_RowsNumber):
         return ca.Function("slopes", [of.z, u, v], [ca.densify(ca.gradient(ca.dot(u, J @ v), of.errors))])
 
     def _worst(self, family: Problem, z: FloatArray) -> FloatArray:
-        """Return points with the joint-centre errors that are worst to first order at points (P, n) of the design."""
+        """Return points of the nominal robot (P, n) with the joint-centre errors that are worst to first order."""
         z = family.exact(z)
         if not self._has_six:
             return z
@@ -180,7 +180,7 @@ class SingularValues(_RowsNumber):
         return np.where(known, found, np.nan)[:, None]
 
     def worst(self, y: FloatArray) -> FloatArray | None:
-        """Return the joint-centre errors (m, 3) that are worst at a pose (6,) to first order; None for the design."""
+        """Return the worst joint-centre errors (m, 3) at a pose (6,), to first order; None for the nominal robot."""
         if self._family is None:
             return None
         robot = self._worst(self._family, y[None, list(self.problem.free)])[0]

@@ -54,10 +54,10 @@ class _Part(NamedTuple):
 
 
 class Motors(Number):
-    """Forces, speed and powers of one actuator; largest values are negated.
+    """Bounds of forces, speed and powers of one actuator; largest values are negated.
 
     Args:
-        problem: the design, or all robots within the tolerance.
+        problem: the nominal robot, or all robots within the tolerance.
         case: case with loads and motions.
         claims: claims about quantities of one actuator.
 
@@ -169,7 +169,10 @@ class Motors(Number):
         return np.asarray(upper)
 
     def _matrices(self, forms: Forms, count: int) -> list[Quadratics]:
-        """Return A, D, row of the leg, twist on the path, arms and wrenches of loads, and rotations, from forms."""
+        """Return matrices from forms of their entries.
+
+        In order: A, D, row of the leg, twist on the path, arms of loads, wrenches of loads, and rotations.
+        """
         ends = np.cumsum([0, *(rows * columns for rows, columns in self._shapes)]).tolist()
         errors = len(self.problem.of_errors) if count else 0
         return [
@@ -178,7 +181,10 @@ class Motors(Number):
         ]
 
     def _bounded(self, matrices: Sequence[Quadratics]) -> tuple[list[Quadratics], FloatArray]:
-        """Return the factors (1, 1) to be bounded from above, and shares (t, B) of coordinates in remainders."""
+        """Return the speeds and forces (1, 1) whose upper bounds are needed, and shares of coordinates in remainders.
+
+        The shares (t, B) are those of each coordinate in the remainders of each box.
+        """
         A, D, row, twist, arms, wrenches, _ = matrices
         every, k = solved(A, D)[:6], self._column
         x = every[:, k : k + 1]
@@ -234,7 +240,7 @@ class Motors(Number):
 
 
 def _parts_of(case: Case, claim: Claim) -> list[_Part]:
-    """Return the factors of the quantity of a claim."""
+    """Return the factors of a claim's quantity: a force, the speed, or both for a power."""
     motor, cases = claim.motor or Motor(), case.loading.cases
     if motor.number is ActuatorQuantity.SPEED:
         return [_Part()]

@@ -29,12 +29,12 @@ from .quadratic_forms import Quadratics, solved
 
 
 def with_rates(problem: Problem, cover: PathCover) -> Problem:
-    """Return the problem along a path, with rates of the pose as additional coordinates."""
+    """Return the robot along a path, with rates of the pose as additional coordinates."""
     return _with(problem, cover, ca.vertcat(SX(0, 1), *[SX.sym(f"rate{k}") for k in problem.rated]))
 
 
 def _with(problem: Problem, cover: PathCover, rates: SX) -> Problem:
-    """Return the problem with symbols of the rates as additional coordinates."""
+    """Return the robot with the given symbols of the rates as additional coordinates."""
     rated, n = problem.rated, len(problem.start) - len(problem.of_errors)
     ends = [each[:, rated] for each in cover.rates(cover.pieces)]
     largest = np.abs(np.concatenate(ends)).max(axis=0)
@@ -59,7 +59,7 @@ class PathSpeeds(Number):
     """Negative absolute speeds of actuators in the motion of a path.
 
     Args:
-        problem: the design, or all robots within the tolerance, with rates of the pose as coordinates.
+        problem: the nominal robot, or all robots within the tolerance, with rates of the pose as coordinates.
         coordinates: (K, 1) actuator coordinates, as expressions of the problem's coordinates.
     """
 

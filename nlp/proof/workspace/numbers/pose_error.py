@@ -53,7 +53,7 @@ def pose_errors(subject: Subject, leg_error: float, record: ProofRecord | None =
     Args:
         subject: robot with six straight legs.
         leg_error: largest leg-length error, length.
-        record: record of the searches for a proof.
+        record: recorder of the searches for a proof file.
     """
     legs, shortest = subject.legs, subject.shortest
     eps = leg_error + 2 * legs.tolerance
@@ -71,7 +71,7 @@ def pose_errors(subject: Subject, leg_error: float, record: ProofRecord | None =
             record.firsts[claim.name] = -found.bound
     first = PoseErrors(*(-eps * found.bound for _, found in searches))
     reach = float(np.linalg.norm(legs.platform, axis=1).max())
-    # Legs of the design may be longer than the legs of a robot within the tolerance.
+    # Legs of the nominal robot may be longer than the legs of a robot within the tolerance.
     exact = shortest + 2 * legs.tolerance if shortest > 0 else -math.inf
     whole = with_rest(first, eps, exact, reach)
     for k, (claim, (number, found)) in enumerate(zip(ERRORS, searches, strict=True)):
@@ -125,7 +125,7 @@ def with_rest(first: PoseErrors, eps: float, shortest: float, reach: float) -> P
 def displaced(legs: Legs, pose: PoseNumbers, errors: FloatArray) -> FloatArray:
     """Return the errors (2, K) of position and rotation for given leg-length errors.
 
-    They are NaN where Newton's method finds no pose with these lengths, for example near a singular pose.
+    The errors are NaN where Newton's method finds no pose with these lengths, for example near a singular pose.
 
     Args:
         legs: joint centres.

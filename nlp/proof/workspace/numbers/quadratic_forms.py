@@ -94,11 +94,11 @@ class Quadratics:
 
     @cached_property
     def size(self) -> FloatArray:
-        """Largest absolute values (n, m, B)."""
+        """Largest absolute values (n, m, B) of the entries over the boxes."""
         return np.asarray((np.abs(self.c) + self.varying + self.r) * (1 + ROUNDING))
 
     def made(self, parts: Iterable[FloatArray]) -> Quadratics:
-        """Return forms with four new arrays c, a, q and r."""
+        """Return forms with the same errors and the given arrays c, a, q and r."""
         c, a, q, r = parts
         return Quadratics(c, a, q, r, self.errors)
 
@@ -165,7 +165,7 @@ class Quadratics:
         return replace(found, c=found.c + 0.5 * t, r=found.r + ROUNDING * t)
 
     def upper(self) -> FloatArray:
-        """Return upper bounds (n, m, B); infinite where no form is known."""
+        """Return upper bounds (n, m, B) of the entries over the boxes; infinite where no form is known."""
         f, total = self.a.shape[2] - self.errors, self.c + self.r
         if not self.q.shape[2]:
             return np.asarray(total + self.varying + 4 * ROUNDING * self.size)

@@ -47,12 +47,13 @@ _POINTS, _SEED = 64, 0
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """Robot whose quantities are searched: the design, or all robots within the tolerance.
+    """Robot whose quantities are searched: the nominal robot, or all robots within the tolerance.
 
     Attributes:
         case: case with fixed dimensions.
         model: robot of the case, with closed forms in place of unknowns.
-        family: the design, or all robots within the tolerance, over the workspace; None if these robots are not judged.
+        family: the nominal robot, or all robots within the tolerance, over the workspace; None if these robots are not
+            judged.
         reason: reason why the robot is not judged; otherwise empty.
         shortest: lower bound of all leg lengths over the workspace, length.
     """
@@ -64,7 +65,10 @@ class Subject:
     shortest: float = 0.0
 
     def errors(self, vectors: FloatArray | None, *, of_legs: bool = False) -> JointErrors | None:
-        """Return joint-centre errors (m, 3) with names; with ``of_legs``, only errors of legs. None for the design."""
+        """Return joint-centre errors (m, 3) with the names of the centres; None for the nominal robot.
+
+        With ``of_legs``, ``vectors`` has only errors of leg centres; other centres have no error.
+        """
         if vectors is None or self.family is None:
             return None
         names, found = self.family.names, np.zeros((len(self.family.names), 3))
@@ -79,7 +83,7 @@ class Subject:
 
     @property
     def problem(self) -> Problem:
-        """The design over the workspace.
+        """The nominal robot over the workspace.
 
         Raises:
             NotJudgedError: the robots are not judged.
@@ -107,12 +111,12 @@ class Subject:
 
 
 def searched_extremes(subject: Subject, names: Sequence[str], search: NumberSearch) -> Iterator[Verdict]:
-    """Yield the verdicts on :func:`~.claims.searched_claims`.
+    """Yield the verdicts on leg clearances, singular values and condition numbers.
 
     Args:
         subject: the robot.
-        names: names of the requested measures; names of other kinds are ignored.
-        search: gap and record.
+        names: names of the requested quantities; other names are ignored.
+        search: requested gap, and the proof record.
     """
     for claim in searched_claims(subject.case, names):
         yield _answer(subject, claim, search)
@@ -149,15 +153,15 @@ def motor_extremes(
     speeds: Mapping[str, float] | None = None,
     record: ProofRecord | None = None,
 ) -> Iterator[Verdict]:
-    """Yield the verdicts on :func:`~.motors.motor_claims`, for each actuator and load.
+    """Yield the verdicts on forces, speeds and powers of each actuator, under each load.
 
-    Each actuator gets an equal share of the remaining time, and so does the work after all actuators.
+    Each actuator gets an equal share of the remaining time; the work after the last actuator gets one share, too.
 
     Args:
         subject: the robot.
         with_all: If false, omit quantities without limits.
         speeds: proved bounds of actuator speeds, by name of the actuator; None if speeds are searched too.
-        record: record of the searches for a proof.
+        record: recorder of the searches for a proof file.
     """
     claims = [each for each in motor_claims(subject.case) if with_all or each.limit is not None]
     known = dict(speeds or {})
@@ -183,7 +187,7 @@ def _motor_answers(
         subject: the robot.
         claims: claims about the quantities of one load, or about the speed.
         speed: proved bound of the actuator's speed; infinite without one.
-        record: record of the search for a proof.
+        record: recorder of the search for a proof file.
     """
     try:
         if subject.family is None:
@@ -234,7 +238,7 @@ def _at_most_products(claims: Sequence[Claim], every: Sequence[Minimum], speed: 
 
 
 def _asked_gap(subject: Subject, number: SingularValues | Clearance, gap: float) -> float:
-    """Return the gap of a quantity without a limit, enlarged by the width of the bound at single poses.
+    """Return the requested gap of a quantity without a limit, plus the width of its bound at single poses.
 
     A bound of the change of J exceeds the change in any single robot. Smaller boxes do not reduce this difference, so
     its largest value at a few poses is added to the gap.
@@ -248,7 +252,7 @@ def _asked_gap(subject: Subject, number: SingularValues | Clearance, gap: float)
 
 
 def _points_of_path(problem: Problem, cover: PathCover) -> FloatArray:
-    """Return coordinates (P, c) at random places of a path."""
+    """Return the coordinates (P, c) of random points of a path."""
     return problem.path_points(cover, cover.random(2 * _POINTS, np.random.default_rng(_SEED)), 0.0)
 
 

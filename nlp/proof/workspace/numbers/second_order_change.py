@@ -53,7 +53,7 @@ def second_order_change(family: Problem, expression: SX, first: float) -> float:
 
 
 def _groups(H: SX, count: int) -> list[list[int]]:
-    """Return groups of centres without second derivatives in common; H has the shape (3 m, 3 m)."""
+    """Return groups of joint centres that share no block of the second derivatives H (3 m, 3 m)."""
     rows, columns = (np.array(each, dtype=int) // 3 for each in H.sparsity().get_triplet())
     group = np.arange(count)
     for i, j in set(zip(rows.tolist(), columns.tolist(), strict=True)):
@@ -63,7 +63,7 @@ def _groups(H: SX, count: int) -> list[list[int]]:
 
 
 def _change(rule: _ChangeRule, enough: float) -> float:
-    """Return a bound of the change of a rule; a bound of at most ``enough`` ends the search."""
+    """Search all boxes of a rule; return a bound of its change. A bound of at most ``enough`` ends the search."""
     lower, upper = rule.whole.lower, rule.whole.upper
     root = Boxes(lower, upper, np.array([math.inf]), np.array([WHOLE]), np.zeros(1))
     search = Search(rule, root, whole=(upper - lower)[0], least=(0.0, 0.0), order=Order.LARGEST)

@@ -67,7 +67,7 @@ class _Combined:
         (self._leg,), self._factors, self._sign = claim.legs, np.array(claim.weights[::-1]), claim.sense.sign
 
     def refined(self, ends: list[Verdict]) -> tuple[list[Verdict], Verdict]:
-        """Return the two lengths with the gap that the limit requires, and the verdict on the combination."""
+        """Return the verdicts on both lengths, with the gap that the limit requires, and on their combination."""
         extreme = self.extreme(ends)
         while (gap := self.finer_gap(extreme, ends)) is not None:
             finer = self.lengths(gap, None)
@@ -99,7 +99,7 @@ class _Combined:
         return verdict_of(self._claim, found, end.pose, errors=errors)
 
     def reached(self, ends: Sequence[Verdict]) -> tuple[float, JointErrors | None]:
-        """Return the value for one robot at both poses, and its joint-centre errors; None for the design."""
+        """Return the value for one robot at both poses, and its joint-centre errors; None for the nominal robot."""
         poses = [each.pose for each in ends if each.pose is not None]
         if not self._legs.tolerance or len(poses) < len(ends):
             return float(self._factors @ [each.reached for each in ends]), None
@@ -154,7 +154,7 @@ class _Combined:
 
 
 def _better(one: Verdict, finer: Verdict) -> Verdict:
-    """Return the verdict with the smaller gap, with the boxes and seconds of both proofs."""
+    """Return the better of two verdicts on a length, with the boxes and seconds of both searches."""
     sign = one.sense.sign
     best = finer if sign * finer.bound <= sign * one.bound else replace(finer, bound=one.bound)
     boxes, seconds = one.boxes + finer.boxes, one.seconds + finer.seconds

@@ -64,22 +64,22 @@ _POSES, _SEED = 32, 0
 
 
 class RobotsWithinTolerance:
-    """All robots within the joint-centre tolerance; without a tolerance only the design.
+    """All robots within the joint-centre tolerance; without a tolerance only the nominal robot.
 
     Args:
         case: case with fixed dimensions.
         closed: robot of the case, with closed forms in place of unknowns.
-        design: this robot over the workspace.
+        design: the nominal robot over the workspace.
 
     Attributes:
         case: the case.
-        built: the robot with joint-centre errors as parameters.
+        built: the robot with joint-centre errors as additional parameters.
         model: the robot with closed forms in place of unknowns.
         family: the robots within the tolerance over the workspace.
         symbols: the case as expressions of one pose and of joint-centre errors.
 
     Raises:
-        NotJudgedError: joint-centre errors cannot be modelled, or remove degrees of freedom of the design.
+        NotJudgedError: joint-centre errors cannot be modelled, or remove degrees of freedom of the robot.
     """
 
     def __init__(self, case: Case, closed: ClosedForm, design: Problem) -> None:
@@ -96,7 +96,7 @@ class RobotsWithinTolerance:
 
     @cached_property
     def _design(self) -> Layout:
-        """The design as expressions of the pose."""
+        """Quantities of the nominal robot, without joint-centre errors, as expressions of the pose."""
         return design_layout(self.case, self.model, self._at)
 
     def extreme(self, claim: Claim, search: NumberSearch = DEFAULT) -> Verdict:
@@ -104,13 +104,15 @@ class RobotsWithinTolerance:
 
         Args:
             claim: claim about the quantity, in the symbols of ``symbols``.
-            search: gap, threads and record.
+            search: requested gap, threads, and recorder for a proof file.
         """
         if is_requested():
             return verdict_of(claim, Minimum(reason=why_stopped()))
         number, found = self.number(claim), None
         try:
-            if not self.family.problem.dependent and is_smooth(number):
+            # Programs have the box of a set of positions, not the set.
+            is_whole_box = self.family.problem.box.positions is None
+            if is_whole_box and not self.family.problem.dependent and is_smooth(number):
                 found = self._by_first_order(claim, number, search)
             small = _SMALL if claim.is_coordinate else 0.0
             return found or next(self._by_search([claim], search.gap, small=small, record=search.record))
@@ -136,7 +138,7 @@ class RobotsWithinTolerance:
 
         Args:
             claims: claims about the quantities, in the symbols of ``symbols``.
-            search: gap and record.
+            search: requested gap, and recorder for a proof file.
             is_enough: If true, a bound within its limit is sufficient, whatever its gap.
         """
         small = _SMALL if is_enough else 0.0
@@ -219,7 +221,7 @@ class RobotsWithinTolerance:
             is_enough: If true, a bound within its limit is sufficient, whatever its gap.
             small: length (relative to the robot's size) or angle below which the gap is relative to this value,
                 because quantities may be 0 at home.
-            record: proof record of the search; along a path, stopped searches are recorded too.
+            record: recorder for a proof file; along a path, stopped searches are recorded, too.
 
         Raises:
             UncoveredError: an expression has an operation without an interval rule.

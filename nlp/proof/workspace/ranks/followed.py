@@ -1,4 +1,4 @@
-"""Joint positions of a design along a tool path: loops are closed from one point to the next, from the start."""
+"""Joint positions of the nominal robot along a tool path: loops are closed from one point to the next."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _JUMP, _SHORTEST = 0.1, 2.0**-10
 
 
 def closed_along(problem: Problem, cover: PathCover) -> FloatArray:
-    """Return points (N, n) of the design with closed loops in the middle of segments.
+    """Return points (N, n) of the nominal robot with closed loops in the middle of segments.
 
     Where the loops cannot be closed, the row is the point of an earlier segment.
     """

@@ -66,7 +66,7 @@ _MANY, _PAIRS = 6000, 512
 
 
 class LoopBoxes(NamedTuple):
-    """B boxes.
+    """B boxes with bounds of their dependent coordinates.
 
     Attributes:
         lower, upper: (B, n) bounds of all coordinates; NaN for dependent coordinates that are not known yet.
@@ -87,7 +87,7 @@ class LoopBoxes(NamedTuple):
 
 
 class Examined(NamedTuple):
-    """Results for B boxes.
+    """Results of the examination of B boxes.
 
     Attributes:
         boxes: the boxes, with their dependent coordinates if known.
@@ -108,7 +108,7 @@ class Examined(NamedTuple):
 
 
 class Test(Protocol):
-    """A test of expressions over boxes.
+    """Interface of a test of expressions over boxes, such as the rank of a matrix.
 
     Attributes:
         entries: (R, 1) the expressions.
@@ -119,7 +119,7 @@ class Test(Protocol):
     unknown: FloatArray
 
     def examine(self, forms: Forms, f: int, errors: int) -> Tested:
-        """Return the results for boxes.
+        """Test expressions over boxes.
 
         Args:
             forms: forms of the entries.
@@ -179,7 +179,7 @@ class Examiner:
         return Encloser(self.problem.z, ca.vertcat(*entries))
 
     def examine(self, boxes: LoopBoxes) -> Examined:
-        """Examine boxes."""
+        """Enclose the dependent coordinates over boxes, and test the entries."""
         B, f, k = len(boxes.lower), len(self.of.independent), len(self.of.dependent)
         relation = no_relation(B, self.of)
         if self.second is not None and B:
@@ -384,7 +384,7 @@ def coordinates_to_split(shares: FloatArray, width: FloatArray) -> NDArray[np.in
 
 
 class Followed(NamedTuple):
-    """Data stored with the boxes of a robot.
+    """Data that a search stores with each box of a robot with closed loops.
 
     Attributes:
         near, is_known: fields of :class:`LoopBoxes`.
@@ -447,11 +447,11 @@ class LoopRule(Rule[Followed]):
         return Boxes(lower, upper, np.full(count, np.inf), np.full(count, -1), columns)
 
     def search(self, order: Order) -> Search[Rule[Followed]]:
-        """Return the search of the whole workspace in an order."""
+        """Return the search of the whole workspace, with the given order of boxes."""
         return Search(self, self.root, whole=self.whole, least=_LEAST_WIDTHS, order=order)
 
     def divided(self, boxes: Boxes[Followed]) -> Boxes[Followed]:
-        """Return the parts of boxes, with their dependent coordinates."""
+        """Return the halves (or quarters) of boxes, with bounds of their dependent coordinates."""
         if self._recorder is not None and self._problem.cover is not None:
             record_halves(self._recorder, boxes.more.along)
         elif self._recorder is not None:
@@ -482,7 +482,7 @@ class LoopRule(Rule[Followed]):
         return parts._replace(more=parts.more._replace(is_known=np.full(2 * count, not D)))
 
     def examined(self, boxes: Boxes[Followed]) -> Examined:
-        """Return the results for the boxes that contain poses of the workspace."""
+        """Examine the boxes that contain poses of the workspace."""
         inside = self._contracted(loop_boxes_of(boxes))
         found = self._examiner.examine(inside)
         # Only boxes outside the ball of rotations are dropped; a path has no ball.
@@ -517,7 +517,10 @@ class LoopRule(Rule[Followed]):
     def boxes_of(
         self, found: Examined, bound: FloatArray, split: NDArray[np.intp], more: FloatArray
     ) -> Boxes[Followed]:
-        """Return examined boxes with bounds (B,), indices (B,) of the coordinates to bisect, and the rule's arrays."""
+        """Return examined boxes as boxes of a search.
+
+        They have bounds (B,), indices (B,) of the coordinates to bisect, and the arrays of the rule.
+        """
         lower, upper, near, is_known = found.boxes
         columns = np.array(self._independent)[split]
         if self._problem.cover is not None:

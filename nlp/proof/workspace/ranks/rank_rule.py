@@ -14,8 +14,9 @@ centre of the box. Full column rank then means that the null space has d dimensi
 
 Joint-centre errors change polynomial entries, such as entries of rows of straight legs, one by one: let g_j be the
 derivative of an entry with respect to the error of centre j, and H its second derivatives with respect to all errors.
-The entry of a robot within the tolerance t differs from the entry of the design by at most ``t sum_j |g_j| + t^2 / 2
-sum |H|``. First derivatives are bounded over each box, second derivatives once over the workspace and all errors.
+The entry of a robot within the tolerance t differs from the entry of the nominal robot by at most
+``t sum_j |g_j| + t^2 / 2 sum |H|``. First derivatives are bounded over each box, second derivatives once over the
+workspace and all errors.
 """
 
 from __future__ import annotations
@@ -48,11 +49,11 @@ _POLYNOMIAL = (
 
 
 class Tested(NamedTuple):
-    """Results for B boxes.
+    """Results of a test over B boxes.
 
     Attributes:
         is_regular: (B,) whether full rank is proved.
-        shares: (B, f) share of each independent coordinate in the bound.
+        shares: (B, f) share of each independent coordinate in the overestimation of the bound.
         smallest: (B,) computed smallest singular value at the centre of the box, relative to the largest; infinite if
             unknown.
         signs: (B,) computed sign of the determinant of a square matrix at the centre of the box; 0 for other matrices.
@@ -179,7 +180,7 @@ class EntryChange:
         entries: (E, 1) polynomials in the coordinates of the family.
 
     Attributes:
-        exact: (E, 1) entries of the design, in the coordinates of the pose.
+        exact: (E, 1) entries of the nominal robot, in the coordinates of the pose.
 
     Raises:
         UncoveredError: an expression has an operation without an interval rule.
@@ -202,7 +203,7 @@ class EntryChange:
         self._bend = 0.5 * self._tolerance**2 * np.bincount(of_entry[of_slope], sizes, count)
 
     def over(self, lower: FloatArray, upper: FloatArray) -> FloatArray:
-        """Return bounds (E, B) over boxes with ends (n, B)."""
+        """Return bounds (E, B) of the changes of the entries over boxes with ends (n, B)."""
         sizes = self._slopes(lower, upper).sizes.T
         squares = np.zeros((len(self._sums), lower.shape[1]))
         np.add.at(squares, self._of_sum, sizes * sizes)

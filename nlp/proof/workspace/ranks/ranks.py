@@ -44,11 +44,11 @@ def prove_ranks(
     """Prove that J and the constraint wrenches keep their ranks at every pose of a box, or find a singular pose.
 
     Args:
-        problem: the design, or all robots within the tolerance.
+        problem: the nominal robot, or all robots within the tolerance.
         is_singular: function that tests a single pose in the home assembly mode; only such poses refute a claim.
         rank: rank of J at almost all dimensions and poses.
         progress: function that is called during the searches.
-        record: record of the searches for a proof.
+        record: recorder of the searches for a proof file.
 
     Returns:
         The verdict on J, and on the constraint wrenches if the robot has any.
@@ -77,7 +77,7 @@ def prove_ranks(
 
 
 def _refuted(verdict: Verdict, problem: Problem, at: Singular | None) -> Verdict:
-    """Return the verdict refuted by a singular pose; without a pose, the verdict stays the same."""
+    """Return a verdict as refuted by a singular pose; without a pose, the verdict stays the same."""
     if at is None:
         return verdict
     pose = problem.box.pose(at.y)
@@ -103,7 +103,7 @@ def prove_rank(
         most_boxes: number of boxes after which the search stops.
         progress: function that is called about ten times a second.
         recorder: recorder of the boxes for a proof.
-        look: function that looks for singular poses; if left out, a new :class:`.SingularSearch`.
+        look: function that searches examined boxes for singular poses; if left out, a new :class:`.SingularSearch`.
 
     Raises:
         UncoveredError: an expression has an operation without an interval rule.
@@ -178,7 +178,7 @@ class RankRule(LoopRule):
         return BoxResults(self.boxes_of(found, np.zeros(len(split)), split, found.shares), 0.0, count)
 
     def divided(self, boxes: Boxes[Followed]) -> Boxes[Followed]:
-        """Return the halves of boxes; quarters if the linear part already makes the test of a half fail."""
+        """Return the halves of boxes, or quarters if the linear part alone shows that the test of a half fails."""
         parts = super().divided(boxes)
         if self._problem.dependent:
             return parts

@@ -10,9 +10,9 @@ another, and the rows are defined along the segment between them, a pose of the 
 inverse of the rows at a pose, their determinant has the sign of det C if every row sum of ``|I - C M|`` is less than 1.
 det C is computed in integers.
 
-A robot within the joint-centre tolerance may be singular although the design is not. The method of Frank and Wolfe [1],
-with steps within the tolerance, reduces the smallest singular value by errors along its derivatives. Each iterate
-starts a search for a singular robot.
+A robot within the joint-centre tolerance may be singular although the nominal robot is not. The method of Frank and
+Wolfe [1], with steps within the tolerance, reduces the smallest singular value by errors along its derivatives. Each
+iterate starts a search for a singular robot.
 
 Source: 1. M. Frank, P. Wolfe, *An algorithm for quadratic programming*, Naval Research Logistics Quarterly 3 (1956).
 """
@@ -44,8 +44,9 @@ if TYPE_CHECKING:
 
 #: Relative singular value below which a pose counts as singular.
 SINGULAR = 1e-10
-#: Reason of a verdict with a singular pose of Newton's method.
+#: Reasons of verdicts: pose of Newton's method; change of sign where a set may not contain the line of two poses.
 BY_NEWTON = "found singular to 1e-10 by Newton's method"
+BY_SIGNS = "the determinant changes its sign at the pose, on the line between two poses"
 #: Largest number of Newton steps: where a determinant touches 0, each step halves the distance.
 _STEPS = 60
 #: Number of steps in which the smallest singular value must decrease by a tenth. At the boundary of a workspace it may
@@ -84,13 +85,13 @@ _PRODUCT = 2.0**-48
 
 
 class Singular(NamedTuple):
-    """A singular pose.
+    """Singular pose of the nominal robot, or of a robot within the tolerance.
 
     Attributes:
         y: (6,) coordinates of the pose.
         reason: method that computed the pose, if its singularity is not proved; otherwise empty.
         sides: (2, 6) two poses at which the determinant provably has opposite signs; None without such poses.
-        errors: joint-centre errors of the singular robot; None for the design.
+        errors: joint-centre errors of the singular robot; None for the nominal robot.
     """
 
     y: FloatArray
@@ -178,7 +179,7 @@ class SingularPose:
         return bool(closed and problem.box.holds(problem.pose_of(z))) and self.smallest(z) <= SINGULAR
 
     def robots(self, z: FloatArray) -> Iterator[FloatArray]:
-        """Yield points (n,) with joint-centre errors and decreasing singular values, from a point of the design."""
+        """Yield points (n,) with joint-centre errors and ever smaller singular values, from a point without errors."""
         problem, robot = self.problem, z
         for step in range(_ROBOTS):
             closed = problem.loops.all_closed(robot[:, None], problem.dependent)[:, 0]
@@ -333,13 +334,13 @@ class DeterminantSigns:
         return self._points(y)
 
     def around(self, z: FloatArray) -> FloatArray:
-        """Return random points (K, n) of the design around a point, at several distances."""
+        """Return random points (K, n) of the nominal robot around a point, at several distances."""
         y, box = self._problem.pose_of(z), self._problem.box
         away = np.random.default_rng(_SEED).uniform(-1, 1, (len(_DISTANCES), _SAMPLES, 6)) * (box.upper - box.lower)
         return self._points((y + np.array(_DISTANCES)[:, None, None] * away).reshape(-1, 6))
 
     def _points(self, y: FloatArray) -> FloatArray:
-        """Return the points (K, n) of the design at poses (K, 6) moved into the workspace."""
+        """Return the points (K, n) of the nominal robot at poses (K, 6) moved into the workspace."""
         return self._problem.exact(self._problem.box.clipped(y)[:, list(self._problem.free)])
 
 
@@ -383,7 +384,7 @@ class SingularSearch:
         self._signed: dict[int, list[FloatArray]] = {1: [], -1: []}
         self._is_sampled = False
         self._attempts, self._last, self._due = 0, _SMALL, _FIRST
-        self._count = len(problem.problem.start)  # coordinates of the design
+        self._count = len(problem.problem.start)  # coordinates of the nominal robot
 
     @cached_property
     def _newton(self) -> SingularPose:
@@ -399,7 +400,7 @@ class SingularSearch:
         return self._singular_robot(self._middle(found, worst[0]))
 
     def everywhere(self) -> Singular | None:
-        """Return the start pose, for a structure that is singular at every pose."""
+        """Return the start pose as singular pose, for a robot that is singular at every pose."""
         start = self._problem.start
         return self._shown(start, EVERYWHERE) if self._newton.smallest(start) <= SINGULAR else None
 
@@ -419,8 +420,7 @@ class SingularSearch:
         if self._is_sampled:
             return self._between(signs, found.boxes.centre, found.signs)
         self._is_sampled = True
-        points = signs.extremes()
-        values = signs.computed(points)
+        values = signs.computed(points := signs.extremes())
         between = self._between(signs, points, values)
         if between is not None or not self._problem.names:
             return between
@@ -430,14 +430,20 @@ class SingularSearch:
     def _between(
         self, signs: DeterminantSigns, points: FloatArray, values: FloatArray | NDArray[np.int32]
     ) -> Singular | None:
-        """Return a singular pose between points (K, n) with computed determinants (K,), or between earlier points."""
+        """Return a singular pose between two points with determinants of opposite sign; None without such points.
+
+        The points are (K, n) with computed determinants (K,), or points of earlier calls.
+        """
         problem = self._problem
         for sign, known in self._signed.items():
             new = points[np.sign(values) == sign][:_SIGNED]
             known[:] = [*new[problem.box.holds(problem.pose_of(new))], *known][:_SIGNED]
         for ends in itertools.product(*self._signed.values()):
-            sides = frozen_array(problem.pose_of(np.stack(ends)), (2, 6))
-            shown = self._shown(signs.change(*ends), "", sides)
+            change = signs.change(*ends)
+            sides = frozen_array(problem.pose_of(np.stack(ends)), (2, 6)) if problem.box.is_convex else None
+            if sides is None and change is not None and not problem.box.holds(problem.pose_of(change)):
+                continue
+            shown = self._shown(change, BY_SIGNS if sides is None else "", sides)
             if shown is not None:
                 return shown
         return None
@@ -458,7 +464,7 @@ class SingularSearch:
         return None
 
     def _pose(self, z: FloatArray) -> Singular | None:
-        """Return a singular pose of the design near a point; if possible between two poses with opposite signs."""
+        """Return a singular pose of the nominal robot near a point, if possible between poses with opposite signs."""
         near = self._newton.search(z, self._count)
         if near is None:
             return None
@@ -469,7 +475,7 @@ class SingularSearch:
         return between or self._shown(near, BY_NEWTON)
 
     def _singular_robot(self, z: FloatArray) -> Singular | None:
-        """Return a singular pose of a robot within the tolerance, at or near a point of the design."""
+        """Return a singular pose of a robot within the tolerance, at or near a point of the nominal robot."""
         signs, is_held = self._signs, self._problem.box.holds(self._problem.pose_of(z))
         for robot in self._newton.robots(z):
             if signs is None:
@@ -481,7 +487,10 @@ class SingularSearch:
         return None
 
     def _shown(self, z: FloatArray | None, reason: str, sides: FloatArray | None = None) -> Singular | None:
-        """Return the singular pose at a point (n,), between poses (2, 6), if it is in the home assembly mode."""
+        """Return the singular pose at a point (n,) if it is in the home assembly mode; None otherwise.
+
+        ``sides`` (2, 6) has two poses with opposite signs of the determinant.
+        """
         if z is None:
             return None
         errors = self._problem.errors_of(z)

@@ -29,7 +29,7 @@ _BLOCK = 2**15
 
 
 class Place(NamedTuple):
-    """Point of a path.
+    """Place on a path: a segment, and the parameter along this segment.
 
     Attributes:
         segment: index of the segment.
@@ -41,7 +41,7 @@ class Place(NamedTuple):
 
 
 def place_in(piece: FloatArray, part: float) -> Place:
-    """Return the place at a part, from 0 to 1, of a piece (3,) of a path."""
+    """Return the place on a path at a fraction, from 0 to 1, of a piece (3,)."""
     segment, low, high = piece.tolist()
     return Place(int(segment), low + part * (high - low) if part < 1 else high)
 
@@ -76,7 +76,7 @@ class _CircleRows(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PathCover:
-    """A path as boxes of poses.
+    """Tool path that is covered by boxes of poses, one for each piece of a segment.
 
     Attributes:
         knots: (N + 1, 3) positions in the path's frame.

@@ -7,6 +7,8 @@ Rotations have coordinates in which ``s R``, with a positive ``s``, is a polynom
 * roll, pitch and yaw: tangents of the half angles;
 * all rotations: a quaternion ``(w, x, y, z)`` of any norm but zero.
 
+Positions may lie in a set inside the box (:mod:`.position_bounds`).
+
 Ends are rounded outwards, so that the box contains every pose of the workspace.
 """
 
@@ -28,6 +30,7 @@ from ....case.pose import Free, Value, ends_of
 from ....case.workspace import TurnKind, Workspace
 from ....path.orientation import matrices_from_quaternions
 from ...statement.tolerance import PoseCoordinates
+from .position_bounds import PositionBounds, position_bounds
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -71,6 +74,7 @@ class PoseBox:
         reference: rotation with Cayley vector zero.
         dependent: indices of the dependent coordinates. Their bounds only start a search, and exclude no pose. A ball
             has only the other components.
+        positions: set of positions; None for all positions of the box.
     """
 
     kind: TurnKind
@@ -80,6 +84,21 @@ class PoseBox:
     ball: float
     reference: Reference = UNTURNED
     dependent: tuple[int, ...] = ()
+    positions: PositionBounds | None = None
+
+    @property
+    def middle(self) -> FloatArray:
+        """Pose (c,) from which searches begin: the middle of the box, or of the set of positions."""
+        y = 0.5 * self.lower + 0.5 * self.upper
+        if self.positions is not None:
+            own = self._positioned
+            y[own] = self.positions.positions.middle[own]
+        return y
+
+    @property
+    def is_convex(self) -> bool:
+        """Whether the workspace contains the line between any two of its poses."""
+        return self.positions is None or self.positions.positions.is_convex
 
     @property
     def free(self) -> tuple[int, ...]:
@@ -114,10 +133,17 @@ class PoseBox:
         """Indices of the components of the ball."""
         return [k for k in range(3, 6) if k not in self.dependent]
 
+    @property
+    def _positioned(self) -> list[int]:
+        """Indices of the independent coordinates of the position that vary."""
+        return [k for k in self.free if k < 3 and k not in self.dependent]
+
     def holds(self, y: FloatArray) -> NDArray[np.bool_]:
         """Return whether points (..., c) are provably poses of the workspace, without the outward rounding."""
         lower, upper, ball = self._inner
         inside = ((y >= lower) & (y <= upper)).all(axis=-1)
+        if self.positions is not None:
+            inside &= self.positions.holds(y[..., :3])
         return np.asarray(inside & (np.square(y[..., self._turns]).sum(axis=-1) <= ball))
 
     def rotations(self, points: FloatArray) -> FloatArray:
@@ -157,10 +183,13 @@ class PoseBox:
         return min(both, key=lambda r: float(np.maximum(self.lower[3:] - r, r - self.upper[3:]).max()))
 
     def contracted(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-        """Return boxes (B, c) contracted to the ball of rotations, and whether each contracted box is empty, (B,)."""
+        """Return boxes (B, c) contracted to the sets of positions and rotations, and whether each is empty then."""
         lower, upper = np.array(lower), np.array(upper)
+        without = np.zeros(len(lower), dtype=bool)
+        if self.positions is not None:
+            lower[:, :3], upper[:, :3], without = self.positions.contracted(lower[:, :3], upper[:, :3])
         if not self.ball < np.inf:
-            return lower, upper, np.zeros(len(lower), dtype=bool)
+            return lower, upper, without
         turns = self._turns
         low, high = lower[:, turns], upper[:, turns]
         least = np.where(low > 0, low, np.where(high < 0, -high, 0.0)) ** 2
@@ -169,7 +198,7 @@ class PoseBox:
         most = np.sqrt(np.maximum(self.ball - (whole - least) + slack, 0)) * (1 + _ULP)
         lower[:, turns], upper[:, turns] = np.maximum(low, -most), np.minimum(high, most)
         outside = (whole > self.ball + slack)[:, 0] | (lower > upper).any(axis=1)
-        return lower, np.maximum(lower, upper), outside
+        return lower, np.maximum(lower, upper), outside | without
 
     def clipped(self, points: FloatArray) -> FloatArray:
         """Return points (K, 6) moved into the workspace."""
@@ -181,16 +210,22 @@ class PoseBox:
             turns = self._turns
             sizes = np.sqrt((points[:, turns] ** 2).sum(axis=1, keepdims=True))
             points[:, turns] *= np.minimum(1.0, radius / np.maximum(sizes, radius))
+        if self.positions is not None:
+            own = self._positioned
+            points[:, own] = self.positions.clipped(points[:, :3])[:, own]
         return np.asarray(points)
 
     def random(self, count: int, rng: np.random.Generator) -> FloatArray:
-        """Return random points (count, 6) of the workspace, with rotations within the ball."""
+        """Return random points (count, 6) of the workspace."""
         points = rng.uniform(self.lower, self.upper, (count, 6))
         while math.isfinite(self.ball):
             outside = np.flatnonzero((points[:, self._turns] ** 2).sum(axis=1) > self._inner[2])
             if not outside.size:
                 break
             points[outside] = rng.uniform(self.lower, self.upper, (outside.size, 6))
+        if self.positions is not None:
+            own = self._positioned
+            points[:, own] = self.positions.random(count, rng)[:, own]
         return points
 
 
@@ -214,7 +249,9 @@ def pose_box(workspace: Workspace) -> PoseBox:
         ends[each.index] = (math.tan(each.lower / 2), math.tan(each.upper / 2)) if is_turn else (each.lower, each.upper)
     lower, upper = frozen_array(np.array(ends).T, (2, 6))
     dependent = tuple(each.index for each in workspace.dependent)
-    return PoseBox(turns.kind, frozen_array(turns.axis, (3,)), lower, upper, ball, dependent=dependent)
+    positions = position_bounds(workspace.position_set, lower[:3], upper[:3])
+    axis = frozen_array(turns.axis, (3,))
+    return PoseBox(turns.kind, axis, lower, upper, ball, dependent=dependent, positions=positions)
 
 
 def pose_coordinates(box: PoseBox) -> PoseCoordinates:
@@ -227,14 +264,23 @@ def pose_coordinates(box: PoseBox) -> PoseCoordinates:
 
 
 def scaled(workspace: Workspace, factor: float) -> Workspace:
-    """Return a workspace scaled about its centre, including angles; ranges of dependent coordinates are kept."""
+    """Return a workspace scaled about its centre, including angles; ranges of dependent coordinates are kept.
+
+    Only the radius of a set of positions is scaled.
+    """
+    positions = None if workspace.position_set is None else workspace.position_set.scaled(factor)
+    if positions is not None and positions.has_radius:
+        return replace(workspace, position=positions.box, position_set=positions)
     turns, dependent = workspace.turns, [each.index for each in workspace.dependent]
     is_ball = turns.kind is TurnKind.ANY_AXIS
     values = [
         value if k in dependent and not (is_ball and k >= 3) else _scaled(value, factor, is_ball and k >= 3)
         for k, value in enumerate((*workspace.position, *turns.angles))
     ]
-    return replace(workspace, position=tuple(values[:3]), turns=replace(turns, angles=tuple(values[3:])))
+    if positions is not None:
+        values[:3] = positions.box
+    turned = replace(turns, angles=tuple(values[3:]))
+    return replace(workspace, position=tuple(values[:3]), turns=turned, position_set=positions)
 
 
 def _scaled(value: Value, factor: float, about_zero: bool = False) -> Value:

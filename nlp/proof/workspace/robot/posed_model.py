@@ -57,15 +57,15 @@ class RankMatrix:
 
 @dataclass(frozen=True, eq=False)
 class Limbs:
-    """Rows and members of a robot at a pose, with its actuators.
+    """Robot at a pose: the rows of J, the members with their screws, and the actuators.
 
     Attributes:
         wrenches: rows of J.
         members: members, with independent screws.
         actuators: actuated joints.
-        loops: (m, k) equations of nested loops in the rates of a member's passive joints, for each member.
+        loops: for each member, matrix (m, k) of its nested-loop equations in the rates of its passive joints.
         position: (3, 1) origin of the platform, length.
-        length: length that multiplies rotations.
+        length: factor of rotations in scaled twists (v, length omega), similar to the robot's size.
     """
 
     wrenches: Sequence[Wrench]
@@ -76,12 +76,12 @@ class Limbs:
     length: float
 
     def reduced(self, columns: Sequence[Sequence[int]], rows: Sequence[Sequence[int]], length: float) -> Limbs:
-        """Return the limbs with selected screws and loop equations of each member, and another length.
+        """Return the limbs with only some screws and loop equations of each member, and with another length.
 
         Args:
             columns: indices of the kept screws of each member.
             rows: indices of the kept loop equations of each member.
-            length: length that multiplies rotations.
+            length: factor of rotations in scaled twists, length.
         """
         members = [
             replace(each, screws=each.screws[:, list(kept)], groups=())
@@ -95,7 +95,10 @@ class Limbs:
         return ca.horzcat(row.force.T, (row.moment - ca.cross(self.position, row.force)).T / self.length)
 
     def twists(self, screws: SX) -> SX:
-        """Convert twists (6, k) from (angular velocity, velocity at the world's origin) to ``(v, length omega)``."""
+        """Convert twists (6, k) from (angular velocity, velocity at the world's origin) to ``(v, length omega)``.
+
+        v is the velocity of the platform's origin.
+        """
         return scaled_twists(screws, self.position, SX(self.length), 6)
 
 
@@ -111,7 +114,7 @@ def free_matrix(limbs: Limbs) -> SX:
 
 
 def _matrix(limbs: Limbs, driven: Sequence[Actuator]) -> SX:
-    """Return the sparse matrix (m, c); its last columns are those of the driven joints."""
+    """Return the sparse matrix (m, c) of rows and members; its last columns belong to the driven joints."""
     # For each row and member: the map of the platform's twist, and the map of the passive rates to subtract.
     parts = [(row.label.member, limbs.about_platform(row), SX(6, 0)) for row in limbs.wrenches]
     for member in limbs.members:
@@ -165,7 +168,7 @@ class Chosen(NamedTuple):
         equations: indices of the kept loop equations.
         columns: indices of the kept screws of each member.
         rows: indices of the kept equations of each member's nested loops.
-        length: length that multiplies rotations, similar to the robot's size.
+        length: factor of rotations in scaled twists, similar to the robot's size.
     """
 
     equations: Sequence[int]
@@ -200,7 +203,7 @@ class PosedModel:
         return self.loops.z
 
     def plain(self, expression: SX) -> SX:
-        """Return an expression of the limbs as an expression of the search's coordinates."""
+        """Return an expression of ``limbs``, rewritten as an expression of the search's coordinates."""
         return ca.substitute(expression, self.rotation, self.turned[0])
 
     def values(self, expression: SX, z: FloatArray) -> FloatArray:

@@ -6,8 +6,8 @@ The dependent coordinates are all unknowns and, if the robot has fewer than six 
 the pose.
 
 For all robots within the joint-centre tolerance, three errors of each centre are additional coordinates, with the
-design's choice of equations and screws. Errors are never bisected: with the gradient g with respect to the error of
-one joint centre, this error changes an expression by at most ``|g|`` times the tolerance.
+nominal robot's choice of equations and screws. Errors are never bisected: with the gradient g with respect to the error
+of one joint centre, this error changes an expression by at most ``|g|`` times the tolerance.
 """
 
 from __future__ import annotations
@@ -57,25 +57,25 @@ class NotJudgedError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A robot over a workspace: the design, or all robots within the tolerance.
+    """A robot over a workspace: the nominal robot, or all robots within the tolerance.
 
     Attributes:
         box: box of poses.
         loops: k loop equations as expressions of the coordinates; joint-centre errors are the last coordinates.
         free: indices, in the box, of the varying pose coordinates; they are the first coordinates of the problem.
-        independent, dependent: indices of the independent and of the k dependent coordinates of the design.
-        start: (n,) point of the design with closed loops, at or near the middle of the workspace.
+        independent, dependent: indices of the independent and of the k dependent coordinates of the nominal robot.
+        start: (n,) point of the nominal robot with closed loops, at or near the middle of the workspace.
         locked: matrix of rows and members with locked actuators.
         unactuated: matrix of rows and members with free actuators; None for a robot without constraints.
-        posed: limbs and loop equations of the design, or of the robots within the tolerance.
+        posed: limbs and loop equations of the nominal robot, or of the robots within the tolerance.
         chosen: independent equations and screws of the model.
         names: names of the m joint centres whose errors are coordinates.
         tolerance: largest norm of each joint-centre error, length.
-        design: the nominal design, if this problem covers all robots within the tolerance; None otherwise.
+        design: the nominal robot, if this problem covers all robots within the tolerance; None otherwise.
         cover: boxes of the path; None for a box of poses.
         rates: indices of the coordinates that are rates of the pose along the path, per second, see :attr:`rated`;
             empty without rates.
-        resting: the design without rates, if this design has rates; None otherwise.
+        resting: the same robot without rates as coordinates, if this problem has rates; None otherwise.
     """
 
     box: PoseBox
@@ -97,7 +97,7 @@ class Problem:
 
     @property
     def problem(self) -> Problem:
-        """The design."""
+        """The nominal robot."""
         return self.design or self
 
     @property
@@ -127,7 +127,7 @@ class Problem:
 
     @property
     def equations(self) -> SX:
-        """Equations (k, 1) that hold where the loops are closed."""
+        """Loop equations (k, 1): expressions that are 0 where the loops are closed."""
         return self.loops.equations
 
     @property
@@ -178,7 +178,7 @@ class Problem:
         return y
 
     def exact(self, z: FloatArray) -> FloatArray:
-        """Return points (..., n) of this problem with errors of 0, from points of the design."""
+        """Return points (..., n) of this problem with errors of 0, from points of the nominal robot."""
         return np.concatenate([z, np.zeros((*z.shape[:-1], len(self.of_errors)))], axis=-1)
 
     def errors_of(self, z: FloatArray) -> JointErrors:
@@ -212,13 +212,14 @@ def build_problem(
     at: FloatArray | None = None,
     near: Callable[[], FloatArray | None] = lambda: None,
 ) -> Problem:
-    """Return a robot over a workspace.
+    """Return the nominal robot of a case over a workspace, with closed loops at the start pose.
 
     Args:
         case: case with fixed dimensions.
         model: robot of the case; some unknowns may be replaced by closed forms.
         box: box of poses.
-        at: (c,) coordinates of the start pose, where the loops are closed; the centre of the workspace if left out.
+        at: (c,) coordinates of the start pose, where the loops are closed: the first pose of a path; the centre of the
+            workspace if left out.
         near: function that returns the unknowns at the start pose in the home assembly mode; None if they are not
             known. The function is called if the straight motion from home does not reach the start pose.
 
@@ -227,7 +228,8 @@ def build_problem(
     """
     posed = posed_model(case, model, box)
     loops, count = posed.loops, len(posed.free)
-    at = 0.5 * (box.lower + box.upper) if at is None else at
+    where = "workspace centre" if at is None else "first pose of the path"
+    at = box.middle if at is None else at
     middle = np.concatenate([at[list(posed.free)], np.zeros(len(loops.size) - count)])
     start = closed_from_home(loops, middle, count)
     if start is None and (unknowns := near()) is not None:
@@ -235,7 +237,7 @@ def build_problem(
         start = loops.all_closed(middle[:, None], range(count, len(middle)), zero=DEPENDENT)[:, 0]
         start = start if loops.is_closed(start) else None
     if start is None:
-        raise NotJudgedError("no solution of the loop equations in the home assembly mode at the workspace centre")
+        raise NotJudgedError(f"found no solution of the loop equations in the home assembly mode at the {where}")
     needed = _needed(loops, start, count)
     loops = loops.some(needed)
     dependent = _dependent(loops, start, posed.free, box)
@@ -287,16 +289,16 @@ def _check_left_out(loops: Loops, start: FloatArray, dependent: tuple[int, ...],
 
 
 def family_of(case: Case, built: BuiltModel, design: Problem, tolerance: float) -> Problem:
-    """Return all robots within the joint-centre tolerance over a workspace; only the design if no error is modelled.
+    """Return all robots within the joint-centre tolerance over a workspace; the nominal robot if there are no errors.
 
     Args:
         case: case with fixed dimensions.
         built: robot of the case with joint-centre errors.
-        design: robot of the case over the workspace.
+        design: nominal robot of the case over the workspace.
         tolerance: largest error of each joint centre, length.
 
     Raises:
-        NotJudgedError: joint-centre errors remove degrees of freedom that the design has over the workspace.
+        NotJudgedError: joint-centre errors remove degrees of freedom that the nominal robot has over the workspace.
     """
     errors = ca.vertcat(SX(0, 1), *[SX.sym(f"e{k}", 3) for k in range(len(built.names))])
     whole = posed_model(case, built.model, design.box, design.z, errors)
@@ -462,7 +464,7 @@ def _rank_of(values: FloatArray) -> int:
 
 
 def steepest(slopes: FloatArray, tolerance: float) -> FloatArray:
-    """Return joint-centre errors (..., 3) along derivatives, with a tolerance as norm.
+    """Return joint-centre errors (..., 3) in the directions of derivatives, with the tolerance as norm.
 
     The errors are zero where the derivatives are zero.
     """

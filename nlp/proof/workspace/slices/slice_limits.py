@@ -57,7 +57,7 @@ class LimitState(enum.IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class SliceLimit:
-    """A limit of a slice.
+    """Limit of a case that a slice shows.
 
     Attributes:
         key: dotted key below ``limits`` in the case.

@@ -1,7 +1,7 @@
 """Slices of a box of poses: regions of proved full rank, regions beyond singular poses, and violated limits.
 
 A slice has two coordinates of the box. The other coordinates stay at the centre, or depend on these two. Boxes
-cover the slice, so its colours are proved only for poses of the slice. It is wider than the workspace, to show the
+cover the slice, so its colours are proved only for poses of the slice. A slice is wider than the workspace, to show the
 surrounding poses. If several limits are violated, a box shows the first violated limit on the straight line from the
 middle. Loops without a closed form are followed from the middle.
 """
@@ -35,6 +35,8 @@ from .slice_limits import POINTS, UNDECIDED, FirstViolated, SliceLimit, SliceLim
 _WIDER = 3.0
 #: Number of smallest boxes along each side of a slice.
 _SIDE = 256
+#: Number of points along each side of the grid for the outline of a set of positions.
+_GRID = 241
 #: Names of the coordinates of a pose, by the kind of its rotations.
 _NAMES = {
     TurnKind.ANY_AXIS: ("p_x", "p_y", "p_z", "rotation about x", "rotation about y", "rotation about z"),
@@ -75,6 +77,8 @@ class Slice:
         limits: limits that the slice shows.
         binding: (B,) index of the first violated limit of each box, or ``KEPT`` or ``UNDECIDED``.
         left_out: keys of limits that the slice does not show: limits over several poses, and limits without bounds.
+        outside: (N, N) numbers on a grid over the slice, by its first and second coordinate: negative in the set of
+            positions, positive outside; None without a set, or for rotations.
     """
 
     names: tuple[str, str]
@@ -87,6 +91,7 @@ class Slice:
     limits: tuple[SliceLimit, ...]
     binding: NDArray[np.int16]
     left_out: tuple[str, ...]
+    outside: FloatArray | None = None
 
 
 def slices_of(case: Case) -> tuple[Slice, ...]:
@@ -101,8 +106,9 @@ def slices_of(case: Case) -> tuple[Slice, ...]:
     """
     case = replace(case, joint_centre_tolerance=None)
     workspace = workspace_of_case(case)
-    # A slice shows the square around the ball of rotations.
-    wide = replace(pose_box(scaled(workspace, min(_WIDER, largest_factor(workspace)))), ball=np.inf)
+    # A slice shows the square around the ball of rotations, and around a set of positions.
+    wide = pose_box(scaled(workspace, min(_WIDER, largest_factor(workspace))))
+    wide = replace(wide, ball=np.inf, positions=None)
     robot = _Robot(case, workspace)
     turning, moving = [k for k in robot.free if k > 2], [k for k in robot.free if k < 3]
     pairs = [*itertools.combinations(moving, 2), *itertools.combinations(turning, 2)]
@@ -120,7 +126,7 @@ def slices_of(case: Case) -> tuple[Slice, ...]:
 
 
 class _Robot:
-    """A robot with its ranks and limits for slices.
+    """Robot with the examiners of its ranks and limits over the boxes of slices.
 
     Args:
         case: case with fixed dimensions.
@@ -156,7 +162,7 @@ class _Robot:
 
 
 def _slice(robot: _Robot, wide: PoseBox, pair: tuple[int, int], over_poses: tuple[str, ...]) -> Slice:
-    """Return the slice along two coordinates."""
+    """Return the slice along a pair of coordinates, covered with boxes."""
     chosen, box = list(pair), robot.problem.box
     rule = _SliceRule(robot, chosen, wide.lower[chosen], wide.upper[chosen])
     parts, region, binding = rule.cover()
@@ -180,7 +186,21 @@ def _slice(robot: _Robot, wide: PoseBox, pair: tuple[int, int], over_poses: tupl
         limits=robot.limits.limits,
         binding=binding,
         left_out=(*robot.limits.uncovered, *over_poses),
+        outside=None if any(are_angles) else _outside(box, chosen, ends[1]),
     )
+
+
+def _outside(box: PoseBox, chosen: list[int], whole: FloatArray) -> FloatArray | None:
+    """Return the numbers of :attr:`Slice.outside` over the ends (2, 2) of a slice along two coordinates."""
+    if box.positions is None:
+        return None
+    first, second = (np.linspace(low, high, _GRID) for low, high in whole.T)
+    points = np.tile(box.middle, (_GRID * _GRID, 1))
+    points[:, chosen] = np.stack(np.meshgrid(first, second, indexing="ij"), axis=-1).reshape(-1, 2)
+    size = np.maximum((box.upper - box.lower)[chosen], np.finfo(float).tiny)
+    ends = np.maximum(box.lower[chosen] - points[:, chosen], points[:, chosen] - box.upper[chosen]) / size
+    found = np.maximum(box.positions.excess(points[:, :3]), ends.max(axis=1)).reshape(_GRID, _GRID)
+    return frozen_array(found, (_GRID, _GRID))
 
 
 class _SliceRule(LoopRule):
