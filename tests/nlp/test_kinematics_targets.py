@@ -766,8 +766,12 @@ def _headers(files: dict[str, str]) -> list[str]:
 
 
 def test_every_description_says_what_is_not_checked() -> None:
+    """Titles with control characters, ends of comments and line breaks get into no file as they are."""
+    case = replace(rotary(), title="\x1b[31m red */ \n new")
     for target in set(TARGETS) - {"c", "marlin", "klipper"}:
-        text = export_kinematics(rotary(), "", target)["README.md"]
+        files = export_kinematics(case, "", target)
+        assert not [name for name, content in files.items() if "\x1b" in content or "red */" in content]
+        text = files["README.md"]
         for head in ("**Frame**", "**Zero and sense**", "**Units**", "**Not checked**", "**Proof**", "screwsynth path"):
             assert head in text, target
 

@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from ...case.case import Case
-from ...errors import InputError, nearest
+from ...errors import InputError, nearest, one_line
 from ..kinematicsfiles import generate_kinematics
 from . import arduino, firmware, klipper, klipper_patch, linuxcnc, linuxcnc_module, ros2
 
@@ -85,4 +85,9 @@ def export_kinematics(case: Case, source: str, target: str, request: Request | N
     ):
         if given and not allowed:
             raise InputError(f"{option}: is not for --target {target}; leave {option} out")
-    return {**found.write(case, of), "case.toml": source}
+    return {**{name: _printable(text) for name, text in found.write(case, of).items()}, "case.toml": source}
+
+
+def _printable(text: str) -> str:
+    """Return a text without control characters, such as those of a title."""
+    return "\n".join("\t".join(map(one_line, line.split("\t"))) for line in text.split("\n"))
