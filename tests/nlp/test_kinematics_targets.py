@@ -56,16 +56,6 @@ LINEAR_JOINTS = (
 )
 #: The same rotary Delta with millimetres as the case's unit.
 IN_MM = re.sub(r"0\.(\d{3})", lambda found: str(int(found[1])), ROTARY).replace('"m"', '"mm"')
-#: A pentapod: struts from ball joints to rings about the spindle.
-STRUT = """
-[[limb]]
-joints = [
-    {{ type = "S", at = {base} }},
-    {{ type = "P", at = {base}, axis = {axis}, actuated = true }},
-    {{ type = "R", at = {end}, axis = {tangent} }},
-    {{ type = "R", at = [0, 0, {height}], axis = "z" }},
-]
-"""
 
 
 def robot_case(text: str, folder: Path, name: str = "robot") -> Case:
@@ -173,35 +163,34 @@ def test_legs_for_linuxcnc(name: str) -> None:
         assert files["kinematics.ini"].count("MIN_LIMIT = 431.8\nMAX_LIMIT = 1092.2") == 6
 
 
-def test_pentapod_for_linuxcnc(tmp_path: Path) -> None:
-    """Rings about the spindle: the configuration returns what the robot file says, and the lengths follow."""
-    rng = np.random.default_rng(1)
-    text, bases, rings = 'name = "pentapod"\nhome = [0, 0, 0]\nlength_unit = "mm"\n', [], []
-    for k in range(5):
-        angle = 2 * math.pi * k / 5
-        u = np.array([math.cos(angle), math.sin(angle), 0.0])
-        radius, height = 80.0, 50.0 * (k + 1)
-        base, end = u * rng.uniform(400, 500) + [0, 0, rng.uniform(500, 600)], u * radius + [0, 0, height]
-        numbers = [list(map(float, each)) for each in (base, end - base, end, np.cross([0, 0, 1], u))]
-        names = dict(zip(("base", "axis", "end", "tangent"), numbers, strict=True))
-        text += STRUT.format(**names, height=height)
-        bases.append(base)
-        rings.append((radius, height))
-    case = robot_case(text, tmp_path)
+def test_pentapod_for_linuxcnc() -> None:
+    """The shipped pentapod has LinuxCNC's own dimensions, which the configuration returns; the lengths follow."""
+    case = read_robot_case("pentapod").case
+    given = {name: float(np.ravel(value)[0]) for name, value in case.parameters.items()}
     files = export_kinematics(case, "", "linuxcnc")
     own = setp(files)
-    found = np.array([[own[f"pentakins.base.{k}.{axis}"] for axis in "xyz"] for k in range(5)])
-    assert found == pytest.approx(np.array(bases), abs=1e-7)
-    assert [[own[f"pentakins.effector.{k}.{axis}"] for axis in "rz"] for k in range(5)] == pytest.approx(
-        np.array(rings), abs=1e-7
-    )
+    base = np.array([[own[f"pentakins.base.{k}.{axis}"] for axis in "xyz"] for k in range(5)])
+    rings = np.array([[own[f"pentakins.effector.{k}.{axis}"] for axis in "rz"] for k in range(5)])
+    expected = [[given[f"base_{k}_x"], given[f"base_{k}_y"], given["base_z"]] for k in range(5)]
+    assert base == pytest.approx(np.array(expected), abs=1e-8)
+    expected = [[given["effector_r"], given[f"effector_{k}_z"]] for k in range(5)]
+    assert rings - rings[0] * [0, 1] == pytest.approx(np.array(expected) - np.array(expected[0]) * [0, 1], abs=1e-8)
     assert "COORDINATES = XYZAB\n" in files["kinematics.ini"]
-    p, R = np.array([20.0, -30.0, 10.0]), matrix_of_rpy(0.1, -0.2, 0.0)
-    seen = (found - p) @ R
-    lengths = [math.hypot(math.hypot(x, y) - r, z - h) for (x, y, z), (r, h) in zip(seen, rings, strict=True)]
     robot = with_table(case, table_of(files))
+    p, R = robot.home[9:12] + np.array([20.0, -30.0, 10.0]), matrix_of_rpy(0.1, -0.2, 0.0)
+    seen = (base - p) @ R
+    lengths = [math.hypot(math.hypot(x, y) - r, z - h) for (x, y, z), (r, h) in zip(seen, rings, strict=True)]
     at = inverse(robot.case, p[None], R[None])
     assert robot.transform.coordinates(at.coordinates)[0] == pytest.approx(lengths, rel=1e-9)
+
+
+def test_shipped_printers_have_the_dimensions_of_their_source() -> None:
+    """Klipper's example files, by whose numbers the robots are shipped."""
+    own = sections(export_kinematics(read_robot_case("linear-delta").case, "", "klipper")["printer.cfg"])
+    assert (own["printer"]["delta_radius"], own["stepper_b"]["arm_length"]) == ("174.75", "333")
+    own = sections(export_kinematics(read_robot_case("rotary-delta").case, "", "klipper")["printer.cfg"])
+    assert (own["printer"]["shoulder_radius"], own["printer"]["shoulder_height"]) == ("33.9", "412.9")
+    assert (own["stepper_c"]["upper_arm_length"], own["stepper_c"]["lower_arm_length"]) == ("170", "320")
 
 
 def sections(text: str) -> dict[str, dict[str, str]]:
@@ -342,7 +331,7 @@ def test_limbs_in_another_order_get_the_joints_of_the_controller(tmp_path: Path)
         ("delta", "klipper", "its motor axes are at height 0 mm, Klipper needs them above the bed"),
         ("3-rrs", "klipper-patch", "degrees of freedom|this platform turns"),
         ("hexapod", "klipper-patch", "this one has 6 degrees of freedom and 6 motors"),
-        ("five-bar", "reprapfirmware", "degrees of freedom, a Delta 3"),
+        ("five-bar", "reprapfirmware", "2 degrees of freedom instead of 3"),
         ("three-upu", "ros2", "degrees of freedom|as many actuators as joints|forward kinematics"),
     ],
 )

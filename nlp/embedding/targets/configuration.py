@@ -6,7 +6,7 @@ The controller's formula is computed here with the numbers as they are printed, 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Literal, NamedTuple
@@ -106,18 +106,49 @@ def delta_configuration(case: Case, rules: Rules) -> Configuration:
     Raises:
         CaseError: the robot is of another kind, or the formula of the controller gives other coordinates.
     """
-    plain = Kinematics(case)
-    try:
-        samples = samples_of(plain)
+
+    def fitted(plain: Kinematics, samples: Samples) -> Configuration:
         delta = delta_of(plain, samples)
         if delta.turns != rules.turns:
-            parts = "arms that turn" if delta.turns else "carriages that slide"
-            raise OtherKindError(f"the robot has {parts}")
+            raise OtherKindError(f"the robot has {'arms that turn' if delta.turns else 'carriages that slide'}")
         if rules.equal:
             equal_rods(delta, plain)
         return _delta(case, rules, plain, delta, samples)
+
+    return _recognised(case, rules.target, rules.kind, rules.hint, fitted)
+
+
+def leg_configuration(case: Case, target: str, kind: str, hint: str) -> Configuration:
+    """Return the joints of six straight legs, in the world frame that the case states for its controller.
+
+    Raises:
+        CaseError: the robot has others.
+    """
+    return _recognised(case, target, kind, hint, lambda plain, at: _legs(case, plain, legs_of(plain, at), at))
+
+
+def strut_configuration(case: Case, target: str, kind: str, hint: str) -> Configuration:
+    """Return the joints of five struts at a spindle, in the world frame that the case states for its controller.
+
+    Raises:
+        CaseError: the robot has others.
+    """
+    return _recognised(case, target, kind, hint, lambda plain, at: _struts(case, plain, struts_of(plain, at), at))
+
+
+def _recognised(
+    case: Case, target: str, kind: str, hint: str, fitted: Callable[[Kinematics, Samples], Configuration]
+) -> Configuration:
+    """Return the configuration that a function fits to a robot and its poses near home.
+
+    Raises:
+        CaseError: the robot is of another kind.
+    """
+    plain = Kinematics(case)
+    try:
+        return fitted(plain, samples_of(plain))
     except OtherKindError as error:
-        raise refused(case, rules.target, rules.kind, str(error), rules.hint) from None
+        raise refused(case, target, kind, str(error), hint) from None
 
 
 def refused(case: Case, target: str, kind: str, fault: str, hint: str) -> CaseError:
@@ -195,35 +226,6 @@ def delta_coordinates(found: Configuration, rules: Rules, positions: FloatArray)
             down = np.arctan2(drop, outward) - np.arccos(cosine)
         columns.append((down if rules.down else -down) / found.robot.transform.degrees)
     return np.column_stack(columns)
-
-
-def leg_configuration(case: Case, target: str, kind: str, hint: str) -> Configuration:
-    """Return the joints of six straight legs, in the world frame that the case states for its controller.
-
-    Raises:
-        CaseError: the robot has others.
-    """
-    plain = Kinematics(case)
-    try:
-        samples = samples_of(plain)
-        legs = legs_of(plain, samples)
-        return _legs(case, plain, legs, samples)
-    except OtherKindError as error:
-        raise refused(case, target, kind, str(error), hint) from None
-
-
-def strut_configuration(case: Case, target: str, kind: str, hint: str) -> Configuration:
-    """Return the joints of five struts at a spindle, in the world frame that the case states for its controller.
-
-    Raises:
-        CaseError: the robot has others.
-    """
-    plain = Kinematics(case)
-    try:
-        samples = samples_of(plain)
-        return _struts(case, plain, struts_of(plain, samples), samples)
-    except OtherKindError as error:
-        raise refused(case, target, kind, str(error), hint) from None
 
 
 def _legs(case: Case, plain: Kinematics, legs: Legs, samples: Samples) -> Configuration:

@@ -111,12 +111,12 @@ def delta_of(robot: Kinematics, samples: Samples) -> Delta:
     units, size = robot.case.units, robot.size / robot.transform.scale
     drives = robot.drives
     if robot.freedoms != 3:
-        raise OtherKindError(f"the platform has {robot.freedoms} degrees of freedom, a Delta 3")
+        raise OtherKindError(f"the platform has {robot.freedoms} degrees of freedom instead of 3")
     if len(drives) != 3 or len({each.dimension for each in drives}) != 1:
-        raise OtherKindError(f"the robot has {len(drives)} actuators that turn or slide, a Delta 3 of one type")
+        raise OtherKindError(f"the robot has {len(drives)} actuators, instead of 3 that all turn or all slide")
     if robot.coordinates != (0, 1, 2) or samples.turned > TOLERANCE:
         raise OtherKindError(
-            f"the platform turns by {units.text(samples.turned, Dimension.ANGLE)} or more along a line"
+            f"the platform turns by {units.text(samples.turned, Dimension.ANGLE)} near home, and that of a Delta does not turn"
         )
     turns = drives[0].dimension is Dimension.ANGLE
     fit = _arm if turns else _carriage
@@ -278,9 +278,7 @@ def legs_of(robot: Kinematics, samples: Samples) -> Legs:
     legs, units, size = robot.robot.robot.legs, robot.case.units, robot.size / robot.transform.scale
     slides = [each.dimension is Dimension.LENGTH for each in robot.drives]
     if len(legs) != 6 or len(slides) != 6 or not all(slides):
-        raise OtherKindError(
-            f"the robot has {len(legs)} straight legs and {len(slides)} actuators, a hexapod 6 of both"
-        )
+        raise OtherKindError(f"the robot has {len(legs)} straight legs and {len(slides)} actuators instead of 6 and 6")
     centres = ca.horzcat(*[ca.vertcat(each.base, each.platform) for each in legs])
     values = np.array(ca.Function("legs", [robot.robot.z], [ca.densify(centres)])(robot.start), dtype=np.float64).T
     base, platform = values[:, :3], values[:, 3:]
@@ -304,7 +302,7 @@ def struts_of(robot: Kinematics, samples: Samples) -> Struts:
     """
     size, slides = robot.size / robot.transform.scale, [each.dimension is Dimension.LENGTH for each in robot.drives]
     if len(slides) != 5 or not all(slides):
-        raise OtherKindError(f"the robot has {len(slides)} actuators, a pentapod 5 that slide")
+        raise OtherKindError(f"the robot has {len(slides)} actuators instead of 5 that slide")
     found = [_strut(robot, samples, k, each, size) for k, each in enumerate(_drives(robot))]
     base, rings, zero, sign = (np.array(each) for each in zip(*found, strict=True))
     return Struts(base, rings, zero, sign)

@@ -59,7 +59,7 @@ def _fault(robot: Kinematics) -> str:
     turned = samples_of(robot).turned
     if robot.coordinates != (0, 1, 2) or turned > TOLERANCE:
         angle = units.text(turned, Dimension.ANGLE)
-        return f"Klipper moves robots of 3 translations: this platform turns by {angle} or more"
+        return f"Klipper moves robots of 3 translations: this platform turns by {angle} between positions near home"
     if robot.forward is None:
         return "Klipper needs forward kinematics, and the actuators of this robot do not determine the pose"
     return ""

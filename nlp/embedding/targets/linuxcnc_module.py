@@ -14,6 +14,8 @@ from .texts import frame_words, readme, zero_words
 TARGET = "linuxcnc-module"
 #: Largest number of characters of a case's name in the name of a module: HAL allows 47 in all.
 _LONGEST = 40
+#: Number of joint coordinates without a closed form from which matrices exceed the stack frames of LinuxCNC's build.
+_LARGE = 12
 
 
 def write(case: Case) -> dict[str, str]:
@@ -61,6 +63,11 @@ def write(case: Case) -> dict[str, str]:
         "Angles of joints are within half a turn of home. Out of reach, and where the robot is singular, the functions "
         "return -1 and leave their results unchanged. `kinematicsJacobian` is read only by releases that have it."
     )
+    if robot.unknowns >= _LARGE:
+        more += (
+            f" With {robot.unknowns} joint coordinates without a closed form, some functions have a stack frame of "
+            "more than 2,560 bytes, and the build warns of it."
+        )
     return {
         f"{module}.c": fill_template("targets/linuxcnc.c.in", texts),
         "kinematics.ini": ini,
