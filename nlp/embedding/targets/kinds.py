@@ -115,9 +115,8 @@ def delta_of(robot: Kinematics, samples: Samples) -> Delta:
     if len(drives) != 3 or len({each.dimension for each in drives}) != 1:
         raise OtherKindError(f"the robot has {len(drives)} actuators, instead of 3 that all turn or all slide")
     if robot.coordinates != (0, 1, 2) or samples.turned > TOLERANCE:
-        raise OtherKindError(
-            f"the platform turns by {units.text(samples.turned, Dimension.ANGLE)} near home, and that of a Delta does not turn"
-        )
+        turned = units.text(samples.turned, Dimension.ANGLE)
+        raise OtherKindError(f"the platform turns by {turned} near home, and that of a Delta does not turn")
     turns = drives[0].dimension is Dimension.ANGLE
     fit = _arm if turns else _carriage
     limbs = tuple(fit(robot, samples, k, each.axis, size) for k, each in enumerate(_drives(robot)))
