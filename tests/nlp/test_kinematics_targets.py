@@ -129,7 +129,7 @@ def test_rotary_delta_for_linuxcnc() -> None:
     assert ini.count("TYPE = ANGULAR") == ini.count("\nHOME = 20\n") == 3
     robot = with_table(rotary(), table_of(files))
     for position, joints in ROTARY_JOINTS:
-        assert joints_at(robot, np.array([position], float))[0] == pytest.approx(joints, abs=2e-11)
+        assert joints_at(robot, np.array([position], float))[0] == pytest.approx(joints, abs=2e-12)
 
 
 def test_linear_delta_for_linuxcnc(linear: Case) -> None:
@@ -137,7 +137,7 @@ def test_linear_delta_for_linuxcnc(linear: Case) -> None:
     assert setp(files) == {"lineardeltakins.R": 130.25, "lineardeltakins.L": 269}
     robot = with_table(linear, table_of(files))
     for position, joints in LINEAR_JOINTS:
-        assert joints_at(robot, np.array([position], float))[0] == pytest.approx(joints, abs=2e-11)
+        assert joints_at(robot, np.array([position], float))[0] == pytest.approx(joints, abs=2e-12)
 
 
 @pytest.mark.parametrize("name", ["hexapod-linuxcnc", "6-ups"])
@@ -218,7 +218,7 @@ def test_rotary_delta_for_klipper() -> None:
     # LinuxCNC (x, y) is (y, -x) of the case.
     for (x, y, z), joints in ROTARY_JOINTS:
         found = np.degrees(joints_at(robot, np.array([[-y, x, z + 20.0]])))[0]
-        assert found == pytest.approx(-np.array(joints), abs=2e-11)
+        assert found == pytest.approx(-np.array(joints), abs=2e-12)
 
 
 def test_linear_delta_for_klipper_marlin_and_reprapfirmware(linear: Case) -> None:
@@ -318,7 +318,7 @@ def test_limbs_in_another_order_get_the_joints_of_the_controller(tmp_path: Path)
     robot = with_table(case, table_of(files))
     for position, joints in ROTARY_JOINTS:
         found = joints_at(robot, np.array([position], float))[0]
-        assert found[[0, 2, 1]] == pytest.approx(joints, abs=2e-11)
+        assert found[[0, 2, 1]] == pytest.approx(joints, abs=2e-12)
 
 
 @pytest.mark.parametrize(
@@ -407,7 +407,7 @@ def test_module_of_linuxcnc(tmp_path: Path) -> None:
     for position, joints in ROTARY_JOINTS:
         status, found = module.inverse(*map(float, position))
         assert (status, found[3]) == (0, -77.0)
-        assert found[:3] == pytest.approx(joints, abs=2e-11)
+        assert found[:3] == pytest.approx(joints, abs=2e-12)
         status, pose = module.forward(found, 0.0, 0.0, -9.0)
         assert status == 0
         assert pose == pytest.approx([*position, 0, 0, 0], abs=1e-9)
@@ -792,3 +792,17 @@ def test_command_line_of_targets(cli: Run, tmp_path: Path) -> None:
 def test_unknown_target() -> None:
     with pytest.raises(InputError, match="is no target"):
         export_kinematics(rotary(), "", "grbl")
+
+
+def test_inches_for_linuxcnc() -> None:
+    files = export_kinematics(rotary('[controller]\nlength = "in"\n'), "", "linuxcnc")
+    assert setp(files)["rotarydeltakins.thighlength"] == pytest.approx(10 / 25.4, rel=1e-11)
+    assert "LINEAR_UNITS = inch\n" in files["kinematics.ini"]
+    robot = with_table(rotary(), table_of(files))
+    for position, joints in ROTARY_JOINTS:
+        assert joints_at(robot, np.array([position], float) / 25.4)[0] == pytest.approx(joints, abs=1e-8)
+
+
+def test_a_free_dimension_is_refused(cli: Run, tmp_path: Path) -> None:
+    words = ("codegen", "pick-and-place", "--kinematics", "--target", "linuxcnc", "--out", str(tmp_path / "out"))
+    assert "robot.parameters" in refusal_of(cli(*words))
