@@ -4,24 +4,22 @@ Expected numbers are those of LinuxCNC's modules, or of geometry by bisection, a
 `nlp/embedding/targets`.
 """
 
-import ctypes
-import importlib
 import math
 import re
 import shutil
 import subprocess
-import sys
 import tomllib
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from builders import Array, Run, refusal_of, turn_about
-from generated import COMPILERS, needs_compiler, run
+from controller_programs import HEADERS, Module, Stepper, klipper, tool_head
+from generated import needs_compiler, run
 from kinematics_library import typical_case
 from test_kinematics_c import ANKLE, LINEAR, ROTARY, case_of
 
@@ -35,12 +33,7 @@ from screwsynth.nlp.units import Units
 
 pytestmark = needs_compiler
 
-HEADERS = Path(__file__).parents[1] / "controllers"
-#: Flags of LinuxCNC's build, and the functions that its real-time mathematics declares.
-LINUXCNC = [
-    "-std=gnu11", "-O2", "-Wall", "-Wextra", "-Werror", "-Wframe-larger-than=2560", "-fno-builtin-sin",
-    "-fno-builtin-cos", "-fno-builtin-sincos",
-]  # fmt: skip
+#: Functions that the mathematics of LinuxCNC's real-time kernel declares.
 LIBM = {
     "sin", "cos", "tan", "sqrt", "fabs", "atan", "atan2", "asin", "acos", "exp", "pow", "fmin", "fmax", "fmod", "round",
     "ceil", "floor",
@@ -357,45 +350,6 @@ def test_a_parallelogram_is_a_delta_too() -> None:
     )
 
 
-class Pose(ctypes.Structure):
-    """LinuxCNC's EmcPose."""
-
-    _fields_ = [(name, ctypes.c_double) for name in "xyzabcuvw"]
-
-
-class Module:
-    """Kinematics module of LinuxCNC, compiled and called from Python."""
-
-    def __init__(self, case: Case, folder: Path) -> None:
-        files = export_kinematics(case, "", "linuxcnc-module")
-        (self.source,) = (name for name in files if name.endswith(".c"))
-        (folder / self.source).write_text(files[self.source], encoding="utf-8")
-        flags = [*LINUXCNC, f"-I{HEADERS / 'linuxcnc'}"]
-        run(COMPILERS[0], *flags, "-c", self.source, "-o", "module.o", where=folder)
-        shown = run("nm", "-u", "module.o", where=folder).split()
-        self.needed = set(shown) - {"U"}
-        same = "(int c) { return c; }"
-        hal = f"int hal_init(const char *n) {{ return n != 0; }} int hal_ready{same} int hal_exit{same}"
-        (folder / "hal.c").write_text(hal, encoding="utf-8")
-        run(COMPILERS[0], *flags, "-shared", "-fPIC", self.source, "hal.c", "-lm", "-o", "module.so", where=folder)
-        self.loaded = ctypes.CDLL(str(folder / "module.so"))
-        assert self.loaded.rtapi_app_main() == 0
-        self.count = len(Kinematics(case).drives)
-
-    def inverse(self, *words: float) -> tuple[int, Array]:
-        joints = np.full(16, -77.0)
-        return self.loaded.kinematicsInverse(ctypes.byref(Pose(*words)), joints.ctypes, None, None), joints
-
-    def forward(self, joints: Array, *guess: float) -> tuple[int, Array]:
-        pose = Pose(*guess)
-        status = self.loaded.kinematicsForward(joints.ctypes, ctypes.byref(pose), None, None)
-        return status, np.array([getattr(pose, each) for each in "xyzabc"])
-
-    def jacobian(self, *words: float) -> tuple[int, Array]:
-        found = np.full((16, 9), -77.0)
-        return self.loaded.kinematicsJacobian(None, ctypes.byref(Pose(*words)), found.ctypes, None), found
-
-
 TABLE = "[controller]\nzero = 20\nrpy = [0, 0, 90]\n"
 
 
@@ -453,52 +407,6 @@ def test_module_of_linuxcnc_with_rotations(name: str, tmp_path: Path) -> None:
             assert rates[: module.count, k] == pytest.approx(slope, abs=1e-6 * size)
 
 
-def klipper(case: Case, folder: Path, patch: pytest.MonkeyPatch) -> tuple[ctypes.CDLL, ModuleType, str]:
-    """Return Klipper's step generator as a library, and its class as a module."""
-    files = export_kinematics(case, "", "klipper-patch")
-    (source,) = (name for name in files if name.endswith(".c"))
-    name = source.removeprefix("kin_").removesuffix(".c")
-    for file in (source, f"{name}.py"):
-        (folder / file).write_text(files[file], encoding="utf-8")
-    flags = f"-O2 -Wall -Wextra -Werror -shared -fPIC -I{HEADERS / 'klipper'}".split()
-    run("gcc", *flags, source, "-lm", "-o", "steps.so", where=folder)
-    library = ctypes.CDLL(str(folder / "steps.so"))
-    getattr(library, f"{name}_stepper_alloc").restype = ctypes.c_void_p
-    declared = re.findall(r"^    .*?(\w+)\(.*\);$", files["chelper.patch.md"], re.MULTILINE)
-    assert len(declared) == 3
-    assert all(hasattr(library, each) for each in declared)
-    for path in (HEADERS / "klipper", folder):
-        patch.syspath_prepend(str(path))
-    for module in ("chelper", "stepper", name):
-        patch.delitem(sys.modules, module, raising=False)
-    importlib.import_module("chelper").libraries.append(library)
-    return library, importlib.import_module(name), name
-
-
-def tool_head(home: Array) -> tuple[Any, Any]:
-    """Return Klipper's tool head and configuration, as far as kinematics need them."""
-    values = {"homing_start": home.tolist(), "position_min": [-50.0] * 3, "position_max": [50.0] * 3}
-    config = SimpleNamespace(
-        getsection=lambda name: name,
-        get_printer=lambda: SimpleNamespace(register_event_handler=lambda *_: None),
-        getfloat=lambda _name, default, **_: default,
-        getfloatlist=lambda name, **_: values[name],
-        error=ValueError,
-    )
-    head = SimpleNamespace(get_trapq=lambda: None, get_max_velocity=lambda: (100.0, 1000.0), Coord=lambda *each: each)
-    return head, config
-
-
-class Stepper(ctypes.Structure):
-    """Head of Klipper's struct stepper_kinematics in our header."""
-
-    _fields_ = [
-        ("commanded", ctypes.c_double),
-        ("flags", ctypes.c_int),
-        ("callback", ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_double)),
-    ]
-
-
 @pytest.mark.skipif(not shutil.which("gcc"), reason="gcc is not installed")
 @pytest.mark.parametrize("name", ["rotary", "uneven"])
 def test_step_generator_of_klipper(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -551,94 +459,6 @@ def test_step_generator_of_klipper(name: str, tmp_path: Path, monkeypatch: pytes
     assert kinematics.get_status(0.0)["homed_axes"] == "xyz"
 
 
-DRIVER = """
-#include <cmath>
-#include <cstdio>
-#include <cstdlib>
-#include <limits>
-#include "PACKAGE/transmission.hpp"
-
-using namespace transmission_interface;
-namespace own = PACKAGE;
-
-static double uniform() { return 2.0 * std::rand() / RAND_MAX - 1.0; }
-
-int main() {
-  const int n = COUNT;
-  /* Alphabetical order of the names is the reverse of the order of the roles. */
-  hardware_interface::TransmissionInfo info;
-  info.name = "test";
-  for (int i = n - 1; i >= 0; --i) {
-    info.joints.push_back({std::string("j") + char('z' - i), JOINTS[i]});
-    info.actuators.push_back({std::string("m") + char('z' - i), ACTUATORS[i]});
-  }
-  own::CLASSLoader loader;
-  std::shared_ptr<Transmission> found = loader.load(info);
-  if (!found || found->num_joints() != COUNT) return 1;
-  own::CLASS & own_class = dynamic_cast<own::CLASS &>(*found);
-  double j[3][COUNT] = {}, m[3][COUNT] = {};
-  const char * const names[] = {"velocity", "effort", "position"};
-  const int index[] = {1, 2, 0};
-  std::vector<JointHandle> joints;
-  std::vector<ActuatorHandle> actuators;
-  for (int i = n - 1; i >= 0; --i)
-    for (int k = 0; k < 3; ++k) {
-      joints.emplace_back(std::string("j") + char('z' - i), names[k], &j[index[k]][i]);
-      actuators.emplace_back(std::string("m") + char('z' - i), names[(k + 1) % 3], &m[index[(k + 1) % 3]][i]);
-    }
-  joints.emplace_back("another", "position", &j[0][0]);
-  found->configure(joints, actuators);
-  const double home[] = {HOME}, spread[] = {SPREAD};
-  double power = 0.0, back = 0.0;
-  for (int state = 0; state < 1000; ++state) {
-    double given[3][COUNT];
-    for (int i = 0; i < n; ++i) {
-      given[0][i] = j[0][i] = home[i] + spread[i] * uniform();
-      given[1][i] = j[1][i] = spread[i] * uniform();
-      given[2][i] = j[2][i] = uniform() / spread[i];
-    }
-    found->joint_to_actuator();
-    if (own_class.fault()) return 2;
-    double by_joints = 0.0, by_motors = 0.0, size = 0.0;
-    for (int i = 0; i < n; ++i) {
-      by_joints += j[1][i] * j[2][i];
-      by_motors += m[1][i] * m[2][i];
-      size += std::fabs(j[1][i] * j[2][i]) + std::fabs(m[1][i] * m[2][i]);
-      if (state == 0) std::printf("%.17g %.17g\\n", j[0][i], m[0][i]);
-    }
-    power = std::fmax(power, std::fabs(by_joints - by_motors) / size);
-    for (int i = 0; i < n; ++i) j[0][i] = j[1][i] = j[2][i] = -77.0;
-    found->actuator_to_joint();
-    if (own_class.fault()) return 3;
-    for (int i = 0; i < n; ++i) {
-      back = std::fmax(back, std::fabs(j[0][i] - given[0][i]) / spread[i]);
-      back = std::fmax(back, std::fabs(j[1][i] - given[1][i]) / spread[i]);
-      back = std::fmax(back, std::fabs(j[2][i] - given[2][i]) * spread[i]);
-    }
-  }
-  std::printf("%.3g %.3g\\n", power, back);
-  const double last = m[0][0], bad[] = {std::numeric_limits<double>::quiet_NaN(), FARTHEST};
-  for (int k = 0; k < 2; ++k) {
-    const double good = j[0][0], before = m[0][0];
-    j[0][0] = bad[k];
-    found->joint_to_actuator();
-    if (!own_class.fault() || m[0][0] != before) return 4;
-    j[0][0] = good;
-    found->joint_to_actuator();
-    if (own_class.fault() || std::fabs(m[0][0] - last) > 1e-9) return 5;
-    const double kept = j[0][0], motor = m[0][0];
-    m[0][0] = bad[0];
-    found->actuator_to_joint();
-    if (!own_class.fault() || j[0][0] != kept) return 6;
-    m[0][0] = motor;
-  }
-  if (own_class.faults() != 4) return 7;
-  info.joints.pop_back();
-  return loader.load(info) ? 8 : 0;
-}
-"""
-
-
 @pytest.mark.skipif(not shutil.which("g++"), reason="g++ is not installed")
 @pytest.mark.parametrize("name", ["ankle", "delta", "3-rrs"])
 def test_transmission_of_ros2_control(name: str, tmp_path: Path) -> None:
@@ -680,7 +500,9 @@ def test_transmission_of_ros2_control(name: str, tmp_path: Path) -> None:
         "FARTHEST": "2.5" if name == "ankle" else "1e6",
         "SPREAD": ", ".join(map(repr, map(float, spread))),
     }
-    text = re.sub("|".join(names), lambda found: names[found[0]], DRIVER)
+    text = re.sub(
+        "|".join(names), lambda found: names[found[0]], (HEADERS / "ros2/driver.cpp").read_text(encoding="utf-8")
+    )
     (tmp_path / "driver.cpp").write_text(text, encoding="utf-8")
     warnings = ["-O1", "-Wall", "-Wextra", "-Werror", f"-I{HEADERS / 'ros2'}", "-Iinclude", "-Isrc"]
     sources = [file for file in files if file.endswith(".c")]
