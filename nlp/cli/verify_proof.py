@@ -120,7 +120,7 @@ def _hold_path(
     stated = case.path if is_own and along is None and given.of_case else None
     if along is None and stated is None:
         if choices.is_any:
-            raise InputError("--along: is missing: it names the tool path that the other options describe")
+            raise InputError("--along: is missing: give the tool path to which the other options apply")
         return False
     own = choices.over(PathOptions() if stated is None else options_of(stated))
     file = along if stated is None else str(stated.name)

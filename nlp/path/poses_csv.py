@@ -48,7 +48,8 @@ def read_poses(text: str, source: str, units: Units, options: PathOptions) -> Pr
     knots = np.hstack([table.block("x y z"), _angles(table, units)])
     if len(knots) < 2:
         raise InputError(
-            f"{source}: there is no path: fewer than two points; expected a first row with the names of the columns, then two or more rows"
+            f"{source}: there is no path: fewer than two points; "
+            "expected a first row with the names of the columns, then two or more rows"
         )
     path = ProgrammedPath(
         source,

@@ -320,7 +320,7 @@ def test_legs_and_built_rows_that_fit_no_limb_are_refused() -> None:
         replace(sound, legs=(*sound.legs, models.Leg("x", SX.zeros(3), SX.zeros(3))))
     with pytest.raises(ModelError, match=r"legs .* must be in the order of their forces"):
         replace(sound, legs=sound.legs[::-1])
-    with pytest.raises(ModelError, match="rows with joint-centre errors"):
+    with pytest.raises(ModelError, match="built must have the same limbs and kinds"):
         replace(sound, built=sound.built[1:])
     with pytest.raises(ModelError, match="leg 1- base should have shape"):
         replace(sound, legs=(models.Leg("1-", SX.zeros(2), SX.zeros(3)),))

@@ -321,7 +321,7 @@ def test_errors_of_legs_are_those_of_the_command(cli: Run, folder: Path) -> None
     for other in (-0.019999999999, 0.0, 0.0099999999, 0.02):
         code, out, err = checked(cli, folder, "machines", with_value(content, ("premises", "leg_error"), other))
         assert (code, out) == (1, "")
-        assert "see --leg-error" in err
+        assert "but --leg-error is 0.01" in err
     case, proof = str(folder / "machines.toml"), str(folder / "machines.json")
     code, out, err = cli("verify-proof", proof, case)
     assert (code, out) == (1, "")

@@ -54,7 +54,7 @@ def test_shipped_cases_at_their_last_pose(name: str) -> None:
     solution = solve(load_case(name), starts=2)
     count = solution.case.pose_count
     assert Tree(export_robot(solution, ["mjcf"], pose=count)["robot.xml"], 50.0).open <= 1e-9
-    with pytest.raises(InputError, match=f"--pose {count + 1}: the case has {count} pose"):
+    with pytest.raises(InputError, match=f"--pose {count + 1}: no such pose; the case has {count} pose"):
         export_robot(solution, ["mjcf"], pose=count + 1)
     with pytest.raises(InputError, match="--format step: no such format"):
         export_robot(solution, ["step"])

@@ -316,8 +316,12 @@ def test_other_paths_are_rejected(proof: Proof) -> None:
     def carrying(given: Proof, **changes: object) -> Proof:
         return replace(given, premises=replace(premises, **changes))  # type: ignore[type-var, arg-type]
 
-    assert "segment 3 between" in rejected(carrying(lengths, text=edited(TIMED, ("4,3,4", "4,30,4"))), machine())
-    assert "segment 2 between" in rejected(carrying(speeds, text=edited(TIMED, ("4,3,3", "4,3,2.02"))), machine())
+    assert "on segment 3, for parameters" in rejected(
+        carrying(lengths, text=edited(TIMED, ("4,3,4", "4,30,4"))), machine()
+    )
+    assert "on segment 2, for parameters" in rejected(
+        carrying(speeds, text=edited(TIMED, ("4,3,3", "4,3,2.02"))), machine()
+    )
     rows = TIMED.splitlines()
     swapped = "\n".join([*rows[:2], rows[3].replace(",3,3", ",3,0.1"), rows[2], rows[4]])
     assert "segment 1 between" in rejected(carrying(speeds, text=swapped), machine())
@@ -333,8 +337,8 @@ def test_other_paths_are_rejected(proof: Proof) -> None:
 def test_claims_of_another_case_or_left_out_are_rejected(proof: Proof) -> None:
     fewer = hexapod(limits=LIMITS | {"leg_length": {"max": 43}}, load=LOAD)
     assert "does not satisfy" in rejected(proof, hexapod(limits=LIMITS | {"leg_length": {"max": 30}}, load=LOAD))
-    assert "each claim of the case exactly once" in rejected(proof, hexapod(limits=LIMITS))
-    assert "each claim of the case exactly once" in rejected(replace(proof, unproved=proof.unproved[1:]), machine())
+    assert "each claim of its case exactly once" in rejected(proof, hexapod(limits=LIMITS))
+    assert "each claim of its case exactly once" in rejected(replace(proof, unproved=proof.unproved[1:]), machine())
     assert verified(alone(proof, "leg_length limb 1-", "max"), fewer).claims
     assert "the proof has no claims" in rejected(replace(proof, claims=()), machine())
 
@@ -385,8 +389,8 @@ def test_a_singular_pose_of_a_path_is_proved_by_two_places() -> None:
         (((0.0,), (0.1,)), "opposite signs"),
         (((low,), (2.5,)), "a pose that the proof states is outside the workspace"),
         (((low,),), "must state two poses"),
-        (((low,), (high, 0.0)), "the claim is about the robot without one"),
-        (((low,), (1.5,)), "change continuously"),
+        (((low,), (high, 0.0)), "for robots within a joint-centre tolerance, but the case has no tolerance"),
+        (((low,), (1.5,)), "changes continuously"),
     ):
         assert words in rejected(with_claim(given, "regular", "", sides=sides), case)
     tree = bytes([Node.BOUNDED] * 2)
@@ -516,4 +520,4 @@ def test_a_path_of_a_case_is_held_to_its_file(cli: Run, tmp_path: Path) -> None:
     assert (code, "--along" in said) == (1, True)
     saved(poses, "x,y,z\n0,0,20\n1,0,22\n")
     code, _, said = cli("verify-proof", str(out), str(case))
-    assert (code, "another path" in said) == (1, True)
+    assert (code, "another tool path" in said) == (1, True)

@@ -137,7 +137,9 @@ def test_another_tolerance_is_rejected(proof: Proof) -> None:
     assert "does not satisfy" in rejections(proof, smaller)("leg_length limb 2-", "max")
     reject = rejections(stating(proof, joint_centre=0.0), without)
     assert "its expressions or bounds differ" in reject("F", "max")
-    assert "the claim is about the robot without one" in reject("actuator.stroke_max limb 2+", "max")
+    assert "for robots within a joint-centre tolerance, but the case has no tolerance" in reject(
+        "actuator.stroke_max limb 2+", "max"
+    )
 
 
 def value_of(name: str, sense: str, number: float) -> float:
@@ -181,7 +183,7 @@ def test_other_lemmas_and_directions_are_rejected(proof: Proof) -> None:
     turned = (stroke.sides[0], (0.0, 0.6, 0.8))
     assert "its expressions or bounds differ" in reject(name, "max", sides=turned)
     assert "must state two directions" in reject(name, "max", sides=turned[:1])
-    assert "not a valid reason" in reject("F", "max", reason="one machine")
+    assert "cannot be proved by the reason" in reject("F", "max", reason="one machine")
     # Of no leg is a length known.
     assert "have no proof" in reject("smallest_singular_value", "min")
 

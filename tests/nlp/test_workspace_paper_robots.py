@@ -83,7 +83,7 @@ def test_reachy_mini_tampered_with_is_rejected(reachy: Proved) -> None:
     assert "ends" in rejected(only(proof, "regular", tree=tree[:-1]), case)
     assert "not outside" in rejected(only(proof, "regular", tree=bytes([Node.OUTSIDE])), case)
     moved = node_bytes(Node.CUT, tree[1], value=2.0) + tree[10:]
-    assert "outside of it" in rejected(only(proof, "regular", tree=moved), case)
+    assert "outside this box" in rejected(only(proof, "regular", tree=moved), case)
     assert "must state two poses" in rejected(only(proof, "regular", reason="singular"), case)
     bound = claim(proof, "reach limb stewart_1").bound
     # Programs maximise: a reach of at least b is a bound of -b.
@@ -183,7 +183,7 @@ def test_boxes_with_another_assembly_do_not_belong_together() -> None:
     lower, upper = whole.lower.copy(), whole.upper.copy()
     D = shown.assembly.dependent
     lower[0, D], upper[0, D] = lower[0, D] + 0.5, upper[0, D] + 0.5
-    with pytest.raises(ProofError, match="assembly mode of the start"):
+    with pytest.raises(ProofError, match="assembly mode of the workspace centre"):
         shown.assembly.refuse_apart(whole._replace(lower=lower, upper=upper))
 
 

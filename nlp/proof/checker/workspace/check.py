@@ -167,7 +167,7 @@ def _check(proof: Proof, begun: Callable[[], _Checker]) -> VerifiedWorkspace:
         name = " ".join(min(wrong)).strip() if wrong else ""
         fault = "lacks the claim" if wrong and min(wrong) in expected else "has the additional claim"
         found = f"the proof {fault} {name}" if wrong else "a claim occurs twice in the proof"
-        raise ProofError(f"{found}; it must have each claim of this case exactly once")
+        raise ProofError(f"{found}; a proof must have each claim of its case exactly once")
     refuse_other_lemmas(proof.lemmas, checker.expected)
     claims = []
     for key in (each for each in expected if each in given):
