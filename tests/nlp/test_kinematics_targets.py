@@ -291,9 +291,7 @@ def test_kinds_do_not_depend_on_the_unit_of_length(unit: str, tmp_path: Path) ->
     own = setp(export_kinematics(case, "", "linuxcnc"))
     assert own["rotarydeltakins.thighlength"] == pytest.approx(10 * scale, rel=1e-7)
     case = robot_case(delta_text((0, 120, 240), (0, 1e-3, 0), unit), tmp_path, "uneven")
-    fault = (
-        rf'uneven.toml: --target = "linuxcnc": .* the arm of arm b1 has 10\.0009\d* {unit}, not 10 {unit}; linuxcnc-m'
-    )
+    fault = rf'uneven.toml: --target = "linuxcnc": .* the arm of arm b1 has a length of 10\.0009\d* {unit}, but the first limb has 10 {unit}; linuxcnc-m'
     with pytest.raises(CaseError, match=fault):
         export_kinematics(case, "", "linuxcnc")
     # Klipper has an arm length for each limb.
@@ -319,7 +317,7 @@ def test_limbs_in_another_order_get_the_joints_of_the_controller(tmp_path: Path)
     [
         ("6-rss", "linuxcnc", "the robot has 0 straight legs and 6 actuators"),
         ("orthoglide", "linuxcnc", r"the rail of 1 is inclined by 90 deg, but the rails of a Delta are vertical"),
-        ("3-rrs", "klipper", "the platform turns by|the platform has 3 degrees"),
+        ("3-rrs", "klipper", "the platform rotates by|the platform has 3 degrees"),
         ("delta", "marlin", "the robot has arms that turn; arduino"),
         ("delta", "klipper", "its motor axes are at height 0 mm, but Klipper needs motor axes above the bed"),
         ("3-rrs", "klipper-patch", "degrees of freedom|this platform turns"),

@@ -295,7 +295,7 @@ def test_a_bound_beyond_the_limit_is_rejected(proof: Proof) -> None:
         (b"", "ends before every box"),
         (bytes([Node.BOUNDED] * 2), "ends before every box"),
         (bytes([Node.BOUNDED] * 4), "additional data after its last box"),
-        (bytes([Node.BOUNDED] * 2 + [Node.OUTSIDE]), "a node OUTSIDE where only HALF or CUT or BOUNDED is allowed"),
+        (bytes([Node.BOUNDED] * 2 + [Node.OUTSIDE]), "a node OUTSIDE where only HALF, CUT or BOUNDED is allowed"),
         (node_bytes(Node.HALF, 1) + bytes([Node.BOUNDED] * 4), "variable 1, which does not exist"),
         (node_bytes(Node.CUT, 0, value=1.5) + bytes([Node.BOUNDED] * 4), "cuts a box at 1.5, a value outside this box"),
         (node_bytes(Node.CUT, 0, value=math.nan) + bytes([Node.BOUNDED] * 4), "cuts a box at nan"),
@@ -324,7 +324,7 @@ def test_other_paths_are_rejected(proof: Proof) -> None:
     )
     rows = TIMED.splitlines()
     swapped = "\n".join([*rows[:2], rows[3].replace(",3,3", ",3,0.1"), rows[2], rows[4]])
-    assert "segment 1 between" in rejected(carrying(speeds, text=swapped), machine())
+    assert "on segment 1, for parameters" in rejected(carrying(speeds, text=swapped), machine())
     assert "additional data after its last box" in rejected(carrying(lengths, text="\n".join(rows[:-1])), machine())
     assert "other joint centres" in rejected(carrying(lengths, legs=()), machine())
     assert "another joint-centre tolerance" in rejected(carrying(lengths, joint_centre=0.1), machine())

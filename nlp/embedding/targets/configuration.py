@@ -195,7 +195,7 @@ def _delta(case: Case, rules: Rules, plain: Kinematics, delta: Delta, samples: S
         tuple(rounded(scale * each.rod) for each in limbs),
     )
     if found.radius <= 0:
-        raise OtherKindError(f"its radius is {_shown(found, found.radius)}, that of a Delta is positive")
+        raise OtherKindError(f"its radius is {_shown(found, found.radius)}; the radius of a Delta must be positive")
     return _checked(found, samples, delta_coordinates(found, rules, _positions(found, samples)))
 
 

@@ -288,7 +288,8 @@ def legs_of(robot: Kinematics, samples: Samples) -> Legs:
     slides = [each.dimension is Dimension.LENGTH for each in robot.drives]
     if len(legs) != 6 or len(slides) != 6 or not all(slides):
         raise OtherKindError(
-            f"the robot has {len(legs)} straight legs and {len(slides)} actuators; 6 legs and 6 prismatic actuators are needed"
+            f"the robot has {len(legs)} straight legs and {len(slides)} actuators; "
+            "6 legs and 6 prismatic actuators are needed"
         )
     centres = ca.horzcat(*[ca.vertcat(each.base, each.platform) for each in legs])
     values = np.array(ca.Function("legs", [robot.robot.z], [ca.densify(centres)])(robot.start), dtype=np.float64).T
@@ -300,7 +301,8 @@ def legs_of(robot: Kinematics, samples: Samples) -> Legs:
         if spread > TOLERANCE * size:
             shown = units.text(spread, Dimension.LENGTH)
             raise OtherKindError(
-                f"actuator {drive.name} is not the length of leg {legs[k].name}: they differ by {shown}"
+                f"the coordinate of actuator {drive.name} must change like the length of leg {legs[k].name}; "
+                f"the changes differ by {shown}"
             )
     return Legs(base, platform, np.asarray(zero.mean(axis=0)))
 

@@ -107,7 +107,7 @@ def with_end(ends: FloatArray, i: int, value: float) -> FloatArray:
 def wrong_node(kind: int, allowed: Sequence[Node]) -> ProofError:
     """Return the error of a tree with a node of a kind that is not allowed at this place."""
     name = next((each.name for each in Node if each == kind), f"of the unknown kind {kind}")
-    names = " or ".join(each.name for each in allowed)
+    names = f"{', '.join(each.name for each in allowed[:-1])} or {allowed[-1].name}"
     return ProofError(f"the tree of boxes has a node {name} where only {names} is allowed")
 
 
