@@ -329,7 +329,7 @@ def test_other_paths_are_rejected(proof: Proof) -> None:
     assert "other joint centres" in rejected(carrying(lengths, legs=()), machine())
     assert "another joint-centre tolerance" in rejected(carrying(lengths, joint_centre=0.1), machine())
     assert "cannot be read" in rejected(carrying(lengths, text="x,y\n1,2"), machine())
-    assert "this case has no path" in rejected(carrying(lengths, of_case=True), machine())
+    assert "this case has no table [path]" in rejected(carrying(lengths, of_case=True), machine())
     slower = edited(TIMED, ("3,2\n", "3,1.5\n"))
     assert verified(carrying(lengths, text=slower), machine()).claims
 

@@ -167,7 +167,7 @@ def test_other_trees_are_rejected(proof: Proof) -> None:
         ("position error", tree + tree[-1:], "additional data after its last box"),
         ("position error", node_bytes(Node.CUT, 0, value=4.0) + tree[10:], "outside this box"),
         ("regular", b"\x07", "where only CUT, BOUNDED or OUTSIDE is allowed"),
-        ("regular", bytes([Node.CUT, 6]) + bytes(8), "names variable 6"),
+        ("regular", bytes([Node.CUT, 6]) + bytes(8), "refers to variable 6"),
         ("regular", bytes([Node.OUTSIDE]), "not outside"),
     ):
         assert fault in refused(changed(proof, name, tree=other))

@@ -185,7 +185,7 @@ def test_other_lemmas_and_directions_are_rejected(proof: Proof) -> None:
     assert "must state two directions" in reject(name, "max", sides=turned[:1])
     assert "cannot be proved by the reason" in reject("F", "max", reason="one machine")
     # Of no leg is a length known.
-    assert "have no proof" in reject("smallest_singular_value", "min")
+    assert "has no bound of the leg length" in reject("smallest_singular_value", "min")
 
 
 def machines_of(case: Case) -> tuple[RobotsWithinTolerance, PoseRoot]:
