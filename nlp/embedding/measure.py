@@ -62,7 +62,8 @@ class Figures(NamedTuple):
         compiler: first line of the compiler's version, and the flags.
         flash: bytes of code and constants of the library; None if not measured.
         stack: bound on the stack of a solve in bytes, without the mathematics library; None without a bound.
-        painted: measured bytes of stack of a solve from all starting points, with that library; None if not run.
+        painted: measured bytes of stack of a solve from all starting points, with the mathematics library; None if not
+            run.
         fault: reason for missing sizes; empty if all sizes are measured.
     """
 

@@ -51,7 +51,7 @@ def solve_point(
 
     Args:
         source: case as text.
-        settings: values of the varied names at the point.
+        settings: values of the varied quantities at the point, by name.
         index: index of the point.
         starts: number of starting points.
         seed: seed that replaces the seed of the case.
@@ -293,7 +293,6 @@ class Job(NamedTuple):
     """Sweep without points: case, names and settings.
 
     Attributes:
-        source: the case.
         source: case as text.
         names: varied parameters, bounds and limits.
         chosen: values at the points at which nonlinear programs are compared.

@@ -123,7 +123,7 @@ def _shown(case: Case, position: Sequence[float], turn: Mapping[str, list[float]
 
 
 def _rounded(values: Sequence[float], digits: int) -> list[float]:
-    """Return numbers rounded at one decimal place, at which the largest number has the given number of digits."""
+    """Return numbers rounded to one common decimal place, which gives the largest number so many digits."""
     size = max(map(abs, values))
     if size == 0:
         return list(values)

@@ -1,8 +1,8 @@
 """Joints and limbs at home, as expressions of the robot's dimensions.
 
-A limb is one path of joints from base to platform, or several that share the joints of a stem. The copies of a repeated
-limb are its rotations about the axis of repetition. A robot given by links and joints has limbs where its graph has
-such paths; the remaining joints form networks.
+A limb is one chain of joints from base to platform, or several chains that share the joints of a stem. The copies of a
+repeated limb are its rotations about the axis of repetition. A robot given by links and joints has limbs where its
+graph has such paths; the remaining joints form networks.
 """
 
 from __future__ import annotations

@@ -204,7 +204,7 @@ def structure_of(limb: str, name: str, path: OpenedPath, ranks: Ranks, unknowns:
 
 
 def joint_screws(limb: str, path: OpenedPath, ranks: Ranks, labels: Mapping[int, str]) -> JointScrews | None:
-    """Return the current screws of a path's joints; None if a joint has unknown screws.
+    """Return the current screws of the joints of a chain; None if a joint has unknown screws.
 
     Args:
         limb: name of the limb.

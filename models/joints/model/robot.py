@@ -127,7 +127,7 @@ class _LimbModes(NamedTuple):
     Attributes:
         place: index of the sign among all signs of the model.
         limb: name of the limb.
-        paths: opened paths of the limb.
+        paths: opened chains of the limb.
         unknowns: range of the limb's unknowns in the model.
     """
 

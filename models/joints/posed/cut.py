@@ -19,7 +19,7 @@ from ..home.motion import UNIT_VECTORS, AxisKind, JointAxis
 
 
 class Cut(NamedTuple):
-    """Place at which a path of joints is opened: joints ``first`` to ``last`` belong to neither side.
+    """Place at which a chain of joints is opened: joints ``first`` to ``last`` belong to neither side.
 
     Attributes:
         type: letter of the joint at the cut; empty if no joint is cut.

@@ -42,7 +42,7 @@ def mode_signs(
 
     Args:
         limb: name of the limb.
-        paths: opened paths of the limb.
+        paths: opened chains of the limb.
         unknowns: unknowns of the limb.
         frame: common data of all paths of the robot.
     """

@@ -1,4 +1,4 @@
-"""Opened path of joints: current screws, and the equations that close its loop through base and platform.
+"""Opened chain of joints: current screws, and the equations that close its loop through base and platform.
 
 Bodies on the base side are displaced by the joints before them; those on the platform side by the pose and the joints
 after them. At the cut, equations state that the joint there holds together:
@@ -62,7 +62,7 @@ class Opened:
 
 @dataclass(eq=False)
 class OpenedPath(Opened):
-    """Path of joints at any pose, opened at its cut.
+    """Chain of joints at any pose, opened at its cut.
 
     Attributes:
         joints: joints from base to platform.

@@ -1,4 +1,4 @@
-"""Rows of J and members of a path of joints: its wrenches on the platform with locked actuators."""
+"""Rows of J and members of a chain of joints: the chain's wrenches on the platform with locked actuators."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Centre(NamedTuple):
 
 
 def path_ranks(frame: PathFrame, joints: Sequence[Joint], cut: Cut) -> Ranks:
-    """Return the ranks of a path of joints."""
+    """Return the ranks of a chain of joints."""
     values = SX.sym("q", sum(len(joint.axes) for joint in joints))
     screws = free_screws(joints, values)
     passive = [j for j, joint in enumerate(joints) if not joint.actuated]

@@ -76,7 +76,7 @@ class LowerLimit(Limit[AtLeast], abc.ABC):
 
 
 def two_sided(allowed: NumberRange) -> Ranges:
-    """Return the allowed ranges of ``min`` and ``max``, both equal."""
+    """Return the allowed ranges of ``min`` and of ``max``: the same range for both."""
     return {"min": allowed, "max": allowed}
 
 

@@ -116,7 +116,7 @@ def _equations(closure: LoopClosure, A: Frame, B: Frame, kept: float | None, twi
         closure: the closure.
         A: frame of the closure on the first body, in world coordinates.
         B: frame of the closure on the second body, in world coordinates.
-        kept: required cosine between the axes of a universal joint; None for the present one.
+        kept: required cosine between the axes of a universal joint; None for the present cosine.
         twist: (6, n) twists of the second body minus twists of the first body, with velocities at the world origin.
     """
     w, v = twist[:3], twist[3:]
@@ -306,7 +306,7 @@ def close_from_other_starts(given: Description, size: float) -> Closed | None:
 
 
 def least_gaps(given: Description, size: float) -> dict[str, float]:
-    """Return the loops that cannot be closed even if all other loops are cut and all actuators are free.
+    """Return the loops that cannot be closed even if all other loops are cut and all actuators are unlocked.
 
     Returns:
         Smallest gap of each of these loops by name, relative to the size.

@@ -196,7 +196,7 @@ class _AlongPath(Judging):
         return Subject(self.case, robots.model, robots.family, "", shortest)
 
     def actuators(self, subject: Subject) -> Iterator[Verdict]:
-        """Yield the verdicts on actuators; a path with times defines its motion."""
+        """Yield the verdicts on actuators; if the path has times, its motion replaces the motion of the case."""
         for each in refuted(list(self.verdicts.values())).values():
             if each.claim.kind in (ClaimKind.CLEARANCE, ClaimKind.SPECTRUM):
                 self._keep_faults(subject.number(each.claim), {0: each})

@@ -31,13 +31,13 @@ _ZERO: _Exact = (Fraction(0), Fraction(0), Fraction(0))
 
 @dataclass(frozen=True)
 class _Condition:
-    """Condition ``d' Q d + b . d <= c`` on the distance d from an origin.
+    """Condition ``d' Q d + b . d <= c`` on the vector d from an origin, for every b in an interval.
 
     Attributes:
         origin: (3,) origin.
         Q: (3, 3) symmetric matrix.
-        b: (3,) vector; with rounded ends it is any vector between them.
-        above: (3,) upper ends of b.
+        b: (3,) lower ends of b.
+        above: (3,) upper ends of b; equal to the lower ends if b is exact.
         c: right side.
     """
 
