@@ -29,7 +29,7 @@ class Controller:
     """Conventions of a controller that differ from those of the case; they apply to generated kinematics in C.
 
     Attributes:
-        length: unit of length; empty for that of the case.
+        length: unit of length; empty for the length unit of the case.
         angle: unit of actuator angles and of roll, pitch and yaw.
         zero: coordinate of the controller at which the coordinate of the case is 0, by actuator; radians or length of
             the case. An empty name stands for all actuators.

@@ -117,7 +117,7 @@ class PositionSet:
 
     @cached_property
     def box(self) -> tuple[Value, Value, Value]:
-        """Ranges of x, y and z of a box that encloses the set; ranges of a file are kept, others rounded outwards."""
+        """Ranges of x, y and z of a box around the set: ranges of the file, or computed ranges, rounded outwards."""
         if self.kind is SetKind.BOX:
             return self._shifted(self.spans)
         r, low, high = self.radius, np.array(self.centre), np.array(self.centre)

@@ -232,8 +232,8 @@ def _name(title: str, unit: str) -> str:
 def _called_by_pointer(function: str, frames: Mapping[str, int], prefix: str) -> set[str]:
     """Return the functions that a function may call by a pointer.
 
-    A search calls its program by pointers: the scaled one, or that of the search for a feasible point, which calls the
-    scaled one. The scaled one calls only the caller's deadline, which is unknown here.
+    A search calls its program by pointers: the scaled program, or the program of the search for a feasible point, which
+    calls the scaled program. The scaled program calls only the caller's deadline, which is unknown here.
     """
     if function.startswith((f"{prefix}_SCALED_", f"{prefix}-scaled:")):
         return set()

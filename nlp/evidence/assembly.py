@@ -230,7 +230,7 @@ class _Path:
         model: model of the robot.
 
     Attributes:
-        scale: (6 + u,) size of each component: a length of the robot for positions, 1 for the others.
+        scale: (6 + u,) size of each component: a length of the robot for positions, 1 for other components.
         is_length: (k,) whether each component of the parameters is a length.
         is_free: (u,) whether each unknown is a free actuator coordinate.
     """
