@@ -266,7 +266,7 @@ def test_rates_are_differences_of_positions(name: str) -> None:
 
 @pytest.mark.parametrize(
     "name",
-    ["five-bar-pen", *(pytest.param(each, marks=pytest.mark.slow) if each == "pentapod" else each for each in MOTIONS)],
+    ["five-bar-pen", *(pytest.param(each, marks=pytest.mark.soak) if each == "pentapod" else each for each in MOTIONS)],
 )
 def test_the_box_of_a_starter_is_proved(name: str) -> None:
     before, table = starter_text(name).split("# [workspace]")

@@ -442,7 +442,7 @@ def test_models_lists_the_shipped_robots_and_shows_one(cli: Run) -> None:
     assert "six degrees of freedom  6-pus, 6-rss, 6-rus, 6-sps, 6-ups\n" in shown
     rows = [line.split()[0] for line in output_of(cli("models", "--all")).splitlines() if line[0] != " "]
     assert rows[rows.index("robot") :][1:3] == ["stewart-gough", "hexapod"]
-    words = ("x1", "x4", "layout", '"octahedral"', "length", "angle", "leg_length", ">= 0, <= 30", "1-", "3+")
+    words = ("x1", "x4", "layout", '"octahedral"', "length", "angle", "leg_length", ">= 0 deg, <= 30 deg", "1-", "3+")
     assert_words(output_of(cli("models", "stewart-gough", "--all")), *words)
     assert_words(output_of(cli("models", "hexapod", "--all")), "base_1_x", "platform_6_z", "leg_length", "any")
 

@@ -473,7 +473,7 @@ def test_the_workspace_command_proves_limits_of_legs_on_paper(cli: Run, tmp_path
 
 def test_robots_without_legs_refuse_their_limits_by_name(cli: Run, tmp_path: Path) -> None:
     for robot_name, (key, limit) in itertools.product(("delta", "6-rss"), OF_LEGS.items()):
-        text = output_of(cli("new", robot_name)).replace("[limits]", f"[limits]\n{key} = {limit}\n#")
+        text = output_of(cli("new", robot_name)).replace("\n[limits]", f"\n[limits]\n{key} = {limit}\n#")
         path = saved(tmp_path / "case.toml", text)
         refusal_of(cli("solve", str(path)), f"no such limit for the robot '{robot_name}'; allowed: actuator_angle")
     # Cones of the joints of a file's legs are stated by joint.

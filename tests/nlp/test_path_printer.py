@@ -461,7 +461,8 @@ def test_case_and_commands_read_a_printers_file_and_its_proof(cli: Run, tmp_path
     )
     run = cli("path", "hexapod-linuxcnc", "--along", file, *words, "--proof", proof, "--json", out)
     shown = " ".join(output_of(run).split())
-    assert "path part.gcode: 2 segments" in shown.replace(str(tmp_path) + "/", "")
+    # A long path of a file may be broken at any character.
+    assert "part.gcode:2segments" in shown.replace(" ", "")
     assert "START_PRINT (line 1): its motions are not in the file" in shown
     found = json.loads(Path(out).read_text(encoding="utf-8"))["path"]
     assert found["time"] == pytest.approx(1.3)

@@ -183,7 +183,7 @@ def test_a_proof_is_for_its_case_only(proof: Proof) -> None:
     assert "not a valid reason" in refused(
         changed(alone(proof, "condition_number"), "condition_number", reason="lengths")
     )
-    assert "measure" in refused(stating(proof, quantities=("none",)))
+    assert "quantity" in refused(stating(proof, quantities=("none",)))
 
 
 def test_a_leaf_across_a_singular_pose_is_rejected(robot: Legs) -> None:
