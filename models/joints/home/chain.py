@@ -79,7 +79,7 @@ class Limb:
     turn: FloatArray
 
     def member(self, path: int) -> str:
-        """Return the name of a chain by its index: the limb's name, with a number if the limb has several paths."""
+        """Return the name of a chain by its index: the limb's name, with a number if the limb has several chains."""
         return f"{self.name}.{path + 1}" if len(self.branches) > 1 else self.name
 
     def label(self, path: int, joint: int) -> str:

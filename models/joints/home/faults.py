@@ -69,7 +69,7 @@ def examine_geometry(frame: PathFrame) -> list[str]:
 
 
 def _joint_faults(robot: HomeRobot, path: Sequence[Joint]) -> list[_Pair]:
-    """Return the distances and angles within single joints of a path."""
+    """Return the distances and angles within single joints of a chain."""
     found = []
     for joint in path:
         if joint.type == "U":

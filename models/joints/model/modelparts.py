@@ -184,9 +184,9 @@ def structure_of(limb: str, name: str, path: OpenedPath, ranks: Ranks, unknowns:
     Args:
         limb: name of the limb.
         name: name of the chain: that of the limb, with the number of the branch if there are several.
-        path: the path.
+        path: the chain.
         ranks: ranks of the chain's screws.
-        unknowns: number of joint coordinates that are unknowns and belong to no earlier path.
+        unknowns: number of joint coordinates that are unknowns and belong to no earlier chain.
     """
     written = [part for joint in path.joints for part in (joint.parts or (joint,))]
     count = len(path.equations)
@@ -208,7 +208,7 @@ def joint_screws(limb: str, path: OpenedPath, ranks: Ranks, labels: Mapping[int,
 
     Args:
         limb: name of the limb.
-        path: the path.
+        path: the chain.
         ranks: ranks of the chain's screws.
         labels: labels of the written joints, by identity.
     """

@@ -38,7 +38,7 @@ class DrawnPath(NamedTuple):
     Attributes:
         limb: the limb.
         number: index of the chain in the limb.
-        path: the path.
+        path: the chain.
         row: index, among the rows of J that belong to the limb, of the chain's row; only if the chain has one row and
             the limb several.
     """

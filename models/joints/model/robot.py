@@ -296,7 +296,7 @@ def joint_labels(limb: Limb, index: int, joints: Sequence[Joint], known: Mapping
     Args:
         limb: the limb.
         index: index of the chain in the limb.
-        joints: joints of the path.
+        joints: joints of the chain.
         known: labels of joints of other chains, which share the joints of the stem.
     """
     return {id(joint): limb.label(index, j) for j, joint in enumerate(joints) if id(joint) not in known}

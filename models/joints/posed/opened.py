@@ -136,7 +136,7 @@ def closures(kind: str, name: str, sides: Iterable[tuple[SX, ...]]) -> list[Clos
 
     Args:
         kind: first word of the names.
-        name: name of the limb or path.
+        name: name of the limb or chain.
         sides: left side of each equation, and its size unless this is 1.
     """
     return [Closure(f"{kind} {name} ({k + 1})", *each) for k, each in enumerate(sides)]
@@ -280,7 +280,7 @@ def distance_equations(path: OpenedPath, variables: Variables, frame: PathFrame)
     """Return the distance equations of a chain opened at a joint; none for a chain with a rod, or opened at no joint.
 
     Args:
-        path: the path.
+        path: the chain.
         variables: function that returns the coordinates of the axes outside the cut.
         frame: common data of all chains of the robot.
     """

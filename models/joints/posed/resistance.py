@@ -74,8 +74,8 @@ def resistance(limb: str, path: OpenedPath, ranks: Ranks, given: SX | None) -> t
 
     Args:
         limb: name of the limb.
-        path: the path.
-        ranks: ranks of the path.
+        path: the chain.
+        ranks: ranks of the chain.
         given: (3, 1) centre given by the user at home, length; None for the centre by rule.
     """
     if ranks.pinned is not None and given is None:

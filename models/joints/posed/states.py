@@ -95,7 +95,7 @@ class PathJoints:
 
     Args:
         limb: the limb.
-        path: the path.
+        path: the chain.
         known: coordinates that are unknowns, by the joint's identity and the number of the axis.
         frame: common data of all chains of the robot.
     """
@@ -251,7 +251,7 @@ def limb_links(path: OpenedPath, labels: Mapping[int, str], frame: PathFrame) ->
     along the line between its neighbours is not an end of a link: the link includes the travel of the slide.
 
     Args:
-        path: the path.
+        path: the chain.
         labels: labels of the joints, by identity.
         frame: common data of all chains of the robot.
     """
