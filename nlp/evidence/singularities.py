@@ -287,7 +287,7 @@ def _homogeneous(screws: FloatArray, centre: FloatArray, reach: float) -> FloatA
 
 
 def _unit_columns(screws: FloatArray, centre: FloatArray) -> tuple[FloatArray, float]:
-    """Return unit twists (6, n) about a centre, with velocities divided by the largest velocity, and this velocity."""
+    """Return unit twists (6, n) about a centre, with velocities divided by the largest; and the largest velocity."""
     reach = _reach(screws, centre)
     scaled = _homogeneous(screws, centre, reach)
     lengths = np.linalg.norm(scaled, axis=0)

@@ -201,7 +201,7 @@ class _Printer(Interpreter):
             self._wait(seconds)
 
     def _wait(self, seconds: float) -> None:
-        """Add a dwell to the path, if it has begun."""
+        """Add a dwell to the path, if the path has begun."""
         if self.is_known:
             self._add(Kind.DWELL, self.now, seconds)
 
@@ -227,7 +227,7 @@ class _Printer(Interpreter):
         self._lose_position()
 
     def _lose_position(self) -> None:
-        """Begin a part at an unknown position; before any motion, a stated start remains."""
+        """Begin a part at an unknown position; before the first motion, a stated start position stays known."""
         if self.options.start is not None and not self.parts and not self.has_motion:
             return
         self._close_part()

@@ -286,7 +286,7 @@ def row_reader(sweep: Sweep, names: Sequence[str] | None = None) -> Callable[[Se
 
 
 def stated_pose_note(case: Case, notes: Iterable[str]) -> str | None:
-    """Return the note that limits over the workspace are only checked at the stated pose, if a row has it.
+    """Return the note that limits over the workspace are only checked at the stated pose, if a row has this note.
 
     Args:
         case: case at one of the points.

@@ -317,7 +317,7 @@ class Job(NamedTuple):
 
 
 class Choice(NamedTuple):
-    """Kind of engine, and the reason for Ipopt; empty for the compiled engine or a requested one."""
+    """Kind of engine, and the reason why Ipopt is used; the reason is empty for a compiled or a requested engine."""
 
     kind: EngineKind
     reason: str

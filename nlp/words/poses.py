@@ -62,7 +62,7 @@ def pose_words(case: Case, pose: WorkspacePose, form: RotationForm | None = None
     Args:
         case: the case.
         pose: the pose.
-        form: form of its rotation; None for the form of the case.
+        form: form of the rotation; None for the form of the case.
     """
     stated = () if case.workspace is None else case.workspace.position
     ends = [part for each in stated for part in ((each.lower, each.upper) if isinstance(each, Free) else (each,))]

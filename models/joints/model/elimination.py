@@ -152,7 +152,7 @@ class _Elimination:
 def eliminated(
     model: Model, rotation: tuple[float, ...] | None = None, held: frozenset[int] = frozenset()
 ) -> tuple[Eliminated, ...]:
-    """Return the unknowns of a robot with a closed form in dimensions and pose, in the solution of home.
+    """Return the unknowns of a robot that have a closed form in dimensions and pose, for the solution of home.
 
     Args:
         model: the robot.

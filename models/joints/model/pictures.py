@@ -272,7 +272,7 @@ def _tip(sketch: _Sketch, joint: PlacedJoint) -> Place:
 
 
 def _rail_end(sketch: _Sketch, name: str) -> _Node | None:
-    """Return the end of a rail that is farther from the platform at home; None for a slide without a rail."""
+    """Return the end of a slide's rail, the farther one from the platform at home; None for a slide without a rail."""
     origin = sketch.frame.typical_value(sketch.origin).ravel()
     ends = [sketch.nodes[end] for end in (f"{name} rail start", f"{name} rail end") if end in sketch.nodes]
     return max(ends, key=lambda each: float(np.linalg.norm(each.at_home - origin)), default=None)

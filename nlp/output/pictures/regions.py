@@ -187,7 +187,7 @@ def _write_number(axes: Axes, place: int, x: float, y: float, *, is_on_top: bool
 
 
 def _regions(sets: NDArray[np.intp]) -> list[NDArray[np.intp]]:
-    """Return the cells (k, 2) of each region that shows a number, in descending order of their distance from the edge.
+    """Return the cells (k, 2) of each region that shows a number, farthest from the region's edge first.
 
     The number of a set of active limits is shown in the largest region of the set, and in its other large regions.
 

@@ -12,7 +12,7 @@ from .markup import Markup, tag
 
 
 def curve_figures(*designs: Designs[Row], here: Mapping[str, float] | None = None) -> Markup:
-    """Return charts of F over a varied value side by side, one for each table and task.
+    """Return charts of F over a varied value, side by side: one for each table and task.
 
     Args:
         designs: tables of designs over one varied value.
