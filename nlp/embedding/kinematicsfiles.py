@@ -233,7 +233,7 @@ def _substitutions(robot: Kinematics, functions: _Functions) -> dict[str, str]:
     forward = robot.forward
     completes = robot.complete is not None
     square = forward is not None
-    length = controller.length or case.units.length
+    length = comment_text(controller.length or case.units.length)
     turning = [each.dimension is Dimension.ANGLE for each in drives]
     labels = [controller.angle if each else length for each in turning]
     complete = robot.complete or forward
@@ -290,7 +290,7 @@ def _substitutions(robot: Kinematics, functions: _Functions) -> dict[str, str]:
         "version": __version__,
         "casadi": ca.CasadiMeta.version(),
         "frame": frame,
-        "length": comment_text(length),
+        "length": length,
         "angle": controller.angle,
         "actuator_table": " * Actuators, with their values at home:\n" + "\n".join(lines),
         "actuator_rows": "\n".join(rows),
