@@ -69,7 +69,7 @@ class Parameter:
 
     @property
     def components(self) -> tuple[str, ...]:
-        """Name of each component."""
+        """Name of each component of the parameter."""
         return component_names(self.name, self.symbol.numel())
 
 

@@ -225,7 +225,7 @@ class Kinematics:
         return ca.horzcat(couples @ ca.DM(self.transform.turn), SX(len(rows), 3 + self.unknowns))
 
     def moved(self, z: FloatArray, step: FloatArray) -> FloatArray:
-        """Return a point after a step, whose parts have the sizes of :attr:`step_sizes`."""
+        """Return a point after a step; the parts of the step have the sizes of :attr:`step_sizes`."""
         step = step * self.step_sizes
         angle = float(np.linalg.norm(step[:3]))
         cross = np.cross(np.eye(3), step[:3] / angle if angle else step[:3])

@@ -92,7 +92,7 @@ class RunTimeLimits:
 
     @property
     def functions(self) -> tuple[ca.Function, ...]:
-        """Both functions; none without limits."""
+        """Functions ``function`` and ``slopes``; none without limits."""
         return tuple(each for each in (self.function, self.slopes) if each is not None)
 
     @property

@@ -247,7 +247,7 @@ def scale_data(found: "Scale", units: Units) -> ScaleData:
 
 
 def _fixed(value: object) -> float:
-    """Return a fixed number."""
+    """Return a dimension as a number; refuse a free dimension."""
     if not isinstance(value, float):
         raise TypeError(f"a robot to be verified must have fixed dimensions, got {value!r}")
     return value

@@ -40,7 +40,7 @@ class Form:
 
 @dataclass(frozen=True, eq=False)
 class Call:
-    """Call of a form.
+    """Call of a :class:`Form` with its arguments.
 
     Attributes:
         form: called function.

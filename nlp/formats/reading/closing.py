@@ -215,7 +215,7 @@ class _Loops:
             yield self.random(rng, _FAR[k % len(_FAR)])
 
     def closed(self, found: Reached) -> Closed:
-        """Return the description with all bodies and joints at the result's coordinates."""
+        """Return the description with all bodies and joints at the coordinates of a solution."""
         given, values = self.given, found.at.values * self.motions.units
         coordinates = {each.name: float(values[self._columns[each.name]].sum()) for each in given.joints}
 

@@ -65,7 +65,7 @@ def _joint(tables: Mapping[str, Any], name: str, offers: Offers) -> tuple[int, d
 
 
 def _dimension(tables: dict[str, Any], name: str, value: float, kind: str, words: str) -> None:
-    """Add a dimension.
+    """Add a dimension to the tables of a robot file.
 
     Raises:
         InputError: a dimension with this name exists.

@@ -45,7 +45,7 @@ _ROOTS = ("mujoco", "mujocoinclude")
 
 
 class CleanModel(NamedTuple):
-    """Reduced model.
+    """MuJoCo model reduced to its geometry.
 
     Attributes:
         root: root element of a model that MuJoCo compiles without other files, with only the requested keyframe.

@@ -23,7 +23,7 @@ _WEIGHTS = {"weld": 0, "R": 1, "P": 1, "H": 1, "S": 2}
 
 @dataclass(frozen=True, eq=False)
 class Edge:
-    """Joint of the tree.
+    """Joint of the spanning tree.
 
     Attributes:
         joint: joint of the mechanism.
