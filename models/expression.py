@@ -165,7 +165,7 @@ def _tree(text: str) -> ast.expr:
     if len(text) > _LONGEST:
         raise ExpressionError(f"is longer than {_LONGEST} letters")
     if "**" in text:
-        raise ExpressionError("has '**': a power is written '^'")
+        raise ExpressionError("has '**'; write a power with '^'")
     if not _CHARACTERS.fullmatch(text) or _OTHER_NUMBERS.search(text):
         raise ExpressionError("may have only numbers, names, + - * / ^, brackets and functions")
     try:

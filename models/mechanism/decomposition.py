@@ -5,8 +5,8 @@ of another shape become networks, each with the reason.
 
 For members, links are merged if a locked joint, a weld, or a joint fixed by couplings connects them. Without base and
 platform, each connected part of the rest is a member; so is a joint directly between base and platform. Coupled joints
-belong to one member. A part that is connected in this way with unlocked actuators is called a *limb* here; it may have
-any shape. Links with a single joint are left out.
+belong to one member. A part that is connected in this way with unlocked actuators is called a *limb*; it may have any
+shape. Links with a single joint are left out.
 """
 
 from __future__ import annotations
@@ -203,7 +203,7 @@ class RobotGraph:
 
     Attributes:
         members: members between base and platform with locked actuators.
-        limbs: joint indices of each limb between base and platform, with unlocked actuators.
+        limbs: joint indices of each limb between base and platform with unlocked actuators.
         still: indices of the joints that locked actuators and couplings fix.
     """
 

@@ -208,7 +208,7 @@ def _member(mechanism: Mechanism, mobility: Mobility, graph: MemberGraph, length
     driven = [k for k in graph.joints if mechanism.joints[k].actuated]
     own = np.array([free.columns.index(k) for k in driven], dtype=np.intp)
     weights = np.array([mobility.angle(mechanism.joints[k]) / mobility.size for k in driven])
-    # In each motion with free actuators the resisted component is rho times the actuator rates, because a motion
+    # In each motion with unlocked actuators the resisted component is rho times the actuator rates, because a motion
     # without such rates is not resisted. The relations exclude actuator rates that occur in no motion.
     rates = free.rates[own] * weights[:, None]
     actuation = projector @ scaled_twists(free.platform, centre, length) @ np.linalg.pinv(rates, rcond=RANK_TOLERANCE)

@@ -64,7 +64,7 @@ class Controller:
             return 1.0
         for key, label in (("controller.length", self.length), ("units.length", units.length)):
             if label not in METRES:
-                raise CaseError(key, f"has no known size: must be one of {', '.join(METRES)}", label)
+                raise CaseError(key, f"must be one of {', '.join(METRES)}", label)
         # A quotient of the larger one by the smaller one is exact for decimal units.
         case, own = METRES[units.length], METRES[self.length]
         return round(case / own, 9) if case >= own else 1 / round(own / case, 9)
@@ -89,7 +89,7 @@ class Controller:
                 if key == "sign" and value not in (1, -1):
                     raise CaseError(where, "must be 1 or -1", value)
         if "" in self.zero and len({each.dimension for each in drives}) > 1:
-            fault = "is one value for actuators that turn and actuators that slide: give zero = { NAME = value }"
+            fault = "is one value, but the robot has revolute and prismatic actuators: give zero = { NAME = value }"
             raise CaseError("controller.zero", fault, self.zero[""])
         for key, values in (("origin", self.origin), ("rpy", self.rpy)):
             check_vector(values, f"controller.{key}")

@@ -181,7 +181,7 @@ class PositionSet:
             depths = self.depths(points)
             if depths.max() > 0:
                 return frozen_array(points[int(depths.argmax())], (3,))
-        raise CaseError(f"{KEY}.half_spaces", f"leave no position of the {self.kind.value}")
+        raise CaseError(f"{KEY}.half_spaces", f"exclude every position of the {self.kind.value}")
 
     def depths(self, points: FloatArray) -> FloatArray:
         """Return the smallest distances (N,) of points (N, 3) from the planes of the half spaces, negative outside."""
@@ -300,7 +300,7 @@ class PositionSet:
             first, last = POINTS[self.kind]
             check_vector(self.end, f"{key}.{last}")
             if not self.axis.any():
-                raise CaseError(f"{key}.{last}", f"must be another point than {first}")
+                raise CaseError(f"{key}.{last}", f"must be a point different from {first}")
         for k, each in enumerate(self.half_spaces):
             check_direction(each.normal, f"{KEY}.half_spaces[{k}].normal")
             check_vector(each.point, f"{KEY}.half_spaces[{k}].point")

@@ -45,7 +45,9 @@ def models(
     # A robot whose options have no default cannot be built, and has no parameters to show.
     model = options.read_robot(file) if file is not None else None if needed else build_model(name)
     if plot is not None and model is None:
-        raise InputError(f"--plot {plot}: robot {name!r} needs its option {needed[0]!r} first")
+        raise InputError(
+            f"--plot {plot}: robot {name!r} cannot be drawn without its option {needed[0]!r}; plot a case instead"
+        )
     files.deliver(
         lambda: model_words(name if file is None or model is None else model.name, model, found),
         whole=whole,

@@ -297,7 +297,7 @@ def _robot(case: Case, entry: Entry) -> ComparedRobotData:
         tasks=tuple(_task(case, k, each) for k, each in enumerate(entry.tasks)),
         dimensions=_dimensions(entry),
         active=_active(entry),
-        limits_kept=0 if placed is None else len(placed.case.limits),
+        limits_kept=len(placed.case.limits) if placed is not None and entry.has_answer else 0,
         limits_left_out=tuple(ComparedLimitData.of(each) for each in left_out),
         certificate=certificate_data(entry.certificate),
         certificate_fault=entry.certificate_fault or None,

@@ -317,7 +317,8 @@ class CompiledCase:
         for key, column in columns.items():
             upper = columns.get(f"{key.removesuffix('.min')}.max") if key.endswith(".min") else None
             if upper is not None and column.ndim == upper.ndim == 0 and column > upper:
-                raise InputError(f"limits[{key!r}] = {column:.10g}: must be at most the other side, {upper:.10g}")
+                most = f"limits[{key.removesuffix('.min') + '.max'!r}] = {upper:.10g}"
+                raise InputError(f"limits[{key!r}] = {column:.10g}: must be at most {most}")
         lengths = {key: len(column) for key, column in columns.items() if column.ndim}
         if len(set(lengths.values())) > 1:
             said = listing(f"{key} {length}" for key, length in lengths.items())

@@ -142,7 +142,10 @@ def dependent_of(case: Case, workspace: Workspace) -> Workspace:
     shaped = workspace.position_set
     if shaped is not None and any(k in shaped.coordinates for k in found):
         names = ", ".join(workspace.names[k] for k in found if k in shaped.coordinates)
-        fault = f"states {names} by its shape, which this robot does not control; state a range or a plane shape"
+        fault = (
+            f"restricts {names}, which this robot cannot choose independently; "
+            f"give ranges in workspace.position, or a plane shape without {names}"
+        )
         raise CaseError(f"workspace.position.{shaped.kind.value}", fault, source=case.source)
     return replace(workspace, dependent=dependent, held=tuple(k for k in independent if k not in chart.ranged))
 

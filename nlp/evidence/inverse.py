@@ -123,7 +123,7 @@ def inverse(
             ``follow`` is not allowed, or an actuator coordinate is not known.
     """
     if rotations is not None and rpy is not None:
-        raise InputError("rpy: conflicts with rotations; state the rotations in one form")
+        raise InputError("rpy: conflicts with rotations; give only one of them")
     p = np.array(positions, dtype=np.float64)
     shape = (*p.shape[:1], 3, 3)
     if rpy is not None:

@@ -59,7 +59,7 @@ _CLAUSES = {
     SingularityKind.SERIAL: "joints are dependent: its actuator cannot drive the platform, "
     "which loses a degree of freedom",
     SingularityKind.CONSTRAINT: "the constraints are dependent: the platform gains a degree of freedom "
-    "even with free actuators",
+    "even with unlocked actuators",
     SingularityKind.ACTUATION: "the platform can move with every actuator locked",
     SingularityKind.ARCHITECTURE: "the rank is below six at all dimensions and poses: the platform can always move",
 }

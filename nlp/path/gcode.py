@@ -258,7 +258,7 @@ class Interpreter:
         """Return the axis words of a line by axis; refuse a line without axis words."""
         found = {AXES[a]: self._length(v) if AXES[a] < 3 else v for a, v in words.items() if a in AXES}
         if not found:
-            raise WordError(code, "needs axis words")
+            raise WordError(code, "needs axis words, such as X10")
         return found
 
     def _set_origin(self, words: dict[str, float]) -> None:
@@ -285,7 +285,7 @@ class Interpreter:
     def _stated(self, axis: int, code: str) -> float:
         """Return a coordinate of the current point; refuse a code that needs an unknown coordinate."""
         if math.isnan(self.now[axis]):
-            raise WordError(code, f"depends on {'XYZABC'[axis]} of the point, which is unknown here; give the start")
+            raise WordError(code, f"needs the present {'XYZABC'[axis]}, which is not yet known; give the start point")
         return self.now[axis]
 
     def _move(self, motion: float, words: dict[str, float], is_machine: bool) -> None:
@@ -294,9 +294,11 @@ class Interpreter:
         if motion == 80:
             return
         if is_machine and self.is_incremental:
-            raise WordError("G53", "needs G90")
+            raise WordError("G53", "needs absolute coordinates: program G90 first")
         if motion and not (words.get("F") if self.is_inverse_time else self.feed):
-            needed = "an F of its own in G93" if self.is_inverse_time else "a feed: F is 0 or not stated since G94"
+            needed = (
+                "an F on the same line in G93" if self.is_inverse_time else "a feed: F is 0 or not stated since G94"
+            )
             raise WordError(f"G{motion:g}", f"needs {needed}")
         end = self._end(words, is_machine)
         if motion > 1:
@@ -390,7 +392,7 @@ def _check_letters(codes: dict[str, float], words: dict[str, float], motion: flo
     is_arc, once, is_blending = motion in (2, 3), codes.get("once"), codes.get("control") == 64
     times = [is_arc, once in (4, 10), is_blending].count(True)
     if "P" in words and times > 1:
-        raise WordError(f"P{words['P']:g}", "belongs to two codes of the line")
+        raise WordError(f"P{words['P']:g}", "could belong to two codes of the line; write these codes on two lines")
     used = {**dict.fromkeys("IJKR", is_arc), "P": times == 1, "L": once == 10, "Q": is_blending}
     for letter, value in words.items():
         if not used.get(letter, True):

@@ -115,7 +115,7 @@ class PathOptions:
             reason = "has no meaning with the flavour printer: firmware of printers reads millimetres without offsets"
         else:
             wrong = {"part": self.part is not None, "macros": bool(self.macros)}
-            reason = "needs the flavour printer: LinuxCNC has no such programs"
+            reason = "is only for the flavour printer"
         for name in wrong:
             if wrong[name]:
                 raise InputError(f"{name} = {getattr(self, name)!r}: {reason}")

@@ -189,7 +189,7 @@ class _Printer(Interpreter):
         for letter, value in words.items():
             if letter in "LXYZUVWABC" and (name == "G10" or value):
                 which = "offsets of tools and coordinates are" if name == "G10" else "a lift of the tool is"
-                raise WordError(name, f"{which} not supported: the path would not be that of the file")
+                raise WordError(name, f"{which} not supported, because the path would differ from that in the file")
 
     def _dwell(self, words: dict[str, float]) -> None:
         if not {"P", "S"}.issuperset(words) or len(words) > 1:

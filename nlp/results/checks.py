@@ -262,7 +262,7 @@ def _check_published(
         return _published(row, (), f"the case has no answer: it is {result.status.value}", found=False)
     if len(computed) != len(row.value):
         source = case.source or name
-        fault = f"must name a number of the result, with {len(row.value)} component{'s' * (len(row.value) != 1)}"
+        fault = f"must name a quantity of the result, with {len(row.value)} component{'s' * (len(row.value) != 1)}"
         raise CaseError(f"published: {row.quantity}", fault, source=source)
     halves = [0.5 * 10.0 ** -(decimals_of(value) if row.decimals is None else row.decimals) for value in row.value]
     off = max(abs(c - v) / h for c, v, h in zip(computed, row.value, halves, strict=True))

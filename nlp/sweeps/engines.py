@@ -151,7 +151,7 @@ class CompiledEngine:
         self, source: CaseSource, chosen: Points, starts: int, seed: int | None, threads: int | None = None
     ) -> None:
         if starts > MOST_STARTS:
-            raise NotPlacedError(f"compiled C has at most {MOST_STARTS} starting points, and {starts} are requested")
+            raise NotPlacedError(f"compiled C has at most {MOST_STARTS} starting points, but {starts} are requested")
         self.source, self.names, self.starts, self.seed, self.threads = source, chosen.names, starts, seed, threads
         self.places: Places = place(source, chosen)
         self.library = _compile(self.places)

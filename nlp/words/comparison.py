@@ -73,10 +73,10 @@ def comparison_columns(result: ComparisonResult) -> Iterator[Column[ComparedRobo
     yield _joined("active", lambda robot: robot.active)
     yield Column(
         "limits_kept",
-        lambda robot: robot.limits_kept,
+        lambda robot: None if robot.part == "no answer" else robot.limits_kept,
         holds=int,
         label="limits satisfied" if result.limits > 0 else "",
-        text=lambda robot: f"{robot.limits_kept} of {result.limits}",
+        text=lambda robot: "" if robot.part == "no answer" else f"{robot.limits_kept} of {result.limits}",
     )
     yield _joined("limits_left_out", lambda robot: (each.key for each in robot.limits_left_out))
     yield _joined("singularities", lambda robot: robot.singularities)

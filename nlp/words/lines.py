@@ -379,7 +379,12 @@ def certificate_lines(certificate: CertificateData | None) -> Iterator[Line]:
     left = f", {certificate.open:,} undecided," if certificate.open else ""
     word = "box" if certificate.boxes == 1 else "boxes"
     boxes = f"{certificate.boxes:,} {word} examined{left} in {certificate.seconds:.2f} s"
-    yield Line(f"{boxes}, engine {certificate.engine}", label="search", part="search")
+    yield Line(f"{boxes}{engine_words(certificate.engine)}", label="search", part="search")
+
+
+def engine_words(engine: str) -> str:
+    """Return the words about the engine of a search; empty without a search."""
+    return " by compiled C" if engine == "c" else ""
 
 
 def choice_lines(

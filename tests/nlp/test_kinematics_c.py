@@ -535,7 +535,7 @@ def test_a_task_is_not_needed(cli: Run, tmp_path: Path) -> None:
     [
         ("sign = 2", "controller.sign = 2.0: must be 1 or -1"),
         ('sign = { "7" = 1 }', "controller.sign.7: is no actuator"),
-        ('length = "furlong"', 'controller.length = "furlong": has no known size'),
+        ('length = "furlong"', 'controller.length = "furlong": must be one of'),
         ('angle = "grad"', "controller.angle"),
         ("rpy = [0, 0]", "controller.rpy"),
         ("zero = inf", "controller.zero"),

@@ -298,7 +298,7 @@ def test_kinds_do_not_depend_on_the_unit_of_length(unit: str, tmp_path: Path) ->
         export_kinematics(case, "", "linuxcnc")
     # Klipper has an arm length for each limb.
     case = robot_case(delta_text((0, 120, 240), (0, 1e-3, 0), unit) + "\n", tmp_path, "uneven")
-    with pytest.raises(CaseError, match="Klipper needs them above the bed"):
+    with pytest.raises(CaseError, match="Klipper needs motor axes above the bed"):
         export_kinematics(case, "", "klipper")
 
 
@@ -318,10 +318,10 @@ def test_limbs_in_another_order_get_the_joints_of_the_controller(tmp_path: Path)
     ("name", "target", "fault"),
     [
         ("6-rss", "linuxcnc", "the robot has 0 straight legs and 6 actuators"),
-        ("orthoglide", "linuxcnc", r"the rail of 1 is inclined by 90 deg, that of a Delta is vertical"),
+        ("orthoglide", "linuxcnc", r"the rail of 1 is inclined by 90 deg, but the rails of a Delta are vertical"),
         ("3-rrs", "klipper", "the platform turns by|the platform has 3 degrees"),
         ("delta", "marlin", "the robot has arms that turn; arduino"),
-        ("delta", "klipper", "its motor axes are at height 0 mm, Klipper needs them above the bed"),
+        ("delta", "klipper", "its motor axes are at height 0 mm, but Klipper needs motor axes above the bed"),
         ("3-rrs", "klipper-patch", "degrees of freedom|this platform turns"),
         ("hexapod", "klipper-patch", "this one has 6 degrees of freedom and 6 motors"),
         ("five-bar", "reprapfirmware", "2 degrees of freedom instead of 3"),
@@ -601,7 +601,7 @@ def test_command_line_of_targets(cli: Run, tmp_path: Path) -> None:
     assert "contains config.g, not written by screwsynth" in fault
     empty = tmp_path / "none"
     for words, expected in (
-        (["--kinematics", "--target", "linuxcn"], "--target linuxcn: is no target; did you mean 'linuxcnc'"),
+        (["--kinematics", "--target", "linuxcn"], "--target linuxcn: no such target; did you mean 'linuxcnc'"),
         (["--kinematics", "--target", "linuxcnc", "--single"], "--single: is not for --target linuxcnc"),
         (["--kinematics", "--target", "klipper", "--coordinates", "1"], "--coordinates: is not for --target klipper"),
         (["--target", "linuxcnc"], "--target: is only for --kinematics"),
@@ -612,7 +612,7 @@ def test_command_line_of_targets(cli: Run, tmp_path: Path) -> None:
 
 
 def test_unknown_target() -> None:
-    with pytest.raises(InputError, match="is no target"):
+    with pytest.raises(InputError, match="no such target"):
         export_kinematics(rotary(), "", "grbl")
 
 

@@ -497,7 +497,7 @@ def test_the_shipped_hexapod_is_proved(cli: Run) -> None:
     [
         (
             ["--html", "-", "--json", "-"],
-            "standard output can take one of --json -, --csv -, --html - and --proof - only",
+            "only one of --json -, --csv -, --html - and --proof - can go to standard output",
         ),
         (["--plot-pose", "a.txt"], "a.txt"),
         (["--html", "nowhere/page.html"], "nowhere/page.html"),

@@ -229,7 +229,7 @@ def directions_at_rod(path: OpenedPath, side: Motion, frame: PathFrame, *, is_bo
     """
     j, far, rod = path.cut.joint, path.cut.far, path.rod
     if far is None or rod is None:
-        raise ValueError("the path has no rod")
+        raise ValueError("the opened loop has no rod, so the axes at the ends of a rod are undefined")
     home = path.joints[j].point - path.joints[far].point
     axes = path.joints[far].axes if far < j else path.joints[far].axes[::-1]
     first, second = (axis.axis for axis in axes)

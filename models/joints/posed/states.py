@@ -29,8 +29,8 @@ COORDINATE_PARTS: Mapping[str, tuple[str, ...]] = {"U": ("first", "second"), "C"
 #: Value of ``a1 . (a2 x d)`` at home above which the solution of an angle that is 0 at home differs from the other one:
 #: rounding leaves 1e-16.
 _DISTINCT = 1e-6
-_ROD = "the joint ends a rod between two spherical joints, which spins freely"
-_PLANE = "the joint's axes are in one plane at home, where the angles of three rotations are not determined"
+_ROD = "the joint is at an end of a rod between two spherical joints, and this rod spins freely"
+_PLANE = "the three axes of the joint are in one plane at home, where its three angles are not determined"
 
 
 class Angle(NamedTuple):

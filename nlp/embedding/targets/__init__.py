@@ -77,7 +77,7 @@ def export_kinematics(case: Case, source: str, target: str, request: Request | N
     """
     of = request or Request()
     if target not in TARGETS:
-        raise InputError(f"--target {target}: is no target; {nearest(target, list(TARGETS))}")
+        raise InputError(f"--target {target}: no such target; {nearest(target, list(TARGETS))}")
     found = TARGETS[target]
     for option, given, allowed in (
         ("--single", of.single, found.has_single),

@@ -114,10 +114,10 @@ def delta_of(robot: Kinematics, samples: Samples) -> Delta:
     if robot.freedoms != 3:
         raise OtherKindError(f"the platform has {robot.freedoms} degrees of freedom instead of 3")
     if len(drives) != 3 or len({each.dimension for each in drives}) != 1:
-        raise OtherKindError(f"the robot has {len(drives)} actuators, instead of 3 that all turn or all slide")
+        raise OtherKindError(f"the robot has {len(drives)} actuators; 3 are needed, all revolute or all prismatic")
     if robot.coordinates != (0, 1, 2) or samples.turned > TOLERANCE:
         turned = units.text(samples.turned, Dimension.ANGLE)
-        raise OtherKindError(f"the platform turns by {turned} near home, and that of a Delta does not turn")
+        raise OtherKindError(f"the platform rotates by {turned} near home, but the platform of a Delta does not rotate")
     turns = drives[0].dimension is Dimension.ANGLE
     fit = _arm if turns else _carriage
     limbs = tuple(fit(robot, samples, k, each.axis, size) for k, each in enumerate(_drives(robot)))
@@ -154,13 +154,17 @@ def equal_rods(found: Delta, robot: Kinematics) -> None:
             if abs(one - other) > TOLERANCE * size:
                 shown = [units.text(each, Dimension.LENGTH) for each in (one, other)]
                 verb = "have" if part == "rods" else "has"
-                raise OtherKindError(f"the {part} of {limb.actuator} {verb} {shown[0]}, not {shown[1]}")
+                raise OtherKindError(
+                    f"the {part} of {limb.actuator} {verb} a length of {shown[0]}, but the first limb has {shown[1]}"
+                )
     for k, index in enumerate(found.anticlockwise):
         limb = found.limbs[index]
         angle = (limb.outward - first.outward) % (2 * math.pi)
         if abs(math.remainder(angle - k * 2 * math.pi / 3, 2 * math.pi)) > TOLERANCE:
             shown = [units.text(each, Dimension.ANGLE) for each in (angle, k * 2 * math.pi / 3)]
-            raise OtherKindError(f"the limb of {limb.actuator} is at {shown[0]} from the first one, not {shown[1]}")
+            raise OtherKindError(
+                f"the limb of {limb.actuator} is at an angle of {shown[0]} from the first limb, instead of {shown[1]}"
+            )
 
 
 class _Drive(NamedTuple):
@@ -189,7 +193,7 @@ def _drives(robot: Kinematics) -> list[_Drive]:
             found.setdefault(name, _Drive(line / np.linalg.norm(line), at_start[:, :column]))
     missing = [each.name for each in robot.drives if each.name not in found]
     if missing:
-        raise OtherKindError(f"the actuator {missing[0]} is no joint with an axis")
+        raise OtherKindError(f"the actuator {missing[0]} is not a joint with an axis")
     return [found[each.name] for each in robot.drives]
 
 
@@ -198,7 +202,9 @@ def _arm(robot: Kinematics, samples: Samples, k: int, axis: FloatArray, size: fl
     units, name = robot.case.units, robot.drives[k].name
     if abs(axis[2]) > TOLERANCE:
         tilt = units.text(math.asin(min(abs(float(axis[2])), 1.0)), Dimension.ANGLE)
-        raise OtherKindError(f"the motor axis of {name} is inclined by {tilt}, that of a Delta is horizontal")
+        raise OtherKindError(
+            f"the motor axis of {name} is inclined by {tilt}, but the motor axes of a Delta are horizontal"
+        )
     outward = np.array([axis[1], -axis[0], 0.0]) / math.hypot(axis[0], axis[1])
     upward = np.array([0.0, 0.0, 1.0])
     # Positions in sizes from home; a coordinate turns the arm from `outward` to `-upward` where the axis is left of it.
@@ -234,7 +240,7 @@ def _carriage(robot: Kinematics, samples: Samples, k: int, axis: FloatArray, siz
     slope = math.hypot(axis[0], axis[1])
     if slope > TOLERANCE:
         tilt = units.text(math.atan2(slope, abs(float(axis[2]))), Dimension.ANGLE)
-        raise OtherKindError(f"the rail of {name} is inclined by {tilt}, that of a Delta is vertical")
+        raise OtherKindError(f"the rail of {name} is inclined by {tilt}, but the rails of a Delta are vertical")
     p = (samples.positions - robot.start[9:12] - samples.coordinates[:, k, None] * axis) / size
     rows = np.column_stack([2 * p, np.ones(len(p))])
     values = _least_squares(rows, np.sum(p**2, axis=1), f"the carriage of {name}")
@@ -248,7 +254,9 @@ def _outward(limbs: tuple[Limb, ...]) -> tuple[Limb, ...]:
     places = np.array([each.centre[:2] for each in limbs])
     sides = places[1:] - places[0]
     if abs(np.linalg.det(sides)) <= TOLERANCE * np.sum(sides**2):
-        raise OtherKindError("the carriages of the robot lie in one plane, those of a Delta on a circle")
+        raise OtherKindError(
+            "the carriages of the robot are in one plane, but the carriages of a Delta are on a circle"
+        )
     centre = places[0] + np.linalg.solve(2 * sides, np.sum(sides**2, axis=1))
     angles = (math.atan2(*(each - centre)[::-1]) for each in places)
     return tuple(each._replace(outward=angle) for each, angle in zip(limbs, angles, strict=True))
@@ -256,7 +264,9 @@ def _outward(limbs: tuple[Limb, ...]) -> tuple[Limb, ...]:
 
 def _least_squares(rows: FloatArray, values: FloatArray, part: str) -> FloatArray:
     if len(rows) < rows.shape[1]:
-        raise OtherKindError(f"{part} is not known: the robot takes only {len(rows)} of the poses near home")
+        raise OtherKindError(
+            f"{part} cannot be determined: the robot reaches only {len(rows)} of the sampled poses near home"
+        )
     return np.asarray(np.linalg.lstsq(rows, values, rcond=None)[0], dtype=np.float64)
 
 
@@ -265,7 +275,7 @@ def _length(rods: FloatArray, robot: Kinematics, size: float, name: str) -> floa
     spread = float(np.ptp(rods))
     if spread > TOLERANCE:
         shown = robot.case.units.text(spread * size, Dimension.LENGTH)
-        raise OtherKindError(f"limb {name} has no rods of a fixed length: near home the length changes by {shown}")
+        raise OtherKindError(f"limb {name} has no rods of constant length: near home the length changes by {shown}")
     return float(rods.mean())
 
 
@@ -278,7 +288,9 @@ def legs_of(robot: Kinematics, samples: Samples) -> Legs:
     legs, units, size = robot.robot.robot.legs, robot.case.units, robot.size / robot.transform.scale
     slides = [each.dimension is Dimension.LENGTH for each in robot.drives]
     if len(legs) != 6 or len(slides) != 6 or not all(slides):
-        raise OtherKindError(f"the robot has {len(legs)} straight legs and {len(slides)} actuators instead of 6 and 6")
+        raise OtherKindError(
+            f"the robot has {len(legs)} straight legs and {len(slides)} actuators; 6 legs and 6 prismatic actuators are needed"
+        )
     centres = ca.horzcat(*[ca.vertcat(each.base, each.platform) for each in legs])
     values = np.array(ca.Function("legs", [robot.robot.z], [ca.densify(centres)])(robot.start), dtype=np.float64).T
     base, platform = values[:, :3], values[:, 3:]
@@ -302,7 +314,7 @@ def struts_of(robot: Kinematics, samples: Samples) -> Struts:
     """
     size, slides = robot.size / robot.transform.scale, [each.dimension is Dimension.LENGTH for each in robot.drives]
     if len(slides) != 5 or not all(slides):
-        raise OtherKindError(f"the robot has {len(slides)} actuators instead of 5 that slide")
+        raise OtherKindError(f"the robot has {len(slides)} actuators; 5 prismatic actuators are needed")
     found = [_strut(robot, samples, k, each, size) for k, each in enumerate(_drives(robot))]
     base, rings, zero, sign = (np.array(each) for each in zip(*found, strict=True))
     return Struts(base, rings, zero, sign)
@@ -323,7 +335,7 @@ def _strut(
     off = float(np.abs(rows @ base - values).max())
     if off > TOLERANCE * size:
         shown = units.text(off, Dimension.LENGTH)
-        raise OtherKindError(f"the strut of {name} does not begin in a point: its axes pass each other at {shown}")
+        raise OtherKindError(f"the first joint axes of the strut of {name} do not meet: their distance is {shown}")
     seen = np.einsum("nji,nj->ni", samples.rotations, base - samples.positions) / size
     q = samples.coordinates[:, k] / size
     around, height = np.hypot(seen[:, 0], seen[:, 1]), seen[:, 2]
@@ -335,6 +347,7 @@ def _strut(
     if spread > TOLERANCE:
         shown = units.text(spread * size, Dimension.LENGTH)
         raise OtherKindError(
-            f"the end of strut {name} is in no ring about the platform's z axis: lengths differ by {shown}"
+            f"the end of the strut of {name} does not move on a circle about the platform's z axis: "
+            f"lengths differ by {shown}"
         )
     return base, size * np.array([radius, level]), size * float(zeros.mean()), math.copysign(1.0, slope)

@@ -30,7 +30,7 @@ def write(case: Case) -> dict[str, str]:
     found = delta_configuration(case, _ROTARY if turns else _LINEAR)
     if turns and found.height <= 0:
         height = f"{printed(found.height)} {found.case.controller.length}"
-        fault = f"its motor axes are at height {height}, Klipper needs them above the bed"
+        fault = f"its motor axes are at height {height}, but Klipper needs motor axes above the bed"
         raise refused(case, TARGET, "rotary_delta", fault, "controller.origin of the case states the bed")
     text = _rotary(found) if turns else _linear(found)
     return {"printer.cfg": text, "README.md": _readme(found, "rotary_delta" if turns else "delta")}

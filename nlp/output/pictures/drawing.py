@@ -219,7 +219,8 @@ def drawing_of(
     case, model = nlp.case, nlp.program.model
     if state is None:
         raise EvaluationError(
-            f"{case.source or case.name}: no picture: the robot has no configuration at the last point"
+            f"{case.source or case.name}: no picture: "
+            "the search ended at a point at which the robot cannot be assembled"
         )
     linkage, posture = _posture(nlp, x, state, pose)
     chosen = case.tasks[task]

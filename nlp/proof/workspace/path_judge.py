@@ -49,7 +49,7 @@ TIME_LIMIT = 600.0
 #: Largest fraction of the remaining time for one search; and relative gap of a quantity without a limit.
 _PART, GAP = 0.5, 1e-3
 #: Reason for quantities with an operation without an interval rule.
-_NO_RULE = "one of its operations has no interval rule"
+_NO_RULE = "its expression contains an operation without an interval rule"
 
 
 @one_call

@@ -230,7 +230,9 @@ def motion_matrix(robot: PosedRobot, start: FloatArray, *, is_locked: bool) -> t
         spectra = np.linalg.svd(np.hsplit(robot.at(matrix, (start + away).T), len(away)), compute_uv=False)
         mobility, idle = matrix.shape[1] - max(int(np.count_nonzero(each > _ZERO * each[0])) for each in spectra), 0
     if not 0 < mobility < 6:
-        raise ProofError("the robot has no constraint wrenches whose rank could be claimed")
+        raise ProofError(
+            "the proof claims a rank of the constraint wrenches, but this robot has none, or has no degree of freedom"
+        )
     return matrix, mobility + idle
 
 
