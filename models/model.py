@@ -71,7 +71,7 @@ class Model(Whole, Shown):
         links: links of the limbs, as segments.
         remarks: sentences for the user on possible mistakes in a robot given joint by joint.
         generic: ranks at almost all dimensions and poses; None for a robot given by its rows.
-        structure: structure of each path of joints; empty for a robot given by its rows.
+        structure: structure of each chain of joints; empty for a robot given by its rows.
         length_unit: unit of the typical lengths, such as ``m``; empty for proportions in any unit.
         size: (1, 1) characteristic size of the robot, length; None for the norm of the parameters that are lengths.
 
@@ -149,7 +149,7 @@ class Model(Whole, Shown):
 
     @property
     def nested(self) -> tuple[JointScrews, ...]:
-        """Paths of joints with nested loops, of the limbs that resist the platform."""
+        """Chains of joints with nested loops, in limbs that resist the platform."""
         return tuple(each for each in self.joint_screws if each.is_nested and each.limb in self.limbs)
 
     @property

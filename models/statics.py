@@ -155,7 +155,7 @@ def rows_about(jacobian: SX, position: SX) -> SX:
 
 
 def inverse_rates(model: Model, robot: RobotInstance) -> SX:
-    """Return the inverse Jacobian (a, 6): actuator rates for the platform's angular velocity and origin's velocity.
+    """Return the inverse Jacobian (a, 6): actuator rates for angular velocity and velocity of the platform's origin.
 
     Least-squares solution of ``D qdot = J chi`` for each limb, exact in every possible platform motion. Unlike
     :meth:`Statics.rates` it also exists where J is singular, and for any number of actuators.

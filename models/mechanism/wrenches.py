@@ -73,7 +73,7 @@ class MemberWrenches:
         return 6 - self.all_rank
 
     def resisted(self, twist: FloatArray) -> FloatArray:
-        """Return the resisted part ``r_k`` (6,) of a twist (6,), angular velocity, then velocity at world origin."""
+        """Return the resisted part ``r_k`` (6,), in scaled coordinates, of a twist (6,) about the world origin."""
         return np.asarray(self.projector @ scaled_twists(twist[:, None], self.centre, self.length)[:, 0])
 
 

@@ -304,7 +304,7 @@ class Case(Whole, Shown):
 
     @property
     def is_optimised_everywhere(self) -> bool:
-        """True if the worst value over the workspace or path is optimised, not that at the stated poses only."""
+        """True if the worst value over the workspace or path is optimised, not only the value at the stated poses."""
         return bool(self.limits_over) and (bool(self.tasks[0].measure) or self.worst_everywhere)
 
     @property

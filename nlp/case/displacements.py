@@ -177,7 +177,7 @@ def _read_offsets(written: OffsetsTable | None, key: str) -> list[float]:
     """Return the offsets along one axis; a single 0 without a table.
 
     Raises:
-        CaseError: the first is not below the last.
+        CaseError: the first offset is not below the last one.
     """
     if written is None:
         return [0.0]

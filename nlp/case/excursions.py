@@ -2,7 +2,8 @@
 
 An excursion displaces the platform along and about the world axes: ``p = p0 + e``, ``R = E R0``. The result is a box in
 world coordinates if the pose has no rotation, the excursions have none, or both rotate about one axis. In ``Rz(yaw)
-Ry(pitch) Rx(roll) R0``, a rotation R0 about x adds to roll; about y to pitch if roll is 0; about z to yaw if both are.
+Ry(pitch) Rx(roll) R0``, a rotation R0 about x adds to roll; about y to pitch, if roll is 0; about z to yaw, if roll and
+pitch are 0.
 """
 
 from __future__ import annotations
@@ -246,7 +247,7 @@ def _moved(value: Value, by: float) -> Value:
 
 
 def _sum(one: float, other: float, outwards: float) -> float:
-    """Return a sum; a rounded one is moved towards ``outwards``, an infinity."""
+    """Return a sum; if it is rounded, it is moved towards ``outwards``, which is plus or minus infinity."""
     total = one + other
     # The error of a sum of two doubles is a double (Knuth).
     part = total - one

@@ -80,7 +80,7 @@ class PositionSet:
         spans: ranges of x, y and z of a box; the last one is also the range of z of a disc or ring.
         half_spaces: half spaces that contain the set.
         shift: displacement of the whole set, length.
-        is_diameter: whether the case states diameters instead of radii.
+        is_diameter: If true, the case states diameters instead of radii.
     """
 
     kind: SetKind
@@ -96,7 +96,7 @@ class PositionSet:
 
     @property
     def coordinates(self) -> tuple[int, ...]:
-        """Indices of the position's coordinates that the set couples; ranges of the others are ends of the box."""
+        """Indices of the coordinates that the set couples; the other coordinates have the ranges of the box."""
         used = [0, 1] if self.kind in UPRIGHT else [] if self.kind is SetKind.BOX else [0, 1, 2]
         return tuple(sorted({*used, *(k for each in self.half_spaces for k in range(3) if each.normal[k])}))
 
@@ -117,7 +117,7 @@ class PositionSet:
 
     @cached_property
     def box(self) -> tuple[Value, Value, Value]:
-        """Ranges of x, y and z of a box that encloses the set; ranges of a file are kept, others rounded outwards."""
+        """Ranges of x, y and z of a box around the set: ranges of the file, or computed ranges, rounded outwards."""
         if self.kind is SetKind.BOX:
             return self._shifted(self.spans)
         r, low, high = self.radius, np.array(self.centre), np.array(self.centre)

@@ -56,7 +56,7 @@ def models(
 
 
 def _variants(name: str, model: Model | None, found: Sequence[ModelOption]) -> list[Model]:
-    """Return the robot with each value of the first option whose values can be listed, or the robot alone."""
+    """Return the robot with each value of the first option with listed values; without such an option, the robot."""
     from ..case.robots import build_model
 
     listed = next((option for option in found if option.choices), None)

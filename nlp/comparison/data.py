@@ -153,7 +153,7 @@ def _rules(comparison: Comparison) -> list[str]:
 
 
 def _cautions(comparison: Comparison) -> list[str]:
-    """Return sentences on other reasons why F of ranked robots differs: sizes, numbers of terms, units."""
+    """Return sentences on differences that affect the comparison of F: sizes, numbers of terms, and units."""
     case, ranked, lines = comparison.case, comparison.ranked, []
     sizes = [each.final_size for each in ranked if each.final_size is not None]
     turns = any(np.any(np.asarray(task.twist, dtype=np.float64)[:3]) for task in case.tasks)

@@ -105,7 +105,7 @@ def _is_same_file(one: Contender, other: Contender) -> bool:
 
 
 def size_of_home(model: Model) -> float:
-    """Return the size of a robot at home with its typical dimensions, in their unit.
+    """Return the size of a robot at home with its typical dimensions, in the unit of these dimensions.
 
     Raises:
         InputError: the robot has no points, or they coincide.

@@ -114,7 +114,7 @@ def _check_pairs(nlp: Nlp) -> None:
 
 
 def _rounded(nlp: Nlp) -> Nlp:
-    """Return a program with fewer digits of the values from a solve."""
+    """Return a program in which the values from a solve are rounded."""
     epigraph = nlp.program.places.epigraph
     if epigraph is None:
         return nlp

@@ -1,8 +1,8 @@
 """Degrees of freedom, actuator rates and singularities of a robot with given joints, at one point.
 
 With ``C`` the constraint wrenches, which do no work in the actuated joints, the platform has ``6 - rank C`` degrees of
-freedom if the actuators are free, and can make a twist in which ``C`` does no work. The actuator rates of a limb for a
-twist minimise the motion that the limb resists (:mod:`screwsynth.models.actuation`).
+freedom if the actuators are unlocked, and can make a twist in which ``C`` does no work. The actuator rates of a limb
+for a twist minimise the motion that the limb resists (:mod:`screwsynth.models.actuation`).
 """
 
 from collections.abc import Mapping

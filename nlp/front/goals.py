@@ -1,6 +1,6 @@
 """Goals of a front, such as ``max F:NAME`` and ``min limits.KEY``, and programs of the epsilon-constraint method.
 
-Each program optimises one goal within bounds on the others.
+Each program optimises one goal within bounds on the other goals.
 
 Source of the method: Y. Y. Haimes, L. S. Lasdon and D. A. Wismer, On a bicriterion formulation of the problems of
 integrated system identification and system optimization, IEEE Trans. Syst. Man Cybern. 1 (1971) 296-297.

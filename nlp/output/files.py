@@ -91,8 +91,8 @@ def write_whole(target: str) -> Iterator[Path]:
 def write_folder(target: str, files: Mapping[str, str], *, force: bool = False) -> None:
     """Write texts into the files of a folder; a missing folder is created.
 
-    All files are complete before the first gets its name; other files in the folder stay. A manifest in the folder has
-    the names of the written files. Two runs at the same time write one after the other.
+    All files are written completely before the first one gets its final name; other files in the folder stay. A
+    manifest in the folder has the names of the written files. Two runs at the same time write one after the other.
 
     Args:
         target: path of the folder.

@@ -44,7 +44,7 @@ class Tolerances(NamedTuple):
     closed: float
 
     def times(self, scale: float) -> Tolerances:
-        """Return the same lengths in another unit."""
+        """Return the tolerances times a factor, which converts them to another unit."""
         return Tolerances(self.radius * scale, self.spiral * scale, self.closed * scale)
 
 
@@ -84,7 +84,7 @@ def arc_about(centre: Point, start: Point, end: Point, turns: int, tolerances: T
         centre: coordinates in the plane.
         start: first point.
         end: last point; equal to the first for a full circle.
-        turns: number of turns, with the last turn complete or partial; negative for clockwise.
+        turns: number of turns, including a partial last turn; negative for clockwise.
         tolerances: tolerances in the unit of the coordinates.
 
     Raises:
@@ -139,7 +139,7 @@ def centre_of_radius(radius: float, start: Point, end: Point, is_clockwise: bool
 
 
 def arc_length(radius: _Numbers, growth: _Numbers, sweep: _Numbers, rise: _Numbers) -> _Numbers:
-    """Return the length of an arc or a helix, or of several.
+    """Return the length of an arc or a helix; arguments may be arrays.
 
     Args:
         radius: radius at the start.

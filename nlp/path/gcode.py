@@ -194,7 +194,7 @@ class Interpreter:
                 self._note(f"{letter}{block.words[letter]:g}")
 
     def _set_modes(self, codes: dict[str, float], words: dict[str, float]) -> None:
-        """Set the modes of a line on which its feed depends."""
+        """Set the modes on which the feed of a line depends: feed mode and unit."""
         if "feed" in codes:
             self.is_inverse_time = codes["feed"] == 93
             self.feed = self.turn_feed = 0.0
@@ -248,7 +248,7 @@ class Interpreter:
         self.shift = [a + b for a, b in zip(self.origins[self.system], self.axis_offsets, strict=True)]
 
     def _dwell(self, words: dict[str, float]) -> None:
-        """Wait."""
+        """Execute a dwell (G4)."""
         if not words.get("P", -1) >= 0:
             raise WordError("G4", "needs P, a time of 0 seconds or more")
         if words["P"]:
@@ -278,12 +278,12 @@ class Interpreter:
             self.origins[system][axis] = origin
 
     def _set_axis_offsets(self, words: dict[str, float]) -> None:
-        """Set the axis offsets, so that the point has the coordinates of the line (G92)."""
+        """Set the axis offsets, so that the current point has the coordinates that the line states (G92)."""
         for axis, value in self._axis_words(words, "G92").items():
             self.axis_offsets[axis] = self._stated(axis, "G92") - self.origins[self.system][axis] - value
 
     def _stated(self, axis: int, code: str) -> float:
-        """Return a coordinate of the point; refuse a code that needs an unknown coordinate."""
+        """Return a coordinate of the current point; refuse a code that needs an unknown coordinate."""
         if math.isnan(self.now[axis]):
             raise WordError(code, f"needs the present {'XYZABC'[axis]}, which is not yet known; give the start point")
         return self.now[axis]
@@ -309,7 +309,7 @@ class Interpreter:
             )
 
     def _end(self, words: dict[str, float], is_machine: bool) -> list[float]:
-        """Return the end of a motion in machine coordinates."""
+        """Return the end point of a motion in machine coordinates."""
         end = self.now.copy()
         for letter, value in words.items():
             axis = AXES.get(letter)
@@ -367,7 +367,7 @@ class Interpreter:
         return one + self.shift[first], other + self.shift[second]
 
     def _add(self, kind: Kind, end: list[float], seconds: float, arc: Arc | None = None) -> None:
-        """Add a segment from the point to an end; from an unknown point, only move there."""
+        """Add a segment from the current point to an end point; from an unknown point, only move there."""
         self.now = end
         if not self.is_known:
             self._note(self.before_path)

@@ -132,7 +132,7 @@ def checks_of(checks: Sequence[CaseCheck]) -> ChecksResult:
 
 
 def check(names: Sequence[str] | None = None) -> list[CaseCheck]:
-    """Solve cases and check their expected and published values; a case that others refer to is solved once.
+    """Solve cases and check their expected and published values; a case to which other cases refer is solved once.
 
     After a request to stop, the cases that are checked so far are returned.
 

@@ -117,7 +117,7 @@ def _task_columns(k: int, task: ComparedTaskData, *, is_shown: bool) -> Iterator
 
 
 def _joined(name: str, texts: Callable[[ComparedRobotData], Iterable[str]]) -> Column[ComparedRobotData]:
-    """Return a column of several texts in a cell."""
+    """Return a column whose cells list several texts."""
     return Column(name, lambda robot: SEPARATOR.join(texts(robot)), holds=str)
 
 

@@ -205,7 +205,7 @@ def _scale_lines(case: Case, scale: ScaleData) -> Iterator[Line]:
 
 
 def _failed_words(claim: str) -> str:
-    """Return a claim and its outcome in words; the result has the name and the status."""
+    """Return a claim with its outcome in words, from a text with the name and the status of the claim."""
     name, comma, status = claim.rpartition(", ")
     words = {each.value: word for each, word in OUTCOME_WORDS.items()}
     return f"{CLAIM_WORDS.get(name, name)}{comma}{words.get(status, status)}"

@@ -94,7 +94,7 @@ class _Displaced:
     """Adds joint-centre errors to joints, one limb after the other.
 
     Args:
-        frame: common data of all paths of the robot.
+        frame: common data of all chains of the robot.
 
     Attributes:
         centres: joint centres with an error so far.

@@ -250,7 +250,7 @@ def _limb(place: str, table: Mapping[str, object], before: int) -> LimbWords:
 
 
 def _check_path(place: str, joints: Sequence[JointWords]) -> None:
-    """Refuse too many joints of one path, invalid joint names, and repeated ones."""
+    """Refuse too many joints of one chain, invalid joint names, and repeated ones."""
     if len(joints) > _MOST_JOINTS:
         raise RobotError(f"{place}, joints", f"has {len(joints)} joints; at most {_MOST_JOINTS} are allowed")
     names = [joint.name for joint in joints if joint.name]

@@ -134,7 +134,7 @@ def _constant(tree: ast.expr, angle: float) -> float | None:
 
 
 class _Reader:
-    """Recursive-descent parser of a text."""
+    """Recursive-descent parser of the text of a relation."""
 
     def __init__(self, text: str, names: Collection[str]) -> None:
         self._text, self._names = text, names

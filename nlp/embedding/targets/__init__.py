@@ -13,7 +13,7 @@ from . import arduino, firmware, klipper, klipper_patch, linuxcnc, linuxcnc_modu
 
 
 class Request(NamedTuple):
-    """Options of an export.
+    """Options of an export of kinematics.
 
     Attributes:
         single: If true, positions, rates and torques are in single precision.
@@ -25,7 +25,7 @@ class Request(NamedTuple):
 
 
 class Target(NamedTuple):
-    """Form of a controller.
+    """Export in the form of one controller.
 
     Attributes:
         write: function from a case and a request to the texts of the files by name.

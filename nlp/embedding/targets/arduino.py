@@ -24,7 +24,7 @@ def write(case: Case, coordinates: str, *, single: bool) -> dict[str, str]:
 
     Raises:
         CaseError: as for :func:`~.library.library_of`.
-        InputError: likewise.
+        InputError: as for :func:`~.library.library_of`.
     """
     controller = case.controller
     library = library_of(case, length=controller.length, angle=controller.angle, single=single, coordinates=coordinates)

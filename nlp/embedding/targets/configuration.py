@@ -37,7 +37,8 @@ class Rules(NamedTuple):
         angle: unit of the coordinates of arms.
         down: If true, the angle of an arm is positive downwards.
         first: direction of the first limb in the controller's frame, degrees; None if the axes are those of the case.
-        has_height: If true, the controller knows the height of the motor axes; else they are at height 0.
+        has_height: If true, the controller knows the height of the motor axes; otherwise the motor axes are at height
+            0.
         equal: If true, all limbs have the same arms and rods, and are 120 degrees apart.
         hint: advice for other robots, as the last clause of a message.
     """
@@ -58,10 +59,10 @@ class Configuration(NamedTuple):
 
     Attributes:
         case: case with these conventions.
-        robot: its kinematics.
-        order: index of the actuator of each joint of the controller.
-        radius, height: dimensions of a Delta; 0 for others.
-        angles: (a,) direction of each limb in the controller's frame, degrees; empty for others.
+        robot: kinematics of the robot.
+        order: index of the robot's actuator for each joint of the controller.
+        radius, height: dimensions of a Delta; 0 for other robots.
+        angles: (a,) direction of each limb in the controller's frame, degrees; empty for other robots.
         arms, rods: (a,) lengths of a Delta; empty for others.
         base: (a, 3) base joints of legs and struts; empty for a Delta.
         platform: (a, 3) platform joints of legs, or (a, 2) radius and height of the rings of struts.
@@ -91,7 +92,7 @@ def printed(value: float) -> str:
 
 
 def printed_home(value: float, size: float) -> str:
-    """Return a coordinate at home, which Newton's method has closed to fewer digits."""
+    """Return a coordinate at home for a file: with fewer digits, because Newton's method limits its accuracy."""
     return f"{_plain(round(value / size, 10), 1.0) * size + 0.0:.9g}"
 
 
@@ -122,7 +123,7 @@ def leg_configuration(case: Case, target: str, kind: str, hint: str) -> Configur
     """Return the joints of six straight legs, in the world frame that the case states for its controller.
 
     Raises:
-        CaseError: the robot has others.
+        CaseError: the robot does not consist of such legs.
     """
     return _recognised(case, target, kind, hint, lambda plain, at: _legs(case, plain, legs_of(plain, at), at))
 
@@ -131,7 +132,7 @@ def strut_configuration(case: Case, target: str, kind: str, hint: str) -> Config
     """Return the joints of five struts at a spindle, in the world frame that the case states for its controller.
 
     Raises:
-        CaseError: the robot has others.
+        CaseError: the robot does not consist of such struts.
     """
     return _recognised(case, target, kind, hint, lambda plain, at: _struts(case, plain, struts_of(plain, at), at))
 
@@ -297,7 +298,7 @@ def length_unit(case: Case) -> str:
 
 
 def _shared(values: Mapping[str, float], usual: float) -> Mapping[str, float]:
-    """Return values by actuator as a controller states them: one for all if they are equal, none for the usual one."""
+    """Return values by actuator as a controller states them: one value for equal values, none for usual values."""
     every = set(values.values())
     if len(every) > 1:
         return MappingProxyType(dict(values))
@@ -306,12 +307,12 @@ def _shared(values: Mapping[str, float], usual: float) -> Mapping[str, float]:
 
 
 def _angle(value: float) -> float:
-    """Return an angle that is round in degrees if its rounding errors are removed, radians."""
+    """Return an angle, radians; rounding errors of an angle that is round in degrees are removed."""
     return math.radians(rounded(math.degrees(_plain(value, 1.0))))
 
 
 def _plain(value: float, size: float) -> float:
-    """Return a value without rounding errors of a quantity of a size."""
+    """Return a value without rounding errors; ``size`` is the magnitude of the quantity."""
     return 0.0 if abs(value) <= _ROUNDING * size else float(value)
 
 

@@ -28,7 +28,7 @@ def write_marlin(case: Case) -> dict[str, str]:
     """Return M665 and M666 for a linear Delta, and a description.
 
     Raises:
-        CaseError: the robot is none.
+        CaseError: the robot is not such a Delta.
     """
     found = delta_configuration(case, _rules(MARLIN, "Marlin's delta", turns=False))
     words = [f"L{printed(found.rods[0])}", f"R{printed(found.radius)}"]
@@ -43,7 +43,7 @@ def write_reprapfirmware(case: Case) -> dict[str, str]:
     """Return M665 and M666 for a linear Delta or M669 for a rotary one, and a description.
 
     Raises:
-        CaseError: the robot is none.
+        CaseError: the robot is not such a Delta.
     """
     turns = Kinematics(case).drives[0].dimension is Dimension.ANGLE
     kind = "the rotary Delta of RepRapFirmware" if turns else "the linear Delta of RepRapFirmware"

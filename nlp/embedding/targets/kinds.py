@@ -36,7 +36,7 @@ class Limb(NamedTuple):
         arm: length of the arm; 0 for a carriage.
         rod: length of the rods.
         zero: angle of the arm below the horizontal at home, radians; 0 for a carriage.
-        sign: 1 if a positive coordinate moves the arm down or the carriage up, else -1.
+        sign: 1 if a positive coordinate moves the arm down or the carriage up, otherwise -1.
     """
 
     actuator: str
@@ -55,7 +55,8 @@ class Delta(NamedTuple):
         turns: If true, arms that turn; if false, carriages.
         limbs: the three limbs, in the order of the robot's actuators.
         axis: (2,) place of the vertical axis.
-        radius: distance of motor axis or carriage from the axis, less that of the platform's joints.
+        radius: distance of motor axis or carriage from the vertical axis, minus the distance of the platform's joints
+            from it.
         height: height of the motor axes, or of the carriages at zero, above the platform's joints at position 0.
     """
 
@@ -67,7 +68,7 @@ class Delta(NamedTuple):
 
     @property
     def anticlockwise(self) -> tuple[int, ...]:
-        """Indices of the limbs anticlockwise from above, from the first one."""
+        """Indices of the limbs in anticlockwise order, seen from above, beginning with the first limb."""
         first = self.limbs[0].outward
         return tuple(sorted(range(3), key=lambda k: (self.limbs[k].outward - first) % (2 * math.pi)))
 
@@ -93,7 +94,7 @@ class Struts(NamedTuple):
         base: (5, 3) base joints in the world frame.
         rings: (5, 2) radius and height of the ends in the platform frame.
         zero: (5,) length of each strut where its coordinate is 0.
-        sign: (5,) 1 if a positive coordinate makes the strut longer, else -1.
+        sign: (5,) 1 if a positive coordinate makes the strut longer, otherwise -1.
     """
 
     base: FloatArray
@@ -106,7 +107,7 @@ def delta_of(robot: Kinematics, samples: Samples) -> Delta:
     """Return the dimensions of a Delta.
 
     Raises:
-        OtherKindError: the robot is none.
+        OtherKindError: the robot is not a Delta.
     """
     units, size = robot.case.units, robot.size / robot.transform.scale
     drives = robot.drives
@@ -177,7 +178,7 @@ def _drives(robot: Kinematics) -> list[_Drive]:
     """Return the actuators at home: axis of an arm, or line of a carriage or strut.
 
     Raises:
-        OtherKindError: an actuator is no joint.
+        OtherKindError: an actuator is not a joint of the robot.
     """
     model, start = robot.robot.model, robot.start
     joints = {each.joint: each.name for each in model.actuators}
@@ -270,7 +271,7 @@ def _least_squares(rows: FloatArray, values: FloatArray, part: str) -> FloatArra
 
 
 def _length(rods: FloatArray, robot: Kinematics, size: float, name: str) -> float:
-    """Return the length of rods from distances (N,), in sizes."""
+    """Return the length of rods from distances (N,) in units of the robot's size."""
     spread = float(np.ptp(rods))
     if spread > TOLERANCE:
         shown = robot.case.units.text(spread * size, Dimension.LENGTH)
@@ -282,7 +283,7 @@ def legs_of(robot: Kinematics, samples: Samples) -> Legs:
     """Return the joints of six straight legs.
 
     Raises:
-        OtherKindError: the robot has others.
+        OtherKindError: the robot does not consist of six straight legs.
     """
     legs, units, size = robot.robot.robot.legs, robot.case.units, robot.size / robot.transform.scale
     slides = [each.dimension is Dimension.LENGTH for each in robot.drives]
@@ -311,7 +312,7 @@ def struts_of(robot: Kinematics, samples: Samples) -> Struts:
     """Return the joints of five struts at a spindle.
 
     Raises:
-        OtherKindError: the robot has others.
+        OtherKindError: the robot does not consist of five such struts.
     """
     size, slides = robot.size / robot.transform.scale, [each.dimension is Dimension.LENGTH for each in robot.drives]
     if len(slides) != 5 or not all(slides):

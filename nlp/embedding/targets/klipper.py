@@ -24,7 +24,7 @@ def write(case: Case) -> dict[str, str]:
     """Return the sections of a printer.cfg and a description for a rotary or linear Delta.
 
     Raises:
-        CaseError: the robot is none, or its motor axes are not above the bed.
+        CaseError: the robot is not such a Delta, or its motor axes are not above the bed.
     """
     turns = Kinematics(case).drives[0].dimension is Dimension.ANGLE
     found = delta_configuration(case, _ROTARY if turns else _LINEAR)

@@ -20,7 +20,7 @@ class Library(NamedTuple):
 
     Attributes:
         case: case with these conventions.
-        robot: its kinematics.
+        robot: kinematics of the robot.
         files: header and sources by name.
         names: texts for the placeholders of templates.
     """
@@ -51,7 +51,7 @@ def library_of(
     single: bool = False,
     coordinates: str = "pose",
 ) -> Library:
-    """Return the kinematics of a case in units of a target; zero, sense and frame stay those of the case.
+    """Return the kinematics of a case in the units of a target; zeros, senses and frame are those that the case states.
 
     Raises:
         CaseError: a dimension is free, a unit is unknown, or no closed configuration is known.

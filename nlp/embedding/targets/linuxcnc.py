@@ -34,7 +34,7 @@ def write(case: Case) -> dict[str, str]:
     """Return HAL lines, INI sections and description for a robot that a module of LinuxCNC describes.
 
     Raises:
-        CaseError: no module does.
+        CaseError: no module of LinuxCNC describes the robot.
     """
     found, module, words = _found(case)
     lines = {"rotarydeltakins": _rotary, "lineardeltakins": _linear, "genhexkins": _joints, "pentakins": _joints}[
@@ -87,7 +87,7 @@ def ini_text(
         robot: kinematics in the conventions of LinuxCNC.
         module: name of the module.
         words: words of the coordinates, such as XYZ.
-        order: index of the actuator of each joint.
+        order: index of the robot's actuator for each joint.
         ranges: limits of each joint.
         home: coordinate of each joint at home.
     """
@@ -119,7 +119,7 @@ def ini_text(
 
 
 def pose_words(robot: Kinematics, words: str) -> list[str]:
-    """Return the words of the home pose, from X to the last one of the given words; others are 0."""
+    """Return the words of the home pose, from X to the last given word; words that are not given are 0."""
     angles = [each / robot.transform.degrees for each in _rpy(robot.home[:9].reshape(3, 3))]
     sizes = [robot.size] * 3 + [1 / robot.transform.degrees] * 3
     values = zip("XYZABC", [*robot.home[9:12].tolist(), *angles], sizes, strict=True)

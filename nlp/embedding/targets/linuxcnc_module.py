@@ -23,7 +23,7 @@ def write(case: Case) -> dict[str, str]:
 
     Raises:
         CaseError: as for :func:`~.library.library_of`.
-        InputError: likewise.
+        InputError: as for :func:`~.library.library_of`.
     """
     library = library_of(case, length=length_unit(case), angle="deg")
     robot, names = library.robot, library.names

@@ -30,7 +30,7 @@ class Samples(NamedTuple):
         rotations: (N, 3, 3) platform to world coordinates.
         coordinates: (N, a) actuator coordinates, radians or length.
         unknowns: (N, u) coordinates of the passive joints.
-        turned: largest entry by which a rotation differs from the one at home.
+        turned: largest difference of an entry of a rotation matrix from the rotation at home.
     """
 
     positions: FloatArray
@@ -41,7 +41,7 @@ class Samples(NamedTuple):
 
 
 def samples_of(robot: Kinematics) -> Samples:
-    """Return poses near home; their rotations differ from the one at home if the robot can turn freely."""
+    """Return poses near home; rotations differ from the rotation at home if the robot can turn freely."""
     rng = np.random.default_rng(_SEED)
     size, home = robot.size / robot.transform.scale, robot.start[:9].reshape(3, 3).T
     given = rng.uniform(-1, 1, (_POSES, 6)) * np.isin(range(6), robot.coordinates)
@@ -68,7 +68,7 @@ class Range(NamedTuple):
 def ranges_of(robot: Kinematics, samples: Samples) -> tuple[Range, ...]:
     """Return the limits of the case on each actuator coordinate, in the conventions of the controller.
 
-    A limit on a coordinate is one whose margin differs from the coordinate by a constant.
+    A limit is a limit on a coordinate if its margin differs from the coordinate by a constant.
     """
     limits = limits_of(robot)
     q = robot.transform.coordinates(samples.coordinates)

@@ -58,7 +58,7 @@ class Incumbent:
 
     @property
     def value(self) -> float:
-        """Maximised value at the point; -inf without one."""
+        """Maximised value at the point; -inf without a point."""
         return self._best.value
 
     @property

@@ -138,7 +138,7 @@ def _claims_of(claims: dict[tuple[Node, int], Box], form: StandardForm, bound: f
 
 
 def _of_shared_limbs(tree: bytes, form: StandardForm, bound: float) -> Iterator[_Block]:
-    """Yield the claims of a tree of limbs that share variables.
+    """Yield the claims of a tree of boxes for a robot whose limbs share variables.
 
     Raises:
         ProofError: the bytes are no tree.

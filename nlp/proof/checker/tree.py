@@ -274,7 +274,7 @@ class SharedLeaves(NamedTuple):
     Q: FloatArray
 
     def select(self, which: NDArray[np.bool_]) -> SharedLeaves:
-        """Return some of the leaves."""
+        """Return the leaves that ``which`` marks."""
         return SharedLeaves(*(each[..., which] for each in self))
 
 

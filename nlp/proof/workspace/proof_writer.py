@@ -128,7 +128,7 @@ class _Writer:
         self.proved: dict[Key, ProofClaim] = {}
 
     def proof(self, each: Claim) -> ProofClaim:
-        """Return a claim with its proof; a claim that depends on others comes after them.
+        """Return a claim with its proof; a claim that depends on other claims comes after them.
 
         Raises:
             ProofError: the claim has no proof; the message is the reason.

@@ -433,7 +433,7 @@ class _Checker:
         return _stated(given)
 
     def _coordinate(self, motor: Motor | None) -> SX | None:  # noqa: ARG002 - of a path with times
-        """Return the coordinate of an actuator whose rate is its speed; None for speeds in any motion of the case."""
+        """Return the actuator coordinate whose rate is the claimed speed; None for speeds in any motion of the case."""
         return None
 
     @cached_property
@@ -473,7 +473,7 @@ class _PathChecker(_Checker):
         return super().check(each, given)
 
     def _coordinate(self, motor: Motor | None) -> SX | None:
-        """Return the coordinate of an actuator whose rate is its speed; None for speeds in any motion of the case."""
+        """Return the actuator coordinate whose rate is the claimed speed; None for speeds in any motion of the case."""
         symbols = self.robot.followed
         if motor is None or symbols is None or not self._is_timed:
             return None

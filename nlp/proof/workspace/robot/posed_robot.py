@@ -66,7 +66,7 @@ class Problem:
         independent, dependent: indices of the independent and of the k dependent coordinates of the nominal robot.
         start: (n,) point of the nominal robot with closed loops, at or near the middle of the workspace.
         locked: matrix of rows and members with locked actuators.
-        unactuated: matrix of rows and members with free actuators; None for a robot without constraints.
+        unactuated: matrix of rows and members with unlocked actuators; None for a robot without constraints.
         posed: limbs and loop equations of the nominal robot, or of the robots within the tolerance.
         chosen: independent equations and screws of the model.
         names: names of the m joint centres whose errors are coordinates.
@@ -442,7 +442,7 @@ def _length(posed: PosedModel, start: FloatArray, size: float) -> float:
 
 
 def _unactuated(model: Model, posed: PosedModel, start: FloatArray) -> RankMatrix | None:
-    """Return the matrix of rows and members with free actuators; None for a robot without constraints."""
+    """Return the matrix of rows and members with unlocked actuators; None for a robot without constraints."""
     generic, limbs = model.generic, posed.limbs
     if (generic is not None and generic.constraints == 0) or (not limbs.actuators and model.members):
         return None
