@@ -21,7 +21,8 @@ from builders import Array, Run, refusal_of, turn_about
 from controller_programs import HEADERS, Module, Stepper, klipper, tool_head
 from generated import needs_compiler, run
 from kinematics_library import typical_case
-from test_kinematics_c import ANKLE, LINEAR, ROTARY, case_of
+from position_cases import DELTA
+from test_kinematics_c import ANKLE, ROTARY, case_of
 
 from screwsynth.models.statics import driven_joints
 from screwsynth.nlp import Case, CaseError, InputError, inverse
@@ -64,7 +65,7 @@ def rotary(table: str = "") -> Case:
 
 @pytest.fixture(scope="module")
 def linear(tmp_path_factory: pytest.TempPathFactory) -> Case:
-    return robot_case(LINEAR, tmp_path_factory.mktemp("linear"), "linear")
+    return robot_case(DELTA, tmp_path_factory.mktemp("linear"), "linear")
 
 
 def table_of(files: dict[str, str]) -> str:
