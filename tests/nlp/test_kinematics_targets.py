@@ -65,7 +65,7 @@ def rotary(table: str = "") -> Case:
 
 @pytest.fixture(scope="module")
 def linear(tmp_path_factory: pytest.TempPathFactory) -> Case:
-    return robot_case(DELTA, tmp_path_factory.mktemp("linear"), "linear")
+    return robot_case('length_unit = "mm"' + DELTA, tmp_path_factory.mktemp("linear"), "linear")
 
 
 def table_of(files: dict[str, str]) -> str:
