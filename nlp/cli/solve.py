@@ -53,7 +53,9 @@ def solve(
 
         check_rounding(loaded, step)
     if pose > loaded.pose_count:
-        raise InputError(f"--pose {pose}: the case has {loaded.pose_count} pose{'s' * (loaded.pose_count > 1)}")
+        raise InputError(
+            f"--pose {pose}: no such pose; the case has {loaded.pose_count} pose{'s' * (loaded.pose_count > 1)}"
+        )
     solution, found, is_proved = solve_with_progress(loaded, jobs, certify=certify, gap=gap, step=step)
     result = result_of(found)
     files.deliver(
