@@ -10,11 +10,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from builders import EACH_KIND, Array, assert_words, soaked, starter
+from builders import EACH_KIND, Array, assert_words, soaked
 from numpy.typing import ArrayLike
 
 from screwsynth.models import model_names
 from screwsynth.nlp import Case, Nlp, load_case, shipped_cases, solve
+from screwsynth.nlp.cli.viewed import read_viewed
 from screwsynth.nlp.errors import CaseError, EvaluationError, InputError
 from screwsynth.nlp.evidence.evaluation import starting_point
 from screwsynth.nlp.evidence.kkt import close_equations
@@ -59,7 +60,7 @@ def made(name: str) -> Made:
 
 
 def case_of(name: str) -> Case:
-    return starter(name[4:]) if name.startswith("new ") else load_case(name)
+    return read_viewed(name[4:], {}).file.case if name.startswith("new ") else load_case(name)
 
 
 def run(

@@ -16,6 +16,7 @@ from pages import Page
 from screwsynth.nlp import load_case, shipped_cases, solve
 from screwsynth.nlp.evidence.evaluation import starting_point
 from screwsynth.nlp.evidence.state import evaluate
+from screwsynth.nlp.output.live import page as live_page
 from screwsynth.nlp.output.live.page import SCRIPTS, script_text
 from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.view import wasm
@@ -312,3 +313,40 @@ def test_a_hand_moves_and_turns_the_platform(live: Callable[..., Live]) -> None:
     assert turned[:7] == moved[:7]
     assert turned[7:] != moved[7:]
     assert_words(*page.shown("words"), "nothing is optimised")
+
+
+@needs_compiler
+@pytest.mark.browser
+def test_a_map_has_the_values_of_evaluate_and_moves_the_robot(live: Callable[..., Live]) -> None:
+    page = live("paper-4.1-helical")
+    page.chrome.execute_script("document.getElementById('map-group').open = true")
+    drawn = "const words = () => document.getElementById('map-words').textContent;"
+    drawn += " const look = () => words() ? arguments[0](words()) : setTimeout(look, 20); look();"
+    assert_words(page.chrome.execute_async_script(drawn), "limit is violated", "ms")
+    # The map leaves the point, and what is said about it, as they were.
+    assert page.shown("word") == ["optimal"]
+    click = """
+    const done = arguments[0], { state } = screwsynth, map = document.getElementById("map");
+    const chosen = ["map-x", "map-y"].map((id) => state.sliders[Number(document.getElementById(id).value)]);
+    document.getElementById("mode-evaluate").click();
+    requestAnimationFrame(() => {
+      const { left, top, width, height } = map.getBoundingClientRect();
+      map.dispatchEvent(new MouseEvent("click", { clientX: left + 0.25 * width, clientY: top + 0.4 * height }));
+      requestAnimationFrame(() => requestAnimationFrame(() => done(chosen.map((each) => [
+        each.set, (state.read(each) - state.ends(each)[0]) / (state.ends(each)[1] - state.ends(each)[0])]))));
+    });"""
+    (_, across), (_, up) = page.chrome.execute_async_script(click)
+    assert (across, up) == pytest.approx((0.25, 0.6), abs=0.02)
+
+
+def test_types_of_scripts(tmp_path: Path) -> None:
+    checker = shutil.which("tsc")
+    if checker is None:
+        pytest.skip("tsc is not installed")
+    folder = Path(live_page.__file__).parent / "page"
+    for name in SCRIPTS:
+        shutil.copy(folder / name, tmp_path)
+    options = "--noEmit --allowJs --checkJs --strict --target es2022 --module es2022 --moduleResolution bundler"
+    words = [checker, *options.split(), "--lib", "es2022,dom,dom.iterable", *SCRIPTS]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.stdout == ""

@@ -37,7 +37,7 @@ from ..report.markup import Markup, join_markup, paragraphs, script_json, tag
 from .casefile import case_parts, stated_tasks
 
 #: Modules of the page in the order of their imports.
-SCRIPTS = ("numbers.js", "module.js", "state.js", "text.js", "scene.js", "canvas.js", "panel.js", "main.js")
+SCRIPTS = ("numbers.js", "module.js", "state.js", "text.js", "scene.js", "canvas.js", "panel.js", "map.js", "main.js")
 _IMPORT = re.compile(r'^import \{[^}]*\} from "\./\w+\.js";\n', re.MULTILINE)
 _EXPORT = re.compile(r"^export (?=const|class)", re.MULTILINE)
 #: Statuses of the module in words, by code.
@@ -312,7 +312,22 @@ def _values(data: ViewData) -> Markup:
         ),
     )
     limits = tag("section", tag("h2", "Limits"), tag("div", id="limits"), id="limits-group")
-    return tag("div", values, _actuators(data), limits, id="values", class_="needs-module")
+    return tag("div", values, _actuators(data), limits, _map(), id="values", class_="needs-module")
+
+
+def _map() -> Markup:
+    """Return the place of a map over two values."""
+    whats = [tag("option", words, value=key) for key, words in (("F", "F"), ("singular", "smallest singular value"))]
+    choices = tag(
+        "div",
+        tag("label", "Value: ", tag("select", *whats, id="map-what")),
+        tag("label", "across: ", tag("select", id="map-x")),
+        tag("label", "upwards: ", tag("select", id="map-y")),
+        class_="controls",
+    )
+    picture = tag("canvas", id="map", role="img", aria_label="Map of a value over two sliders; a click moves there")
+    words = tag("p", id="map-words", class_="note")
+    return tag("details", tag("summary", "Map"), choices, picture, words, id="map-group")
 
 
 def _actuators(data: ViewData) -> Markup:

@@ -5,6 +5,7 @@ import { argumentsOf, caseFileOf, fragmentOf, takeFragment } from "./text.js";
 import { axesOf, colourOf, extentOf, piecesOf, robotOf } from "./scene.js";
 import { Picture } from "./canvas.js";
 import { LimitBars, Sliders, TaskFields, byId, showValues } from "./panel.js";
+import { ValueMap } from "./map.js";
 import { plus } from "./numbers.js";
 
 /** Bytes from base64, unpacked. @param {string} text */
@@ -72,6 +73,7 @@ const show = () => {
     sliders?.refresh();
     fields?.refresh();
     showValues(state, bars?.refresh() ?? []);
+    map?.refresh();
     const isEvaluated = state.mode === "evaluate";
     byId("mode-solve").setAttribute("aria-pressed", String(!isEvaluated));
     byId("mode-evaluate").setAttribute("aria-pressed", String(isEvaluated));
@@ -80,6 +82,8 @@ const show = () => {
 };
 /** @type {Sliders | undefined} */
 let sliders;
+/** @type {ValueMap | undefined} */
+let map;
 /** @type {TaskFields | undefined} */
 let fields;
 /** @type {LimitBars | undefined} */
@@ -192,6 +196,7 @@ if (data.has_module) {
   sliders = new Sliders(state, change);
   bars = new LimitBars(state, change);
   fields = new TaskFields(state, change);
+  map = new ValueMap(state, change);
   listen();
   document.documentElement.classList.add("live");
   document.documentElement.classList.toggle("no-slopes", !data.has_slopes);
