@@ -136,7 +136,7 @@ class Examiner:
         test: test with entries in the coordinates of the problem.
 
     Attributes:
-        of: indices of the coordinates.
+        of: indices of the independent coordinates, of the dependent coordinates, and of the joint-centre errors.
         loops: the loop equations as functions.
         second: second-order forms of the entries; None if first-order forms are used.
 
