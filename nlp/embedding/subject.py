@@ -65,7 +65,7 @@ def find_subject(case: Case) -> Subject:
     combination = solve(case).combination
     combined = None if combination is None else combination.combined
     if combined is None:
-        fault = "has a task without a separate optimum, so the tasks cannot be combined"
+        fault = "cannot combine the tasks: for at least one of them, solved alone, no optimum was found"
         raise CaseError("combine.method", fault, case.method.value, case.source)
     return Subject(_rounded(with_all_pairs(combined.nlp)), combined.F if combined.status is Status.OPTIMAL else None)
 

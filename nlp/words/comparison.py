@@ -59,7 +59,7 @@ def comparison_columns(result: ComparisonResult) -> Iterator[Column[ComparedRobo
     for k, task in enumerate(tasks):
         yield from _task_columns(k, task, is_shown=several)
     yield Column("", _constraints, label="constraint wrenches", unit="% of F", text=_constraints)
-    yield Column("", _largest_rate, label="largest rate", text=_largest_rate)
+    yield Column("", _largest_rate, label="largest actuator rate", text=_largest_rate)
     yield Column("factor", lambda robot: robot.factor)
     yield Column("size", lambda robot: robot.size)
     yield Column(
