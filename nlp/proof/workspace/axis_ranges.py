@@ -194,7 +194,7 @@ def _of_case(case: Case) -> FloatArray:
     """Return the coordinates (6,) of a case's first pose.
 
     Raises:
-        InputError: a number of the pose is free.
+        InputError: a coordinate of the pose is free.
     """
     axis, values = case.axis, (*case.position, case.rotation.angle)
     fixed = [each for each in values if not isinstance(each, Free)]

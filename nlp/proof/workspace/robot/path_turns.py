@@ -194,7 +194,7 @@ class LinearAngles:
 
     @cached_property
     def _rounded(self) -> float:
-        """Error bound of a quaternion without the rounding of its angles; a frame is one more factor."""
+        """Error bound of a quaternion of exact angles; with a frame, the quaternion is a product of one more factor."""
         return ROUNDED if self.frame is None else 2 * ROUNDED
 
     def boxes(
