@@ -393,8 +393,9 @@ def _cut(pieces: _Pieces, count: int) -> list[_Pieces]:
 
 
 def _both(place: NDArray[np.intp], count: NDArray[np.intp]) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-    """Return, for the starts and then for the ends of parts, the place of each among ``count`` equal steps, and
-    ``count``.
+    """Return the places of the starts and of the ends of parts, each with ``count``.
+
+    A place is the number of equal steps, of ``count`` in a piece, from its start.
     """
     return [(place, count), (place + 1, count)]
 

@@ -139,7 +139,10 @@ class PoseBox:
         return [k for k in self.free if k < 3 and k not in self.dependent]
 
     def holds(self, y: FloatArray) -> NDArray[np.bool_]:
-        """Return whether points (..., c) are provably poses of the workspace, not only of its outward rounded bounds."""
+        """Return whether points (..., c) are provably poses of the workspace itself.
+
+        Points that only the outward rounding of its bounds includes do not count.
+        """
         lower, upper, ball = self._inner
         inside = ((y >= lower) & (y <= upper)).all(axis=-1)
         if self.positions is not None:
