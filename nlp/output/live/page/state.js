@@ -443,7 +443,7 @@ export class State {
       if (this.hasOtherTask()) changed.push("the task");
       const parts = [held.length ? `${held.join(", ")} held` : "", changed.length ? `${changed.join(", ")} changed` : ""].filter(Boolean);
       const end = parts.length ? ` with ${parts.join(", ")}` : "";
-      return { word: "local optimum", words: `found in this page${end}; not proved`, isFault: false };
+      return { word: "local optimum", words: `found in this page${end}${data.notice ? ", limits only at the stated pose" : ""}; not proved`, isFault: false };
     }
     if (this.kind === "none") {
       return { word: "no optimum", words: data.statuses[this.status], isFault: true };
