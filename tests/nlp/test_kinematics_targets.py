@@ -248,7 +248,7 @@ def test_the_description_for_klipper_names_settings_of_a_printer_in_use(linear: 
     text = export_kinematics(linear, "", "klipper")["README.md"]
     assert "Klipper's defaults are 210, 330, 90." in text
     assert "State `print_radius`\n  yourself" in text
-    text = export_kinematics(rotary(), "", "klipper")["README.md"]
+    text = export_kinematics(rotary("[controller]\norigin = [0, 0, -0.02]\n"), "", "klipper")["README.md"]
     assert "print_radius" not in text
     assert "Klipper's defaults are 30, 150, 270." in text
 

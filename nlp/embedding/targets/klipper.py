@@ -108,9 +108,9 @@ def _printer_words(found: Configuration, kind: str) -> str:
     if max(abs(a - b) for a, b in zip(own, usual, strict=True)) > _SAME_ANGLE:
         shown, theirs = (", ".join(printed(each) for each in angles) for angles in (own, usual))
         items.append(
-            f"- **Angles**: the {'arms' if turns else 'towers'} are at {shown} degrees; Klipper's defaults are {theirs}.\n"
-            "  With other angles than before, x and y turn on the bed. Keep the angles of your `printer.cfg` if all three\n"
-            "  differ from these by the same angle."
+            f"- **Angles**: {'arms' if turns else 'towers'} are at {shown} degrees; Klipper's defaults are {theirs}.\n"
+            "  With other angles than before, x and y turn on the bed. Keep the angles of your `printer.cfg` if all\n"
+            "  three differ from these by the same angle."
         )
     if not turns:
         items.append(
