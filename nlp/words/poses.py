@@ -89,10 +89,14 @@ def evaluate_command(
     turn = rotation_numbers(case, pose.axis, pose.angle, rotation_form(case) if form is None else form)
     position = list(pose.position)
     wanted = _shown(case, position, turn)
-    for digits in range(_FEWEST if wanted else _ENOUGH, _ALL):
+    for digits in () if wanted is None else range(_FEWEST if wanted else _ENOUGH, _ALL):
         shorter = _rounded(position, digits), {key: _rounded(each, digits) for key, each in turn.items()}
         found = _shown(case, *shorter)
-        if found >= wanted and {*found} & {_IMPOSSIBLE, _OPEN} == {*wanted} & {_IMPOSSIBLE, _OPEN}:
+        if (
+            found is not None
+            and found >= wanted
+            and {*found} & {_IMPOSSIBLE, _OPEN} == {*wanted} & {_IMPOSSIBLE, _OPEN}
+        ):
             position, turn = shorter
             break
     prefix = case.pose_prefixes[0]
@@ -103,21 +107,28 @@ def evaluate_command(
     return " ".join(["screwsynth evaluate", shlex.quote(name), *texts])
 
 
-def _shown(case: Case, position: Sequence[float], turn: Mapping[str, list[float]]) -> frozenset[str]:
-    """Return the faults that an evaluation at a pose shows: violated limits, a lost rank, or an impossible pose."""
-    from ..errors import ScrewsynthError  # noqa: PLC0415 - few results have a pose to be shown
+def _shown(case: Case, position: Sequence[float], turn: Mapping[str, list[float]]) -> frozenset[str] | None:
+    """Return the faults that an evaluation at a pose shows: violated limits, a lost rank, or an impossible pose.
+
+    As in the command ``evaluate``, limits on speeds and powers of a case without a motion are left out. The result is
+    None if the case is refused, because its error says nothing about the pose.
+    """
+    from ..errors import CaseError, ScrewsynthError  # noqa: PLC0415 - few results have a pose to be shown
     from ..evidence.closing import closed_start  # noqa: PLC0415
+    from ..evidence.evaluation import without_speeds  # noqa: PLC0415
     from ..evidence.margins import margins_of  # noqa: PLC0415
     from ..evidence.state import evaluate, loops_are_closed  # noqa: PLC0415
     from ..program.formulation import formulate_each  # noqa: PLC0415
     from ..proof.statement.posed_layout import at_one_pose  # noqa: PLC0415
 
     try:
-        nlp = formulate_each(at_one_pose(case, position, _rotation(case, turn)))[0]
+        nlp = formulate_each(at_one_pose(without_speeds(case), position, _rotation(case, turn)))[0]
         x = closed_start(nlp)
         lost = ["rank"] if evaluate(nlp, x).is_singular else []
         lost += [] if loops_are_closed(nlp, x) else [_OPEN]
         return frozenset([*lost, *(row.name for row in margins_of(nlp, x, optimal=False) if row.violated)])
+    except CaseError:
+        return None
     except ScrewsynthError:
         return frozenset([_IMPOSSIBLE])
 
