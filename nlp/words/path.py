@@ -28,7 +28,6 @@ from .verdicts import (
 
 if TYPE_CHECKING:
     from ..case.case import Case
-    from ..evidence.state import WorkspacePose
     from ..results.path import PathData, PathFaultData, PathProofData, PathResult, PathVerdictData
 
 #: Title of the table of limits with the smallest margin.
@@ -38,14 +37,15 @@ _SHOWN = 6
 
 
 def path_summary(
-    case: Case, result: PathResult, command: Callable[[WorkspacePose], str] | None = None
+    case: Case, result: PathResult, command: Callable[[PathVerdictData], str] | None = None
 ) -> Iterator[Line | TextTable]:
     """Yield the verdicts on a robot along a tool path.
 
     Args:
         case: the case.
         result: the verdicts.
-        command: function that returns the command for a pose; None for a page, which lists claims only in tables.
+        command: function that returns the command that shows a violated claim; None for a page, which lists claims only
+            in tables.
     """
     path, answer = result.path, verdict_words(result)
     limited = [each for each in path.claims if each.limit is not None]
@@ -55,7 +55,7 @@ def path_summary(
     if wrong is not None and wrong.fault is not None:
         yield Line(fault_words(wrong, wrong.fault), label="first violation", tone=Tone.FAULT)
         if command is not None:
-            yield Line(command(wrong.fault.pose), label="see it with", is_command=True)
+            yield Line(command(wrong), label="see it with", is_command=True)
     for each in path.claims:
         if each.sense is None:
             after = f": {each.reason}" if each.reason else ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from ...models import Dimension, component_names
@@ -73,7 +73,14 @@ def pose_words(case: Case, pose: WorkspacePose, form: RotationForm | None = None
 
 
 def evaluate_command(
-    name: str, case: Case, settings: Settings, pose: WorkspacePose, form: RotationForm | None = None
+    name: str,
+    case: Case,
+    settings: Settings,
+    pose: WorkspacePose,
+    form: RotationForm | None = None,
+    *,
+    claim: str = "",
+    further: Iterable[WorkspacePose] = (),
 ) -> str:
     """Return the shell command that shows a robot at a pose.
 
@@ -85,10 +92,19 @@ def evaluate_command(
         settings: values that replace those of the case's file.
         pose: the pose.
         form: form of its rotation; None for the form of the case.
+        claim: name of the limit that the pose violates; empty if unknown.
+        further: other poses with a violation of this limit. The first one at which it is shown replaces a pose at
+            which it counts as rounding error.
     """
-    turn = rotation_numbers(case, pose.axis, pose.angle, rotation_form(case) if form is None else form)
-    position = list(pose.position)
+    form = rotation_form(case) if form is None else form
+    position, turn = list(pose.position), rotation_numbers(case, pose.axis, pose.angle, form)
     wanted = _shown(case, position, turn)
+    for other in further if wanted == frozenset() else ():
+        numbers = list(other.position), rotation_numbers(case, other.axis, other.angle, form)
+        found = _shown(case, *numbers)
+        if found is not None and claim in found:
+            (position, turn), wanted = numbers, found
+            break
     for digits in () if wanted is None else range(_FEWEST if wanted else _ENOUGH, _ALL):
         shorter = _rounded(position, digits), {key: _rounded(each, digits) for key, each in turn.items()}
         found = _shown(case, *shorter)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from builders import Run, case_from, case_of, output_of, refusal_of, saved
+from builders import Run, case_from, case_of, commands_in, output_of, refusal_of, saved
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -521,3 +521,27 @@ def test_the_page_about_a_delta_proves_a_file_and_names_what_is_out_of_reach(cli
     assert status == 1
     assert "no solution of the loop equations in the home assembly mode at the first pose of the path" in words
     assert "actuator unit" not in words
+
+
+@pytest.mark.parametrize("speed", ["", "actuator_speed = { max = 300 }"])
+def test_the_command_of_the_first_violation_shows_it(cli: Run, tmp_path: Path, speed: str) -> None:
+    """At the crossing the violation is rounding error, so the pose of the command is a little further along."""
+    page = (Path(__file__).parents[2] / "docs" / "printing.md").read_text(encoding="utf-8")
+    text = re.findall("```toml\n(.*?)```", page, re.DOTALL)[1]
+    text = re.sub(r"actuator_length = .*\nactuator_speed = .*\n", f"actuator_length.min = -100\n{speed}\n", text)
+    case, out = str(saved(tmp_path / "printer.toml", text)), tmp_path / "path.json"
+    saved(tmp_path / "part.gcode", "G28\nG1 X0 Y0 Z0 F3000\nG1 X-105\nM84")
+    status, shown, _ = cli("path", case)
+    assert status == 1
+    cli("path", case, "--json", str(out))
+    (refuted,) = (each for each in json.loads(out.read_text())["path"]["claims"] if each["outcome"] == "refuted")
+    height = math.sqrt(333**2 - 174.75**2)
+    crossing = (math.sqrt(333**2 - (height - 100) ** 2) - 174.75) / 105
+    assert refuted["fault"]["parameter"] == pytest.approx(crossing, rel=1e-6)
+    (command,) = commands_in(shown, "see it with")
+    status, evaluated, _ = cli(*command, "--json", "-")
+    assert status == 1
+    (margin,) = json.loads(evaluated)["violated"]
+    assert (margin["name"], margin["bound"]) == (refuted["name"], "min")
+    (x,) = (float(each.removeprefix("p_x=")) for each in command if each.startswith("p_x="))
+    assert -x == pytest.approx(105 * crossing, rel=1e-3)
