@@ -32,7 +32,7 @@ def path(
     unit: pathoptions.Unit = None,
     start: Annotated[
         str | None,
-        options.text("--start", "X,Y,Z,A,B,C", "Pose before the G-code begins, or the pose of --range"),
+        options.text("--start", "X,Y,Z,A,B,C", "Pose before the G-code, or of --range; X,Y,Z if the angles are 0"),
     ] = None,
     offset: pathoptions.Offsets = None,
     angles: pathoptions.Angles = None,

@@ -545,3 +545,15 @@ def test_the_command_of_the_first_violation_shows_it(cli: Run, tmp_path: Path, s
     assert (margin["name"], margin["bound"]) == (refuted["name"], "min")
     (x,) = (float(each.removeprefix("p_x=")) for each in command if each.startswith("p_x="))
     assert -x == pytest.approx(105 * crossing, rel=1e-3)
+
+
+def test_a_start_may_leave_out_the_angles(cli: Run, tmp_path: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "printing.md").read_text(encoding="utf-8")
+    case = str(saved(tmp_path / "printer.toml", re.findall("```toml\n(.*?)```", page, re.DOTALL)[1]))
+    saved(tmp_path / "part.gcode", "G1 X0 Y0 Z0 F3000\nG1 X30\nM84")
+    three, six = (output_of(cli("path", case, "--start", f"0,0,45{rest}")) for rest in ("", ",0,0,0"))
+    assert "part.gcode: 2 segments" in three
+    assert three == six
+    for wrong in ("0,0", "0,0,nan", "0,0,45,0", "0,0,z", "0,0,0,0,0,0,0"):
+        refusal_of(cli("path", case, "--start", wrong), f"--start {wrong}: must be six finite numbers", "or three")
+    refusal_of(cli("path", case, "--flavour", "linuxcnc", "--offset", "G54=1,2,3"), "--offset G54=1,2,3: must be six")
