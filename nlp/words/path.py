@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from ..case.pathfile import PLACE
 from ..case.pose import Free
 from ..case.task import Sense
+from ..path.idle import BEFORE_PATH
 from ..proof.workspace.verdict import Outcome
 from .claims import CLAIM_WORDS, SINGULAR, rank_line, unproved_ranks
 from .motors import OUTCOME_WORDS, TONES
@@ -28,6 +29,7 @@ from .verdicts import (
 
 if TYPE_CHECKING:
     from ..case.case import Case
+    from ..path.idle import Idle
     from ..results.path import PathData, PathFaultData, PathProofData, PathResult, PathVerdictData
 
 #: Title of the table of limits with the smallest margin.
@@ -76,12 +78,23 @@ def _subject_lines(path: PathData) -> Iterator[Line]:
     yield Line(f"{path.file}: {path.segments:,} segment{'s' * (path.segments != 1)}", label="path")
     if path.time is not None:
         yield Line(f"{number(path.time)} s", label="time", after=_untimed_words(path))
-    if path.idle:
-        words = ", ".join(f"{each.word} (line {each.line})" for each in path.idle[:_SHOWN])
-        rest = len(path.idle) - _SHOWN
+    idle = [each for each in path.idle if not each.is_motion]
+    if idle:
+        words = ", ".join(f"{each.word} (line {each.line})" for each in idle[:_SHOWN])
+        rest = len(idle) - _SHOWN
         yield Line(words + (f", and {rest} more" if rest > 0 else ""), label="ignored (no motion)")
-    for sentence in path.warnings or ():
+    for sentence in (*(_unchecked_words(each) for each in path.idle if each.is_motion), *(path.warnings or ())):
         yield Line(sentence, label="note", tone=Tone.CAUTION)
+
+
+def _unchecked_words(motion: Idle) -> str:
+    """Return a sentence about motions whose start is unknown, which are not part of the path."""
+    one = f"line {motion.line}: its start is unknown, so this motion is not checked"
+    several = (
+        f"line {motion.line}, and {motion.lines - 1} more: their start is unknown, so these motions are not checked"
+    )
+    hint = "; --start X,Y,Z,A,B,C states it" if motion.word == BEFORE_PATH else ""
+    return (one if motion.lines == 1 else several) + hint
 
 
 def _other_faults(path: PathData, first: PathVerdictData | None) -> Iterator[Line]:

@@ -557,3 +557,31 @@ def test_a_start_may_leave_out_the_angles(cli: Run, tmp_path: Path) -> None:
     for wrong in ("0,0", "0,0,nan", "0,0,45,0", "0,0,z", "0,0,0,0,0,0,0"):
         refusal_of(cli("path", case, "--start", wrong), f"--start {wrong}: must be six finite numbers", "or three")
     refusal_of(cli("path", case, "--flavour", "linuxcnc", "--offset", "G54=1,2,3"), "--offset G54=1,2,3: must be six")
+
+
+@pytest.mark.parametrize("flavour", ["linuxcnc", "printer"])
+def test_a_motion_from_an_unknown_start_is_a_note_and_not_ignored(cli: Run, tmp_path: Path, flavour: str) -> None:
+    out, words = tmp_path / "path.json", ["--along", str(tmp_path / "part.ngc"), "--flavour", flavour]
+    ways = (
+        ("G1 X0 Y0 Z500 F600", "line 1: its start is unknown, so this motion is not checked"),
+        ("G1 X0 Y0 F600\nG1 Z500", "line 1, and 1 more: their start is unknown, so these motions are not checked"),
+    )
+    for before, note in ways:
+        saved(tmp_path / "part.ngc", f"{before}\nG1 X9\nM0\nM2")
+        cli("path", "hexapod-linuxcnc", *words, "--json", str(out))
+        shown = " ".join(cli("path", "hexapod-linuxcnc", *words)[1].split())
+        assert f"note {note}; --start X,Y,Z,A,B,C states it" in shown
+        assert "ignored (no motion) M0" in shown
+        assert "motion before the path" not in shown
+        lines = before.count("\n") + 1
+        assert {"word": "motion before the path", "line": 1, "lines": lines} in json.loads(out.read_text())["path"][
+            "idle"
+        ]
+        shown = " ".join(cli("path", "hexapod-linuxcnc", *words, "--start", "1,0,500")[1].split())
+        assert "its start is unknown" not in shown
+
+
+def test_a_later_part_has_a_note_without_the_option_start(cli: Run, tmp_path: Path) -> None:
+    file = str(saved(tmp_path / "part.gcode", "G1 X0 Y0 Z500 F600\nG1 X9\nG28\nG1 X0 Y0 Z500\nG1 X5\nM84"))
+    _, shown, _ = cli("path", "hexapod-linuxcnc", "--along", file, "--flavour", "printer", "--part", "2")
+    assert "note line 4: its start is unknown, so this motion is not checked note" in " ".join(shown.split())
