@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from builders import Run, case_from, case_of, commands_in, output_of, refusal_of, saved
+from builders import Run, case_file, case_from, case_of, case_tables, commands_in, output_of, refusal_of, saved
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -585,3 +585,22 @@ def test_a_later_part_has_a_note_without_the_option_start(cli: Run, tmp_path: Pa
     file = str(saved(tmp_path / "part.gcode", "G1 X0 Y0 Z500 F600\nG1 X9\nG28\nG1 X0 Y0 Z500\nG1 X5\nM84"))
     _, shown, _ = cli("path", "hexapod-linuxcnc", "--along", file, "--flavour", "printer", "--part", "2")
     assert "note line 4: its start is unknown, so this motion is not checked note" in " ".join(shown.split())
+
+
+def test_the_proof_of_a_path_with_violations_counts_them(cli: Run, tmp_path: Path) -> None:
+    """Lines of claims without a proof follow each other, also where a short view shows only some of them."""
+    tables = case_tables("hexapod-linuxcnc", limits={"leg_length": {"min": 20, "max": 24}})
+    case, out = str(case_file(tmp_path, tables)), str(tmp_path / "proof.json")
+    file = str(saved(tmp_path / "part.gcode", "G1 X0 Y0 Z500 F600\nG1 X90\nM84"))
+    run = cli("path", case, "--along", file, "--flavour", "printer", "--proof", out, "--json", str(tmp_path / "r.json"))
+    assert run[0] == 1
+    claims = json.loads((tmp_path / "r.json").read_text())["path"]["claims"]
+    refuted = [each for each in claims if each["outcome"] == "refuted"]
+    assert len(refuted) > 2
+    for words in ([], ["--all"]):
+        lines = output_of(cli("verify-proof", out, *words)).splitlines()
+        assert (
+            lines[0] == f"PROOF VALID for {len(claims) - len(refuted)} of {len(claims)} claims; {len(refuted)} refuted"
+        )
+        rows = [k for k, line in enumerate(lines) if line.startswith("no proof: ")]
+        assert rows == list(range(rows[0], rows[0] + len(refuted)))
