@@ -100,19 +100,15 @@ def evaluate_command(
     position, turn = list(pose.position), rotation_numbers(case, pose.axis, pose.angle, form)
     wanted = _shown(case, position, turn)
     for other in further if wanted == frozenset() else ():
-        numbers = list(other.position), rotation_numbers(case, other.axis, other.angle, form)
-        found = _shown(case, *numbers)
+        point = list(other.position), rotation_numbers(case, other.axis, other.angle, form)
+        found = _shown(case, *point)
         if found is not None and claim in found:
-            (position, turn), wanted = numbers, found
+            (position, turn), wanted = point, found
             break
-    for digits in () if wanted is None else range(_FEWEST if wanted else _ENOUGH, _ALL):
+    least = _FEWEST if wanted else _ENOUGH
+    for digits in range(_ALL if wanted is None else least, _ALL):
         shorter = _rounded(position, digits), {key: _rounded(each, digits) for key, each in turn.items()}
-        found = _shown(case, *shorter)
-        if (
-            found is not None
-            and found >= wanted
-            and {*found} & {_IMPOSSIBLE, _OPEN} == {*wanted} & {_IMPOSSIBLE, _OPEN}
-        ):
+        if _is_shown(wanted or frozenset(), _shown(case, *shorter)):
             position, turn = shorter
             break
     prefix = case.pose_prefixes[0]
@@ -121,6 +117,12 @@ def evaluate_command(
     written = {**others, **{f"{prefix}{key}": each for key, each in numbers.items()}}
     texts = [f"--set {shlex.quote(f'{key}={_digits(value)}')}" for key, value in written.items()]
     return " ".join(["screwsynth evaluate", shlex.quote(name), *texts])
+
+
+def _is_shown(wanted: frozenset[str], found: frozenset[str] | None) -> bool:
+    """Return whether a pose shows all faults of another pose, and is impossible only if the other pose is."""
+    fatal = {_IMPOSSIBLE, _OPEN}
+    return found is not None and found >= wanted and found & fatal == wanted & fatal
 
 
 def _shown(case: Case, position: Sequence[float], turn: Mapping[str, list[float]]) -> frozenset[str] | None:
