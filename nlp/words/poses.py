@@ -99,7 +99,8 @@ def evaluate_command(
     form = rotation_form(case) if form is None else form
     position, turn = list(pose.position), rotation_numbers(case, pose.axis, pose.angle, form)
     wanted = _shown(case, position, turn)
-    for other in further if wanted == frozenset() else ():
+    is_hidden = wanted is not None and wanted.isdisjoint((claim, "rank", _IMPOSSIBLE, _OPEN))
+    for other in further if is_hidden else ():
         point = list(other.position), rotation_numbers(case, other.axis, other.angle, form)
         found = _shown(case, *point)
         if found is not None and claim in found:
