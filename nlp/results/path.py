@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from ..units import Units
 
 #: Distances along a segment, as parts of it, at which a violation is shown that is rounding error at its first point.
-_FURTHER = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 1.0)
+_FURTHER = (1e-3, 1e-2, 0.1, 1.0)
 
 
 class PathFaultData(JsonObject):
