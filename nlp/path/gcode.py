@@ -17,7 +17,7 @@ from ..case.pose import LARGEST
 from ..errors import InputError
 from ..units import Units
 from .arcs import PLANES, TOLERANCES, Arc, ArcError, Tolerances, arc_about, arc_length, centre_of_radius
-from .idle import idle_words
+from .idle import BEFORE_PATH, idle_words
 from .options import SYSTEMS, Between, PathOptions, code_of_unit, program_unit
 from .orientation import order_named
 from .path import Kind, ProgrammedPath
@@ -78,7 +78,7 @@ class Interpreter:
         self.lines, self.kinds, self.seconds = array("i"), array("B"), array("d")
         self.arcs, self.planes = array("d"), array("B")
         self.idle: dict[str, list[int]] = {}
-        self.before_path = "motion before the path"
+        self.before_path = BEFORE_PATH
 
     def run(self, lines: Iterable[str]) -> ProgrammedPath:
         """Return the tool path of a program; the errors are those of :func:`read_program`."""

@@ -18,6 +18,7 @@ from ..errors import InputError
 from ..units import Units
 from .arcs import Arc
 from .gcode import Interpreter
+from .idle import UNKNOWN_START
 from .merging import joined_to_previous
 from .options import PathOptions
 from .path import Kind, ProgrammedPath
@@ -233,7 +234,7 @@ class _Printer(Interpreter):
         self._close_part()
         self.now, self.is_known = [math.nan] * 3 + [0.0] * 3, False
         if self.parts:
-            self.before_path = "motion from an unknown position"
+            self.before_path = UNKNOWN_START
 
     def _close_part(self) -> None:
         """End a part; a part without a motion is dropped."""
