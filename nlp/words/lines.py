@@ -333,11 +333,12 @@ def singularity_lines(robot: RobotData, units: Units) -> Iterator[Line]:
         yield from joint_lines(robot, robot.joints, units)
     yield from convention_lines(robot)
     if not robot.singular:
-        values = robot.singular_values
-        words = f"{robot.rank}, nearly singular: the smallest singular value is {{:.2g}} of the largest"
-        is_near = values[-1] < _NEAR * values[0]
-        shown = Line(words.format(values[-1] / values[0]), label="rank of J", tone=Tone.CAUTION)
-        yield shown if is_near else Line(f"{robot.rank}", label="rank of J")
+        share = robot.singular_values[-1] / robot.singular_values[0]
+        if share < _NEAR:
+            words = f"nearly singular: the smallest singular value is {share:.2g} of the largest"
+            yield Line(f"{robot.rank}, {words}", label="rank of J", tone=Tone.CAUTION)
+        else:
+            yield Line(f"{robot.rank}", label="rank of J")
         return
     several = " combinations of" if len(robot.free_motions) > 1 else ""
     yield Line(f"{robot.rank}: singular; with all actuators locked nothing resists{several}", label="rank of J")
