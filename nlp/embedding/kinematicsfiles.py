@@ -40,7 +40,7 @@ _ROUNDING = 1e-10
 #: Meaning of the column ``axis`` of the table of actuators.
 _AXES = """\
   An angle grows if the actuator turns about its axis by the right-hand rule, and a length grows if it slides along its
-  axis. Both are at home, along the axes of the world frame above."""
+  axis. Axes are given at home, in the world frame above."""
 _COORDINATES = ("x", "y", "z", "a", "b", "c")
 #: Functions of the mathematics library that generated C may call.
 _LIBM = (

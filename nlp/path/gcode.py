@@ -92,8 +92,8 @@ class Interpreter:
             raise InputError(f"{self.source}: {where}: {fault}") from None
         if not (has_end or self.options.end_of_file):
             raise InputError(
-                f"{self.source}: line {self.line}: the program has no end, M2, M30 or %; it may be cut off;"
-                " if it is complete, give --end-of-file"
+                f"{self.source}: line {self.line}: the program does not end with M2, M30 or %, so it may be"
+                " cut off; if it is complete, give --end-of-file"
             )
         if not self.lines:
             unknown = [letter for letter, axis in AXES.items() if math.isnan(self.now[axis])]

@@ -94,11 +94,13 @@ class _Printer(Interpreter):
         if self.factors:
             shown = ", ".join(f"{name} (line {line})" for name, line in list(self.factors.items())[:_SHOWN])
             more = f", and {len(self.factors) - _SHOWN} more" if len(self.factors) > _SHOWN else ""
-            found.append(f"{shown}{more}: later feeds are multiplied by this percentage")
+            found.append(f"{shown}{more}: each scales the feeds after it by this percentage")
         if len(self.parts) > 1:
             found.append(f"part {self.part} of {len(self.parts)} of the program; the other parts are not checked")
         if not all(map(math.isnan, self.seconds)):
-            found.append("times are those of the programmed feeds; accelerations of the firmware make a print longer")
+            found.append(
+                "times follow from the programmed feeds; a print takes longer, because firmware limits acceleration"
+            )
         if not self.is_ended:
             found.append("no M84 after the last motion: the file may be cut off")
         return tuple(found)
@@ -259,9 +261,9 @@ class _Printer(Interpreter):
                 for k, (first, last) in enumerate(self.parts[:_SHOWN], 1)
             )
             more = f", and {count - _SHOWN} more" if count > _SHOWN else ""
-            cause = f"the path has {count} part{'s' * (count > 1)} between homing, macros and motors off"
+            cause = f"homing, macros and motors off divide the program into {count} part{'s' * (count > 1)}"
             fault = f"there is no part {chosen}; {cause}" if chosen > count else cause
-            raise InputError(f"{self.source}: {fault}: {shown}{more}; choose one of them with --part")
+            raise InputError(f"{self.source}: {fault}: {shown}{more}; choose one with --part")
         self.part = chosen
         first, last = self.parts[chosen - 1]
         self.knots = self.knots[6 * first.knots : 6 * last.knots]

@@ -90,10 +90,9 @@ def _subject_lines(path: PathData) -> Iterator[Line]:
 def _unchecked_words(motion: Idle) -> str:
     """Return a sentence about motions whose start is unknown, which are not part of the path."""
     one = f"line {motion.line}: its start is unknown, so this motion is not checked"
-    several = (
-        f"line {motion.line}, and {motion.lines - 1} more: their start is unknown, so these motions are not checked"
-    )
-    hint = "; --start X,Y,Z,A,B,C states it" if motion.word == BEFORE_PATH else ""
+    lines = f"line {motion.line} and {motion.lines - 1} more"
+    several = f"{lines}: the start of these motions is unknown, so they are not checked"
+    hint = "; state it with --start X,Y,Z,A,B,C" if motion.word == BEFORE_PATH else ""
     return (one if motion.lines == 1 else several) + hint
 
 

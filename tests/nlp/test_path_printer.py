@@ -364,7 +364,9 @@ TWO = "G28\nG1 X0 Y0 Z0 F600\nG1 X5\nG2 I2\nG28 Z0\nG1 X7 Y7\nG1 X9 Z1\nG1 Y2\nG
 
 
 def test_homing_divides_a_program_into_parts_and_one_is_chosen() -> None:
-    with pytest.raises(InputError, match=r"2 parts between .*: 1 \(lines 3 to 4\), 2 \(lines 8 to 9\); .* --part"):
+    with pytest.raises(
+        InputError, match=r"divide the program into 2 parts: 1 \(lines 3 to 4\), 2 \(lines 8 to 9\); .* --part"
+    ):
         program(TWO)
     with pytest.raises(InputError, match="there is no part 3"):
         program(TWO, part=3)
@@ -380,7 +382,7 @@ def test_motors_without_current_lose_the_position() -> None:
     for off, parts in (("M84", 2), ("M18 X Y", 2), ("M84 E", 1), ("M84 S30", 1)):
         text = f"{BEGIN}G1 X1\n{off}\nG1 X2 Y0 Z0\nG1 X3\nM84"
         if parts == 2:
-            with pytest.raises(InputError, match="the path has 2 parts"):
+            with pytest.raises(InputError, match="divide the program into 2 parts"):
                 program(text)
         assert len(program(text, part=1)) == 1  # one merged line, or the first part
 
@@ -442,7 +444,7 @@ def test_a_refused_file_of_a_printer_is_named_as_such(text: str, sign: str) -> N
 
 def test_a_program_of_linuxcnc_ends_with_its_file_only_by_option() -> None:
     text = "G94 F600\nG0 X0 Y0 Z0\nG1 X10"
-    with pytest.raises(InputError, match=r"has no end, M2, M30 or %; .* --end-of-file") as error:
+    with pytest.raises(InputError, match=r"does not end with M2, M30 or %, .* --end-of-file") as error:
         path_of_text(text, "part.ngc", MM)
     assert "printer" not in str(error.value)
     path = path_of_text(text, "part.ngc", MM, PathOptions(end_of_file=True))
@@ -564,13 +566,13 @@ def test_a_motion_from_an_unknown_start_is_a_note_and_not_ignored(cli: Run, tmp_
     out, words = tmp_path / "path.json", ["--along", str(tmp_path / "part.ngc"), "--flavour", flavour]
     ways = (
         ("G1 X0 Y0 Z500 F600", "line 1: its start is unknown, so this motion is not checked"),
-        ("G1 X0 Y0 F600\nG1 Z500", "line 1, and 1 more: their start is unknown, so these motions are not checked"),
+        ("G1 X0 Y0 F600\nG1 Z500", "line 1 and 1 more: the start of these motions is unknown, so they are not checked"),
     )
     for before, note in ways:
         saved(tmp_path / "part.ngc", f"{before}\nG1 X9\nM0\nM2")
         cli("path", "hexapod-linuxcnc", *words, "--json", str(out))
         shown = " ".join(cli("path", "hexapod-linuxcnc", *words)[1].split())
-        assert f"note {note}; --start X,Y,Z,A,B,C states it" in shown
+        assert f"note {note}; state it with --start X,Y,Z,A,B,C" in shown
         assert "ignored (no motion) M0" in shown
         assert "motion before the path" not in shown
         lines = before.count("\n") + 1

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from ....models import Dimension
+from ....models.statics import driven_joints
 from ...case.case import Case
-from ..kinematics import Kinematics
 from .configuration import Configuration, Rules, delta_configuration, printed, refused
 from .texts import conventions_table, frame_words, readme, zero_words
 
@@ -18,8 +18,8 @@ _LINEAR = Rules(TARGET, "delta", False, "rad", False, None, True, False, _HINT)
 _USUAL = {"delta": (210.0, 330.0, 90.0), "rotary_delta": (30.0, 150.0, 270.0)}
 _SAME_ANGLE = 1e-6
 UNCHECKED = (
-    "Klipper checks only the end point of a move, by radius and height. Out of reach its step generator\n"
-    "  goes on without an error."
+    "Klipper checks only the end point of a move, by radius and height. If a move leaves the reach,\n"
+    "  its step generator reports no error."
 )
 
 
@@ -29,7 +29,7 @@ def write(case: Case) -> dict[str, str]:
     Raises:
         CaseError: the robot is not such a Delta, or its motor axes are not above the bed.
     """
-    turns = Kinematics(case).drives[0].dimension is Dimension.ANGLE
+    turns = any(each.dimension is Dimension.ANGLE for each in driven_joints(case.model)[:1])
     found = delta_configuration(case, _ROTARY if turns else _LINEAR)
     if turns and found.height <= 0:
         height = f"{printed(found.height)} {found.case.controller.length}"

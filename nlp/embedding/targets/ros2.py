@@ -190,8 +190,8 @@ def _readme(library: Library, package: str, limb: LimbCoordinates | None) -> str
         "frame": f"{frame_words(robot)}\n  {_joint_words(library, limb)}",
         "zero": zero_words(robot, range(len(robot.drives))) + " `mechanical_reduction` and `offset` are not read.",
         "units": "lengths in m, angles in rad, efforts in N and N m; velocities and efforts keep the power equal.",
-        "unchecked": "ros2_control does not load transmissions by itself: the hardware component does. Joint limits\n"
-        "  are those of its controllers, not those of the loops.",
+        "unchecked": "ros2_control does not load transmissions by itself: the hardware component does. Its\n"
+        "  controllers check limits of these joints; nothing checks limits of passive joints.",
     }
     what = (
         f"`{package}` is a package for ros2_control: build it with colcon, and copy `transmission.urdf` into the "
