@@ -194,7 +194,7 @@ class Workspace:
             dimension = Dimension.LENGTH if k < 3 else Dimension.ANGLE
             at = f"= {digits(units.shown(ends_of(values[k])[0], dimension))} {units.label(dimension)}"
             groups.setdefault(at, []).append(self.names[k])
-        texts = [] if chosen_set is None else [chosen_set.words(units, digits)]
+        texts = [] if chosen_set is None else [f"position in the {chosen_set.words(units, digits)}"]
         texts += [f"{', '.join(names)} {ends}".rstrip() for ends, names in groups.items()]
         if is_any:
             most = max(map(abs, ends_of(self.turns.angles[0])))
