@@ -22,7 +22,7 @@ from .lines import (
     choice_lines,
     combined_lines,
     combined_value_lines,
-    exclusion_line,
+    exclusion_lines,
     fault_lines,
     heading_lines,
     is_unasked_singularity,
@@ -84,7 +84,7 @@ def _task_summary(case: Case, result: SolveResult) -> Summary:
     yield from certificate_lines(result.certificate)
     if robot is not None and result.reached is None:
         yield from singularity_lines(robot, case.units)
-        yield from _advice_lines(case, robot)
+        yield from exclusion_lines(case, robot)
     yield from _remark_lines(case)
     if robot is not None:
         yield solved_design_table(case, result, robot)
@@ -169,7 +169,7 @@ def _combined_summary(case: Case, result: CombinedResult) -> Summary:
     if robot is not None:
         part = "" if is_unasked_singularity(robot, case) else "rank"
         yield from in_part(part, singularity_lines(robot, case.units))
-        yield from _advice_lines(case, robot)
+        yield from exclusion_lines(case, robot)
     if point is not None and point.limits:
         title = limits_title(case, result.workspace or result.path)
         yield from in_part("limits", [limit_table(point.limits, combined.value or 0.0, title)])
@@ -237,13 +237,6 @@ def _limb_parts(case: Case, robot: RobotData) -> Summary:
     table = limb_part_table(case, robot)
     if table is not None and robot.joints is not None and robot.joints.constrained:
         yield table
-
-
-def _advice_lines(case: Case, robot: RobotData) -> Iterator[Line]:
-    """Yield the limit that excludes singular designs, if the answer is singular."""
-    advice = exclusion_line(case, robot)
-    if advice is not None:
-        yield advice
 
 
 def _remark_lines(case: Case) -> Summary:
