@@ -8,29 +8,33 @@ from collections.abc import Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from ..evidence.evaluation import shown_parameters
 from ..evidence.sensitivity import Sensitivity, sensitivities
+from ..evidence.state import stated_poses
 from ..program.relaxation import RelaxedLimit
 from ..proof.certificate.certificate import Certificate
 from ..solver.multistart import ProgramSolution
-from ..solver.solution import Combination, Solution, TaskOutcome
+from ..solver.solution import Combination, SharedInstead, Solution, TaskOutcome
 from ..solver.starts import Optimum, StartStatus
 from ..system.jsonvalues import finite_or_none, vector
 from .choices import ChoiceData, RoundingData, choice_data, rounding_data
 from .data import (
     CaseResult,
+    ChangeData,
     CombinedData,
     CombinedPointData,
     CombinedResult,
     OptimumData,
     OutcomeData,
     ReachedData,
+    SettingData,
     SolveResult,
     StartsData,
 )
 from .design import limits_data, margins_data, tolerance_loss_of
 from .evidence import certificate_data, optimality_of
 from .objective import objective_data, over_workspace
-from .point import head_data, objective, robot_data, versions, violations
+from .point import head_data, objective, pose_data, robot_data, versions, violations
 
 if TYPE_CHECKING:
     from ..solver.certified import Certified
@@ -142,7 +146,11 @@ def combined_result(
         head=head_data(solution.case),
         status=solution.status,
         tasks=tuple(
-            task_result(outcome.exchanged or outcome.own, j, certificates[j] if certificates else None)
+            task_result(
+                outcome.exchanged or outcome.own,
+                0 if solution.case.changes else j,
+                certificates[j] if certificates else None,
+            )
             for j, outcome in enumerate(solution.outcomes)
         ),
         combined=CombinedData.of(
@@ -154,6 +162,8 @@ def combined_result(
             optimality=None if combined is None else optimality_of(combined.nlp, combined.evidence),
             starts=None if combined is None else starts_data(combined),
             certificate=certificate_data(combined_certificate),
+            settings=_settings(solution) or None,
+            changes=tuple(map(_change, solution.changes)) or None,
         ),
         choice=choice_data(solution),
         rounding=rounding_data(solution),
@@ -172,8 +182,40 @@ def _point(solution: Solution, combination: Combination) -> CombinedPointData:
     # Only a combined program has derivatives of its value with respect to the limits.
     nlp, x = (own.own.nlp, solution.x) if combined is None else (combined.nlp, combined.x)
     margins = margins_data(nlp, x, optimal=combined is not None and solution.all_solved)
-    robot = robot_data(own.own.nlp, solution.x, own.state, None)
+    robot = robot_data(own.own.nlp, own.at, own.state, None)
     return CombinedPointData(robot=robot, margins=margins, limits=limits_data(margins))
+
+
+def _settings(solution: Solution) -> tuple[SettingData, ...]:
+    """Return the dimensions and poses of each task, if these change from task to task and the robot exists."""
+    if not solution.case.changes or any(outcome.state is None for outcome in solution.outcomes):
+        return ()
+    return tuple(
+        SettingData(
+            task=outcome.task.name,
+            parameters=shown_parameters(outcome.own.nlp.case, outcome.state),
+            stated_poses=tuple(
+                pose_data(outcome.own.nlp.case, pose) for pose in stated_poses(outcome.own.nlp, outcome.at)
+            ),
+            rank=outcome.state.rank,
+            singular=outcome.state.is_singular,
+        )
+        for outcome in solution.outcomes
+        if outcome.state is not None
+    )
+
+
+def _change(shared: SharedInstead) -> ChangeData:
+    """Return the gain by a change from task to task."""
+    answer = shared.solution if shared.solution is not None and shared.solution.all_solved else None
+    combination = None if answer is None else answer.combination
+    return ChangeData(
+        name=shared.name,
+        gain=shared.gain,
+        shared_value=None if combination is None else combination.value,
+        shared_F=None if answer is None else vector([outcome.F for outcome in answer.outcomes]),
+        reason=shared.reason or None,
+    )
 
 
 def _outcome(outcome: TaskOutcome, *, is_answer: bool) -> OutcomeData:

@@ -16,7 +16,7 @@ from ..case.choices import catalogue_dimensions
 from ..case.task import Method, Sense
 from ..errors import InputError, check_seconds
 from ..interruption import is_requested, one_call, reason_of, seconds_left, within
-from ..program.formulation import formulate_each
+from ..program.formulation import formulate_tasks
 from ..proof.boxes.engine import search_tape
 from ..proof.boxes.tree import TreeRecord
 from ..proof.certificate.branch_and_bound import GAP, CertifyProgress, certify_program
@@ -157,7 +157,7 @@ def certify(
     with within(time_limit):
         if isinstance(found, Solution) and is_rounded:
             # The rounded design is proved as it is; bounds do not cover what rounding lost.
-            own = prove(replace(found, case=found.outcomes[0].own.nlp.case, choice=None, rounding=None), options)
+            own = prove(replace(found, case=found.chosen_case, choice=None, rounding=None), options)
             solution = replace(own.solution, case=case, choice=found.choice, rounding=found.rounding)
             tasks = tuple(replace(each, scope=_ROUNDED) for each in own.tasks)
             combined = None if own.combined is None else replace(own.combined, scope=_ROUNDED)
@@ -216,7 +216,7 @@ def _certify(
             raise OptionError(str(error)) from None
     if several and with_proof and case.method is Method.AVERAGE:
         raise OptionError("proof: averaged tasks have no common program whose optimum could be proved")
-    nlps = formulate_each(case) if given is None else [outcome.own.nlp for outcome in given.outcomes]
+    nlps = formulate_tasks(case) if given is None else [outcome.own.nlp for outcome in given.outcomes]
     with_mode = not all_assemblies and has_modes(case.model)
     if given is None and nlps[0].n:
         # Refuse a missing kernel, or an operation without a rule, before a solve.
@@ -306,7 +306,7 @@ def _certify_choices(
     def solve_fixed(one: Case) -> Solution:
         if case.is_optimised_everywhere:
             return solve(one, starts=starts, seed=seed, jobs=options.jobs)
-        return solve_programs(one, formulate_each(one), search, jobs=options.jobs)
+        return solve_programs(one, formulate_tasks(one), search, jobs=options.jobs)
 
     choice = found.choice if isinstance(found, Solution) else None
     choice = choice or _in_half(lambda: solve_choices(case, solve_fixed).choice)

@@ -6,48 +6,57 @@ Only this comparison shows if a drive, a row of holes or a further fixture is wo
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Protocol
 
+from ...models import FloatArray
 from ..case.case import Case
 from ..errors import CaseError, EvaluationError
 from ..interruption import is_requested
 from .solution import SharedInstead, Solution
-from .status import Status
 
 
-def with_each_shared(case: Case, solve_once: Callable[[Case], Solution]) -> Solution:
-    """Solve a case with changes from task to task; then solve it with each of them shared, one at a time.
+class SolveOnce(Protocol):
+    """A function that solves a case with the settings of the whole solve."""
+
+    def __call__(self, case: Case, *, beside: Sequence[Sequence[FloatArray]] = ()) -> Solution:
+        """Solve a case, also from the points ``beside``, each as the point (n,) of every task's program."""
+        ...
+
+
+def with_each_shared(case: Case, solve_once: SolveOnce) -> Solution:
+    """Solve a case with each change from task to task left out, one at a time; then solve the case itself.
+
+    The answers with less freedom are starting points of the last search, which is therefore not worse.
 
     Args:
         case: the case.
         solve_once: function that solves a case.
     """
-    solution = solve_once(case)
-    changes: list[SharedInstead] = []
-    for name in case.changes:
-        if is_requested() or solution.status is Status.INTERRUPTED:
-            break
-        changes.append(_shared(solution, name, solve_once))
-    return replace(solution, changes=tuple(changes))
+    shared = [] if is_requested() else [_shared(case, name, solve_once) for name in case.changes]
+    answers = [each.solution for each in shared if each.solution is not None and not each.reason]
+    beside = [[outcome.at for outcome in answer.outcomes] for answer in answers]
+    solution = solve_once(case, beside=beside)
+    return replace(solution, changes=tuple(replace(each, gain=_gain(solution, each)) for each in shared))
 
 
-def _shared(solution: Solution, name: str, solve_once: Callable[[Case], Solution]) -> SharedInstead:
-    """Return the answer to the problem of a solution with one change fewer."""
+def _shared(case: Case, name: str, solve_once: SolveOnce) -> SharedInstead:
+    """Return the answer to the problem of a case with one change fewer; its gain is not set."""
     try:
-        shared = solve_once(solution.case.sharing(name))
+        shared = solve_once(case.sharing(name))
     except (CaseError, EvaluationError) as error:
         return SharedInstead(name, None, None, str(error))
-    if not shared.status.is_answer:
-        return SharedInstead(name, shared, None, f"no answer with {name} shared: {shared.status.value}")
-    return SharedInstead(name, shared, _gain(solution, shared))
+    reason = "" if shared.status.is_answer else f"no answer with {name} shared: {shared.status.value}"
+    return SharedInstead(name, shared, None, reason)
 
 
-def _gain(solution: Solution, shared: Solution) -> float | None:
+def _gain(solution: Solution, shared: SharedInstead) -> float | None:
     """Return the relative gain of the combined objective; None without a combined objective."""
-    if solution.combination is None or shared.combination is None or not solution.status.is_answer:
+    answer = shared.solution
+    if answer is None or shared.reason or not solution.status.is_answer:
         return None
-    value, other, decided = solution.combination.value, shared.combination.value, solution.decided_by
-    if value is None or other is None or decided is None or other == 0:
+    combination, other, decided = solution.combination, answer.combination, solution.decided_by
+    if combination is None or other is None or decided is None or combination.value is None or not other.value:
         return None
-    return -decided.nlp.sign * (value - other) / abs(other)
+    return -decided.nlp.sign * (combination.value - other.value) / abs(other.value)

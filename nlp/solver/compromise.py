@@ -74,7 +74,12 @@ def solution_of_one_task(case: Case, own: ProgramSolution) -> Solution:
 
 
 def combine(
-    case: Case, nlps: Sequence[Nlp], own: Sequence[ProgramSolution], solve_one: SolveOne, polish: Polish
+    case: Case,
+    nlps: Sequence[Nlp],
+    own: Sequence[ProgramSolution],
+    solve_one: SolveOne,
+    polish: Polish,
+    beside: Sequence[Sequence[FloatArray]] = (),
 ) -> Solution:
     """Combine several separately solved tasks by the method of the case.
 
@@ -84,6 +89,7 @@ def combine(
         own: solution of each task's program.
         solve_one: function that solves the combined program.
         polish: function that searches the nearest optimum of a set.
+        beside: further points at which the combined search starts, each as the point of every task's program.
 
     Returns:
         The solution; its time is not set.
@@ -101,6 +107,7 @@ def combine(
     elif case.method is Method.AVERAGE:
         x, status, value = _average(whole, joined, weights), Status.AVERAGED, None
     else:
+        joined += [_joined(whole, each)[0] for each in beside if _fits(nlps, each)]
         combined = _solve_combined(case, whole, nlps, own, joined, weights, solve_one)
         x, status, value = combined.x[: whole.n], combined.status, combined.nlp.evaluate(combined.x)[0]
     paired = with_pairs_at(whole, [x])
@@ -148,6 +155,11 @@ def _at_task(whole: Nlp, x: FloatArray, task: int) -> FloatArray:
     return x[whole.program.places.of_task(task, len(x))]
 
 
+def _fits(nlps: Sequence[Nlp], points: Sequence[FloatArray]) -> bool:
+    """Return whether each of several points has as many components as the program of its task has variables."""
+    return all(nlp.n == len(point) for nlp, point in zip(nlps, points, strict=True))
+
+
 def _joined(whole: Nlp, points: Sequence[FloatArray]) -> list[FloatArray]:
     """Return a point (n,) of the whole program for each task's point.
 
@@ -174,7 +186,7 @@ def _solve_combined(
     solve_one: SolveOne,
 ) -> ProgramSolution:
     """Solve the combined program from the optima of the tasks, their average, and sampled starting points."""
-    first = [*points, _average(whole, points, weights)]
+    first = [*points, _average(whole, points[: len(nlps)], weights)]
     if case.method is Method.WEIGHTED_SUM:
         return solve_one(case.method.value, whole if case.changes else formulate_weighted(case, weights), first)
     best = [nlp.evaluate(solution.x)[0] for nlp, solution in zip(nlps, own, strict=True)]

@@ -12,7 +12,7 @@ from ...models.shown import Shown
 from ...models.values import dataclass
 from ...models.whole import Whole
 from ..case.case import Case
-from ..case.choices import ChosenDimension, Ranges
+from ..case.choices import ChosenDimension, Ranges, catalogue_dimensions, within_ranges
 from ..case.names import name_of_task, pose_names
 from ..case.task import Method, Task
 from ..errors import EvaluationError, InputError, nearest
@@ -318,6 +318,15 @@ class Solution(Whole, Shown, Answer):
             EvaluationError: the robot's loops cannot be closed at the point.
         """
         return self._state().jacobian
+
+    @property
+    def chosen_case(self) -> Case:
+        """Case with the chosen catalogue values; the case itself if it has none."""
+        if not self.case.changes:
+            return self.outcomes[0].own.nlp.case
+        if self.choice is None:
+            return self.case
+        return within_ranges(self.case, catalogue_dimensions(self.case), self.choice.chosen)
 
     @property
     def keeps_limits(self) -> bool:

@@ -85,6 +85,8 @@ def _solve(
     progress: SolveProgress | None,
     solver: Solver,
     phase: PhaseProgress,
+    beside: Sequence[Sequence[FloatArray]] = (),
+    may_be_fixed: bool = False,
 ) -> Solution:
     """Solve a case, without the answers to the same problem with one change fewer; see :func:`solve`."""
     began = time.perf_counter()
@@ -92,7 +94,15 @@ def _solve(
         from .choices import solve_choices  # noqa: PLC0415 - few cases have listed values
 
         solve_fixed = partial(
-            _solve, starts=starts, seed=seed, jobs=jobs, compiled=compiled, progress=progress, solver=solver, phase=phase
+            _solve,
+            starts=starts,
+            seed=seed,
+            jobs=jobs,
+            compiled=compiled,
+            progress=progress,
+            solver=solver,
+            phase=phase,
+            may_be_fixed=True,
         )
         return replace(solve_choices(case, solve_fixed), seconds=time.perf_counter() - began)
     search = case.search.but(starts, seed, compiled=compiled)
@@ -114,6 +124,8 @@ def _solve(
         solver=solver,
         phase=phase,
         everywhere=everywhere,
+        beside=beside,
+        may_be_fixed=may_be_fixed or bool(case.changes),
     )
     return replace(solution, seconds=time.perf_counter() - began)
 
@@ -128,6 +140,8 @@ def solve_programs(
     solver: Solver = ipopt,
     phase: PhaseProgress = no_phase,
     everywhere: Everywhere | None = None,
+    beside: Sequence[Sequence[FloatArray]] = (),
+    may_be_fixed: bool = False,
 ) -> Solution:
     """Solve a case from the formulated program of each of its tasks.
 
@@ -141,6 +155,8 @@ def solve_programs(
         phase: function to call with the phase of the solve and its progress.
         everywhere: function that adds limits over a workspace or along a path to a program with limits at the stated
             poses; None without such limits.
+        beside: further starting points of several tasks; see :func:`.combine`.
+        may_be_fixed: If true, several tasks without a free variable are combined too, as for a choice of all values.
 
     Raises:
         CaseError: the case has several tasks and nothing free.
@@ -162,7 +178,7 @@ def solve_programs(
         found, proof[case.limits_over] = exchanged(everywhere(case, nlp), partial(solve_one, name), first)
         return found
 
-    if len(nlps) > 1 and all(nlp.is_fixed for nlp in nlps):
+    if len(nlps) > 1 and not may_be_fixed and all(nlp.is_fixed for nlp in nlps):
         raise CaseError("robot", "has no free variable, so several tasks cannot be combined", source=case.source)
     if len(nlps) == 1:
         found = solve_everywhere(case, case.tasks[0].name, nlps[0])
@@ -182,7 +198,7 @@ def solve_programs(
     polish = partial(solve_program, search=replace(search, starts=1), jobs=1, solver=solver)
     solve_combined = partial(solve_everywhere, case)
     if everywhere is None:
-        solution = combine(case, nlps, own, solve_combined, polish)
+        solution = combine(case, nlps, own, solve_combined, polish, beside)
     else:
         stated = [_at_stated_poses(solution, nlp) for solution, nlp in zip(own, nlps, strict=True)]
         solution = _with_exchanged(combine(case, nlps, stated, solve_combined, polish), own, notices)

@@ -18,6 +18,7 @@ from .joints import limb_part_table
 from .lines import (
     active_limit_lines,
     certificate_lines,
+    change_lines,
     check_lines,
     choice_lines,
     combined_lines,
@@ -156,6 +157,7 @@ def _combined_summary(case: Case, result: CombinedResult) -> Summary:
         yield caution
     yield from _proof_lines(case, result)
     yield from combined_value_lines(combined)
+    yield from change_lines(combined)
     for task in result.tasks:
         name = task.robot.task.name if task.robot is not None and task.robot.task is not None else None
         yield from _named(certificate_lines(task.certificate), name)

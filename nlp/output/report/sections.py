@@ -15,6 +15,7 @@ from ...words.checks import published_table
 from ...words.joints import limb_part_table
 from ...words.lines import (
     certificate_lines,
+    change_lines,
     choice_lines,
     costliest_words,
     counted,
@@ -276,12 +277,13 @@ def _combined_result(report: Report, result: CombinedResult) -> Markup:
         parts.append(paragraphs(singularity_lines(robot, case.units)))
     if combined.tasks:
         parts.append(html_table(outcome_table(combined, result.tasks), "F of each task", id="outcomes"))
+    parts.append(paragraphs(change_lines(combined)))
     parts += [tag("p", f"Note: {notice}.") for notice in combined.notices]
     parts += [tag("p", f"Violated: {name}", class_="warning") for name in combined.violated]
     for k, own in enumerate(result.tasks):
         parts.append(tag("h3", f"Separate optimum of “{report.parts[k].name}”"))
         parts.append(paragraphs([headline(own, case)]))
-        parts += _task_tables(case, own, f"design-{k + 1}")
+        parts += _task_tables(case.of_task(k) if case.changes else case, own, f"design-{k + 1}")
     return join_markup(parts)
 
 
