@@ -38,7 +38,7 @@ from .limits.limits import Limits
 from .loads import NO_LOADING, Loading
 from .names import name_of_task, parameter_name, pose_prefixes
 from .pathfile import PathFile
-from .pertask import check_per_task, task_value
+from .pertask import check_poses, common_poses, common_value, task_value
 from .pose import LARGEST, MAX_FREE_ROTATION, NO_DISPLACEMENT, Free, OverPoses, PerTask, Pose, Rotation, Value
 from .radians import angles_of, check_radians, with_radians
 from .settings import Expectation, Published, Search
@@ -80,8 +80,8 @@ class Case(Whole, Shown):
         limits: limits that a design must satisfy to be buildable.
         displacements: displacements of the first stated pose; each gives one pose of the robot.
         further: stated poses after the first one, with their displacements; the dimensions are the same at all poses.
-        pose_per_task: If true, every task has its own pose: the stated poses belong to the tasks in turn, the same number
-            to each task. A single stated pose gives the ranges of all tasks.
+        pose_per_task: If true, every task has its own pose: the stated poses belong to the tasks in turn, as many to
+            each task. A single stated pose gives the ranges of all tasks.
         over_poses: combination of F over several poses.
         worst_everywhere: If true, the worst F over the workspace or path is optimised, not F at the stated poses only.
         joint_centre_tolerance: largest manufacturing error of each joint centre, length; None for no tolerance.
@@ -159,7 +159,7 @@ class Case(Whole, Shown):
             store(self, "further", [Pose(self.position, self.rotation, self.displacements)] * (len(self.tasks) - 1))
         store(self, "further", _check_further_poses(self))
         store(self, "tasks", _check_tasks(self))
-        check_per_task(self)
+        _check_changes(self)
         _check_choices(self)
         _check_worst_everywhere(self)
         _check_loading(self)
@@ -240,6 +240,12 @@ class Case(Whole, Shown):
         """Names of what changes from task to task: components of parameters, then ``pose``; empty if nothing does."""
         return (*map(self.parameter_name, self.dimensions_per_task), *(["pose"] if self.pose_per_task else []))
 
+    @property
+    def changing_key(self) -> str:
+        """Dotted key of the first dimension that changes from task to task, or else of the pose."""
+        name = next(iter(self.dimensions_per_task), None)
+        return "pose" if name is None else f"robot.parameters.{name}"
+
     def of_task(self, index: int) -> Case:
         """Return the case of one task: its dimensions, its poses, and no other task.
 
@@ -275,9 +281,22 @@ class Case(Whole, Shown):
         Raises:
             CaseError: no value is allowed for every task.
         """
-        from .pertask import sharing  # noqa: PLC0415 - it makes cases
-
-        return sharing(self, names)
+        own = self.dimensions_per_task
+        parameters = {item.name: list(self._stated(item.name)) for item in self.model.parameters}
+        for item in self.model.parameters:
+            for k, key in enumerate(item.components):
+                if key in own and self.parameter_name(key) in names:
+                    parameters[item.name][k] = common_value(own[key].values, f"robot.parameters.{key}")
+        first, *further = common_poses(self.poses, len(self.tasks)) if "pose" in names else self.poses
+        return replace(
+            self,
+            parameters=parameters,
+            position=first.position,
+            rotation=first.rotation,
+            displacements=first.displacements,
+            further=further,
+            pose_per_task=self.pose_per_task and "pose" not in names,
+        )
 
     def fixed_parameters(self, reason: str) -> FloatArray:
         """Return the values (d,) of all components of the robot's parameters, in the robot's order.
@@ -347,6 +366,11 @@ class Case(Whole, Shown):
         If only dimensions change from task to task, the robot takes every pose once for each task.
         """
         return len(self.stations)
+
+    @property
+    def poses_per_task(self) -> int:
+        """Number of poses at which F of one task is taken."""
+        return self.pose_count // (len(self.tasks) if self.changes else 1)
 
     @property
     def stations(self) -> tuple[Station, ...]:
@@ -451,6 +475,31 @@ class Case(Whole, Shown):
         """Part of the case on which its limits depend."""
         scalars = self.of_task(0).scalars if self.changes else self.scalars
         return LimitedCase(self.model, self.units, scalars, self.loading)
+
+
+def _check_changes(case: Case) -> None:
+    """Refuse dimensions and poses that change from task to task where this has no meaning, or is not supported.
+
+    Raises:
+        CaseError: there is only one task, poses do not fit to tasks, or another table of the case conflicts.
+    """
+    if not case.changes:
+        return
+    key, tasks = case.changing_key, len(case.tasks)
+    if tasks == 1:
+        raise CaseError(f"{key}.per", "needs several tasks, but the case has one [[task]]; leave per out", "task")
+    for table, stated in (("workspace", case.workspace), ("path", case.path)):
+        if stated is not None:
+            fault = (
+                f"conflicts with {key}, which changes from task to task: the proof needs one robot; remove [{table}]"
+            )
+            raise CaseError(table, fault)
+    if case.pose_per_task:
+        check_poses(case.poses, tasks)
+    if case.over_poses is OverPoses.WORST and case.poses_per_task > 1:
+        raise CaseError("combine.over_poses", "must be 'sum' or 'mean' with several tasks", case.over_poses.value)
+    for task in range(tasks):
+        case.of_task(task)  # checks the dimensions and poses of this task
 
 
 def _check_worst_everywhere(case: Case) -> None:
@@ -588,7 +637,9 @@ def _check_each(
     given = tuple(value.values)
     given = given * len(case.tasks) if len(given) == 1 else given
     if len(given) != len(case.tasks):
-        raise CaseError(f"{key}.tasks", f"must have one value for each of the {len(case.tasks)} tasks, got {len(given)}")
+        raise CaseError(
+            f"{key}.tasks", f"must have one value for each of the {len(case.tasks)} tasks, got {len(given)}"
+        )
     keys = [key if len(value.values) == 1 else f"{key}.tasks[{k}]" for k in range(len(given))]
     return PerTask(
         tuple(check_value(each, place, dimension, case.units, domain) for each, place in zip(given, keys, strict=True))

@@ -97,9 +97,7 @@ def within_ranges(case: Case, numbers: Sequence[CatalogueDimension], ranges: Ran
         values = [(task, given.get((item.name, k, task), value)) for task, _, value in _values_of(case, item, k)]
         return values[0][1] if values[0][0] is None else PerTask(tuple(value for _, value in values))
 
-    parameters = {
-        item.name: [within(item, k) for k in range(len(item.components))] for item in case.model.parameters
-    }
+    parameters = {item.name: [within(item, k) for k in range(len(item.components))] for item in case.model.parameters}
     return replace(case, parameters=parameters)
 
 

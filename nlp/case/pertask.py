@@ -1,19 +1,14 @@
-"""Dimensions and poses that change from task to task: values of one task, sharing, and refusals."""
+"""Values and poses that change from task to task: those of one task, and those that all tasks allow."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import islice
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import CaseError
-from .pose import OverPoses, PerTask, Pose, Rotation, Value, shared_value
-
-if TYPE_CHECKING:
-    from .case import Case
+from .pose import PerTask, Pose, Rotation, Value, shared_value
 
 
 def task_value(value: Value | PerTask, task: int) -> Value:
@@ -21,70 +16,30 @@ def task_value(value: Value | PerTask, task: int) -> Value:
     return value.values[task] if isinstance(value, PerTask) else value
 
 
-def check_per_task(case: Case) -> None:
-    """Refuse dimensions and poses that change from task to task where this has no meaning, or is not supported.
-
-    Raises:
-        CaseError: there is only one task, poses do not fit to tasks, or another table of the case conflicts.
-    """
-    if not case.changes:
-        return
-    name = next(iter(case.dimensions_per_task), None)
-    key = "pose" if name is None else f"robot.parameters.{name}"
-    tasks = len(case.tasks)
-    if tasks == 1:
-        raise CaseError(f"{key}.per", "'task' needs several [[task]], but the case has one; leave per out")
-    if case.limits_over:
-        fault = f"conflicts with {key}.per = 'task': a workspace or path needs one robot; remove over"
-        raise CaseError("limits.over", fault, case.limits_over)
-    if case.over_poses is OverPoses.WORST and case.pose_count > tasks:
-        raise CaseError("combine.over_poses", "must be 'sum' or 'mean' with several tasks", case.over_poses.value)
-    if case.pose_per_task:
-        counts = _counts(case)
-        if len(case.poses) % tasks or len(set(counts)) > 1:
-            fault = f"must give every task the same number of poses: {tasks} tasks"
-            raise CaseError("pose", f"{fault} have {len(case.poses)} stated poses, {sum(counts)} with displacements")
-    for task in range(tasks):
-        case.of_task(task)  # checks the dimensions and poses of this task
-
-
-def _counts(case: Case) -> list[int]:
-    """Return the number of poses of each task, with displacements."""
-    each = max(len(case.poses) // len(case.tasks), 1)
-    numbers = iter([len(pose.displacements) for pose in case.poses])
-    return [sum(islice(numbers, each)) for _ in case.tasks]
-
-
-def sharing(case: Case, names: Sequence[str]) -> Case:
-    """Return a case in which some of the changing dimensions, or the pose, are the same for every task.
+def check_poses(poses: Sequence[Pose], tasks: int) -> None:
+    """Refuse poses that cannot be divided among tasks, the same number for each task.
 
     Args:
-        case: the case.
-        names: names of its changing dimensions, or ``pose``.
+        poses: stated poses, with their displacements.
+        tasks: number of tasks.
 
     Raises:
-        CaseError: no value is allowed for every task.
+        CaseError: the tasks have different numbers of poses.
     """
-    found = case
-    if "pose" in names:
-        first, *further = _shared_poses(case)
-        found = replace(
-            found, position=first.position, rotation=first.rotation, further=further, pose_per_task=False
-        )
-    parameters: dict[str, list[Value | PerTask]] = {}
-    for item in case.model.parameters:
-        given = case.parameters[item.name]
-        parts = list(given) if isinstance(given, Sequence) else [given]
-        for k, name in enumerate(item.components):
-            part = parts[k]
-            if isinstance(part, PerTask) and case.parameter_name(name) in names:
-                parts[k] = _common(part.values, f"robot.parameters.{name}")
-        parameters[item.name] = parts
-    return replace(found, parameters=parameters)
+    count = max(len(poses) // tasks, 1)
+    sizes = [len(pose.displacements) for pose in poses]
+    counts = [sum(sizes[k : k + count]) for k in range(0, len(poses), count)]
+    if len(poses) % tasks or len(set(counts)) > 1:
+        fault = f"must give each of the {tasks} tasks the same number of poses"
+        raise CaseError("pose", f"{fault}, got {len(poses)} stated poses and {sum(sizes)} with displacements")
 
 
-def _common(values: Sequence[Value], key: str) -> Value:
+def common_value(values: Sequence[Value], key: str) -> Value:
     """Return the values that every task allows.
+
+    Args:
+        values: value of each task.
+        key: dotted key, for messages.
 
     Raises:
         CaseError: there is none.
@@ -95,24 +50,27 @@ def _common(values: Sequence[Value], key: str) -> Value:
     return value
 
 
-def _shared_poses(case: Case) -> list[Pose]:
+def common_poses(poses: Sequence[Pose], tasks: int) -> list[Pose]:
     """Return the poses with the coordinates that every task allows.
+
+    Args:
+        poses: stated poses of all tasks in turn.
+        tasks: number of tasks.
 
     Raises:
         CaseError: the tasks have different axes or displacements, or no coordinate is allowed for every task.
     """
-    count = len(case.poses) // len(case.tasks)
+    count = len(poses) // tasks
     found = []
     for k in range(count):
-        poses = case.poses[k::count]
-        first = poses[0]
-        rotations = [pose.rotation for pose in poses]
-        if not all(_same_axis(first.rotation, each) for each in rotations):
+        own = poses[k::count]
+        first = own[0]
+        if not all(_same_axis(first.rotation, pose.rotation) for pose in own):
             raise CaseError("pose.rotation", "has no axis that every task allows")
-        if not all(_same_steps(first, pose) for pose in poses):
+        if not all(_same_steps(first, pose) for pose in own):
             raise CaseError("pose", "has displacements that differ from task to task")
-        position = [_common(values, "pose.position") for values in zip(*(pose.position for pose in poses), strict=True)]
-        angle = _common([each.angle for each in rotations], "pose.rotation.angle")
+        position = [common_value(values, "pose.position") for values in zip(*(p.position for p in own), strict=True)]
+        angle = common_value([pose.rotation.angle for pose in own], "pose.rotation.angle")
         found.append(Pose(position, replace(first.rotation, angle=angle), first.displacements))
     return found
 

@@ -37,15 +37,25 @@ from .pose import (
     rotation_from_rpy,
 )
 from .robots import insert_robot_file, model_of_table
-from .schema import Document, ExpectTable, Listed, PoseTable, PublishedTable, RotationTable, TaskTable, TaskValues
+from .schema import (
+    DimensionRange,
+    Document,
+    ExpectTable,
+    Listed,
+    PoseTable,
+    PublishedTable,
+    RotationTable,
+    TaskTable,
+    TaskValues,
+)
 from .settings import Expectation, ExpectedValue, Published, Search
 from .source import find_case, inputs_of, named_files, read_text, source_name, tables_of
-from .table import Range, case_error
+from .table import case_error
 from .task import Method, Sense, Task, unit_twist
 from .toml import toml_document
 
 #: Value of a dimension in a case file.
-Dimensional: TypeAlias = float | Range | Listed | TaskValues
+Dimensional: TypeAlias = float | DimensionRange | Listed | TaskValues
 
 #: Tables of robot files; each robot file has at least one of these.
 _OF_ROBOT_FILES = frozenset(("limb", "links", "joint"))
@@ -305,7 +315,9 @@ def _poses_of_tasks(written: Document) -> bool:
     poses, keys = (written.pose if isinstance(written.pose, list) else [written.pose]), _pose_keys(written)
     for pose, key in zip(poses, keys, strict=True):
         if pose.per is not None and (len(poses) > 1 or pose.task is not None):
-            raise CaseError(f"{key}.per", "needs a single [pose]; write task = \"NAME\" in each [[pose]] instead", pose.per)
+            raise CaseError(
+                f"{key}.per", 'needs a single [pose]; write task = "NAME" in each [[pose]] instead', pose.per
+            )
     if all(pose.task is None for pose in poses):
         return any(pose.per is not None for pose in poses)
     names = [task.name or f"task {k + 1}" for k, task in enumerate(written.task)]

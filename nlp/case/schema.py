@@ -100,7 +100,7 @@ class TaskValues(Table):
     """Dimension with a value or range of its own for every task."""
 
     tasks: Annotated[list[TaskValue], Field(min_length=1)] = Field(
-        description="value of the dimension for each task, in the order of the tasks: a number, { min, max } or { values }"
+        description="value for each task, in the order of the tasks: a number, { min, max } or { values }"
     )
 
 
@@ -152,8 +152,8 @@ class RobotTable(Table):
     definition: dict[str, Any] | None = Field(default=None, description="content of a robot file, instead of model")
     parameters: dict[str, VectorOrValue] = Field(
         default_factory=dict,
-        description="value of each parameter by name: a number, a range { min, max }, catalogue values { values }, or a "
-        "value for each task { tasks }; three of these for a point or direction",
+        description="value of each parameter by name: a number, a range { min, max }, catalogue values { values }, or "
+        "a value for each task { tasks }; three of these for a point or direction",
     )
     characteristic_length: FiniteFloat = Field(
         default=Case.characteristic_length,

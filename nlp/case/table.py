@@ -102,7 +102,19 @@ class Later:
 
 
 #: Parts of a pydantic location that are branches of a union, or mark a key of a table, and not keys of the file.
-_TAGS = ("<number>", "<range>", "<values>", "<tasks>", "<list>", "<pose>", "<poses>", "<word>", "<lists>", "<set>", "[key]")
+_TAGS = (
+    "<number>",
+    "<range>",
+    "<values>",
+    "<tasks>",
+    "<list>",
+    "<pose>",
+    "<poses>",
+    "<word>",
+    "<lists>",
+    "<set>",
+    "[key]",
+)
 
 
 def fault_of(key: str, fault: str) -> PydanticCustomError:

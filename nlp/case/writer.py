@@ -205,7 +205,7 @@ def _direction(unit: FloatArray) -> list[float]:
 
 
 def _poses(case: Case) -> Iterator[str]:
-    """Yield the lines of the stated poses; a pose for each task is written once if the ranges of all tasks are equal."""
+    """Yield the lines of the stated poses; equal ranges of all tasks are written once."""
     tables = [_pose(case, pose) for pose in case.poses]
     if not case.pose_per_task:
         yield from toml_tables("[[pose]]" if case.further else "[pose]", tables)
@@ -253,8 +253,7 @@ def _task(task: Task) -> dict[str, TomlValue | None]:
 def _combination(case: Case) -> dict[str, TomlValue | None]:
     """Return the table of the combination of tasks and poses, with only the keys that the file may have."""
     method = case.method.value if len(case.tasks) > 1 else None
-    count = case.pose_count // (len(case.tasks) if case.changes else 1)
-    return {"method": method, "over_poses": case.over_poses.value if count > 1 else None}
+    return {"method": method, "over_poses": case.over_poses.value if case.poses_per_task > 1 else None}
 
 
 def _limits(case: Case) -> dict[str, TomlValue | None]:

@@ -144,8 +144,11 @@ def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) 
     """
     check_no_catalogue(case)
     if case.changes and len(tasks) < len(case.tasks):
-        fault = "changes from task to task, which is only supported by solve"
-        raise CaseError(case.changes[0], f"{fault}; write one case for each task", source=case.source)
+        fault = "changes from task to task, but this command takes one robot and pose for all tasks"
+        key = case.changing_key
+        raise CaseError(
+            key, f"{fault}; use solve, report, certify or export, or a case for each task", source=case.source
+        )
     table, model = SymbolTable(), case.model
     owners = _Owners(table)
     parameters = [_add_parameter(case, item, owners) for item in model.parameters]
@@ -159,9 +162,9 @@ def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) 
     ranges = _ranges_of_unknowns(model, reference)
     unknowns = []
     for k, station in enumerate(case.stations):
-        pose = 0 if case.pose_count == 1 else k + 1
+        number = 0 if case.pose_count == 1 else k + 1
         pairs = zip(model.unknowns, ranges, strict=True)
-        unknowns.append([table.add(_name_of(item, pose), item.dimension, own) for item, own in pairs])
+        unknowns.append([table.add(_name_of(item, number), item.dimension, own) for item, own in pairs])
         owners.belong(station.task)
     joints = [
         [each.places[0].index for each, item in zip(at_pose, model.unknowns, strict=True) if item.is_free]

@@ -164,7 +164,9 @@ def _constraints(
     for part in named:
         for item in _of_design(part, robots, limits):
             if part.task and _is_of_task(item, part, named):
-                yield replace(item, constraint=replace(item.constraint, name=f"{item.constraint.name} task {part.task}"))
+                yield replace(
+                    item, constraint=replace(item.constraint, name=f"{item.constraint.name} task {part.task}")
+                )
             elif part is named[0]:
                 yield item
     for pair in pairs:

@@ -10,7 +10,6 @@ from ..case.task import Method, Sense
 from ..evidence.margins import Margin
 from ..evidence.optimality import Evidence, PointKind
 from ..evidence.sensitivity import Sensitivity
-from ..evidence.state import PlatformPose
 from ..evidence.tolerance import ToleranceLoss
 from ..program.relaxation import RelaxedLimit
 from ..proof.certificate.certificate import CertificateStatus
@@ -183,24 +182,6 @@ class OutcomeData(JsonObject):
     rates: Vector | None
 
 
-class SettingData(JsonObject):
-    """Dimensions and poses of one task, where these change from task to task.
-
-    Attributes:
-        task: name of the task.
-        parameters: dimensions by name; three numbers for a point or direction.
-        stated_poses: stated poses of the task, before their displacements.
-        rank: rank of the Jacobian at the first pose of the task.
-        singular: If true, the rank is below six.
-    """
-
-    task: str
-    parameters: Mapping[str, float | Vector]
-    stated_poses: tuple[PlatformPose, ...]
-    rank: int
-    singular: bool
-
-
 class ChangeData(JsonObject):
     """Gain by a dimension, or the pose, that changes from task to task.
 
@@ -208,15 +189,15 @@ class ChangeData(JsonObject):
         name: name of the dimension; ``pose`` for the pose.
         gain: relative gain of the combined objective, compared with the same problem with the dimension or pose shared;
             null for an average, and without an answer.
-        shared_value: combined objective with it shared; null for an average, and without an answer.
-        shared_F: F of each task with it shared; null without an answer.
+        value_shared: combined objective with it shared; null for an average, and without an answer.
+        F_shared: F of each task with it shared; null without an answer.
         reason: reason why this problem has no answer; otherwise absent.
     """
 
     name: str
     gain: float | None
-    shared_value: float | None
-    shared_F: Vector | None
+    value_shared: float | None
+    F_shared: Vector | None
     reason: Absent[str]
 
 
@@ -248,7 +229,8 @@ class CombinedData(JsonObject):
         optimality: evidence of optimality for the combined program; null without such a program.
         starts: outcomes of the starts of the combined program; null without such a program.
         certificate: proved bound of the combined program; null if no proof was requested.
-        settings: dimensions and poses of each task; absent if nothing changes from task to task.
+        settings: robot of each task, at the dimensions and the pose of the task; absent if nothing changes from task to
+            task, and then the robot of the point is that of all tasks.
         changes: gain by each dimension or pose that changes from task to task; absent if nothing does.
     """
 
@@ -262,7 +244,7 @@ class CombinedData(JsonObject):
     optimality: Evidence | None
     starts: StartsData | None
     certificate: CertificateData | None
-    settings: Absent[tuple[SettingData, ...]]
+    settings: Absent[tuple[RobotData, ...]]
     changes: Absent[tuple[ChangeData, ...]]
 
     @property

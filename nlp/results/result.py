@@ -8,9 +8,7 @@ from collections.abc import Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from ..evidence.evaluation import shown_parameters
 from ..evidence.sensitivity import Sensitivity, sensitivities
-from ..evidence.state import stated_poses
 from ..program.relaxation import RelaxedLimit
 from ..proof.certificate.certificate import Certificate
 from ..solver.multistart import ProgramSolution
@@ -27,14 +25,14 @@ from .data import (
     OptimumData,
     OutcomeData,
     ReachedData,
-    SettingData,
     SolveResult,
     StartsData,
 )
 from .design import limits_data, margins_data, tolerance_loss_of
 from .evidence import certificate_data, optimality_of
 from .objective import objective_data, over_workspace
-from .point import head_data, objective, pose_data, robot_data, versions, violations
+from .parts import RobotData
+from .point import head_data, objective, robot_data, versions, violations
 
 if TYPE_CHECKING:
     from ..solver.certified import Certified
@@ -186,20 +184,13 @@ def _point(solution: Solution, combination: Combination) -> CombinedPointData:
     return CombinedPointData(robot=robot, margins=margins, limits=limits_data(margins))
 
 
-def _settings(solution: Solution) -> tuple[SettingData, ...]:
-    """Return the dimensions and poses of each task, if these change from task to task and the robot exists."""
-    if not solution.case.changes or any(outcome.state is None for outcome in solution.outcomes):
+def _settings(solution: Solution) -> tuple[RobotData, ...]:
+    """Return the robot of each task, if dimensions or the pose change from task to task and all robots exist."""
+    states = [outcome.state for outcome in solution.outcomes]
+    if not solution.case.changes or any(state is None for state in states):
         return ()
     return tuple(
-        SettingData(
-            task=outcome.task.name,
-            parameters=shown_parameters(outcome.own.nlp.case, outcome.state),
-            stated_poses=tuple(
-                pose_data(outcome.own.nlp.case, pose) for pose in stated_poses(outcome.own.nlp, outcome.at)
-            ),
-            rank=outcome.state.rank,
-            singular=outcome.state.is_singular,
-        )
+        robot_data(outcome.own.nlp, outcome.at, outcome.state, 0)
         for outcome in solution.outcomes
         if outcome.state is not None
     )
@@ -212,8 +203,8 @@ def _change(shared: SharedInstead) -> ChangeData:
     return ChangeData(
         name=shared.name,
         gain=shared.gain,
-        shared_value=None if combination is None else combination.value,
-        shared_F=None if answer is None else vector([outcome.F for outcome in answer.outcomes]),
+        value_shared=None if combination is None else combination.value,
+        F_shared=None if answer is None else tuple(outcome.F for outcome in answer.outcomes),
         reason=shared.reason or None,
     )
 

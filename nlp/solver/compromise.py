@@ -214,8 +214,7 @@ def _choose_members(
     members = [_known_members(solution) for solution in own]
     unique = [_is_unique(solution) for solution in own]
     notices = [
-        f"the optimum of {case.tasks[j].name!r} is not unique: "
-        "the optimum nearest to the other tasks' optima was used"
+        f"the optimum of {case.tasks[j].name!r} is not unique: the optimum nearest to the other tasks' optima was used"
         for j, solution in enumerate(own)
         if not unique[j] and solution.status.is_answer
     ]

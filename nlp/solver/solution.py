@@ -103,8 +103,8 @@ class TaskOutcome:
         evidence: evidence of optimality at the solution for this task only; None without free variables.
         loss: loss of F compared with the task's separate optimum; negative if the combined search reached a better
             optimum; 0 for a case with one task.
-        at: (m,) point of the solution in the variables of the task's program: those of the solution, or the shared ones and
-            those of the task if dimensions or the pose change from task to task.
+        at: (m,) point of the solution in the variables of the task's program; these are only a part of the solution's
+            variables if dimensions or the pose change from task to task.
         exchanged: solution of the task's separate program with constraints at the poses that the exchange added; only
             for several tasks with limits over a workspace or along a path, otherwise None. The program of ``own`` has
             no such constraints.
@@ -158,6 +158,14 @@ class SharedInstead:
     solution: Solution | None
     gain: float | None
     reason: str = ""
+
+
+class PointAtPose(NamedTuple):
+    """Program of a task, a point (n,) in its variables, and the index of one of its poses."""
+
+    nlp: Nlp
+    x: FloatArray
+    pose: int
 
 
 class ChoicePart(NamedTuple):
@@ -295,8 +303,7 @@ class Solution(Whole, Shown, Answer):
 
     @property
     def settings(self) -> tuple[Mapping[str, float | Vector], ...]:
-        """Parameters and pose coordinates of each task at the point, in the units of the case, by their names for
-        ``--set``.
+        """Parameters and pose coordinates of each task at the point, in the case's units, by their names for ``--set``.
 
         Raises:
             EvaluationError: the robot's loops cannot be closed at the point.
@@ -318,6 +325,18 @@ class Solution(Whole, Shown, Answer):
             EvaluationError: the robot's loops cannot be closed at the point.
         """
         return self._state().jacobian
+
+    def at_pose(self, pose: int) -> PointAtPose:
+        """Return the program of the task of a pose, the point in its variables, and the pose's index in the program.
+
+        Args:
+            pose: index of the pose in the case.
+        """
+        stations = self.case.stations
+        task = stations[pose].task or 0
+        before = sum(station.task == stations[pose].task for station in stations[:pose])
+        outcome = self.outcomes[task]
+        return PointAtPose(outcome.own.nlp, outcome.at, before)
 
     @property
     def chosen_case(self) -> Case:

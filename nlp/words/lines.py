@@ -433,21 +433,18 @@ def combined_value_lines(combined: CombinedData) -> Iterator[Line]:
 
 def change_lines(combined: CombinedData) -> Iterator[Line]:
     """Yield the gain by each dimension or pose that changes from task to task."""
-    for setting in combined.settings or ():
-        if setting.singular:
-            yield Line(f"singular at the pose of {setting.task}: rank of J {setting.rank}", tone=Tone.CAUTION)
     for change in combined.changes or ():
         yield Line(_gain_words(change, combined), label=f"{change.name} per task")
 
 
 def _gain_words(change: ChangeData, combined: CombinedData) -> str:
     """Return the gain by a change from task to task in words."""
-    if change.shared_F is None:
+    if change.F_shared is None:
         return f"not compared: {change.reason}"
-    if change.gain is None or change.shared_value is None:
-        pairs = zip(combined.tasks, change.shared_F, strict=True)
+    if change.gain is None or change.value_shared is None:
+        pairs = zip(combined.tasks, change.F_shared, strict=True)
         return f"F with {change.name} shared: {', '.join(f'{task.name} {number(F)}' for task, F in pairs)}"
-    beside = f"{number(change.shared_value)} with {change.name} shared"
+    beside = f"{number(change.value_shared)} with {change.name} shared"
     if abs(change.gain) < _NO_GAIN:
         return f"no gain: the {combined.method.value} objective is {beside}"
     return f"{100 * change.gain:+.3g} % of the {combined.method.value} objective: {beside}"

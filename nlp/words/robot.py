@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from ..evidence.sensitivity import Sensitivity
     from ..evidence.state import PlatformPose
     from ..program.free_joints import FreeJoint
-    from ..results.data import CombinedData, SettingData, SolveResult
+    from ..results.data import CombinedData, SolveResult
     from ..results.parts import ByOwner, PosesData, PoseStateData, RobotData, TaskData
 
 #: Number of fixed values that are shown with the variables: the values with the largest relative sensitivity of F.
@@ -165,7 +165,7 @@ def design_table(
     sensitivity: Sequence[Sensitivity] = (),
     F: float | None = None,
     combined: bool = False,
-    settings: Sequence[SettingData] = (),
+    settings: Sequence[RobotData] = (),
 ) -> TextTable:
     """Return every dimension and the pose: value, unit, bounds, status, and derivative of the optimal objective.
 
@@ -177,7 +177,7 @@ def design_table(
         sensitivity: derivatives of the optimal F with respect to the fixed values.
         F: objective; None if F is unknown.
         combined: If true, the objective combines several tasks.
-        settings: dimensions and poses of each task, if these change from task to task.
+        settings: robot of each task, if dimensions or the pose change from task to task.
     """
     reasons = _Rows(case.units, robot_size(robot), size_of_F(robot, F or 0.0), active, sensitivity, _sense(case))
     rows: list[_Row] = []
@@ -187,10 +187,10 @@ def design_table(
         names, largest = case.component_names(parameter), max(map(abs, values))
         for name, value, given in zip(names, values, case.components(parameter.name), strict=True):
             rows.append(reasons.row(name, value, given, parameter.dimension, largest))
-    stated = (robot.pose,) if robot.several is None else robot.several.stated_poses
+    stated = stated_poses_of(robot)
     if settings:
         rows = list(_rows_of_tasks(case, settings, reasons))
-        stated = tuple(pose for each in settings for pose in each.stated_poses)[: len(case.poses)]
+        stated = tuple(pose for each in settings for pose in stated_poses_of(each))[: len(case.poses)]
     for k, found in enumerate(stated):
         rows += _pose_rows(case, k, found, reasons)
     joints = _free_joint_rows(case, robot.free_joints or (), reasons)
@@ -213,7 +213,12 @@ def design_table(
     return TextTable(headers[:columns], cells, "design", folded=folded, folded_words=words, named=named)
 
 
-def _rows_of_tasks(case: Case, settings: Sequence[SettingData], reasons: _Rows) -> Iterator[_Row]:
+def stated_poses_of(robot: RobotData) -> tuple[PlatformPose, ...]:
+    """Return the stated poses of a robot."""
+    return (robot.pose,) if robot.several is None else robot.several.stated_poses
+
+
+def _rows_of_tasks(case: Case, settings: Sequence[RobotData], reasons: _Rows) -> Iterator[_Row]:
     """Yield the rows of the dimensions; of those that change from task to task, one row for each task."""
     for parameter in case.model.parameters:
         shown = [each.parameters[parameter.name] for each in settings]
@@ -287,9 +292,7 @@ def combined_design_table(case: Case, combined: CombinedData, robot: RobotData) 
     reached = combined.method_point is None
     active = () if reached or combined.optimality is None else combined.optimality.active
     settings = combined.settings or ()
-    return design_table(
-        case, robot, reached=reached, active=active, F=combined.value, combined=True, settings=settings
-    )
+    return design_table(case, robot, reached=reached, active=active, F=combined.value, combined=True, settings=settings)
 
 
 #: Largest relative difference from the worst F at which a pose also counts as worst.
