@@ -177,7 +177,8 @@ class Case(Whole, Shown):
             raise CaseError("robot.characteristic_length", "must be positive and finite", self.characteristic_length)
 
     def __repr__(self) -> str:
-        values = [value for name in self.parameters for value in self.components(name)]
+        stated = [value for name in self.parameters for value in self._stated(name)]
+        values = [each for value in stated for each in (value.values if isinstance(value, PerTask) else [value])]
         values += [value for pose in self.poses for value in (*pose.position, pose.rotation.angle)]
         free = sum(isinstance(value, Free) for value in values)
         parts = [_counted(free, "variable"), _counted(len(self.tasks), "task"), _counted(self.pose_count, "pose")]

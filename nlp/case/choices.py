@@ -61,18 +61,26 @@ def catalogue_dimensions(case: Case) -> tuple[CatalogueDimension, ...]:
         CatalogueDimension(item.name, k, name, item.dimension, value.values, task)
         for item in case.model.parameters
         for k in range(len(item.components))
-        for task, name, value in _values_of(case, item, k)
+        for task, name, value in values_of_component(case, item, k)
         if isinstance(value, Free) and value.values
     )
 
 
-def _values_of(case: Case, item: Parameter, component: int) -> list[tuple[int | None, str, Value]]:
-    """Return task, name and value of a component of a parameter; each task's, if it changes from task to task."""
+class ComponentValue(NamedTuple):
+    """Name and value of a component of a parameter; with the index of the task, if it changes from task to task."""
+
+    task: int | None
+    name: str
+    value: Value
+
+
+def values_of_component(case: Case, item: Parameter, component: int) -> list[ComponentValue]:
+    """Return the value of a component of a parameter by its index; for each task, if it changes from task to task."""
     name = case.component_names(item)[component]
     own = case.dimensions_per_task.get(item.components[component])
     if own is None:
-        return [(None, name, case.components(item.name)[component])]
-    return [(task, name_of_task(name, task), value) for task, value in enumerate(own.values)]
+        return [ComponentValue(None, name, case.components(item.name)[component])]
+    return [ComponentValue(task, name_of_task(name, task), value) for task, value in enumerate(own.values)]
 
 
 def all_values(numbers: Sequence[CatalogueDimension]) -> Ranges:
@@ -94,7 +102,9 @@ def within_ranges(case: Case, numbers: Sequence[CatalogueDimension], ranges: Ran
         given[number.parameter, number.component, number.task] = low if behind - first == 1 else Free(low, high)
 
     def within(item: Parameter, k: int) -> Value | PerTask:
-        values = [(task, given.get((item.name, k, task), value)) for task, _, value in _values_of(case, item, k)]
+        values = [
+            (task, given.get((item.name, k, task), value)) for task, _, value in values_of_component(case, item, k)
+        ]
         return values[0][1] if values[0][0] is None else PerTask(tuple(value for _, value in values))
 
     parameters = {item.name: [within(item, k) for k in range(len(item.components))] for item in case.model.parameters}
@@ -112,7 +122,7 @@ def chosen_settings(case: Case, fixed: Case) -> Mapping[str, float]:
     return {
         each.name: case.units.shown(value, each.dimension)
         for each in catalogue_dimensions(case)
-        for task, _, value in _values_of(fixed, items[each.parameter], each.component)
+        for task, _, value in values_of_component(fixed, items[each.parameter], each.component)
         if task == each.task and not isinstance(value, Free)
     }
 
