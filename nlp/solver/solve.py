@@ -72,7 +72,8 @@ def solve(
         return solve_once(case)
     from .changes import with_each_shared  # noqa: PLC0415 - few cases have changes
 
-    return replace(with_each_shared(case, solve_once), seconds=time.perf_counter() - began)
+    solution = with_each_shared(case, partial(solve_once, may_be_fixed=True))
+    return replace(solution, seconds=time.perf_counter() - began)
 
 
 def _solve(
@@ -125,7 +126,7 @@ def _solve(
         phase=phase,
         everywhere=everywhere,
         beside=beside,
-        may_be_fixed=may_be_fixed or bool(case.changes),
+        may_be_fixed=may_be_fixed,
     )
     return replace(solution, seconds=time.perf_counter() - began)
 
