@@ -169,9 +169,12 @@ def _drawings_at_start(case: Case) -> list[Drawing]:
     numbers = catalogue_dimensions(case)
     case = within_ranges(case, numbers, tuple((0, 1) for _ in numbers))
     parts = [case.of_task(k) for k in range(len(case.tasks))] if case.changes else [case]
-    plain = {"limits": Limits(), "displacements": (NO_DISPLACEMENT,), "further": (), "joint_centre_tolerance": None}
+    steps = (NO_DISPLACEMENT,)
+    plain = [
+        replace(part, limits=Limits(), displacements=steps, further=(), joint_centre_tolerance=None) for part in parts
+    ]
     try:
-        nlps = [nlp for part in parts for nlp in formulate_each(replace(part, **plain))]
+        nlps = [nlp for part in plain for nlp in formulate_each(part)]
     except CaseError as error:
         raise EvaluationError(str(error)) from None
     return [

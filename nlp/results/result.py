@@ -178,7 +178,7 @@ def _point(solution: Solution, combination: Combination) -> CombinedPointData:
     if own.state is None:
         return CombinedPointData(robot=None, margins=None, limits=None)
     # Only a combined program has derivatives of its value with respect to the limits.
-    nlp, x = (own.own.nlp, solution.x) if combined is None else (combined.nlp, combined.x)
+    nlp, x = (combination.whole, solution.x) if combined is None else (combined.nlp, combined.x)
     margins = margins_data(nlp, x, optimal=combined is not None and solution.all_solved)
     robot = robot_data(own.own.nlp, own.at, own.state, None)
     return CombinedPointData(robot=robot, margins=margins, limits=limits_data(margins))

@@ -16,6 +16,9 @@ from ..errors import CaseError, EvaluationError
 from ..interruption import is_requested
 from .solution import SharedInstead, Solution
 
+#: Relative loss of the combined objective by a change, above which the search missed a better point.
+_WORSE = 1e-7
+
 
 class SolveOnce(Protocol):
     """A function that solves a case with the settings of the whole solve."""
@@ -26,29 +29,40 @@ class SolveOnce(Protocol):
 
 
 def with_each_shared(case: Case, solve_once: SolveOnce) -> Solution:
-    """Solve a case with each change from task to task left out, one at a time; then solve the case itself.
+    """Solve a case; then solve it with each change from task to task left out, one at a time.
 
-    The answers with less freedom are starting points of the last search, which is therefore not worse.
+    An answer with less freedom cannot be better. If a search found a better one, the case is solved again from there.
 
     Args:
         case: the case.
         solve_once: function that solves a case.
     """
-    shared = [] if is_requested() else [_shared(case, name, solve_once) for name in case.changes]
-    answers = [each.solution for each in shared if each.solution is not None and not each.reason]
-    beside = [[outcome.at for outcome in answer.outcomes] for answer in answers]
-    solution = solve_once(case, beside=beside)
-    return replace(solution, changes=tuple(replace(each, gain=_gain(solution, each)) for each in shared))
+    solution = solve_once(case)
+    shared = [_compared(solution, _shared(case, name, solve_once)) for name in case.changes]
+    better = [each.solution for each in shared if each.solution and each.gain is not None and each.gain < -_WORSE]
+    if better and not is_requested():
+        again = solve_once(case, beside=[[outcome.at for outcome in each.outcomes] for each in better])
+        if again.status.is_answer:
+            solution = again
+            shared = [_compared(solution, each) for each in shared]
+    return replace(solution, changes=tuple(shared))
 
 
 def _shared(case: Case, name: str, solve_once: SolveOnce) -> SharedInstead:
     """Return the answer to the problem of a case with one change fewer; its gain is not set."""
+    if is_requested():
+        return SharedInstead(name, None, None, "the solve was stopped")
     try:
         shared = solve_once(case.sharing(name))
     except (CaseError, EvaluationError) as error:
         return SharedInstead(name, None, None, str(error))
-    reason = "" if shared.status.is_answer else f"no answer with {name} shared: {shared.status.value}"
+    reason = "" if shared.status.is_answer else f"the solve with {name} shared is {shared.status.value}"
     return SharedInstead(name, shared, None, reason)
+
+
+def _compared(solution: Solution, shared: SharedInstead) -> SharedInstead:
+    """Return an answer with one change fewer, with the gain by this change."""
+    return replace(shared, gain=_gain(solution, shared))
 
 
 def _gain(solution: Solution, shared: SharedInstead) -> float | None:

@@ -126,7 +126,7 @@ def combine(
                 zip(nlps, case.tasks, weights, own, unique, points, strict=True)
             )
         ),
-        combination=Combination(case.method, value, tuple(weights), violated, tuple(notices), combined),
+        combination=Combination(case.method, value, tuple(weights), violated, tuple(notices), combined, whole),
         seconds=0.0,
     )
 

@@ -133,6 +133,8 @@ class Combination:
         violated: names of the bounds and constraints that the combined point violates.
         notices: sentences about scaled weights and optima that are not unique.
         combined: solution of the combined program; None for an average, or if a task has no separate optimum.
+        whole: program with the variables and limits of the solution: that of the first task, or a program of all tasks
+            if dimensions or the pose change from task to task.
     """
 
     method: Method
@@ -141,6 +143,7 @@ class Combination:
     violated: tuple[str, ...]
     notices: tuple[str, ...]
     combined: ProgramSolution | None
+    whole: Nlp
 
 
 @dataclass(frozen=True, eq=False)

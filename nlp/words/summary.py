@@ -172,11 +172,13 @@ def _combined_summary(case: Case, result: CombinedResult) -> Summary:
     if point is not None:
         yield from active_limit_lines(point.limits or (), limits_title(case, result.workspace or result.path))
     yield from in_part("notes", (Line(notice, label="note") for notice in combined.notices))
+    advice: dict[str, Line] = {}
     for each in combined.settings or ([] if robot is None else [robot]):
         part = "" if is_unasked_singularity(each, case) else "rank"
         name = each.task.name if each.task is not None and combined.settings else None
         yield from in_part(part, _named(singularity_lines(each, case.units), name))
-        yield from _advice_lines(case, each)
+        advice |= {line.text: line for line in _advice_lines(case, each)}
+    yield from advice.values()
     if point is not None and point.limits:
         title = limits_title(case, result.workspace or result.path)
         yield from in_part("limits", [limit_table(point.limits, combined.value or 0.0, title)])

@@ -18,6 +18,7 @@ from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.evidence.state import loops_are_closed
 from screwsynth.nlp.output.pictures.solutions import drawings_of
 from screwsynth.nlp.results.schema import result_schema
+from screwsynth.nlp.solver import changes
 
 HEIGHT, PLATFORM = 40.0, 6.0
 
@@ -500,3 +501,27 @@ def test_cases_in_python_are_checked_too() -> None:
         replace(case, tasks=case.tasks[:1], parameters={**case.parameters, "x1": PerTask([Free(5, 12)])})
     with pytest.raises(CaseError, match="must give each of the 2 tasks the same number of poses, got 3 stated poses"):
         replace(case, further=[Pose((0, 0, 40))] * 2, pose_per_task=True)
+
+
+@pytest.mark.parametrize("method", ["average", "weighted-sum", "worst-case"])
+def test_limits_of_all_tasks_are_reported_for_every_method(method: str, tmp_path: Path, cli: Run) -> None:
+    file, data = tmp_path / "case.toml", tmp_path / "result.json"
+    text = SECTION_4_3.replace("worst-case", method)
+    file.write_text(text + "[limits]\nactuator = { stroke_max = 20 }\nleg_length = { min = 25, max = 52 }\n")
+    status, _, fault = cli("solve", str(file), "--json", str(data))
+    assert fault == ""
+    combined = json.loads(data.read_text())["combined"]
+    lengths = np.array([list(each["quantities"]["leg_length"].values()) for each in combined["settings"]])
+    outside = [row["key"] for row in combined["limits"] if row["violated"]]
+    assert ("actuator.stroke_max" in outside) == bool(np.ptp(lengths, axis=0).max() > 20 + 1e-6)
+    assert ("leg_length.min" in outside) == bool(lengths.min() < 25 - 1e-6)
+    assert ("leg_length.max" in outside) == bool(lengths.max() > 52 + 1e-6)
+    assert status == (1 if outside else 0)
+    assert outside or method != "average"  # nothing keeps an average within limits
+
+
+def test_the_answer_comes_before_its_comparisons(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(changes, "is_requested", lambda: True)
+    solution = solve(pins())
+    assert solution.status is Status.OPTIMAL
+    assert [(each.solution, each.reason) for each in solution.changes] == [(None, "the solve was stopped")]
