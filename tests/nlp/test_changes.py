@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -163,6 +164,23 @@ def test_a_pose_per_task_of_section_4_3() -> None:
     poses = [[setting[name] for name in names] for setting in solution.settings]
     assert poses == [[solution[f"pose{k}_{name}"] for name in names] for k in (1, 2)]
     assert poses[0] != poses[1]
+
+
+def test_the_page_says_what_its_cases_give(cli: Run, tmp_path: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "changing.md").read_text(encoding="utf-8")
+    pins_text, poses_text = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
+    file = tmp_path / "pins.toml"
+    file.write_text(pins_text)
+    (line,) = re.findall(r"```text\n(.*?)\n```", page, flags=re.DOTALL)
+    assert line in output_of(cli("solve", str(file)))
+    solution = solve(read(poses_text))
+    shared = solution.changes[0].solution
+    assert shared is not None
+    everything = {**read(poses_text).parameters, "x4": PerTask([Free(0, math.radians(30))])}
+    parts = [
+        min(relative(each)) for each in (shared, solution, solve(replace(read(poses_text), parameters=everything)))
+    ]
+    assert [f"{part:.3g}" for part in parts] == re.findall(r"^\|[^|]*\| ([01][.0-9]*) \|$", page, flags=re.MULTILINE)
 
 
 def test_if_all_variables_change_no_task_has_a_loss() -> None:
@@ -473,7 +491,14 @@ def test_refusals(text: str, message: str) -> None:
 
 @pytest.mark.parametrize(
     "command",
-    [("evaluate",), ("sweep", "--over", "x2=5:6:3"), ("tradeoff", "--over", "x2=5:7:3"), ("codegen", "--out", "x")],
+    [
+        ("evaluate",),
+        ("sweep", "--over", "x2=5:6:3"),
+        ("tradeoff", "--over", "x2=5:7:3"),
+        ("codegen", "--out", "x"),
+        ("pareto", "--goal", "max F:push", "--goal", "max F:turn"),
+        ("compare", "case", "stewart-gough"),
+    ],
 )
 def test_commands_for_one_robot_refuse_it(command: tuple[str, ...], tmp_path: Path, cli: Run) -> None:
     file = tmp_path / "pins.toml"
