@@ -3,8 +3,9 @@
     python bench/printer_path.py [LINES]
 
 The file is generated as a slicer would write it: two walls of a twisting cup with seams, straight infill that is cut
-into short pieces, travels, retractions and fillets as arcs. The linear Delta has 130.25 mm and rods of 269 mm, the
-defaults of LinuxCNC's lineardeltakins; the rotary Delta is the model of this package, in metres.
+into short pieces, travels, retractions and fillets as arcs. The linear Delta has the
+defaults of LinuxCNC's lineardeltakins, 130.25 mm and rods of 269 mm; the rotary Delta is the model of this package, in
+metres.
 """
 
 import math
@@ -17,29 +18,14 @@ from pathlib import Path
 from screwsynth.nlp import check_path, load_case, read_path
 from screwsynth.nlp.path.options import PathOptions
 
-LINEAR = """\
-name = "Linear delta"
-home = [0, 0, "h"]
-length_unit = "mm"
-[dimensions]
-R = { typical = 130.25, description = "radius of the carriage joints less that of the platform joints" }
-rp = { typical = 33, description = "radius of the platform joints" }
-L = { typical = 269, description = "length of the rods" }
-w = { typical = 50, description = "distance between the rods" }
-[derived]
-h = "-sqrt(L^2 - R^2)"
-[[limb]]
-repeat = { count = 3 }
-points = { E = ["R + rp", 0, 0], A = ["rp", 0, "h"] }
-joints = [{ type = "P", at = "E", axis = "z", actuated = true }]
-branch = [
-    { joints = [{ type = "S", at = "E + w/2*y" }, { type = "S", at = "A + w/2*y" }] },
-    { joints = [{ type = "S", at = "E - w/2*y" }, { type = "S", at = "A - w/2*y" }] },
-]
-"""
 #: Cases with the place of the part: a cup of 60 mm, up to 60 mm high, in the workspace of each robot.
 CASES = {
-    "linear-delta": ("mm", 'file = "linear.toml"', "R = 130.25\nrp = 33\nL = 269\nw = 50", -330),
+    "linear-delta": (
+        "mm",
+        'model = "linear-delta"',
+        "delta_radius = 130.25\narm_length = 269\neffector_radius = 33\nrod_spacing = 50",
+        -94.64,
+    ),
     "delta": ("m", 'model = "delta"', "rb = 0.164\nrp = 0.044\narm = 0.524\nrod = 1.244\nw = 0.131\ntilt = 20", -1.2),
 }
 
@@ -84,7 +70,6 @@ def main() -> None:
         lines = list(sliced(count))
         file = Path(folder) / "part.gcode"
         file.write_text("\n".join([*lines, ""]), encoding="utf-8")
-        (Path(folder) / "linear.toml").write_text(LINEAR, encoding="utf-8")
         for name, stated in CASES.items():
             path = Path(folder) / f"{name}.toml"
             path.write_text(case_text(*stated), encoding="utf-8")

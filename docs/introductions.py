@@ -17,7 +17,18 @@ from pathlib import Path
 
 FOLDER = Path(__file__).parent
 INTRODUCTIONS = ("intro-machine-tool", "intro-delta", "intro-motion-base", "intro-wrist")
-PAGES = (*INTRODUCTIONS, "start", "certificate", "loads", "workspace", "printing", "servo-angles", "../README")
+PAGES = (
+    *INTRODUCTIONS,
+    "start",
+    "certificate",
+    "loads",
+    "workspace",
+    "printing",
+    "servo-angles",
+    "linuxcnc",
+    "ankle",
+    "../README",
+)
 _PYTHON = [sys.executable, "-P"]
 #: Programs of the commands, and what runs them.
 _PROGRAMS = {"screwsynth": [*_PYTHON, "-m", "screwsynth.nlp"], "python": _PYTHON, "make": ["make", "--silent"]}

@@ -1,10 +1,10 @@
 """Velocity equations of the actuators, ``J chi = D qdot`` and ``B qdot = 0``, of a limb of any topology.
 
 ``D`` holds the work rate of each row of ``J`` for a unit rate of each actuator. Nested loops with more actuators than
-degrees of freedom add equations ``B qdot = 0`` of the actuator rates only. With ``Z`` a basis of the null space of
+degrees of freedom add equations ``B qdot = 0`` on the actuator rates alone. With ``Z`` a basis of the null space of
 ``B``, the constraint wrenches are the combinations ``n'J`` with ``n'D Z = 0``. The actuator rates are the least-squares
-solution of the first equation subject to the second. They are undetermined where ``D qdot = 0`` and ``B qdot = 0`` have
-a nonzero solution.
+solution of the first equation subject to the second. The rates are undetermined if ``D qdot = 0`` and ``B qdot = 0``
+have a common nonzero solution.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class Velocities(NamedTuple):
     Attributes:
         jacobian: (m, 6) ``J``: the rows of a :class:`~.instance.RobotInstance`, force, then moment about the origin.
         driven: (m, a) ``D``: work rate of each row for a unit rate of each actuator.
-        relations: (r, a) ``B``: coefficients of the equations of the actuator rates only.
+        relations: (r, a) ``B``: coefficients of the equations that loops impose on the actuator rates alone.
     """
 
     jacobian: FloatArray
@@ -112,13 +112,13 @@ def drive_of(driven: FloatArray, relations: FloatArray, unit: FloatArray, size: 
 
 
 class PathScrews(NamedTuple):
-    """Screws of a path of joints at a point.
+    """Screws of a chain of joints at a point.
 
     Attributes:
-        path: symbolic screws of the path.
-        screws: (6, k) screws of the path's joints.
-        loops: (m, k) matrix of the path's loop equations.
-        centre: (3,) centre of the path's member, length.
+        path: symbolic screws of the chain.
+        screws: (6, k) screws of the chain's joints.
+        loops: (m, k) matrix of the chain's loop equations.
+        centre: (3,) centre of the chain's member, length.
     """
 
     path: JointScrews
@@ -128,12 +128,12 @@ class PathScrews(NamedTuple):
 
 
 def expressions_of_paths(paths: Sequence[JointScrews]) -> list[SX]:
-    """Return the expressions of paths whose values :func:`paths_of` takes."""
+    """Return the expressions of chains of joints, whose values are the argument of :func:`paths_of`."""
     return [ca.densify(part) for each in paths for part in (each.all, each.loops, each.centre)]
 
 
 def paths_of(paths: Sequence[JointScrews], values: Sequence[FloatArray]) -> list[PathScrews]:
-    """Return the screws of paths at a point from the values of :func:`expressions_of_paths`."""
+    """Return the screws of chains of joints at a point, from the values of :func:`expressions_of_paths`."""
     thirds = zip(paths, values[::3], values[1::3], values[2::3], strict=True)
     return [PathScrews(path, screws, loops, np.ravel(centre)) for path, screws, loops, centre in thirds]
 

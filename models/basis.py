@@ -130,7 +130,7 @@ def _span(rows: FloatArray) -> FloatArray:
 def settled_basis(rows: FloatArray) -> FloatArray:
     """Return an orthonormal basis (k, n) of the span of orthonormal rows (k, n) that depends on the span only.
 
-    Each vector is the projection of the coordinate axis nearest to the rest of the space; ties take the first axis.
+    Each vector is the projection of the coordinate axis nearest to the remaining space; ties take the first axis.
     """
     projector, found = rows.T @ rows, np.zeros(rows.shape)
     for vector in found:

@@ -51,7 +51,7 @@ def model_names() -> tuple[str, ...]:
 
 
 def gallery_names() -> tuple[str, ...]:
-    """Return the names of this package's robots that are given joint by joint, in order."""
+    """Return the names of this package's robots that are given joint by joint, sorted."""
     return tuple(sorted(path.stem for path in _GALLERY.glob("*.toml")))
 
 
@@ -61,14 +61,14 @@ def gallery_description(name: str) -> str | None:
 
 
 def gallery_tables(name: str) -> dict[str, Any]:
-    """Return the tables of the robot file of a robot of the gallery, by one of the names of :func:`gallery_names`."""
+    """Return the tables of a gallery robot's file, by a name of :func:`gallery_names`."""
     import tomllib  # noqa: PLC0415 - most runs do not need it
 
     return tomllib.loads((_GALLERY / f"{name}.toml").read_text(encoding="utf-8"))
 
 
 def definition_of(model: Model) -> dict[str, object]:
-    """Return the tables of the robot file of a robot given joint by joint, under its own name; empty if unknown."""
+    """Return the tables of the robot file, with the robot's name, of a robot given joint by joint; empty if unknown."""
     found = model.options.get("definition")
     if isinstance(found, Mapping):
         return dict(found)
@@ -95,7 +95,7 @@ def gallery_robot(name: str) -> Model:
 
 
 def robot_function(name: str) -> RobotFunction:
-    """Return the function that builds the named robot. Another package cannot replace a robot of this package.
+    """Return the function that builds a robot, by name; other packages cannot replace robots of this package.
 
     Args:
         name: the robot's name in case files.

@@ -3,7 +3,7 @@
 An expression consists of numbers, names, ``+ - * / ^``, brackets, and the functions of :data:`FUNCTIONS`. Values are
 scalars or vectors; ``x``, ``y`` and ``z`` are the unit vectors of the world frame. Python's parser builds the syntax
 tree only. Each node type is accepted explicitly and all others are refused, so that a text can neither reach an
-attribute nor call other functions. A :class:`Language` also evaluates other texts with functions of their own.
+attribute nor call other functions. A :class:`Language` with other functions evaluates other kinds of texts.
 """
 
 from __future__ import annotations
@@ -165,7 +165,7 @@ def _tree(text: str) -> ast.expr:
     if len(text) > _LONGEST:
         raise ExpressionError(f"is longer than {_LONGEST} letters")
     if "**" in text:
-        raise ExpressionError("has '**': a power is written '^'")
+        raise ExpressionError("has '**'; write a power with '^'")
     if not _CHARACTERS.fullmatch(text) or _OTHER_NUMBERS.search(text):
         raise ExpressionError("may have only numbers, names, + - * / ^, brackets and functions")
     try:

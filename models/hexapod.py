@@ -115,7 +115,7 @@ def _joint(plate: str, i: int, radius: float, half_angle: float) -> Parameter:
 
 
 def _placed(joint: SX, image: _Image) -> SX:
-    """Return the joint centre (3, 1) of a leg as the image of that of the given leg."""
+    """Return the joint centre (3, 1) of a leg: the image of the given leg's joint centre."""
     if image == _Image(image.of):
         return joint
     x, y, z = joint[0], -joint[1] if image.mirrored else joint[1], joint[2]

@@ -105,7 +105,7 @@ class RobotInstance:
             twists.
         loops: (k, 1) left sides of all loop equations, including the equations that ``closure`` omits.
         driven: (m, a) work rate of each row for a unit rate of each actuator.
-        relations: (r, a) coefficients of the equations of the actuator rates only, which loops impose.
+        relations: (r, a) coefficients of the equations that loops impose on the actuator rates alone.
         signs: (s, 1) expressions that are positive in the home assembly mode.
         distances: (d, 1) left sides of equations that follow from the loop equations.
         joints: joints of the model's limbs.
@@ -251,7 +251,7 @@ def jacobian(rows: Sequence[Wrench], length: SX, members: Sequence[Member] = ())
 
 
 def rates(rows: Sequence[Wrench], twist: SX, length: SX, members: Sequence[Member] = ()) -> SX:
-    """Return the work rates ``L_i ^ chi``, (m, 1), in a twist (6, 1); those of couples times the length."""
+    """Return the work rates ``L_i ^ chi``, (m, 1), in a twist (6, 1); work rates of couples are times the length."""
     own = [_scaled_rate(row, twist, length) / ca.sqrt(row.square) for row in rows]
     return ca.vertcat(SX(0, 1), *own, *[resistance(member, twist, length) for member in members])
 

@@ -71,7 +71,7 @@ class Model(Whole, Shown):
         links: links of the limbs, as segments.
         remarks: sentences for the user on possible mistakes in a robot given joint by joint.
         generic: ranks at almost all dimensions and poses; None for a robot given by its rows.
-        structure: structure of each path of joints; empty for a robot given by its rows.
+        structure: structure of each chain of joints; empty for a robot given by its rows.
         length_unit: unit of the typical lengths, such as ``m``; empty for proportions in any unit.
         size: (1, 1) characteristic size of the robot, length; None for the norm of the parameters that are lengths.
 
@@ -149,7 +149,7 @@ class Model(Whole, Shown):
 
     @property
     def nested(self) -> tuple[JointScrews, ...]:
-        """Paths of joints with nested loops, of the limbs that resist the platform."""
+        """Chains of joints with nested loops, in limbs that resist the platform."""
         return tuple(each for each in self.joint_screws if each.is_nested and each.limb in self.limbs)
 
     @property
@@ -188,7 +188,9 @@ def _check_names(model: Model) -> None:
     for unknown in model.unknowns:
         if not -math.inf < unknown.lower < unknown.upper < math.inf:
             raise _model_error(
-                model, f"the unknown joint coordinate {unknown.name!r} needs finite bounds, the lower below the upper"
+                model,
+                f"the joint coordinate {unknown.name!r}, for which the loop equations are solved, needs finite bounds, "
+                "the lower below the upper",
             )
 
 
@@ -249,7 +251,9 @@ def _check_symbols(model: Model) -> None:
             raise _model_error(model, f"{symbol} is an expression; a symbol is required")
     scalars = ca.vertcat(*[ca.vec(symbol) for symbol in declared])
     if len({scalars[i].element_hash() for i in range(scalars.numel())}) < scalars.numel():
-        raise _model_error(model, "a symbol is used for two parameters or unknowns")
+        raise _model_error(
+            model, "two parameters or joint coordinates use the same symbol; each needs a symbol of its own"
+        )
     others = [getattr(model, each.name) for each in fields(model) if each.name not in ("legs", "built")]
     used = expressions_of((*others, *((leg.base, leg.platform) for leg in model.legs)))
     known = {scalars[i].element_hash() for i in range(scalars.numel())}
@@ -258,22 +262,26 @@ def _check_symbols(model: Model) -> None:
     for expressions, allowed in ((used, known), (expressions_of(model.built), known_if_built)):
         stray = sorted({str(s) for s in ca.symvar(ca.veccat(SX(0), *expressions)) if s.element_hash() not in allowed})
         if stray:
-            raise _model_error(model, f"symbols are used but not declared: {', '.join(stray)}")
+            raise _model_error(
+                model, f"expressions contain symbols of no parameter, joint coordinate or pose: {', '.join(stray)}"
+            )
 
 
 def _check_references(model: Model) -> None:
     """Refuse legs, built rows and drawings that do not match the rows of the model."""
     for leg in model.legs:
         if leg.name not in model.limbs:
-            raise _model_error(model, f"leg {leg.name!r} is not a limb: it has no wrench")
+            raise _model_error(model, f"leg {leg.name!r} needs a wrench of a limb with this name")
     # Where the legs are the actuators, the force rows are those of the legs, in order.
     names = [leg.name for leg in model.legs]
     forces = [row.limb for row in model.wrenches if row.kind is WrenchKind.FORCE and row.limb in names]
     if not model.actuators and forces != names:
-        raise _model_error(model, f"legs {', '.join(names)} are not in the order of their forces, {', '.join(forces)}")
+        raise _model_error(
+            model, f"legs {', '.join(names)} must be in the order of their forces in wrenches, {', '.join(forces)}"
+        )
     if model.built and [(row.limb, row.kind) for row in model.built] != [
         (row.limb, row.kind) for row in model.wrenches
     ]:
-        raise _model_error(model, "the rows with joint-centre errors do not match the rows without")
+        raise _model_error(model, "built must have the same limbs and kinds of wrenches as wrenches, in the same order")
     for fault in model.scene.faults(model.limbs, [parameter.name for parameter in model.parameters]):
         raise _model_error(model, fault)

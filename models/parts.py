@@ -69,7 +69,7 @@ class Parameter:
 
     @property
     def components(self) -> tuple[str, ...]:
-        """Name of each component."""
+        """Name of each component of the parameter."""
         return component_names(self.name, self.symbol.numel())
 
 
@@ -89,7 +89,7 @@ class Unknown:
         lower: finite lower bound in the search for assembly modes, relative to ``size``.
         upper: finite upper bound in the search for assembly modes, relative to ``size``.
         size: (1, 1) order of magnitude of the unknown as an expression of the parameters: 1, or a length of the robot.
-        joint: label, such as ``2:3``, of the actuated joint, for a free actuator coordinate; empty for a determined
+        joint: for a free actuator coordinate, label of the actuated joint, such as ``2:3``; empty for a determined
             unknown.
     """
 
@@ -134,7 +134,7 @@ class Closure:
 
 @dataclass(frozen=True, eq=False)
 class AssemblySign:
-    """Expression that is positive in the home assembly mode, where the loops are closed.
+    """Expression that, for closed loops, is positive in the home assembly mode.
 
     Attributes:
         name: unique name within the model.
@@ -225,8 +225,8 @@ class Actuator:
         screws: (6, k) platform twist about the world origin for a unit rate of this actuator while the other actuators
             stand still. There is one column for each member, determined up to the twists that the member allows.
         dimension: length for a prismatic joint or a parallelogram, angle for a revolute joint.
-        relations: (r, 1) coefficients of the actuator in the equations of the actuator rates only, which loops impose:
-            the same number for all actuators of a robot; none unless nested loops have more actuators than degrees of
+        relations: (r, 1) coefficients of the actuator in the r equations that loops impose on the actuator rates alone.
+            All actuators of a robot have the same r; it is 0 unless nested loops have more actuators than degrees of
             freedom.
         joint: label of the joint, such as ``2:3``.
     """
@@ -245,7 +245,7 @@ class Actuator:
 
 
 def rate_relations(actuators: Sequence[Actuator]) -> SX:
-    """Return the coefficients (r, a) of the equations of the actuator rates only, which loops impose."""
+    """Return the coefficients (r, a) of the equations that loops impose on the actuator rates alone."""
     return ca.horzcat(*[each.relations for each in actuators]) if actuators else SX(0, 0)
 
 
@@ -263,7 +263,7 @@ class JointScrews:
         driven: indices of the columns of actuated joints.
         passive_rank: rank of the platform motions by passive joints, at almost all dimensions and poses.
         all_rank: rank of the platform motions by all joints, at almost all dimensions and poses.
-        member: name of the member of nested loops; empty for a path of joints.
+        member: name of the member of nested loops; empty for a chain of joints.
         loops: (m, k) matrix ``L`` of nested loops, dimensionless for scaled rates.
         loop_rank: rank of the passive columns of ``L``, at almost all dimensions and poses.
         centre: (3, 1) centre of the member, length.
@@ -314,7 +314,7 @@ class GenericRanks:
         idle: dimension of the space of actuator rates with which the platform does not move.
         undetermined: names of the actuators with undetermined rates.
         motions: motions of the platform at some of these configurations; empty for six degrees of freedom.
-        is_shared: True if limbs share all constraints, so that statics determines those of no limb.
+        is_shared: True if limbs share all constraints, so that statics determines the constraint wrenches of no limb.
     """
 
     jacobian: int
@@ -327,20 +327,20 @@ class GenericRanks:
 
 @dataclass(frozen=True)
 class PathStructure:
-    """Structure of a path of joints from base to platform, at almost all dimensions and poses.
+    """Structure of a chain of joints from base to platform, at almost all dimensions and poses.
 
     Attributes:
         limb: name of the limb.
-        name: name of the path: that of the limb, with the number of the branch if there are several.
+        name: name of the chain: that of the limb, with the number of the branch if there are several.
         joints: letters of the joints from base to platform, with a star for an actuated joint.
         opened: place at which the loop is opened, in words.
-        wrenches: dimension of the space ``W`` of the path's wrenches on the platform with locked actuators.
+        wrenches: dimension of the space ``W`` of the chain's wrenches on the platform with locked actuators.
         constraints: dimension of the space ``C`` of constraint wrenches, which do no work in actuated joints.
-        unknowns: number of joint coordinates that are unknowns and belong to no earlier path.
-        equations: number of loop equations of the path.
-        kept: number of loop equations that do not follow from others.
+        unknowns: number of joint coordinates that are unknowns and belong to no earlier chain.
+        equations: number of loop equations of the chain.
+        kept: number of loop equations that do not follow from other loop equations.
         nested: names of the joints, for nested loops, coupled joints or a passive joint before branches; empty for a
-            path of a limb.
+            chain of a limb.
     """
 
     limb: str

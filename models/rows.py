@@ -79,8 +79,8 @@ def column_groups(matrices: Sequence[FloatArray], rank: int) -> tuple[ColumnGrou
     that are zero are in the first group: there are more of them where the loops of their joints are singular.
 
     Args:
-        matrices: (size, n) each: the same columns at different points, velocities and, if the size is 6, rotations of
-            order 1.
+        matrices: (size, n) each: the same columns at different points, velocities and, if the size is 6, rotations,
+            both with magnitudes of about 1.
         rank: rank of the matrix; points with another rank are ignored.
 
     Returns:

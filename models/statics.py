@@ -45,7 +45,7 @@ def driven_joints(model: Model) -> tuple[DrivenJoint, ...]:
 
 
 def degrees_of_freedom(model: Model) -> int:
-    """Return the degrees of freedom of the platform with free actuators, at almost all dimensions and poses."""
+    """Return the degrees of freedom of the platform with unlocked actuators, at almost all dimensions and poses."""
     if model.generic is not None:
         return 6 - model.generic.constraints
     return 6 - sum(row.kind is not WrenchKind.FORCE for row in model.wrenches)
@@ -155,7 +155,7 @@ def rows_about(jacobian: SX, position: SX) -> SX:
 
 
 def inverse_rates(model: Model, robot: RobotInstance) -> SX:
-    """Return the inverse Jacobian (a, 6): actuator rates for the platform's angular velocity and origin's velocity.
+    """Return the inverse Jacobian (a, 6): actuator rates for angular velocity and velocity of the platform's origin.
 
     Least-squares solution of ``D qdot = J chi`` for each limb, exact in every possible platform motion. Unlike
     :meth:`Statics.rates` it also exists where J is singular, and for any number of actuators.

@@ -154,7 +154,7 @@ def within(seconds: float | None, part: float = 1.0) -> Iterator[None]:
     A generator must not yield in such a block, because its reader would be within the block too.
 
     Args:
-        seconds: time limit; None for that of the enclosing block.
+        seconds: time limit; None for the time limit of the enclosing block.
         part: largest fraction of the remaining time for one search, so that later searches have time too.
     """
     left = seconds_left()

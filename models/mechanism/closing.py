@@ -97,7 +97,8 @@ def close(
             step = (part - done) / 2
             continue
         if found is None:
-            fault = f"its loops do not close at the requested pose or actuators: after {100 * done:.0f} % of the way"
+            after = f"after {100 * done:.0f} % of the motion"
+            fault = f"its loops do not close at the requested pose or actuator coordinates: {after}"
             raise MechanismError("", f"{fault} the loops stay open by {values[0]:.3g}")
         at, done, step = found, part, 2 * step
         spectra.append(values)

@@ -5,7 +5,7 @@ of another shape become networks, each with the reason.
 
 For members, links are merged if a locked joint, a weld, or a joint fixed by couplings connects them. Without base and
 platform, each connected part of the rest is a member; so is a joint directly between base and platform. Coupled joints
-belong to one member. A part that is connected in this way with free actuators is called a *limb* here; it may have any
+belong to one member. A part that is connected in this way with unlocked actuators is called a *limb*; it may have any
 shape. Links with a single joint are left out.
 """
 
@@ -186,7 +186,7 @@ class MemberGraph:
     Attributes:
         limb: number of the member's limb, from 0.
         passive: indices of the joints that move with locked actuators.
-        joints: indices of all joints on which the member's motions with free actuators depend: those of the limb
+        joints: indices of all joints on which the member's motions with unlocked actuators depend: those of the limb
             without the passive joints of other members.
         on_platform: indices of the passive joints on the platform, or on a link locked to it.
     """
@@ -203,7 +203,7 @@ class RobotGraph:
 
     Attributes:
         members: members between base and platform with locked actuators.
-        limbs: joint indices of each limb between base and platform with free actuators.
+        limbs: joint indices of each limb between base and platform with unlocked actuators.
         still: indices of the joints that locked actuators and couplings fix.
     """
 

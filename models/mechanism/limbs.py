@@ -123,7 +123,7 @@ def _limb_table(limb: LimbPaths, joints: Sequence[_FileJoint]) -> dict[str, Any]
 
 
 def _named(table: dict[str, Any], taken: set[str]) -> dict[str, Any]:
-    """Return a joint's table without its name if another joint of the path has the same name."""
+    """Return a joint's table without its name if another joint of the chain has the same name."""
     if table["name"] in taken:
         return {key: value for key, value in table.items() if key != "name"}
     taken.add(table["name"])
@@ -188,7 +188,7 @@ class _Rod(NamedTuple):
     span: FloatArray
 
     def is_parallel_to(self, other: _Rod) -> bool:
-        """Return True if this rod and another one are the long sides of a parallelogram."""
+        """Return True if this rod and another rod are the long sides of a parallelogram."""
         if self.ends != other.ends or self.joints[0].name == other.joints[0].name:
             return False
         length = float(np.linalg.norm(self.span))

@@ -26,7 +26,7 @@ class SingularityType(enum.Enum):
 
     PASSIVE = "its passive joints allow other motions than elsewhere: F jumps here"
     SERIAL = "its joints are dependent: an actuator cannot drive the platform, which loses a degree of freedom"
-    CONSTRAINT = "the constraints are dependent: the platform gains a degree of freedom even with free actuators"
+    CONSTRAINT = "the constraints are dependent: the platform gains a degree of freedom even with unlocked actuators"
     ACTUATION = "the platform can move with every actuator locked"
     ARCHITECTURE = "the rank is below six at all configurations: the platform can always move"
 

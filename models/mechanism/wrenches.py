@@ -45,7 +45,7 @@ class MemberWrenches:
             constraint wrenches first.
         kinds: kind of each row.
         twists: (6, t) basis of ``T_k``, the platform twists that the member allows with locked actuators.
-        all_rank: number of independent platform twists that the member allows with free actuators.
+        all_rank: number of independent platform twists that the member allows with unlocked actuators.
         length: characteristic length of scaled coordinates.
     """
 
@@ -73,7 +73,7 @@ class MemberWrenches:
         return 6 - self.all_rank
 
     def resisted(self, twist: FloatArray) -> FloatArray:
-        """Return the resisted part ``r_k`` (6,) of a twist (6,), angular velocity, then velocity at world origin."""
+        """Return the resisted part ``r_k`` (6,), in scaled coordinates, of a twist (6,) about the world origin."""
         return np.asarray(self.projector @ scaled_twists(twist[:, None], self.centre, self.length)[:, 0])
 
 
@@ -83,7 +83,7 @@ class RobotRanks:
 
     Attributes:
         passive: dimension of each member's ``T_k``, the twists that it allows with locked actuators.
-        all: dimension of the twists that each member allows with free actuators.
+        all: dimension of the twists that each member allows with unlocked actuators.
         jacobian: rank of J, of all rows.
         constraints: rank of the constraint wrenches of all limbs.
     """
@@ -95,7 +95,7 @@ class RobotRanks:
 
     @property
     def freedoms(self) -> int:
-        """Degrees of freedom of the platform with free actuators."""
+        """Degrees of freedom of the platform with unlocked actuators."""
         return 6 - self.constraints
 
     @property
@@ -112,7 +112,7 @@ class RobotWrenches:
         members: members of the mechanism.
         ranks: ranks at the configuration.
         units: rate of each actuated joint, by name, that moves the platform with a velocity of about 1.
-        feasible: (6, f) basis of the platform twists with free actuators.
+        feasible: (6, f) basis of the platform twists with unlocked actuators.
     """
 
     members: tuple[MemberWrenches, ...]
@@ -208,7 +208,7 @@ def _member(mechanism: Mechanism, mobility: Mobility, graph: MemberGraph, length
     driven = [k for k in graph.joints if mechanism.joints[k].actuated]
     own = np.array([free.columns.index(k) for k in driven], dtype=np.intp)
     weights = np.array([mobility.angle(mechanism.joints[k]) / mobility.size for k in driven])
-    # In each motion with free actuators the resisted component is rho times the actuator rates, because a motion
+    # In each motion with unlocked actuators the resisted component is rho times the actuator rates, because a motion
     # without such rates is not resisted. The relations exclude actuator rates that occur in no motion.
     rates = free.rates[own] * weights[:, None]
     actuation = projector @ scaled_twists(free.platform, centre, length) @ np.linalg.pinv(rates, rcond=RANK_TOLERANCE)

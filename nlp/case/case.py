@@ -432,7 +432,7 @@ class Case(Whole, Shown):
 
     @property
     def is_optimised_everywhere(self) -> bool:
-        """True if the worst value over the workspace or path is optimised, not that at the stated poses only."""
+        """True if the worst value over the workspace or path is optimised, not only the value at the stated poses."""
         return bool(self.limits_over) and (bool(self.tasks[0].measure) or self.worst_everywhere)
 
     @property
@@ -573,7 +573,7 @@ def _check_measure(case: Case, task: Task) -> None:
     if task.measure not in MEASURES:
         raise CaseError(key, f"must be one of {listing(MEASURES)}", task.measure)
     if len(case.tasks) > 1:
-        fault = "must be one at most with objective.minimise, which does not optimise the F of tasks"
+        fault = "must be given at most once with objective.minimise, which does not optimise the F of tasks"
         raise CaseError("task", f"{fault}, got {len(case.tasks)}")
     if task.sense is not Sense.MIN:
         fault = 'objective.minimise needs no task: remove [[task]], or give it sense = "min"'

@@ -212,4 +212,6 @@ def check_determined_joints(model: Model, key: str, source: str | None = None) -
         several = len(joints) > 1
         names = f"actuated joint{'s' * several} {', '.join(joints)} of {model.name!r}"
         fault = f"is not possible: the pose does not determine the coordinate{'s' * several} of {names}"
-        raise CaseError(key, f"{fault}; use a robot file without {'them' if several else 'it'}", source=source)
+        raise CaseError(
+            key, f"{fault}; use a robot file without {'these joints' if several else 'this joint'}", source=source
+        )

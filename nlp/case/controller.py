@@ -29,11 +29,12 @@ class Controller:
     """Conventions of a controller that differ from those of the case; they apply to generated kinematics in C.
 
     Attributes:
-        length: unit of length; empty for that of the case.
+        length: unit of length; empty for the length unit of the case.
         angle: unit of actuator angles and of roll, pitch and yaw.
-        zero: coordinate of the controller where that of the case is 0, by actuator; radians or length of the case. An
-            empty name stands for all actuators.
-        sign: 1 or -1, sense of the controller's coordinate relative to the case, by actuator; an empty name as above.
+        zero: coordinate of the controller at which the coordinate of the case is 0, by actuator; radians or length of
+            the case. An empty name stands for all actuators.
+        sign: 1 or -1, sense of the controller's coordinate relative to the case, by actuator; an empty name stands for
+            all actuators.
         origin: origin of the controller's world frame in the world frame of the case, length of the case.
         rpy: roll, pitch and yaw of the controller's world frame in the world frame of the case, radians.
     """
@@ -54,7 +55,7 @@ class Controller:
         return 1 if self.sign.get(actuator, self.sign.get("", 1)) > 0 else -1
 
     def scale(self, units: Units) -> float:
-        """Return the length of the controller in a unit of length of the case.
+        """Return the length unit of the controller, in the length unit of the case.
 
         Raises:
             CaseError: a unit has no known size.
@@ -63,7 +64,7 @@ class Controller:
             return 1.0
         for key, label in (("controller.length", self.length), ("units.length", units.length)):
             if label not in METRES:
-                raise CaseError(key, f"has no known size: must be one of {', '.join(METRES)}", label)
+                raise CaseError(key, f"must be one of {', '.join(METRES)}", label)
         # A quotient of the larger one by the smaller one is exact for decimal units.
         case, own = METRES[units.length], METRES[self.length]
         return round(case / own, 9) if case >= own else 1 / round(own / case, 9)
@@ -72,7 +73,7 @@ class Controller:
         """Refuse conventions that are not finite or name no actuator of the robot.
 
         Raises:
-            CaseError: in the words of a case file.
+            CaseError: a convention is not allowed; the message names its key in a case file.
         """
         if self.angle not in ("deg", "rad"):
             raise CaseError("controller.angle", "must be one of 'deg', 'rad'", self.angle)
@@ -88,13 +89,13 @@ class Controller:
                 if key == "sign" and value not in (1, -1):
                     raise CaseError(where, "must be 1 or -1", value)
         if "" in self.zero and len({each.dimension for each in drives}) > 1:
-            fault = "is one value for actuators that turn and actuators that slide: give zero = { NAME = value }"
+            fault = "is one value, but the robot has revolute and prismatic actuators: give zero = { NAME = value }"
             raise CaseError("controller.zero", fault, self.zero[""])
         for key, values in (("origin", self.origin), ("rpy", self.rpy)):
             check_vector(values, f"controller.{key}")
 
     def to_keys(self, drives: Sequence[DrivenJoint], units: Units) -> Mapping[str, TomlValue | None]:
-        """Return the keys of ``[controller]`` that state these conventions; none for those of the case."""
+        """Return the keys of ``[controller]`` that state these conventions, without the conventions of the case."""
         dimensions = {each.name: each.dimension for each in drives} | {"": _common(drives)}
 
         def stated(given: Mapping[str, float]) -> TomlValue | None:
@@ -135,8 +136,8 @@ def controller_of(
         units: units of the file.
         length: unit of length of the controller.
         angle: unit of angles of the controller.
-        zero: coordinate of the controller where that of the case is 0, of all actuators or by name.
-        sign: sense of the controller's coordinates, of all actuators or by name.
+        zero: coordinate of the controller at which the coordinate of the case is 0, for all actuators or by name.
+        sign: sense of the controller's coordinates, for all actuators or by name.
         origin: (3,) origin of the controller's world frame.
         rpy: (3,) roll, pitch and yaw of the controller's world frame.
     """

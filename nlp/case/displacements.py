@@ -58,7 +58,7 @@ def _read_trajectory(written: AlongTable, tasks: Sequence[Task], units: Units, k
         raise CaseError(f"{key}.last", f"must differ from first = {written.first:g}", written.last)
     twist = tasks[0 if written.task is None else names.index(written.task)].twist
     if not np.any(np.asarray(twist, dtype=np.float64)):
-        raise CaseError(f"{key}.task", "must have a motion: its twist is zero")
+        raise CaseError(f"{key}.task", "must be a task with a motion; the twist of this task is zero")
     dimension = Dimension.LENGTH if math.isinf(axis_from_screw(twist).pitch) else Dimension.ANGLE
     first, last = (units.to_internal(end, dimension) for end in (written.first, written.last))
     return along_screw(twist, [float(each) for each in np.linspace(first, last, written.count)])
@@ -177,7 +177,7 @@ def _read_offsets(written: OffsetsTable | None, key: str) -> list[float]:
     """Return the offsets along one axis; a single 0 without a table.
 
     Raises:
-        CaseError: the first is not below the last.
+        CaseError: the first offset is not below the last one.
     """
     if written is None:
         return [0.0]

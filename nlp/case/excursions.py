@@ -2,7 +2,8 @@
 
 An excursion displaces the platform along and about the world axes: ``p = p0 + e``, ``R = E R0``. The result is a box in
 world coordinates if the pose has no rotation, the excursions have none, or both rotate about one axis. In ``Rz(yaw)
-Ry(pitch) Rx(roll) R0``, a rotation R0 about x adds to roll; about y to pitch if roll is 0; about z to yaw if both are.
+Ry(pitch) Rx(roll) R0``, a rotation R0 about x adds to roll; about y to pitch, if roll is 0; about z to yaw, if roll and
+pitch are 0.
 """
 
 from __future__ import annotations
@@ -77,12 +78,17 @@ def check_excursions(workspace: Workspace, pose: Pose, count: int, units: Units)
     if not workspace.about_pose:
         return
     if count > 1 or not pose.displacements[0].is_identity:
-        raise CaseError("workspace.about", "must be 'world' for a case with several or displaced poses", "pose")
+        raise CaseError(
+            "workspace.about", "must be 'world' for a case with several poses or with displacements", "pose"
+        )
     turns, rotation = workspace.turns, pose.rotation
     along = _along(turns, rotation)
     if along is None:
         if any(each != 0.0 for each in turns.angles) and rotation.angle != 0.0:
-            fault = "must be left out, or about the axis of the pose: with about = 'pose', two axes are not supported"
+            fault = (
+                "must be left out, or rotate about the axis of the pose's rotation: with about = 'pose', "
+                "rotations about different axes cannot be combined"
+            )
             raise CaseError("workspace.rotation", fault)
         return
     name = TURNS[along.place] if turns.kind is TurnKind.ROLL_PITCH_YAW else "angle"
@@ -90,7 +96,9 @@ def check_excursions(workspace: Workspace, pose: Pose, count: int, units: Units)
     far = max(abs(one + other) for one in ends_of(turns.angles[along.place]) for other in ends)
     if far > LARGEST_TURN:
         most = units.text(LARGEST_TURN, Dimension.ANGLE)
-        fault = f"must be at most {most} together with the angle of the pose, got {units.text(far, Dimension.ANGLE)}"
+
+        both = units.text(far, Dimension.ANGLE)
+        fault = f"must be at most {most} when added to the rotation angle of the pose, got the sum {both}"
         raise CaseError(f"workspace.rotation.{name}", fault)
 
 
@@ -239,7 +247,7 @@ def _moved(value: Value, by: float) -> Value:
 
 
 def _sum(one: float, other: float, outwards: float) -> float:
-    """Return a sum; a rounded one is moved towards ``outwards``, an infinity."""
+    """Return a sum; if it is rounded, it is moved towards ``outwards``, which is plus or minus infinity."""
     total = one + other
     # The error of a sum of two doubles is a double (Knuth).
     part = total - one

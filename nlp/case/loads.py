@@ -235,7 +235,9 @@ class Loading(NamedTuple):
             if not any(self.gravity):
                 raise CaseError("gravity.acceleration", "must not be zero; remove the masses for no gravity")
         elif (units.length, units.force) != _KNOWN and any(load.mass for load in self.loads):
-            fault = f"is missing: give [gravity] acceleration, with mass times acceleration in {units.force}"
+            fault = (
+                f"is missing: give [gravity] acceleration in units in which mass times acceleration is in {units.force}"
+            )
             known = ", such as [0, 0, -9.81] for a mass in kg" if units.force == _KNOWN[1] else ""
             raise CaseError("gravity.acceleration", fault + known)
 

@@ -384,7 +384,7 @@ def _numbers(values: ArrayLike, shape: tuple[int, ...], key: str, words: str) ->
     """Return finite numbers as an array of a given shape.
 
     Raises:
-        CaseError: a number is not finite, or the shape is another one.
+        CaseError: a number is not finite, or the shape is wrong.
     """
     try:
         numbers: FloatArray = np.array(values, dtype=np.float64)

@@ -80,7 +80,7 @@ class PositionSet:
         spans: ranges of x, y and z of a box; the last one is also the range of z of a disc or ring.
         half_spaces: half spaces that contain the set.
         shift: displacement of the whole set, length.
-        is_diameter: whether the case states diameters instead of radii.
+        is_diameter: If true, the case states diameters instead of radii.
     """
 
     kind: SetKind
@@ -96,7 +96,7 @@ class PositionSet:
 
     @property
     def coordinates(self) -> tuple[int, ...]:
-        """Indices of the position's coordinates that the set couples; ranges of the others are ends of the box."""
+        """Indices of the coordinates that the set couples; the other coordinates have the ranges of the box."""
         used = [0, 1] if self.kind in UPRIGHT else [] if self.kind is SetKind.BOX else [0, 1, 2]
         return tuple(sorted({*used, *(k for each in self.half_spaces for k in range(3) if each.normal[k])}))
 
@@ -117,7 +117,7 @@ class PositionSet:
 
     @cached_property
     def box(self) -> tuple[Value, Value, Value]:
-        """Ranges of x, y and z of a box that encloses the set; ranges of a file are kept, others rounded outwards."""
+        """Ranges of x, y and z of a box around the set: ranges of the file, or computed ranges, rounded outwards."""
         if self.kind is SetKind.BOX:
             return self._shifted(self.spans)
         r, low, high = self.radius, np.array(self.centre), np.array(self.centre)
@@ -181,7 +181,7 @@ class PositionSet:
             depths = self.depths(points)
             if depths.max() > 0:
                 return frozen_array(points[int(depths.argmax())], (3,))
-        raise CaseError(f"{KEY}.half_spaces", f"leave no position of the {self.kind.value}")
+        raise CaseError(f"{KEY}.half_spaces", f"exclude every position of the {self.kind.value}")
 
     def depths(self, points: FloatArray) -> FloatArray:
         """Return the smallest distances (N,) of points (N, 3) from the planes of the half spaces, negative outside."""
@@ -300,7 +300,7 @@ class PositionSet:
             first, last = POINTS[self.kind]
             check_vector(self.end, f"{key}.{last}")
             if not self.axis.any():
-                raise CaseError(f"{key}.{last}", f"must be another point than {first}")
+                raise CaseError(f"{key}.{last}", f"must be a point different from {first}")
         for k, each in enumerate(self.half_spaces):
             check_direction(each.normal, f"{KEY}.half_spaces[{k}].normal")
             check_vector(each.point, f"{KEY}.half_spaces[{k}].point")

@@ -181,7 +181,7 @@ def case_from_tables(
     try:
         if is_robot_file(tables):
             fault = f'is a robot file, not a case; write [robot] file = "{source}" in a case'
-            raise CaseError("the file", f"{fault}, or let screwsynth new {source} write one")
+            raise CaseError("the file", f"{fault}, or create a case with screwsynth new {source}")
         check_version(CASE_FILES, tables)
         origins = insert_rows(tables, folder or Path())
         robot_file = insert_robot_file(tables, folder or Path())

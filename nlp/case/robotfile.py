@@ -206,7 +206,7 @@ def check_form(tables: dict[str, Any]) -> None:
         CaseError: a key or a type is not allowed; the first one is reported, with limb and joint in words.
     """
     if "robot" in tables and "task" in tables:
-        raise CaseError("the file", "is a case, not a robot file; screwsynth solve takes it")
+        raise CaseError("the file", "is a case, not a robot file; use it with screwsynth solve")
     check_version(ROBOT_FILES, tables)
     given = [key for key in GRAPH_KEYS if key in tables]
     if given and "limb" in tables:
@@ -277,7 +277,7 @@ def insert_robot(tables: dict[str, Any], folder: Path) -> str:
         raise CaseError("robot.file", "must be the name of a robot file in quotes")
     for other in ("model", "definition"):
         if other in table:
-            raise CaseError(f"robot.{other}", "conflicts with file: give the robot in one way")
+            raise CaseError(f"robot.{other}", "conflicts with robot.file; give only one of them")
     definition = read_definition(name, folder)
     tables["robot"] = {"definition": definition, **{key: value for key, value in table.items() if key != "file"}}
     return name

@@ -170,7 +170,7 @@ def _hint(name: str) -> str:
     if name.endswith(".toml"):
         return f'for a robot file, write file = "{name}" instead of model'
     if name in shipped_cases():
-        return f"{name!r} is a case; screwsynth solve takes it"
+        return f"{name!r} is a case; use it with screwsynth solve"
     return nearest(name, model_names())
 
 

@@ -167,11 +167,11 @@ class RobotTable(Table):
 
     @model_validator(mode="after")
     def _refuse_two_robots(self) -> RobotTable:
-        """Refuse a table without a robot, or with two forms of it."""
+        """Refuse a table that gives no robot, or gives a robot in two ways."""
         if self.model is None and self.definition is None:
-            raise fault_of("model", "is missing: give model, or the name of a robot file by file")
+            raise fault_of("model", "is missing: give model, or file with the name of a robot file")
         if self.model is not None and self.definition is not None:
-            raise fault_of("definition", "conflicts with model: give the robot in one way")
+            raise fault_of("definition", "conflicts with model; give only one of them")
         return self
 
     @property

@@ -100,7 +100,7 @@ class Published:
         source: place in the literature.
         reproduced: If true, this program reproduces the value.
         because: reason why the value is not reproduced; empty if it is.
-        decimals: number of printed decimals, if trailing zeros were printed; None to count those of the value.
+        decimals: number of printed decimals, if trailing zeros were printed; None to count the decimals of the value.
         over: name of the reference case of a gain.
     """
 

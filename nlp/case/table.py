@@ -101,6 +101,8 @@ class Later:
         return kind
 
 
+#: Similarity from which a key is taken for a misspelled one: "rotation" is no misspelled "position".
+_TYPO = 0.8
 #: Parts of a pydantic location that are branches of a union, or mark a key of a table, and not keys of the file.
 _TAGS = (
     "<number>",
@@ -221,7 +223,7 @@ def _sentence_of_missing_key(key: str, table: object) -> str:
     """Return the message about a missing key, with an unknown key of the table that is similar."""
     import difflib  # noqa: PLC0415 - only messages need it
 
-    close = difflib.get_close_matches(key, table if isinstance(table, dict) else (), n=1)
+    close = difflib.get_close_matches(key, table if isinstance(table, dict) else (), n=1, cutoff=_TYPO)
     if close:
         return f"is missing; rename {close[0]!r}?"
     return f"is missing: {_MISSING[key]}" if key in _MISSING else "is missing"

@@ -85,7 +85,7 @@ class Task:
             weight: positive weight of the task in a combination of several tasks.
 
         Raises:
-            CaseError: the sense is another word, the axis is zero, the point is missing, or a number is not finite.
+            CaseError: the sense is not allowed, the axis is zero, the point is missing, or a number is not finite.
         """
         if sense not in ("max", "min", Sense.MAX, Sense.MIN):
             raise CaseError("task.sense", "must be 'max' or 'min'", sense)
@@ -106,7 +106,7 @@ class Task:
             weight: positive weight of the task in a combination of several tasks.
 
         Raises:
-            CaseError: the sense is another word, the axis is zero, or a number is not finite.
+            CaseError: the sense is not allowed, the axis is zero, or a number is not finite.
         """
         point = check_vector(through, "task.through")
         return cls.screw(sense, axis=axis, pitch=0.0, point=point, name=name, weight=weight)
@@ -124,7 +124,7 @@ class Task:
             weight: positive weight of the task in a combination of several tasks.
 
         Raises:
-            CaseError: the sense is another word, the direction is zero, or a number is not finite.
+            CaseError: the sense is not allowed, the direction is zero, or a number is not finite.
         """
         along = check_direction(direction, "task.direction")
         return cls.screw(sense, axis=along, pitch=math.inf, name=name, weight=weight)

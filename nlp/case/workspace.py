@@ -68,7 +68,7 @@ class DependentCoordinate:
 
 @dataclass(frozen=True)
 class Workspace:
-    """Box of poses, or the poses in it with their position in a set.
+    """Box of poses; with a set of positions, the poses of the box with positions in the set.
 
     Attributes:
         position: (3,) origin of the platform frame in the world frame, length; each coordinate fixed or free. With a

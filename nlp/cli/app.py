@@ -72,7 +72,7 @@ GROUPS = {
             "export paper-4.1-helical --format mjcf --format csv --out robot",
         ),
         "codegen": (
-            "Write F and its derivatives as C code for controllers.",
+            "Write F and its derivatives, or the kinematics alone, as C code for controllers.",
             "codegen paper-4.1-helical --out helical",
         ),
         "schema": ("Print the JSON Schema of case files or results.", "schema --result > result.schema.json"),

@@ -32,7 +32,7 @@ def check(
     from ..results.checks import checks_of
 
     if [json_file, junit, "-" if markdown else None].count("-") > 1:
-        raise InputError("standard output can take one of --json -, --junit - and --markdown only")
+        raise InputError("only one of --json -, --junit - and --markdown can go to standard output")
     inputs = {path: words for each in cases or shipped_cases() for path, words in case_inputs(each).items()}
     files = options.Outputs(json=json_file, junit=junit, markdown="-" if markdown else None)
     files.check(inputs)

@@ -31,15 +31,28 @@ def codegen(
             "--coordinates", "NAME", "With --kinematics: pose, or a limb whose joint coordinates are used too"
         ),
     ] = "pose",
+    target: Annotated[
+        str,
+        options.text(
+            "--target",
+            "NAME",
+            "With --kinematics: form of a controller: c, linuxcnc, linuxcnc-module, klipper, klipper-patch, marlin, "
+            "reprapfirmware, ros2, arduino",
+        ),
+    ] = "c",
     force: options.Force = False,
 ) -> None:
     """Write F and its derivatives, or the kinematics alone, as C code for controllers."""
     from ..errors import InputError
 
     if kinematics:
-        _write_kinematics(case, out, settings, of, single=single, coordinates=coordinates, force=force)
+        _write_kinematics(case, out, settings, of, target, single=single, coordinates=coordinates, force=force)
         return
-    for option, given in (("--single", single), ("--coordinates", coordinates != "pose")):
+    for option, given in (
+        ("--single", single),
+        ("--coordinates", coordinates != "pose"),
+        ("--target", target != "c"),
+    ):
         if given:
             raise InputError(f"{option}: is only for --kinematics; add --kinematics, or leave {option} out")
     from ..embedding.codegen import generate_c, size_words
@@ -68,14 +81,15 @@ def _write_kinematics(
     out: str,
     settings: list[str] | None,
     of: str | None,
+    target: str,
     *,
     single: bool,
     coordinates: str,
     force: bool,
 ) -> None:
-    """Write the kinematics of a robot as C."""
+    """Write the kinematics of a robot in the form of a controller."""
     from ..case.robotcase import read_robot_case
-    from ..embedding.kinematicsfiles import generate_kinematics
+    from ..embedding.targets import Request, export_kinematics
     from ..errors import one_line
     from ..output.files import check_folder, check_outputs, write_folder
 
@@ -85,14 +99,16 @@ def _write_kinematics(
         loaded, text, inputs = read_robot_case(name, options.read_settings(settings))
     else:
         loaded, text, inputs = options.read_changed_case(name, settings, of).file
-    files = generate_kinematics(loaded, text, single=single, coordinates=coordinates)
-    for each in files if Path(out).is_dir() else ():
-        check_outputs(inputs, {"--out": str(Path(out) / each)})
+    files = export_kinematics(loaded, text, target, Request(single, coordinates))
+    for each in (path for path in (Path(out) / name for name in files) if path.exists()):
+        check_outputs(inputs, {"--out": str(each)})
     size = sum(len(text.encode()) for each, text in files.items() if each.endswith((".c", ".h")))
-    print_line(f"{size / 1000:.0f} kB of C")
+    if size:
+        print_line(f"{size / 1000:.0f} kB of C")
     write_folder(out, files, force=force)
     command = f"make -C {shlex.quote(one_line(out))} test"
-    print_line(f"{len(files)} files in {one_line(out)}; {command} compiles and tests them")
+    advice = f"{command} compiles and tests them" if target == "c" else "README.md describes them"
+    print_line(f"{len(files)} files in {one_line(out)}; {advice}")
 
 
 def _measured(files: dict[str, str], prefix: str) -> dict[str, str]:

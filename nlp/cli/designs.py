@@ -54,7 +54,7 @@ def deliver(
 
 @contextmanager
 def resumed(journal: str | None) -> Iterator[None]:
-    """Take searches of a block from the journal of an earlier run, and add new ones to it.
+    """Take the searches of a block from the journal of an earlier run, and add new searches to the journal.
 
     The journal is removed after a result that no stop has cut short.
 

@@ -45,7 +45,9 @@ def models(
     # A robot whose options have no default cannot be built, and has no parameters to show.
     model = options.read_robot(file) if file is not None else None if needed else build_model(name)
     if plot is not None and model is None:
-        raise InputError(f"--plot {plot}: robot {name!r} needs its option {needed[0]!r} first")
+        raise InputError(
+            f"--plot {plot}: robot {name!r} cannot be drawn without its option {needed[0]!r}; plot a case instead"
+        )
     files.deliver(
         lambda: model_words(name if file is None or model is None else model.name, model, found),
         whole=whole,
@@ -54,7 +56,7 @@ def models(
 
 
 def _variants(name: str, model: Model | None, found: Sequence[ModelOption]) -> list[Model]:
-    """Return the robot with each value of the first option whose values can be listed, or the robot alone."""
+    """Return the robot with each value of the first option with listed values; without such an option, the robot."""
     from ..case.robots import build_model
 
     listed = next((option for option in found if option.choices), None)

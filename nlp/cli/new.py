@@ -14,7 +14,7 @@ def new(
 ) -> None:
     """Print a commented starter case.
 
-    Save a case for a robot file in the folder of that file.
+    A case for a robot file names the file without its folder: save the case in the folder of the robot file.
     """
     from pathlib import Path
 

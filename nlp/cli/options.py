@@ -320,7 +320,7 @@ class Outputs:
             from ..errors import InputError
 
             *names, last = (f"--{name} -" for name in texts)
-            raise InputError(f"standard output can take one of {', '.join(names)} and {last} only")
+            raise InputError(f"only one of {', '.join(names)} and {last} can go to standard output")
         if pictures or targets.get("html") is not None:
             from ..output.pictures.requirements import check_library, check_picture
 

@@ -153,7 +153,7 @@ def _sampling(step: float | None, within: float | None, *, is_written: bool) -> 
     """Return the requirements on the rows of a table; None without a table.
 
     Raises:
-        InputError: a length is not positive, or both are given.
+        InputError: a length is not positive, or both options are given.
     """
     from ..errors import InputError
     from ..proof.workspace.path_knots import Sampling

@@ -101,7 +101,7 @@ def tell_workspace(case: Case) -> None:
 def solve_with_progress(
     case: Case, jobs: int | None, *, certify: bool = False, gap: float = 1e-4, step: float | None = None
 ) -> SolveOutcome:
-    """Solve a case, with rounded dimensions for a given step, and with certificates for ``certify``.
+    """Solve a case; round its dimensions if a step is given, and compute certificates if ``certify`` is true.
 
     Raises:
         CaseError: the case contradicts itself.

@@ -35,7 +35,7 @@ def proof_record(target: str | None, json_file: str | None) -> ProofRecord | Non
     if target is None:
         return None
     if target == "-" and json_file == "-":
-        raise InputError("standard output can take one of --json - and --proof - only")
+        raise InputError("only one of --json - and --proof - can go to standard output")
     return ProofRecord()
 
 

@@ -55,7 +55,7 @@ def solve(
     poses = loaded.poses_per_task  # each picture shows its task
     if pose > poses:
         whose = "every task" if loaded.changes else "the case"
-        raise InputError(f"--pose {pose}: {whose} has {poses} pose{'s' * (poses > 1)}")
+        raise InputError(f"--pose {pose}: no such pose; {whose} has {poses} pose{'s' * (poses > 1)}")
     solution, found, is_proved = solve_with_progress(loaded, jobs, certify=certify, gap=gap, step=step)
     result = result_of(found)
     files.deliver(

@@ -120,7 +120,7 @@ def _hold_path(
     stated = case.path if is_own and along is None and given.of_case else None
     if along is None and stated is None:
         if choices.is_any:
-            raise InputError("--along: is missing: options for reading a path need it")
+            raise InputError("--along: is missing: give the tool path to which the other options apply")
         return False
     own = choices.over(PathOptions() if stated is None else options_of(stated))
     file = along if stated is None else str(stated.name)
@@ -152,7 +152,9 @@ def _verify(
         checked = check_proof(claim, program_of(case, statement))
         shown = root_below(-checked.bound) if case.tasks[0].measure else -checked.bound
         if above is not None and not shown > above:
-            raise ProofError(f"the proof shows {shown:.10g}, which is not above {above:.10g}")
+            raise ProofError(
+                f"the proof shows only F >= {shown:.10g}, but --above {above:.10g} needs a larger lower bound"
+            )
     except ProofError as error:
         print_notice(f"rejected: {error}")
         raise SystemExit(1) from None

@@ -113,7 +113,7 @@ def compare(
     contenders = read_robots(robots, case)
     if case.limits_over == "path":
         raise CaseError(
-            "limits.over", "is for one robot: a comparison along a path is not supported", "path", case.source
+            "limits.over", "is not supported in a comparison: compare robots over a workspace", "path", case.source
         )
     check_seconds(time_limit)
     _check_numbers(size, part, scale=scale)

@@ -153,7 +153,7 @@ def _rules(comparison: Comparison) -> list[str]:
 
 
 def _cautions(comparison: Comparison) -> list[str]:
-    """Return sentences on other reasons why F of ranked robots differs: sizes, numbers of terms, units."""
+    """Return sentences on differences that affect the comparison of F: sizes, numbers of terms, and units."""
     case, ranked, lines = comparison.case, comparison.ranked, []
     sizes = [each.final_size for each in ranked if each.final_size is not None]
     turns = any(np.any(np.asarray(task.twist, dtype=np.float64)[:3]) for task in case.tasks)
@@ -297,7 +297,7 @@ def _robot(case: Case, entry: Entry) -> ComparedRobotData:
         tasks=tuple(_task(case, k, each) for k, each in enumerate(entry.tasks)),
         dimensions=_dimensions(entry),
         active=_active(entry),
-        limits_kept=0 if placed is None else len(placed.case.limits),
+        limits_kept=len(placed.case.limits) if placed is not None and entry.has_answer else 0,
         limits_left_out=tuple(ComparedLimitData.of(each) for each in left_out),
         certificate=certificate_data(entry.certificate),
         certificate_fault=entry.certificate_fault or None,

@@ -50,7 +50,7 @@ class TaskFit(NamedTuple):
     Attributes:
         name: name of the task.
         F: objective; None without an optimum.
-        can_move: True if the platform can follow the motion with free actuators; None if unknown.
+        can_move: True if the platform can follow the motion with unlocked actuators; None if unknown.
         constraint: fraction of F from constraint wrenches, 0 to 1; above 0 the platform cannot follow the motion.
             None if unknown.
         rates: rates of the actuators; empty if the robot's actuators are unknown.

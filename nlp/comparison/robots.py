@@ -105,7 +105,7 @@ def _is_same_file(one: Contender, other: Contender) -> bool:
 
 
 def size_of_home(model: Model) -> float:
-    """Return the size of a robot at home with its typical dimensions, in their unit.
+    """Return the size of a robot at home with its typical dimensions, in the unit of these dimensions.
 
     Raises:
         InputError: the robot has no points, or they coincide.
@@ -247,7 +247,7 @@ def _limits(case: Case, bare: Case) -> tuple[Limits, list[LeftOut]]:
                 raise CaseError(
                     f"limits.{limit.name}",
                     "cannot be compared: actuators of this robot have another unit (length or angle) "
-                    "than those of the case",
+                    "than those of the robot of the case",
                 )
         except CaseError as error:
             left_out.append(LeftOut(f"limits.{limit.name}", error.fault, limit.needs_legs))

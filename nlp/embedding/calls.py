@@ -52,7 +52,7 @@ class InnerCall(NamedTuple):
 
 
 class FinalCall(NamedTuple):
-    """Call, and the index of its constraint; the number of constraints for the objective."""
+    """Call, and the index of its constraint; for the objective, the index is the number of constraints."""
 
     call: Call
     place: int
@@ -179,7 +179,7 @@ def _inner_calls(program: Program, matrices: Sequence[SX]) -> tuple[InnerCall, .
 
 
 def _with_first_joints(leg: LegInstance, first: LegInstance) -> LegInstance:
-    """Return a leg with the joint-centre expressions of the first pose, because no pose changes the centres."""
+    """Return a leg with the joint centres of the first pose if these equal its own; otherwise the leg itself."""
     pairs = (leg.base, first.base), (leg.platform, first.platform)
     same = all(ca.is_equal(here, there, _DEPTH) for here, there in pairs)
     return replace(leg, base=first.base, platform=first.platform) if same else leg

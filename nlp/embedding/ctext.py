@@ -24,7 +24,7 @@ NO_BOUND = 1e300
 def identifier(name: str) -> str:
     """Return the prefix of a case's C names, an identifier of C for any name of a case.
 
-    Generated names continue the prefix by one word, by one with a capital letter, or for files by a hyphen, so that two
+    Generated names continue the prefix by a single word or a capitalised word, and names of files by a hyphen. So two
     cases with different prefixes have no name in common.
     """
     plain = re.sub(r"[^0-9a-z]+", "_", name.lower(), flags=re.ASCII).strip("_")
@@ -112,7 +112,7 @@ def index_macros(program: Program, prefix: str) -> str:
 class Macros:
     """Macros of C texts with whole-number values: sums, products and comparisons of macros and of parameters.
 
-    For two macros with one name, the macro of the later text counts.
+    For two macros with the same name, the macro of the later text counts.
     """
 
     _DEFINITION = re.compile(r"^#define (\w+)(?:\(([\w, ]+)\))?[ \t]+(.+?)[ \t]*$", re.MULTILINE)
@@ -187,7 +187,7 @@ _USED = "(void)arg, (void)res, (void)iw, (void)w, (void)mem;"
 
 
 def for_controllers(text: str) -> str:
-    """Return the text of a source or header without these functions, their tables, and tests of inputs.
+    """Return the text of a source or header without the functions for loading, their tables, and tests of inputs.
 
     Unused parameters are cast to void, so that no compiler warns of them.
     """

@@ -1,8 +1,8 @@
 """Kinematics of a robot with fixed dimensions as functions for C, in the conventions of a controller.
 
-The expressions are those of :mod:`screwsynth.nlp.evidence.inverse`. Newton's method in C needs in addition the
-derivatives by a small rotation, a translation and the joint coordinates without closed form, and the equations that are
-independent. These are chosen at closed configurations near home.
+The expressions are those of :mod:`screwsynth.nlp.evidence.inverse`. In addition, Newton's method in C needs derivatives
+with respect to a small rotation, a translation and the joint coordinates without closed form, and a set of independent
+equations, which is chosen at closed configurations near home.
 """
 
 from __future__ import annotations
@@ -61,12 +61,12 @@ class Transform:
     """Conventions of a controller for one robot, as numbers.
 
     Attributes:
-        scale: controller's length in a unit of length of the case.
-        degrees: unit of angles, radians.
-        turn: (3, 3) controller's world frame to the world frame of the case.
+        scale: length unit of the controller, in the length unit of the case.
+        degrees: angle unit of the controller, radians.
+        turn: (3, 3) rotation from the controller's world frame to the world frame of the case.
         offset: (3,) origin of the controller's world frame, length of the case.
-        zero: (a,) coordinates of the controller where those of the case are 0, in its units.
-        slope: (a,) coordinate of the controller for a unit of that of the case.
+        zero: (a,) coordinates of the controller at which those of the case are 0, in the controller's units.
+        slope: (a,) change of the controller's coordinate for a unit change of the case's coordinate.
     """
 
     scale: float
@@ -137,15 +137,16 @@ class Kinematics:
         case: case with fixed dimensions and the conventions of a controller.
 
     Attributes:
-        controller: these conventions.
+        controller: conventions of the controller.
         drives: the actuators.
         transform: the conventions as numbers.
         size: a length of the robot, in the controller's unit.
         sizes: (f,) sizes of the joint coordinates without closed form.
-        start: the same point as ``z`` of the robot's functions, in the conventions of the case.
+        start: point ``home`` in the conventions of the case, as ``z`` of the robot's functions.
         home: (12 + f,) closed point at home, or at the case's pose where home cannot be closed.
-        forward: equations and coordinates of forward kinematics; None where actuators do not determine the pose.
-        complete: those of the dependent coordinates; None where all six are independent, or none is known.
+        forward: equations and coordinates of forward kinematics; None if the actuators do not determine the pose.
+        complete: equations and coordinates that determine the dependent coordinates; None if all six coordinates are
+            independent, or no such equations are known.
         loops: independent loop equations of the joint coordinates without closed form.
 
     Raises:
@@ -224,7 +225,7 @@ class Kinematics:
         return ca.horzcat(couples @ ca.DM(self.transform.turn), SX(len(rows), 3 + self.unknowns))
 
     def moved(self, z: FloatArray, step: FloatArray) -> FloatArray:
-        """Return a point after a step, whose parts have the sizes of :attr:`step_sizes`."""
+        """Return a point after a step; the parts of the step have the sizes of :attr:`step_sizes`."""
         step = step * self.step_sizes
         angle = float(np.linalg.norm(step[:3]))
         cross = np.cross(np.eye(3), step[:3] / angle if angle else step[:3])
@@ -232,7 +233,7 @@ class Kinematics:
         return np.concatenate([(turn @ z[:9].reshape(3, 3)).ravel(), z[9:] + step[3:]])
 
     def by_step(self, expression: SX) -> SX:
-        """Return the derivatives (k, 6 + f) of an expression (k, 1) by the components of a step."""
+        """Return the derivatives (k, 6 + f) of an expression (k, 1) with respect to the components of a step."""
         slopes = ca.jacobian(expression, self.z)
         R = ca.reshape(self.z[:9], 3, 3).T
         turns = ca.horzcat(*[ca.vec((ca.skew(SX.eye(3)[:, k]) @ R).T) for k in range(3)])
@@ -283,7 +284,7 @@ class Kinematics:
     def _move_home(self) -> None:
         """Move the home point to the configuration where all actuator coordinates of the case are 0, if that is near.
 
-        Where the dimensions differ from those of the robot file, the platform's place at home does too.
+        If the dimensions differ from those of the robot file, the platform's pose at home differs too.
         """
         if self.forward is None or set(self.robot.measures) == {"leg_length"}:
             return
@@ -298,12 +299,12 @@ class Kinematics:
 
     @cached_property
     def motor_sizes(self) -> FloatArray:
-        """Sizes (a,) of actuator coordinates of order 1: a radian, or the robot's size."""
+        """Typical sizes (a,) of actuator coordinates: a radian, or the robot's size."""
         turns = [each.dimension is Dimension.ANGLE for each in self.drives]
         return np.where(turns, 1 / self.transform.degrees, self.size)
 
     def _forward(self, slopes: FloatArray) -> Choice | None:
-        """Return the equations of forward kinematics from derivatives (N, a + e, 6 + f) by steps of order 1."""
+        """Return the equations of forward kinematics from derivatives (N, a + e, 6 + f) for scaled steps."""
         columns = self._columns(slopes)
         a = len(self.drives)
         loops = list(range(a, slopes.shape[1]))
@@ -337,7 +338,7 @@ class Kinematics:
         """Return the indices of the independent coordinates x, y, z, a, b, c of the pose.
 
         Args:
-            slopes: (N, e, 6 + f) derivatives of the independent loop equations by steps of order 1.
+            slopes: (N, e, 6 + f) derivatives of the independent loop equations with respect to scaled steps.
         """
         if not self.independent:
             return tuple(range(6))
@@ -376,14 +377,14 @@ class Kinematics:
         return np.concatenate([pose, unknowns[places]])
 
     def feasible(self, z: FloatArray, step: FloatArray) -> FloatArray:
-        """Return the motion (6,) nearest to the given one that the platform can make at a closed point, of order 1."""
+        """Return the motion (6,), scaled, that is possible at a closed point and nearest to the given motion."""
         slopes = np.array(self._slopes(z), dtype=np.float64) * self.step_sizes
         return np.asarray((step - np.linalg.pinv(slopes, rcond=RANK_TOLERANCE) @ (slopes @ step))[:6])
 
     def side(self, z: FloatArray) -> float:
-        """Return the determinant of the equations of forward kinematics at a point, as a part of that at home.
+        """Return the determinant of the equations of forward kinematics at a point, divided by the determinant at home.
 
-        It is 0 at a singularity; NaN where actuators do not determine the pose.
+        It is 0 at a singularity, and NaN if the actuators do not determine the pose.
         """
         if self.forward is None:
             return math.nan
@@ -407,13 +408,13 @@ class Kinematics:
 
     @cached_property
     def no_torques(self) -> str:
-        """Reason why a load does not determine the forces of the actuators, as a clause; empty where it does."""
+        """Reason why loads do not determine the actuator forces, as a clause; empty if they do."""
         hindrance = statics_hindrance(self.case.model)
         return hindrance or ("" if self.forward else "actuators and loops do not determine the pose")
 
 
 def _coordinate_rows(coordinates: Sequence[int], unknowns: int) -> FloatArray:
-    """Return derivatives (k, 6 + f) of coordinates x, y, z, a, b, c by a step from a pose without rotation."""
+    """Return derivatives (k, 6 + f) of coordinates x, y, z, a, b, c for a step from a pose without rotation."""
     found = np.zeros((len(coordinates), 6 + unknowns))
     for row, k in zip(found, coordinates, strict=True):
         row[k + 3 if k < 3 else k - 3] = 1.0
@@ -434,18 +435,18 @@ class _Closing:
         self._function = ca.Function("closing", [of.z], outputs)
 
     def error(self, at: FloatArray) -> float:
-        """Return the largest left side at a point; infinite where it is not defined."""
+        """Return the largest left side at a point; infinite if it is not defined."""
         values = np.array(self._function(at)[0], dtype=np.float64)
         return float(np.abs(values).max(initial=0.0)) if np.isfinite(values).all() else math.inf
 
     def linear(self, at: FloatArray) -> Linear | None:
-        """Return the equations to first order; None where they hold or are not defined."""
+        """Return the equations to first order; None if they hold or are not defined."""
         values, slopes = (np.array(each, dtype=np.float64) for each in self._function(at))
         if not _CLOSED < np.abs(values).max(initial=0.0) < math.inf or not np.isfinite(slopes).all():
             return None
         return Linear(values.ravel(), slopes * self._of.step_sizes)
 
     def moved(self, at: FloatArray, step: FloatArray) -> FloatArray | None:
-        """Return the point after a step; None where the equations get worse, or are not defined."""
+        """Return the point after a step; None if the residual grows or is not defined."""
         found = self._of.moved(at, step)
         return found if self.error(found) < self.error(at) else None

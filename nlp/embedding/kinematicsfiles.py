@@ -106,7 +106,7 @@ def kinematics_files(case: Case, *, single: bool = False, coordinates: str = "po
 
     Raises:
         CaseError: as for :func:`generate_kinematics`.
-        InputError: likewise.
+        InputError: as for :func:`generate_kinematics`.
     """
     robot = Kinematics(case)
     limits = limits_of(robot)
@@ -137,7 +137,7 @@ def kinematics_files(case: Case, *, single: bool = False, coordinates: str = "po
 def combined_kinematics(case: Case) -> KinematicsFiles:
     """Return the kinematics for the folder of a solver: files, and texts for its build files and description.
 
-    They have no files where a dimension is free, or where no closed configuration is known; the description says so.
+    If a dimension is free, or no closed configuration is known, there are no files, and the description says so.
     """
     none = ("programs", "test", "cmake", "header", "rows")
     try:
@@ -167,7 +167,7 @@ def combined_kinematics(case: Case) -> KinematicsFiles:
 
 
 def _part(file: str, KIN: str, head: str, text: str) -> str:
-    """Return a source of CasADi's with its own number type, after which its macros are undefined.
+    """Return a source of CasADi with a number type of its own; at the end of the source its macros are undefined.
 
     So a module of one source file can include all sources, with the mathematics library of its controller.
     """
@@ -233,7 +233,7 @@ def _substitutions(robot: Kinematics, functions: _Functions) -> dict[str, str]:
     forward = robot.forward
     completes = robot.complete is not None
     square = forward is not None
-    length = controller.length or case.units.length
+    length = comment_text(controller.length or case.units.length)
     turning = [each.dimension is Dimension.ANGLE for each in drives]
     labels = [controller.angle if each else length for each in turning]
     complete = robot.complete or forward
@@ -290,7 +290,7 @@ def _substitutions(robot: Kinematics, functions: _Functions) -> dict[str, str]:
         "version": __version__,
         "casadi": ca.CasadiMeta.version(),
         "frame": frame,
-        "length": comment_text(length),
+        "length": length,
         "angle": controller.angle,
         "actuator_table": " * Actuators, with their values at home:\n" + "\n".join(lines),
         "actuator_rows": "\n".join(rows),
@@ -342,7 +342,7 @@ def _frame_words(controller: Controller, case: Case) -> str:
 
 
 def _motor_texts(robot: Kinematics, names: Mapping[str, str]) -> dict[str, str]:
-    """Return the texts about one motor alone, from those of the other placeholders."""
+    """Return the texts about a single motor, from the texts of the other placeholders."""
     keys = {"motor": "motor.h", "motor_body": "motor.c", "test_motor": "motor-test.c", "bench_motor": "motor-bench.c"}
     if robot.unknowns:
         return dict.fromkeys((*keys, "prototypes"), "")

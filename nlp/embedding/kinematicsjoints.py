@@ -93,7 +93,7 @@ def _name(joint: LimbJoint, coordinate: JointCoordinate) -> str:
 
 
 def _fault(robot: Kinematics, joints: list[LimbJoint], counts: dict[str, int]) -> str:
-    """Return why the joint coordinates of a limb do not serve as coordinates, as the end of a sentence; else empty."""
+    """Return the reason why a limb's joint coordinates cannot replace the pose, as the end of a sentence; or empty."""
     for each in joints:
         if each.type not in _TYPES:
             return (
@@ -159,7 +159,7 @@ def _check(robot: Kinematics, found: LimbCoordinates, at_home: FloatArray, limb:
     """Refuse coordinates that differ from those of the model at a pose near home.
 
     Raises:
-        CaseError: they differ.
+        CaseError: the coordinates differ.
     """
     if robot.unknowns and ca.which_depends(found.measured, robot.z, 1, False)[12:].count(True):
         return
@@ -183,7 +183,7 @@ def coordinate_texts(
 
     Args:
         robot: the kinematics.
-        found: the coordinates; None for those of the pose alone.
+        found: the coordinates; None if only the coordinates of the pose are used.
         limb: name of the limb.
         names: texts of the other placeholders.
     """

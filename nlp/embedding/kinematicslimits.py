@@ -74,7 +74,7 @@ def _measured(reading: Reading) -> Callable[[SX], SX]:
     """Return the function from the value of a constraint to the measured value.
 
     Raises:
-        ValueError: the reading has another form.
+        ValueError: the conversion has an unsupported form.
     """
     part = reading.from_value(_VALUES[0]) / _VALUES[0]
     forms: tuple[Callable[[SX], SX], ...] = (

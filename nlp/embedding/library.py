@@ -193,11 +193,12 @@ class CompiledCase:
 
         Args:
             x0: (variables,) or (n, variables) start of the first search of each problem; None for no such search.
-            p: (parameters,) or (n, parameters) values of the fixed parameters; None for those of the case.
-            lower: (variables,) or (n, variables) lower bounds; None for those of the case. Equal bounds fix a variable.
-            upper: (variables,) or (n, variables) upper bounds; None for those of the case.
+            p: (parameters,) or (n, parameters) values of the fixed parameters; None for the values of the case.
+            lower: (variables,) or (n, variables) lower bounds; None for the bounds of the case. Equal bounds fix a
+                variable.
+            upper: (variables,) or (n, variables) upper bounds; None for the bounds of the case.
             limits: one or (n,) values for each key of ``limits``, lengths in the case's unit and angles in radians.
-            sense: ``"max"`` or ``"min"``; None for that of the case.
+            sense: ``"max"`` or ``"min"``; None for the sense of the case.
             seeds: number of further searches from the table of starting points; None for all.
             threads: number of threads; None for the number of processors.
             max_iterations: one or (n,) values: largest number of iterations of all searches of a problem.
@@ -316,7 +317,8 @@ class CompiledCase:
         for key, column in columns.items():
             upper = columns.get(f"{key.removesuffix('.min')}.max") if key.endswith(".min") else None
             if upper is not None and column.ndim == upper.ndim == 0 and column > upper:
-                raise InputError(f"limits[{key!r}] = {column:.10g}: must be at most the other side, {upper:.10g}")
+                most = f"limits[{key.removesuffix('.min') + '.max'!r}] = {upper:.10g}"
+                raise InputError(f"limits[{key!r}] = {column:.10g}: must be at most {most}")
         lengths = {key: len(column) for key, column in columns.items() if column.ndim}
         if len(set(lengths.values())) > 1:
             said = listing(f"{key} {length}" for key, length in lengths.items())
@@ -333,7 +335,7 @@ def load_compiled(folder: str | os.PathLike[str]) -> CompiledCase:
     """Return the solver of a folder of generated C, compiled when it is first loaded.
 
     The shared library is cached in the user's cache folder, by a hash of the C. Compilation needs a C compiler: ``cc``,
-    ``gcc`` or ``clang``, or that of the environment variable ``CC``.
+    ``gcc`` or ``clang``, or the compiler that the environment variable ``CC`` names.
 
     Args:
         folder: folder with the files of ``screwsynth codegen`` or :func:`~screwsynth.nlp.generate_c`. A pickle of the

@@ -29,8 +29,8 @@ class Loop:
         values: (r, 1) expressions of inputs and constants.
         slots: k slots of each call.
         constant_places: q indices of each call among the constants.
-        outputs: targets of the r values of each call: slots, or for final loops the index of a constraint; the number
-            of constraints for the objective.
+        outputs: targets of the r values of each call: slots; in final loops, the index of a constraint, or for the
+            objective the number of constraints.
     """
 
     inputs: SX

@@ -54,7 +54,7 @@ class NumberColumns(NamedTuple):
 
 
 def number_columns(nlp: Nlp, limits: Sequence[RunTimeLimit], prefix: str) -> NumberColumns:
-    """Return the columns of a program in C, with the limits that can be set; C's names begin with the prefix."""
+    """Return the columns of a program in C, with the limits that can be set; ``prefix`` begins the names in C."""
     case, program, epigraph = nlp.case, nlp.program, nlp.program.places.epigraph
     units = replace(case.units, angle="rad")
     twists = [np.asarray(task.twist, dtype=np.float64).tolist() for task in case.tasks]
@@ -70,7 +70,7 @@ def number_columns(nlp: Nlp, limits: Sequence[RunTimeLimit], prefix: str) -> Num
             of_parameters[index] = F
 
     def multipliers(labels: Iterable[str]) -> list[str]:
-        """Return units of F per other units; empty if F has none."""
+        """Return the unit of F per unit of each label; empty if F has no unit."""
         return ["" if label == F else f"{F}/{label}" if F and label else F for label in labels]
 
     readings = [each.reading for each in program.constraints]

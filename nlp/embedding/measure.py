@@ -62,7 +62,8 @@ class Figures(NamedTuple):
         compiler: first line of the compiler's version, and the flags.
         flash: bytes of code and constants of the library; None if not measured.
         stack: bound on the stack of a solve in bytes, without the mathematics library; None without a bound.
-        painted: measured bytes of stack of a solve from all starting points, with that library; None if not run.
+        painted: measured bytes of stack of a solve from all starting points, with the mathematics library; None if not
+            run.
         fault: reason for missing sizes; empty if all sizes are measured.
     """
 
@@ -231,8 +232,8 @@ def _name(title: str, unit: str) -> str:
 def _called_by_pointer(function: str, frames: Mapping[str, int], prefix: str) -> set[str]:
     """Return the functions that a function may call by a pointer.
 
-    A search calls its program by pointers: the scaled one, or that of the search for a feasible point, which calls the
-    scaled one. The scaled one calls only the caller's deadline, which is unknown here.
+    A search calls its program by pointers: the scaled program, or the program of the search for a feasible point, which
+    calls the scaled program. The scaled program calls only the caller's deadline, which is unknown here.
     """
     if function.startswith((f"{prefix}_SCALED_", f"{prefix}-scaled:")):
         return set()

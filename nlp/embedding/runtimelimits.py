@@ -92,7 +92,7 @@ class RunTimeLimits:
 
     @property
     def functions(self) -> tuple[ca.Function, ...]:
-        """Both functions; none without limits."""
+        """Functions ``function`` and ``slopes``; none without limits."""
         return tuple(each for each in (self.function, self.slopes) if each is not None)
 
     @property
@@ -101,7 +101,7 @@ class RunTimeLimits:
         return 0 if self.function is None else int(self.function.numel_out(0))
 
     def places(self, key: str, reading: Reading, *, is_upper: bool) -> list[int]:
-        """Return the constraints whose bound on a side is the limit with a key, by a conversion."""
+        """Return the constraints that have, on one side, a bound converted from the limit with a key."""
         if self.function is None or key not in (keys := [each.key for each in self.limits]):
             return []
         (values,) = self.function.sx_in()

@@ -1,8 +1,8 @@
 """Functions of a program in two stages, and the C text of its loops.
 
-The first stage computes the values that depend only on the arguments, the second the rest at each point. A controller
-changes the task or a dimension rarely and the point always, so sines of fixed angles and the like must not be computed
-at every point.
+The first stage computes the values that depend only on the arguments, the second computes all other values at each
+point. A controller changes the task or a dimension rarely and the point always, so sines of fixed angles and the like
+must not be computed at every point.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class StagedFunctions:
             constants of the loops.
         functions: second stage, by name: functions of ``(x, k)`` and of further inputs, with dense results.
         of_loops: functions of each loop.
-        of_robot: for several poses, functions of the robot's inputs at one of them.
+        of_robot: for several poses, functions of the robot's inputs at one pose.
         loops: loops of the program.
         by_direction: True if ``curvature`` is the product of the Hessian with a direction.
     """

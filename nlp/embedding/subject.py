@@ -49,7 +49,7 @@ def find_subject(case: Case) -> Subject:
         InputError: the functions of the case have no finite value at any trial point.
     """
     if len(case.tasks) > 1 and case.method is Method.AVERAGE:
-        fault = "has no objective to generate C for: must be 'weighted-sum' or 'worst-case'"
+        fault = "must be 'weighted-sum' or 'worst-case' for C, because an average of optima has no objective"
         raise CaseError("combine.method", fault, case.method.value, case.source)
     if case.tasks[0].measure:
         fault = "is not supported in C: minimise F, and limit forces, speeds and powers instead"
@@ -65,7 +65,7 @@ def find_subject(case: Case) -> Subject:
     combination = solve(case).combination
     combined = None if combination is None else combination.combined
     if combined is None:
-        fault = "has a task without a separate optimum, so the tasks cannot be combined"
+        fault = "cannot combine the tasks: for at least one of them, solved alone, no optimum was found"
         raise CaseError("combine.method", fault, case.method.value, case.source)
     return Subject(_rounded(with_all_pairs(combined.nlp)), combined.F if combined.status is Status.OPTIMAL else None)
 
@@ -75,7 +75,9 @@ def _refuse_nested_loops(case: Case) -> None:
     for each in case.model.structure:
         if each.nested:
             shown = ", ".join(each.nested[:_MOST_SHOWN]) + (", ..." if len(each.nested) > _MOST_SHOWN else "")
-            fault = f"has joints outside limbs with branches ({shown}); C is generated only for limbs with branches"
+            fault = (
+                f"has loops within a limb (joints {shown}) that branches cannot describe; C is not supported for them"
+            )
             raise CaseError("robot", fault, source=case.source)
 
 
@@ -112,7 +114,7 @@ def _check_pairs(nlp: Nlp) -> None:
 
 
 def _rounded(nlp: Nlp) -> Nlp:
-    """Return a program with fewer digits of the values from a solve."""
+    """Return a program in which the values from a solve are rounded."""
     epigraph = nlp.program.places.epigraph
     if epigraph is None:
         return nlp

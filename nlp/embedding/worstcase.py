@@ -21,7 +21,7 @@ _DERIVATIVES = 4
 def worst_case_texts(searches: int, phases: int, trials: int, programs: int) -> dict[str, str]:
     """Return the texts of the placeholders for the solver's constants and for its worst case.
 
-    A search counts its first derivatives. It may have a few for each judged point, in addition to those of one line
+    A search counts its first derivatives. It may compute a few for each judged point, in addition to those of a line
     search: one point in each iteration, one at the end of each part, with one part for each scale of F and each
     feasible point, and the first point, which scales the constraints.
 

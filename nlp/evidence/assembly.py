@@ -59,8 +59,8 @@ class Assembly:
         is_home: If true, the path from home ends at the internal unknowns of the point.
         nearness: smallest singular value of the loop equations on the path, as a fraction of its value at home; 0 if
             the path jumps or does not reach the pose.
-        turned: names of the limbs in another working mode than at home: the path ends at other joint positions, and
-            the actuators of the limb drive the platform in the opposite sense.
+        turned: names of the limbs in another working mode than at home: the path ends at joint positions that differ
+            from those of the point, and the actuators of the limb drive the platform in the opposite sense.
     """
 
     is_home: bool
@@ -149,7 +149,7 @@ def assembly_at(model: Model, posture: Posture) -> Assembly:
 
 
 def _turned(model: Model, posture: Posture, differ: Sequence[bool]) -> tuple[str, ...]:
-    """Return the limbs driven in the opposite sense to home, among the limbs with an unknown that differs."""
+    """Return the limbs that are driven in the opposite sense to home and have an unknown that ``differ`` marks."""
     owners = [each.limb for each in model.structure for _ in range(each.unknowns)]
     own = {limb for limb, other in zip(owners, differ, strict=True) if other}
     return tuple(limb for limb in turned_limbs(model, posture) if limb in own)
@@ -170,7 +170,7 @@ def unknowns_from_home(
 
 
 def home_position(model: Model, parameters: FloatArray) -> FloatArray:
-    """Return the position (3,) of the platform at home, for a robot with parameters (k,), scaled to its size."""
+    """Return the position (3,) of the platform at home, scaled to the size of the robot with parameters (k,)."""
     return np.array(model.home) * _path_of(model).factor(parameters)
 
 
@@ -230,7 +230,7 @@ class _Path:
         model: model of the robot.
 
     Attributes:
-        scale: (6 + u,) size of each component: a length of the robot for positions, 1 for the others.
+        scale: (6 + u,) size of each component: a length of the robot for positions, 1 for other components.
         is_length: (k,) whether each component of the parameters is a length.
         is_free: (u,) whether each unknown is a free actuator coordinate.
     """
@@ -272,9 +272,9 @@ class _Path:
         return factor if float(np.abs(self._kernel(home, typical)[0]).max(initial=0.0)) <= _SIMILAR else 1.0
 
     def singular_values(self, z: FloatArray, parameters: FloatArray) -> FloatArray:
-        """Return the smallest singular values of the Jacobian of the determined unknowns, without and with the pose.
+        """Return the smallest singular values of two Jacobians: of the determined unknowns, and of these and the pose.
 
-        The array is empty without equations, or without such unknowns.
+        The array is empty without equations, or without determined unknowns.
         """
         slopes = self._kernel(z, parameters)[1] * self.scale
         with_pose = np.concatenate([np.arange(6), self._determined])

@@ -1,7 +1,7 @@
 """Starting points with closed loops, in the home assembly mode.
 
-Newton's method may end in another assembly mode where the pose is far from home. At the first starting point the loops
-are therefore closed along a path from home, and the other starting points take their unknowns from it. For a robot with
+Newton's method may end in another assembly mode if the pose is far from home. At the first starting point the loops are
+therefore closed along a path from home, and the other starting points take their unknowns from it. For a robot with
 free actuator coordinates, which are spread over their ranges, each starting point has its own path from home.
 """
 
@@ -59,7 +59,7 @@ def _closed_along_path(nlp: Nlp, first: FloatArray, x: FloatArray) -> FloatArray
 
 
 def closed_in_place(nlp: Nlp, x: FloatArray) -> FloatArray | None:
-    """Return a point with the given dimensions and pose, and with joints on the path from home.
+    """Return a point with the given dimensions and pose, and with joints from the end of the path from home.
 
     Args:
         nlp: the nonlinear program.

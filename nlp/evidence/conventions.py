@@ -1,6 +1,6 @@
 """Dependence of F on two conventions: the characteristic length, and centres that the joints do not determine.
 
-For almost every robot F does not depend on them if the platform can make the motion with free actuators. For other
+For almost every robot F does not depend on them if the platform can make the motion with unlocked actuators. For other
 motions constraint wrenches count too: the characteristic length weighs their couples, and a couple depends on the point
 about which it is taken. In a limb without ball joint and without two intersecting hinges, this point is the centre of
 the last passive joint, and its position along the joint axis is arbitrary.

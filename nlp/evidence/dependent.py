@@ -49,7 +49,7 @@ _POSITION = 3.0
 
 
 class LoopSystem(NamedTuple):
-    """Equations of a robot's closed loops, with other symbols for pose and unknowns.
+    """Equations of a robot's closed loops, in which expressions replace the symbols of pose and unknowns.
 
     Attributes:
         equations: (k, 1) independent equations, divided by their sizes.
@@ -88,7 +88,7 @@ def with_dependent(case: Case, workspace: Workspace) -> Workspace:
     """Return a workspace with its dependent coordinates; refuse ranges that the robot cannot control.
 
     Raises:
-        CaseError: the robot controls no coordinate that has a range, or as :func:`dependent_of`.
+        CaseError: the robot controls no coordinate that has a range, or :func:`dependent_of` refuses the workspace.
     """
     found = dependent_of(case, workspace)
     if not found.independent and found.dependent:
@@ -142,7 +142,10 @@ def dependent_of(case: Case, workspace: Workspace) -> Workspace:
     shaped = workspace.position_set
     if shaped is not None and any(k in shaped.coordinates for k in found):
         names = ", ".join(workspace.names[k] for k in found if k in shaped.coordinates)
-        fault = f"states {names} by its shape, which this robot does not control; state a range or a plane shape"
+        fault = (
+            f"restricts {names}, which this robot cannot choose independently; "
+            f"give ranges in workspace.position, or a plane shape without {names}"
+        )
         raise CaseError(f"workspace.position.{shaped.kind.value}", fault, source=case.source)
     return replace(workspace, dependent=dependent, held=tuple(k for k in independent if k not in chart.ranged))
 
@@ -246,7 +249,7 @@ def _angles(R: FloatArray) -> tuple[float, float, float]:
 
 
 def _may_depend(model: Model) -> bool:
-    """Return whether a robot has fewer than six degrees of freedom and loop equations that determine the rest."""
+    """Return whether a robot has fewer than six degrees of freedom, and loop equations for the other coordinates."""
     return model.generic is not None and model.generic.constraints > 0 and bool(model.closure)
 
 

@@ -119,11 +119,11 @@ def inverse(
 
     Raises:
         CaseError: a dimension of the case's robot is free.
-        InputError: the arrays have other shapes, rotations are stated in two forms, an angle is more than a whole turn,
-            ``follow`` is another word, or an actuator coordinate is not known.
+        InputError: an array has a wrong shape, rotations are stated in two forms, an angle is more than a whole turn,
+            ``follow`` is not allowed, or an actuator coordinate is not known.
     """
     if rotations is not None and rpy is not None:
-        raise InputError("rpy: conflicts with rotations; state the rotations in one form")
+        raise InputError("rpy: conflicts with rotations; give only one of them")
     p = np.array(positions, dtype=np.float64)
     shape = (*p.shape[:1], 3, 3)
     if rpy is not None:
@@ -152,7 +152,7 @@ def _rpy_rows(rpy: ArrayLike, count: int) -> FloatArray:
         count: number of poses.
 
     Raises:
-        InputError: the array has another shape, or an angle is more than a whole turn.
+        InputError: the array has a wrong shape, or an angle is more than a whole turn.
     """
     rows = np.array(rpy, dtype=np.float64)
     if rows.shape != (count, 3):
@@ -223,7 +223,7 @@ class RobotExpressions(NamedTuple):
         jacobian: (m, 6) Jacobian, as in :class:`InversePoses`.
         rates: (a, 6) actuator rates, as in :class:`InversePoses`.
         margin: (1, 1) relative determinant of ``J'J``.
-        residual: (e, 1) left sides of all loop equations, of order 1.
+        residual: (e, 1) left sides of all loop equations, scaled to magnitudes of about 1.
         signs: (s, 1) expressions that are positive in the home assembly mode.
         modes: (w, 1) expressions that are positive in the home working mode too.
     """

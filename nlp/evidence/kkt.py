@@ -287,8 +287,8 @@ class _Stationarity:
 def _residual(at: Linearisation, active_set: list[int]) -> tuple[FloatArray, float]:
     """Return least-squares multipliers (k,) of an active set, and the residual of the KKT conditions.
 
-    The residual is the largest of three values: the derivatives of the Lagrangian, the distances from the active sides
-    to either direction, and the violation.
+    The residual is the largest of three values: the derivatives of the Lagrangian, the distances from the active sides,
+    inside or outside, and the violation.
     """
     mu = np.zeros(len(at.sides))
     if active_set and np.isfinite(at.gradient).all():

@@ -133,7 +133,7 @@ class ActuatorLoading(JsonObject):
     Attributes:
         loads: balance of every load at every pose; absent without loads.
         speeds: largest speed of every actuator at every pose; absent without motions.
-        compliance: compliance of the platform at the first pose: translation of its origin and rotation in radians, by
+        compliance: compliance of the platform at the first pose: translation of its origin and rotation in radians, per
             force and moment about the origin; absent at a singular pose, or if the stiffness of an actuator is not
             known.
     """
@@ -149,7 +149,7 @@ class PoseLoads(NamedTuple):
     Attributes:
         loads: load cases with their balance.
         speeds: largest speeds of the actuators; empty without a motion.
-        compliance: (6, 6) displacement of the platform (rotation, then translation of its origin) by moment and force
+        compliance: (6, 6) displacement of the platform (rotation, then translation of its origin) per moment and force
             about the origin; empty if the stiffness of an actuator is not known.
     """
 
@@ -212,7 +212,7 @@ def largest_of(found: PoseLoads, measure: str) -> float:
 
 
 def _top_speeds(nlp: Nlp, speeds: FloatArray, pose: int | None) -> tuple[TopSpeed, ...]:
-    """Return the largest speeds (a,) of the actuators at a pose, given by its number; empty without a motion."""
+    """Return the largest speeds (a,) of the actuators at a pose, by the number of the pose; empty without a motion."""
     return tuple(
         TopSpeed(
             actuator=joint.name,

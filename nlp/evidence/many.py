@@ -34,7 +34,7 @@ class Numbers(NamedTuple):
         lower: (N, n) lower bounds of the variables.
         upper: (N, n) upper bounds of the variables.
         g_lower: (N, c) lower sides of the constraints, infinite and equal in the same places as in the program.
-        g_upper: (N, c) upper sides of the constraints, likewise.
+        g_upper: (N, c) upper sides of the constraints, infinite and equal in the same places as in the program.
     """
 
     arguments: FloatArray

@@ -103,7 +103,7 @@ def measured_slack(nlp: Nlp, x: FloatArray, at: Linearisation, numbers: Sequence
 
 
 def _loaded(nlp: Nlp, constraints: Sequence[Constraint]) -> list[int]:
-    """Return the indices of the constraints by limits on quantities that depend on loads."""
+    """Return the indices of the constraints that are limits on quantities under loads."""
     prefixes = tuple(f"{limit.name}." for limit in nlp.case.limits if limit.needs_loads)
     return [k for k, each in enumerate(constraints) if any(key.startswith(prefixes) for key in each.keys)]
 
@@ -115,7 +115,7 @@ def measured_violation(nlp: Nlp, x: FloatArray) -> float:
 
 
 def measured_values(nlp: Nlp, x: FloatArray) -> list[float]:
-    """Return the measured value of each constraint's limit at a point (n,), radians for angles; NaN without a limit."""
+    """Return the measured value of each constraint at a point (n,), radians for angles; NaN if it is not a limit."""
     return _measured(nlp, x, nlp.program.constraints, nlp.evaluate(x)[1])
 
 

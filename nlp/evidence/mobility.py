@@ -1,8 +1,8 @@
 """Degrees of freedom, actuator rates and singularities of a robot with given joints, at one point.
 
 With ``C`` the constraint wrenches, which do no work in the actuated joints, the platform has ``6 - rank C`` degrees of
-freedom if the actuators are free, and can make a twist in which ``C`` does no work. The actuator rates of a limb for a
-twist minimise the motion that the limb resists (:mod:`screwsynth.models.actuation`).
+freedom if the actuators are unlocked, and can make a twist in which ``C`` does no work. The actuator rates of a limb
+for a twist minimise the motion that the limb resists (:mod:`screwsynth.models.actuation`).
 """
 
 from collections.abc import Mapping
@@ -49,7 +49,7 @@ class Mobility:
     """Degrees of freedom and actuator rates at a point.
 
     Attributes:
-        freedoms: degrees of freedom of the platform with free actuators.
+        freedoms: degrees of freedom of the platform with unlocked actuators.
         constraint_rank: rank of the constraint wrenches.
         actuator_rates: rate of each actuator for the program's task: rad or length per unit of time; infinite if the
             actuator cannot drive the platform, NaN where the motion does not determine it.

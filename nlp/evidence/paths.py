@@ -11,7 +11,7 @@ from ..program.program import RobotNumbers
 
 
 def paths_at(nlp: Nlp, x: FloatArray, numbers: RobotNumbers, pose: int = 0) -> list[PathScrews]:
-    """Return the joint paths of a robot whose screws are known, at a point.
+    """Return the screws of each chain of joints of a robot at a point; empty if the model does not give them.
 
     Args:
         nlp: the nonlinear program.

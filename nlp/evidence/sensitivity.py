@@ -92,7 +92,7 @@ def sensitivities(nlp: Nlp, x: FloatArray) -> list[Sensitivity]:
 
 
 def _can_follow(by_variable: FloatArray, by_argument: FloatArray) -> "NDArray[np.bool_]":
-    """Return for each argument, (k,), whether the variables can follow it with unchanged values of the functions.
+    """Return for each argument (k,) whether variables can follow its change so that functions keep their values.
 
     Args:
         by_variable: (m, n) derivatives of the functions with respect to the variables.

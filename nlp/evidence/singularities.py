@@ -59,7 +59,7 @@ _CLAUSES = {
     SingularityKind.SERIAL: "joints are dependent: its actuator cannot drive the platform, "
     "which loses a degree of freedom",
     SingularityKind.CONSTRAINT: "the constraints are dependent: the platform gains a degree of freedom "
-    "even with free actuators",
+    "even with unlocked actuators",
     SingularityKind.ACTUATION: "the platform can move with every actuator locked",
     SingularityKind.ARCHITECTURE: "the rank is below six at all dimensions and poses: the platform can always move",
 }
@@ -176,7 +176,7 @@ def platform_singularities(
 
 
 class _Motions(NamedTuple):
-    """Screws (6, k) of a path of joints; for nested loops the motions that they allow, passive joints first."""
+    """Screws (6, k) of a chain of joints; for nested loops, the motions that the loops allow, passive joints first."""
 
     path: JointScrews
     screws: FloatArray
@@ -184,7 +184,7 @@ class _Motions(NamedTuple):
 
 
 def _motions_at(nlp: Nlp, x: FloatArray, numbers: RobotNumbers, pose: int) -> list[_Motions]:
-    """Return the screws of each path of joints at a point."""
+    """Return the screws of each chain of joints at a point."""
     found = []
     for each in paths_at(nlp, x, numbers, pose):
         screws, passive = each.screws, each.path.passive
@@ -208,11 +208,11 @@ def _without_rounding(screws: FloatArray, centre: FloatArray) -> FloatArray:
 
 
 def _singularity_of(motions: _Motions, own: FloatArray, centre: FloatArray) -> Singularity | None:
-    """Return the singularity of one path of joints, or None.
+    """Return the singularity of one chain of joints; None if the chain is not singular.
 
     Args:
-        motions: screws of the path; not finite for a joint whose axis has no direction at the point.
-        own: (m, 6) rows of the path's limb in J.
+        motions: screws of the chain; not finite for a joint whose axis has no direction at the point.
+        own: (m, 6) rows of the chain's limb in J.
         centre: (3,) the platform's origin, length.
     """
     each, screws, passive = motions
@@ -287,7 +287,7 @@ def _homogeneous(screws: FloatArray, centre: FloatArray, reach: float) -> FloatA
 
 
 def _unit_columns(screws: FloatArray, centre: FloatArray) -> tuple[FloatArray, float]:
-    """Return unit twists (6, n) about a centre, with velocities divided by the largest velocity, and this velocity."""
+    """Return unit twists (6, n) about a centre, with velocities divided by the largest; and the largest velocity."""
     reach = _reach(screws, centre)
     scaled = _homogeneous(screws, centre, reach)
     lengths = np.linalg.norm(scaled, axis=0)
@@ -350,6 +350,6 @@ def _are_alike(one: Singularity | None, other: Singularity) -> bool:
 
 
 def _together(one: Singularity, other: Singularity) -> Singularity:
-    """Return one singularity of a limb from the singularities of two paths."""
+    """Return one singularity of a limb from the singularities of two chains of joints."""
     joints = tuple(dict.fromkeys([*(one.joints or ()), *(other.joints or ())]))
     return singularity(one.kind, one.limb, joints, locking=(*(one.locking or ()), *(other.locking or ())))

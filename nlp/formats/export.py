@@ -124,7 +124,9 @@ def check_pose(case: Case, pose: int) -> None:
         InputError: the case has fewer poses.
     """
     if not 1 <= pose <= case.pose_count:
-        raise InputError(f"--pose {pose}: the case has {case.pose_count} pose{'s' * (case.pose_count > 1)}")
+        raise InputError(
+            f"--pose {pose}: no such pose; the case has {case.pose_count} pose{'s' * (case.pose_count > 1)}"
+        )
 
 
 def check_formats(formats: Collection[str]) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ class Frame:
     rotation: FloatArray = field(default_factory=lambda: np.eye(3))
 
     def __matmul__(self, inner: Frame) -> Frame:
-        """Return a frame given in this frame, in the outer coordinates."""
+        """Return a frame, given relative to this frame, in the coordinates in which this frame is given."""
         return Frame(self.position + self.rotation @ inner.position, self.rotation @ inner.rotation)
 
     def inverse(self) -> Frame:

@@ -90,7 +90,7 @@ class Region:
 
 
 def _largest(corners: FloatArray) -> list[int]:
-    """Return the indices of the corners (m, k) that are not below others, the first index of equal corners."""
+    """Return the indices of the corners (m, k) that are below no other corner; of equal corners, the first one."""
     kept = []
     for j, corner in enumerate(corners):
         above = (corners >= corner).all(axis=1)

@@ -8,7 +8,7 @@ of the gap, and the other goal is optimised. If this returns an end of the gap, 
 front has no point in the gap.
 
 More goals: the next box is that with room for the largest piece of the front (:mod:`.boxes`). The goal along its
-shortest side is optimised, and all others get bounds in the middle of their sides. If this gives no new point, the
+shortest side is optimised, and all other goals get bounds in the middle of their sides. If this gives no new point, the
 other goals are optimised in turn; if none gives a point, the box is closed.
 """
 
@@ -45,7 +45,7 @@ _ROUNDING = 1e-8
 
 @dataclass(frozen=True, eq=False)
 class FrontPoint:
-    """Point of a front: the optimum of one goal within bounds on the others.
+    """Point of a front: the optimum of one goal within bounds on the other goals.
 
     Attributes:
         values: (k,) values of the goals, angles in radians.
@@ -246,7 +246,7 @@ class _Builder:
         return np.array([goal.sign for goal in self.goals])
 
     def solve(self, optimised: int, bounds: tuple[float | None, ...], near: list[FrontPoint]) -> FrontPoint | None:
-        """Return the optimum of one goal within bounds on the others; None without an optimum."""
+        """Return the optimum of one goal within bounds on the other goals; None without an optimum."""
         program = program_of(self.case, self.goals, optimised, bounds)
         nlp = program.nlp
         first = [_start(program, point) for point in near]

@@ -1,6 +1,6 @@
 """Goals of a front, such as ``max F:NAME`` and ``min limits.KEY``, and programs of the epsilon-constraint method.
 
-Each program optimises one goal within bounds on the others.
+Each program optimises one goal within bounds on the other goals.
 
 Source of the method: Y. Y. Haimes, L. S. Lasdon and D. A. Wismer, On a bicriterion formulation of the problems of
 integrated system identification and system optimization, IEEE Trans. Syst. Man Cybern. 1 (1971) 296-297.
@@ -129,7 +129,7 @@ def loosest_numbers(case: Case, goals: Sequence[Goal]) -> FloatArray:
         InputError: a limit is not in the case or cannot be a goal, or the case has the worst F of several poses.
     """
     if case.over_poses is OverPoses.WORST and case.pose_count > 1:
-        raise InputError("pareto: the worst F of several poses is not supported; use sum or mean")
+        raise InputError("pareto: combine.over_poses = 'worst' is not supported; use 'sum' or 'mean'")
     layout = lay_out(case, [case.tasks[0]])
     found = []
     for goal in goals:
@@ -218,7 +218,9 @@ def _range(layout: Layout, goal: Goal) -> tuple[float, float]:
         raise InputError(f"--goal {goal.sense.value} {goal.label}: {fault}; allowed: {listing(keys)}")
     reading = found[0].constraint.reading
     if any(item.constraint.exact is not None or item.constraint.measure is not None for item in found):
-        raise InputError(f"--goal {goal.label}: is approximated by a smooth estimate, and cannot be a goal")
+        raise InputError(
+            f"--goal {goal.label}: cannot be a goal: the nonlinear program has only a smooth approximation of it"
+        )
     if goal.sense is Sense.MIN:
         least, most = reading.above, min(reading.from_value(item.upper) for item in found)
     else:

@@ -91,12 +91,12 @@ def write_whole(target: str) -> Iterator[Path]:
 def write_folder(target: str, files: Mapping[str, str], *, force: bool = False) -> None:
     """Write texts into the files of a folder; a missing folder is created.
 
-    All files are complete before the first gets its name; other files in the folder stay. A manifest in the folder has
-    the names of the written files. Two runs at the same time write one after the other.
+    All files are written completely before the first one gets its final name; other files in the folder stay. A
+    manifest in the folder has the names of the written files. Two runs at the same time write one after the other.
 
     Args:
         target: path of the folder.
-        files: texts by file name.
+        files: texts by file name, which may begin with the name of a subfolder.
         force: If true, also overwrite files that screwsynth did not write.
 
     Raises:
@@ -114,8 +114,10 @@ def write_folder(target: str, files: Mapping[str, str], *, force: bool = False) 
             every = {**files, MANIFEST: "\n".join([_MANIFEST_HEAD, *listed]) + "\n"}
             with WRITING, tempfile.TemporaryDirectory(dir=folder, prefix=_WAITING) as waiting:
                 for name, text in every.items():
+                    (Path(waiting) / name).parent.mkdir(parents=True, exist_ok=True)
                     (Path(waiting) / name).write_text(text, encoding="utf-8")
                 for name in every:
+                    (folder / name).parent.mkdir(parents=True, exist_ok=True)
                     (Path(waiting) / name).replace(folder / name)
         wrote(target)
     except OSError as error:
@@ -148,8 +150,10 @@ def _refuse_foreign(folder: Path, target: str, files: Iterable[str]) -> None:
     """Refuse a folder with files of another origin; arguments and errors as for :func:`check_folder`."""
     written = _written_before(folder)
     # Incomplete files of a killed run may be replaced.
-    present = sorted(each.name for each in folder.iterdir() if not each.name.startswith(_WAITING))
-    foreign = [name for name in present if written is None or (name in set(files) and name not in written)]
+    if written is None:
+        foreign = sorted(each.name for each in folder.iterdir() if not each.name.startswith(_WAITING))
+    else:
+        foreign = sorted(name for name in set(files) - set(written) if (folder / name).exists())
     if foreign:
         raise InputError(
             f"{target}: contains {foreign[0]}, not written by screwsynth: choose an empty or a new folder, or --force"

@@ -205,14 +205,15 @@ def sweep(
         engine: ``"compiled"`` or ``"ipopt"``; by default the compiled engine if it covers the sweep.
         certified: If true, also compute a certificate for each point, which needs the engine ``"ipopt"``.
         time_limit: seconds for the whole call; if they end before all points are solved, there is no table. The
-            certificate of a point takes an equal part of the remaining time, at most 60 s, and then has its best bound.
+            certificate of a point takes an equal part of the remaining time, at most 60 s, and has the best bound that
+            it reaches in this time.
         dask: address of a Dask cluster for the computation.
         progress: function called after each block of points.
         notice: function called with the reason if Ipopt replaces the compiled engine.
 
     Raises:
-        CaseError: a name is unknown in the case, its smallest or largest value is not allowed, or no case file can
-            represent the case.
+        CaseError: a name is unknown in the case, the smallest or largest value of a name is not allowed, or no case
+            file can represent the case.
         InputError: there are no points, an option is not allowed, the file cannot be written or has another origin, or
             the time ends before all points are solved.
     """

@@ -44,7 +44,7 @@ class Tolerances(NamedTuple):
     closed: float
 
     def times(self, scale: float) -> Tolerances:
-        """Return the same lengths in another unit."""
+        """Return the tolerances times a factor, which converts them to another unit."""
         return Tolerances(self.radius * scale, self.spiral * scale, self.closed * scale)
 
 
@@ -84,7 +84,7 @@ def arc_about(centre: Point, start: Point, end: Point, turns: int, tolerances: T
         centre: coordinates in the plane.
         start: first point.
         end: last point; equal to the first for a full circle.
-        turns: number of turns, with the last turn complete or partial; negative for clockwise.
+        turns: number of turns, including a partial last turn; negative for clockwise.
         tolerances: tolerances in the unit of the coordinates.
 
     Raises:
@@ -97,8 +97,9 @@ def arc_about(centre: Point, start: Point, end: Point, turns: int, tolerances: T
     gap = abs(last - radius)
     if gap > 100 * tolerances.spiral or (gap > tolerances.spiral and gap > _SPIRAL * max(radius, last)):
         raise ArcError(
-            f"start and end of the arc are {radius:.7g} and {last:.7g} from its centre; these may differ by"
-            f" {max(tolerances.spiral, min(100 * tolerances.spiral, _SPIRAL * max(radius, last))):.3g}"
+            f"start and end of the arc are {radius:.7g} and {last:.7g} from its centre; "
+            f"these distances may differ by at most "
+            f"{max(tolerances.spiral, min(100 * tolerances.spiral, _SPIRAL * max(radius, last))):.3g}"
         )
     angle = math.atan2(from_start[1], from_start[0])
     sense = math.copysign(1, turns)
@@ -127,7 +128,7 @@ def centre_of_radius(radius: float, start: Point, end: Point, is_clockwise: bool
     length, size = math.hypot(*chord), abs(radius)
     if length <= tolerances.closed:
         raise ArcError(
-            "an arc with R must not end at its start, because its centre is undetermined; give I, J, K instead"
+            "an arc with R must not end at its start, because this does not determine its centre; give I, J, K instead"
         )
     if length / 2 - size > tolerances.radius:
         raise ArcError(f"start and end of the arc are {length:.7g} apart, more than two radii of {size:.7g}")
@@ -138,7 +139,7 @@ def centre_of_radius(radius: float, start: Point, end: Point, is_clockwise: bool
 
 
 def arc_length(radius: _Numbers, growth: _Numbers, sweep: _Numbers, rise: _Numbers) -> _Numbers:
-    """Return the length of an arc or a helix, or of several.
+    """Return the length of an arc or a helix; arguments may be arrays.
 
     Args:
         radius: radius at the start.

@@ -194,7 +194,7 @@ class Interpreter:
                 self._note(f"{letter}{block.words[letter]:g}")
 
     def _set_modes(self, codes: dict[str, float], words: dict[str, float]) -> None:
-        """Set the modes of a line on which its feed depends."""
+        """Set the modes on which the feed of a line depends: feed mode and unit."""
         if "feed" in codes:
             self.is_inverse_time = codes["feed"] == 93
             self.feed = self.turn_feed = 0.0
@@ -248,7 +248,7 @@ class Interpreter:
         self.shift = [a + b for a, b in zip(self.origins[self.system], self.axis_offsets, strict=True)]
 
     def _dwell(self, words: dict[str, float]) -> None:
-        """Wait."""
+        """Execute a dwell (G4)."""
         if not words.get("P", -1) >= 0:
             raise WordError("G4", "needs P, a time of 0 seconds or more")
         if words["P"]:
@@ -258,7 +258,7 @@ class Interpreter:
         """Return the axis words of a line by axis; refuse a line without axis words."""
         found = {AXES[a]: self._length(v) if AXES[a] < 3 else v for a, v in words.items() if a in AXES}
         if not found:
-            raise WordError(code, "needs axis words")
+            raise WordError(code, "needs axis words, such as X10")
         return found
 
     def _set_origin(self, words: dict[str, float]) -> None:
@@ -278,14 +278,14 @@ class Interpreter:
             self.origins[system][axis] = origin
 
     def _set_axis_offsets(self, words: dict[str, float]) -> None:
-        """Set the axis offsets, so that the point has the coordinates of the line (G92)."""
+        """Set the axis offsets, so that the current point has the coordinates that the line states (G92)."""
         for axis, value in self._axis_words(words, "G92").items():
             self.axis_offsets[axis] = self._stated(axis, "G92") - self.origins[self.system][axis] - value
 
     def _stated(self, axis: int, code: str) -> float:
-        """Return a coordinate of the point; refuse a code that needs an unknown coordinate."""
+        """Return a coordinate of the current point; refuse a code that needs an unknown coordinate."""
         if math.isnan(self.now[axis]):
-            raise WordError(code, f"depends on {'XYZABC'[axis]} of the point, which is unknown here; give the start")
+            raise WordError(code, f"needs the present {'XYZABC'[axis]}, which is not yet known; give the start point")
         return self.now[axis]
 
     def _move(self, motion: float, words: dict[str, float], is_machine: bool) -> None:
@@ -294,9 +294,11 @@ class Interpreter:
         if motion == 80:
             return
         if is_machine and self.is_incremental:
-            raise WordError("G53", "needs G90")
+            raise WordError("G53", "needs absolute coordinates: program G90 first")
         if motion and not (words.get("F") if self.is_inverse_time else self.feed):
-            needed = "an F of its own in G93" if self.is_inverse_time else "a feed: F is 0 or not stated since G94"
+            needed = (
+                "an F on the same line in G93" if self.is_inverse_time else "a feed: F is 0 or not stated since G94"
+            )
             raise WordError(f"G{motion:g}", f"needs {needed}")
         end = self._end(words, is_machine)
         if motion > 1:
@@ -307,7 +309,7 @@ class Interpreter:
             )
 
     def _end(self, words: dict[str, float], is_machine: bool) -> list[float]:
-        """Return the end of a motion in machine coordinates."""
+        """Return the end point of a motion in machine coordinates."""
         end = self.now.copy()
         for letter, value in words.items():
             axis = AXES.get(letter)
@@ -365,7 +367,7 @@ class Interpreter:
         return one + self.shift[first], other + self.shift[second]
 
     def _add(self, kind: Kind, end: list[float], seconds: float, arc: Arc | None = None) -> None:
-        """Add a segment from the point to an end; from an unknown point, only move there."""
+        """Add a segment from the current point to an end point; from an unknown point, only move there."""
         self.now = end
         if not self.is_known:
             self._note(self.before_path)
@@ -390,7 +392,7 @@ def _check_letters(codes: dict[str, float], words: dict[str, float], motion: flo
     is_arc, once, is_blending = motion in (2, 3), codes.get("once"), codes.get("control") == 64
     times = [is_arc, once in (4, 10), is_blending].count(True)
     if "P" in words and times > 1:
-        raise WordError(f"P{words['P']:g}", "belongs to two codes of the line")
+        raise WordError(f"P{words['P']:g}", "could belong to two codes of the line; write these codes on two lines")
     used = {**dict.fromkeys("IJKR", is_arc), "P": times == 1, "L": once == 10, "Q": is_blending}
     for letter, value in words.items():
         if not used.get(letter, True):

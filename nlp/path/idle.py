@@ -20,6 +20,6 @@ class Idle(JsonObject):
 
 
 def idle_words(counts: Mapping[str, Sequence[int]]) -> tuple[Idle, ...]:
-    """Return the words without motion in order of their first lines, from first line and number of lines of each."""
+    """Return the words without motion, sorted by first line; ``counts`` has first line and number of lines by word."""
     found = sorted((line, word, lines) for word, (line, lines) in counts.items())
     return tuple(Idle(word=word, line=line, lines=lines) for line, word, lines in found)

@@ -25,10 +25,10 @@ _LARGEST, _FARTHEST = 2**31, 2**52
 def joined_to_previous(
     positions: FloatArray, kinds: NDArray[np.uint8], feeds: FloatArray, scale: tuple[float, float]
 ) -> NDArray[np.bool_]:
-    """Return for each segment whether it continues the one before: a line in the same direction at the same feed.
+    """Return for each segment whether it continues the previous segment: a line in the same direction at the same feed.
 
-    Each line must have the nearest numbers to decimals of a grid as ends. On this grid the middle point is a point of
-    the merged line without any rounding.
+    The end coordinates of each line must be the floating-point numbers nearest to decimals of a grid. On this grid the
+    common point lies exactly on the merged line.
 
     Args:
         positions: (n + 1, 3) ends of the segments, in the unit of the case.

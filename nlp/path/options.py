@@ -47,12 +47,12 @@ class PathOptions:
         between: interpolation between two points; None for linear angles, or for ``SLERP`` if a table of poses states
             quaternions, or axes and angles.
         angles: convention of a program's angles A, B and C; see :data:`.orientation.ORDERS`.
-        unit: length unit of a program before G20 or G21, ``"mm"`` or ``"in"``; None for that of the case if it is one
-            of these.
+        unit: length unit of a program before G20 or G21, ``"mm"`` or ``"in"``; None for the length unit of the case, if
+            this is mm or in.
         start: (6,) position X, Y, Z, A, B, C of the machine before a program, in machine coordinates; None if unknown:
             the path then begins at the first point with known X, Y and Z.
-        offsets: (6,) origin of each coordinate system in machine coordinates, by its name, such as ``"G54"``; 0 for the
-            others.
+        offsets: (6,) origin of each coordinate system in machine coordinates, by the system's name, such as ``"G54"``;
+            0 for a system without an entry.
         skips_deleted: If true, lines that begin with a slash are skipped, as by default in LinuxCNC.
         flavour: rules of reading a program: ``"linuxcnc"``, or ``"printer"`` for firmware of 3D printers.
         end_of_file: If true, the end of the file ends a program, as for printers; otherwise it needs M2, M30 or %.
@@ -91,7 +91,7 @@ class PathOptions:
 
     @classmethod
     def stated_in(cls, given: object) -> PathOptions:
-        """Return the options that a case or the premises of a proof state, with equal names.
+        """Return the options that a case or the premises of a proof state under the same names.
 
         Raises:
             InputError: an option has no meaning in the flavour of the program.
@@ -115,7 +115,7 @@ class PathOptions:
             reason = "has no meaning with the flavour printer: firmware of printers reads millimetres without offsets"
         else:
             wrong = {"part": self.part is not None, "macros": bool(self.macros)}
-            reason = "needs the flavour printer: LinuxCNC has no such programs"
+            reason = "is only for the flavour printer"
         for name in wrong:
             if wrong[name]:
                 raise InputError(f"{name} = {getattr(self, name)!r}: {reason}")
@@ -125,7 +125,7 @@ def code_of_unit(unit: str | None, units: Units) -> int | None:
     """Return the code of the initial unit of a program; None if it is unknown.
 
     Args:
-        unit: unit as in :class:`PathOptions`.
+        unit: length unit, see ``unit`` of :class:`PathOptions`.
         units: units of the case.
     """
     return {"mm": 21, "in": 20}.get(unit or units.length)

@@ -113,7 +113,7 @@ class ProgrammedPath:
     Attributes:
         source: name of the file.
         knots: (n + 1, 6) position and angles of the segment ends: segment k goes from knot k to knot k + 1. Knots and
-            arcs are in the path's frame if there is one, else in the world frame.
+            arcs are in the path's frame; without a frame, in the world frame.
         lines: (n,) line of the file, or row of a table, for each segment.
         kinds: (n,) kind of each segment.
         durations: (n,) duration of each segment, seconds; NaN if the file states neither time nor feed, as for rapid
@@ -165,7 +165,7 @@ class ProgrammedPath:
 
     @property
     def is_timed(self) -> bool:
-        """True if the file states the time of a motion."""
+        """True if the file states the time of at least one motion."""
         return bool(np.isfinite(self.durations[self.kinds != Kind.DWELL]).any())
 
     @property
@@ -187,7 +187,7 @@ class ProgrammedPath:
 
         Args:
             segments: (k,) indices of segments.
-            s: (k,) path parameters, from 0 to 1, or one for all.
+            s: (k,) path parameters, from 0 to 1; or one parameter for all segments.
         """
         index = np.asarray(segments, dtype=np.intp)
         parameter = np.broadcast_to(np.asarray(s, dtype=np.float64), index.shape)[:, None]

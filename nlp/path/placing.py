@@ -1,8 +1,8 @@
 """Placement of a path: translation and rotation of its frame in the world frame.
 
-Lines stay lines for every placement, and arcs in the plane XY stay such after a rotation about z: these paths are
-converted to world coordinates. Arcs in tilted planes, and linearly changing angles before another rotation, cannot be:
-such a path keeps its coordinates and has a frame.
+Lines stay lines for every placement, and arcs in the plane XY stay in this plane after a rotation about z: such paths
+are converted to world coordinates. Arcs in other planes, and linearly changing angles with another rotation of the
+frame, cannot be converted: such a path keeps its coordinates and has a frame.
 """
 
 from __future__ import annotations

@@ -47,7 +47,10 @@ def read_poses(text: str, source: str, units: Units, options: PathOptions) -> Pr
         raise InputError(f"{source}: {fault}")
     knots = np.hstack([table.block("x y z"), _angles(table, units)])
     if len(knots) < 2:
-        raise InputError(f"{source}: there is no path: fewer than two points below a row that names the columns")
+        raise InputError(
+            f"{source}: there is no path: fewer than two points; "
+            "expected a first row with the names of the columns, then two or more rows"
+        )
     path = ProgrammedPath(
         source,
         knots,
@@ -72,7 +75,9 @@ def _read_table(text: str, source: str) -> NumberTable:
     records = csv_rows(text, source)
     top, header = next(records, (0, []))
     if not header:
-        raise InputError(f"{source}: has no rows below a row that names the columns")
+        raise InputError(
+            f"{source}: has no rows: expected a first row with the names of the columns, then rows of values"
+        )
     found = check_header(header, _ROWS, lambda fault: CaseError(f"row {top}", fault, source=source))
     if {"t", "feed"} <= found.keys():
         raise CaseError(f"row {top}", "column 'feed' conflicts with 't'; keep one of them", source=source)

@@ -1,8 +1,8 @@
 """G-code programs of 3D printers as tool paths, by the rules of Klipper and Marlin.
 
-Points, arcs and offsets are those of :mod:`.gcode`. Different are the feed, which all motions share, and dwells in
-milliseconds; motions of the extruder alone are dwells. After homing, macros and motors off the position is unknown:
-they divide a program into parts, and one part is the path.
+Points, arcs and offsets are read as by :mod:`.gcode`. The differences: all motions share one feed, dwells are in
+milliseconds, and motions of the extruder only are dwells. After homing, macros and motors off the position is unknown:
+these commands divide a program into parts, and one part is the path.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def read_printer_program(lines: Iterable[str], source: str, units: Units, option
 
 
 class _Place(NamedTuple):
-    """Numbers of stored values before a part: of knots, segments and arcs."""
+    """Numbers of knots, segments and arcs before a part."""
 
     knots: int
     segments: int
@@ -125,7 +125,7 @@ class _Printer(Interpreter):
             self.has_motion, self.is_ended = True, False
 
     def _execute_command(self, name: str, words: dict[str, float]) -> None:
-        """Execute a line without a motion that it states."""
+        """Execute a line whose command is not a motion."""
         self.is_ended = self.is_ended or name in _ENDS or name in self.macros
         if name in STILL:
             self._check_retraction(name, words)
@@ -189,7 +189,7 @@ class _Printer(Interpreter):
         for letter, value in words.items():
             if letter in "LXYZUVWABC" and (name == "G10" or value):
                 which = "offsets of tools and coordinates are" if name == "G10" else "a lift of the tool is"
-                raise WordError(name, f"{which} not supported: the path would not be that of the file")
+                raise WordError(name, f"{which} not supported, because the path would differ from that in the file")
 
     def _dwell(self, words: dict[str, float]) -> None:
         if not {"P", "S"}.issuperset(words) or len(words) > 1:
@@ -201,7 +201,7 @@ class _Printer(Interpreter):
             self._wait(seconds)
 
     def _wait(self, seconds: float) -> None:
-        """Add a dwell to the path, if it has begun."""
+        """Add a dwell to the path, if the path has begun."""
         if self.is_known:
             self._add(Kind.DWELL, self.now, seconds)
 
@@ -222,12 +222,12 @@ class _Printer(Interpreter):
         return _Place(len(self.knots) // 6, len(self.lines), len(self.planes))
 
     def _hide(self, name: str) -> None:
-        """Make motions that are not in the file."""
+        """Record a command with motions that are not in the file, and lose the position."""
         self.hidden.setdefault(name, [self.line, 0])[1] += 1
         self._lose_position()
 
     def _lose_position(self) -> None:
-        """Begin a part at an unknown position; before any motion, a stated start remains."""
+        """Begin a part at an unknown position; before the first motion, a stated start position stays known."""
         if self.options.start is not None and not self.parts and not self.has_motion:
             return
         self._close_part()

@@ -120,7 +120,7 @@ def command_of(line: str) -> Command:
 
 
 def refuse(name: str) -> WordError:
-    """Return the error of a command that is neither acted on nor known to move nothing."""
+    """Return the error of an unsupported command, which may move the robot."""
     if name in _REFUSED:
         return WordError(name, _REFUSED[name])
     if name[0] == "T" and name[1:].isdigit():
@@ -135,12 +135,12 @@ def refuse(name: str) -> WordError:
 
 
 def is_closed(name: str) -> bool:
-    """Return True if a command is refused even as a macro: the path after it is not that of the file."""
+    """Return True if a command is refused even as a macro, because the path after it may differ from the file."""
     return name in _REFUSED
 
 
 def sign_of_printer(lines: Iterable[str]) -> str | None:
-    """Return the first sign that a program is a printer's, with its line; None without any."""
+    """Return the first sign that a program is for a printer, with the line of the sign; None without a sign."""
     for number, line in enumerate(lines, 1):
         found = _SIGNS.match(line)
         if found:
@@ -202,6 +202,6 @@ def _no_command(text: str) -> WordError:
 
 
 def _placeholder(text: str) -> WordError:
-    """Return the error of a placeholder."""
+    """Return the error of a placeholder, which a slicer replaces by a value."""
     at = min(text.find(sign) for sign in "{[" if sign in text)
     return WordError(shortened(text[at:]), "is a placeholder, which a slicer replaces by a value; read its output")

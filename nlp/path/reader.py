@@ -87,7 +87,7 @@ def path_of_text(text: str, source: str, units: Units, options: PathOptions | No
 
 
 def _path_of_program(lines: list[str], source: str, units: Units, options: PathOptions) -> ProgrammedPath:
-    """Return the tool path of a program in its flavour; a refused program of a printer is named as such.
+    """Return the tool path of a program in its flavour; an error says if the program is for a printer.
 
     Raises:
         InputError: the program cannot be read.
@@ -105,7 +105,7 @@ def _path_of_program(lines: list[str], source: str, units: Units, options: PathO
 
 
 def path_of_case(case: Case, options: PathOptions | None = None) -> ProgrammedPath:
-    """Return the tool path of a case, in its placement.
+    """Return the tool path of a case, in the placement that the case states.
 
     Args:
         case: the case.

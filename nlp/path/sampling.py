@@ -54,7 +54,7 @@ def spread_points(path: ProgrammedPath, most: int, also: Sequence[tuple[int, flo
 
     Args:
         path: the path.
-        most: number of points.
+        most: largest number of points before ``also`` is added.
         also: segments and path parameters of further points.
     """
     count, turned = len(path), np.abs(np.diff(path.knots[:, 3:], axis=0)).sum(axis=1)

@@ -45,7 +45,7 @@ def rest_length(positions: FloatArray) -> float:
 
 
 def standing(knots: FloatArray, order: Order, between: Between) -> NDArray[np.intp]:
-    """Return for each knot the index (n,) of the knot at which the platform came to rest there.
+    """Return for each knot the index (n,) of the first knot of the same rest.
 
     If the platform has not moved since an earlier knot, this is the earlier knot; otherwise it is the knot itself.
 
@@ -68,13 +68,13 @@ def standing(knots: FloatArray, order: Order, between: Between) -> NDArray[np.in
 
 
 def duration_at(way: FloatArray, turn: FloatArray, feeds: tuple[FloatArray, FloatArray], still: float) -> FloatArray:
-    """Return the times of motions at a feed, seconds: of the translation, or of a pure rotation.
+    """Return the times of motions, seconds: of the translation at its feed, or of the rotation without a translation.
 
     Args:
         way: lengths of the translations.
         turn: rotation angles, radians.
         feeds: feeds of translation (length per second) and of rotation (radians per second).
-        still: length of a translation that counts as a pure rotation.
+        still: largest length of a translation that counts as none.
     """
     of_way, of_turn = way / feeds[0], turn / feeds[1]
     # Neither translation nor rotation is a motion by itself: a part of one.
@@ -83,7 +83,7 @@ def duration_at(way: FloatArray, turn: FloatArray, feeds: tuple[FloatArray, Floa
 
 
 def _times_of_steps(path: ProgrammedPath, at: NDArray[np.intp]) -> FloatArray:
-    """Return the times of segments; successive short steps share the time of their motion."""
+    """Return the times (n,) of segments; the last of successive short steps gets the time of their whole motion."""
     found = path.durations.copy()
     ways, turns = path.lengths, turns_between(path.knots[:, 3:], path.order, path.between)
     most = rest_length(path.knots[:, :3])
@@ -105,7 +105,7 @@ def without_rests(path: ProgrammedPath, *, are_timed: bool) -> ProgrammedPath:
         are_timed: True if lines have their own times; such a line becomes a dwell.
 
     Raises:
-        InputError: the path has no other segment.
+        InputError: the path has only such lines.
     """
     at = standing(path.knots, path.order, path.between)
     still = (at[1:] < np.arange(1, len(path.knots))) & (path.kinds == Kind.LINE)

@@ -148,7 +148,7 @@ def _put(letter: str, number: str, codes: dict[str, float], groups: Mapping[floa
     """Add a code to the codes of a line.
 
     Raises:
-        WordError: the code is not supported, or excluded by another one.
+        WordError: the code is not supported, or conflicts with another code of the line.
     """
     code = float(number)
     group, name = groups.get(code), f"{letter}{code:.6g}"

@@ -34,7 +34,7 @@ def with_pairs_at(nlp: Nlp, points: Iterable[FloatArray]) -> Nlp:
 
 
 def with_pairs(nlp: Nlp, places: Iterable[PairPlace]) -> Nlp:
-    """Return a program with constraints on further pairs, after all others; unchanged if it already has all pairs.
+    """Return a program with constraints on further pairs at the end; unchanged if it already has all pairs.
 
     Pairs of a symmetric robot that are the same function become one constraint.
     """

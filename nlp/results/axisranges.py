@@ -21,7 +21,7 @@ class AxisRangesResult(JsonObject):
         pose: position, and roll, pitch and yaw.
         largest: largest travel in the search, length and angle.
         faults: claims that are not proved at the pose itself.
-        axes: ranges of the independent coordinates, with the others held.
+        axes: range of each independent coordinate while the other independent coordinates keep their values.
         pairs: ranges of the pairs of independent coordinates.
         not_alone: names of the dependent coordinates, which move with the independent coordinates.
         reason: reason for the end of the search before all axes and pairs were examined; absent otherwise.

@@ -132,7 +132,7 @@ def checks_of(checks: Sequence[CaseCheck]) -> ChecksResult:
 
 
 def check(names: Sequence[str] | None = None) -> list[CaseCheck]:
-    """Solve cases and check their expected and published values; a case that others refer to is solved once.
+    """Solve cases and check their expected and published values; a case to which other cases refer is solved once.
 
     After a request to stop, the cases that are checked so far are returned.
 
@@ -262,7 +262,7 @@ def _check_published(
         return _published(row, (), f"the case has no answer: it is {result.status.value}", found=False)
     if len(computed) != len(row.value):
         source = case.source or name
-        fault = f"must name a number of the result, with {len(row.value)} component{'s' * (len(row.value) != 1)}"
+        fault = f"must name a quantity of the result, with {len(row.value)} component{'s' * (len(row.value) != 1)}"
         raise CaseError(f"published: {row.quantity}", fault, source=source)
     halves = [0.5 * 10.0 ** -(decimals_of(value) if row.decimals is None else row.decimals) for value in row.value]
     off = max(abs(c - v) / h for c, v, h in zip(computed, row.value, halves, strict=True))

@@ -62,7 +62,8 @@ def refuted_claims(result: WorkspaceResult) -> Iterator[PosedClaim]:
 def worst_claim(result: WorkspaceResult, sense: Sense) -> PosedClaim | None:
     """Return the claim with the largest excess over its limit, or with the smallest margin, and its pose.
 
-    A singular pose is worse than any limit. Without limits it is the worst F. None if no pose is known.
+    A singular pose is worse than any violated limit. Without limits, the claim with the worst F is returned. None is
+    returned if no pose is known.
 
     Args:
         result: verdicts over the workspace.

@@ -107,7 +107,7 @@ class ComparedRobotData(JsonObject):
         dimensions: dimensions of the design; empty without an answer.
         active: active bounds and limits.
         singularities: clauses about singularities of the design.
-        limits_kept: number of the case's limits that the robot satisfies.
+        limits_kept: number of the case's limits that the design satisfies; 0 without an answer.
         limits_left_out: limits that do not apply to the robot.
         certificate: proved bound; null without a proof.
         certificate_fault: reason why there is no certificate; absent with a certificate, or if none was requested.

@@ -43,7 +43,8 @@ class OptimumData(JsonObject):
     Attributes:
         F: objective.
         count: number of starts that ended at the optimum.
-        spread: largest distance of these points along a variable, divided by its range; 0 for an isolated optimum.
+        spread: largest distance between the end points of these starts along a variable, divided by the variable's
+            range; 0 for an isolated optimum.
         assembly: assembly mode in a few words, if it is not, or may not be, that of home; empty for the home mode,
             absent for a robot without loops.
     """

@@ -15,7 +15,7 @@ from .point import head_data, objective, robot_data, task_data, versions, violat
 
 
 class EvaluatedTaskData(JsonObject):
-    """Task at the point.
+    """Task at the evaluated point.
 
     Attributes:
         task: the task.

@@ -32,8 +32,8 @@ class JointsData(JsonObject):
     """Joints of a robot defined by joints, at its first pose.
 
     Attributes:
-        freedoms: degrees of freedom of the platform with free actuators.
-        feasible: If true, the platform can make the task's motion with free actuators; absent with several tasks.
+        freedoms: degrees of freedom of the platform with unlocked actuators.
+        feasible: If true, the platform can make the task's motion with unlocked actuators; absent with several tasks.
         actuators: actuators with their rates for the task's motion; absent with several tasks.
         constrained: fraction of F from constraint wrenches, 0 to 1; 0 for a motion that the platform can make.
         limb_parts: F by limb, split into actuation and constraint wrenches; absent with several tasks.

@@ -1,6 +1,6 @@
 """Parts of several kinds of result: the case, poses, motions, the robot at a point, limits and their margins.
 
-Values are in the case's units. None is NaN or infinite; an infinite pitch is the string ``"inf"``.
+Values are in the case's units. No value is NaN or infinite; an infinite pitch is the string ``"inf"``.
 """
 
 import math
@@ -165,9 +165,10 @@ class RobotData(JsonObject):
         limited_quantities: further quantities that the case limits, by name and limb: joint angles from stated mounting
             axes, and leg lengths of a robot defined by joints; absent without any.
         characteristic_length: factor between couples and forces; absent for robots without constraint couples.
-        length_dependence: relative derivative of F with respect to the characteristic length, ``(l / F) dF/dl``;
-            absent without that length, where F is 0, and with several tasks.
-        joints: degrees of freedom, actuator rates and singularities of a robot defined by joints; absent for others.
+        length_dependence: relative derivative of F with respect to the characteristic length, ``(l / F) dF/dl``; absent
+            without a characteristic length, for F = 0, and with several tasks.
+        joints: degrees of freedom, actuator rates and singularities of a robot defined by joints; absent for other
+            robots.
         free_joints: actuator coordinates that the pose does not determine, at every pose; absent if there are none.
         loading: forces and speeds of the actuators; absent without loads and motions.
         several: robot at every pose; absent for a single pose.

@@ -52,8 +52,8 @@ class PathVerdictData(VerdictData):
 
     Attributes:
         line: line of the file, or row of a table, of the segment with the pose; null if no pose is known.
-        segment: index of this segment, from 0; null likewise.
-        parameter: parameter along this segment, from 0 to 1; null likewise.
+        segment: index of this segment, from 0; null if no pose is known.
+        parameter: parameter along this segment, from 0 to 1; null if no pose is known.
         fault: first known point of the path that refutes the claim; absent for another outcome.
     """
 
@@ -68,7 +68,7 @@ class PathActuatorData(JsonObject):
 
     Attributes:
         actuator: name of the actuator.
-        unit: unit of its coordinate.
+        unit: unit of the actuator coordinate.
         smallest: proved smallest coordinate; null if nothing is proved.
         largest: proved largest coordinate; null if nothing is proved.
         speed: proved largest speed in the motion of the path, unit per second; absent without times.
@@ -153,9 +153,9 @@ class PlaceData(JsonObject):
     """Placement of a path's frame in the world.
 
     Attributes:
-        x: x coordinate of its origin.
-        y: y coordinate of its origin.
-        z: z coordinate of its origin.
+        x: x coordinate of the frame's origin.
+        y: y coordinate of the frame's origin.
+        z: z coordinate of the frame's origin.
         roll: first rotation, about the world's x.
         pitch: second rotation, about the world's y.
         yaw: third rotation, about the world's z.
@@ -174,7 +174,7 @@ class PathProofData(ExchangeData):
 
     Attributes:
         file: name of the path's file.
-        segments: number of its segments.
+        segments: number of segments of the path.
         place: placement of the path's frame.
         claims: verdicts, ranks first.
     """
@@ -257,7 +257,7 @@ def _fault(each: "Verdict", fault: "Fault", judged: "Judgement") -> PathFaultDat
 
 
 def _knots_data(units: "Units", knots: "Knots") -> PathKnotsData:
-    """Return the knots of a table."""
+    """Return the summary of the knots: their number, the number of reached knots, and the proved deviation."""
     within, deviation = (
         None if each is None else units.shown(each, Dimension.LENGTH) for each in (knots.within, knots.deviation)
     )

@@ -65,7 +65,7 @@ def robot_of(result: Answer, source: str, case: Case, *, of_any_case: bool = Fal
         raise InputError(f"{source}: has the units {units.length!r} and {units.angle!r}, but the case has {own}")
     robot = result.robot
     if robot is None or (not isinstance(result, EvaluationResult) and not result.status.is_answer):
-        raise InputError(f"{source}: contains no answer: the solve has failed{_reached_words(robot, case)}")
+        raise InputError(f"{source}: contains no answer: the solve failed{_reached_words(robot, case)}")
     return robot
 
 

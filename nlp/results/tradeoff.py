@@ -230,7 +230,7 @@ def _values_about(limit: float) -> list[float]:
 
 
 def _is_allowed(case_at: Callable[[float], Case], value: float) -> bool:
-    """Return whether the case with a value is valid: some limits cannot be this large, or contradict others."""
+    """Return whether the case with a value is valid: some limits cannot be this large, or contradict other limits."""
     try:
         case_at(value)
     except CaseError:

@@ -60,7 +60,7 @@ class RegularData(JsonObject):
         share: volume of the undecided boxes, as a fraction of the box of poses.
         seconds: wall time.
         engine: ``c``, or ``none`` where no search was made.
-        reason: reason for an early end, or method of a singular pose that is not between two poses; absent without one.
+        reason: reason for an early end, or method of a singular pose that is not between two poses; otherwise absent.
         machine: joint-centre errors of the singular robot; absent if the claim is not refuted, or the exact robot is
             singular.
     """
@@ -85,14 +85,15 @@ class VerdictData(JsonObject):
         unit: unit of the values; empty for a plain number, absent for a rank.
         sense: smallest or largest value; absent for a rank.
         bound: proved bound: no pose has a smaller, or larger, value; null if nothing is proved, or for a rank.
-        reached: smallest or largest known value; null without one, and for a rank.
-        key: dotted key, below ``limits``, of the limit in the case; absent without one.
+        reached: smallest or largest known value; null if no value is known, and for a rank.
+        key: dotted key, below ``limits``, of the limit in the case; absent without a limit.
         limit: the limit; absent without one.
         outcome: outcome of the limit or rank; for a quantity without a limit, ``proved`` if the gap was reached.
-        pose: pose with the value, singular pose, or centre of the widest undecided box of a rank; null without one.
+        pose: pose with the value, singular pose, or centre of the widest undecided box of a rank; null if no pose is
+            known.
         boxes: number of examined boxes; absent in results of earlier versions along a path.
         seconds: wall time; absent in results of earlier versions along a path.
-        reason: reason for an open outcome, or how a singular pose was computed; absent without one.
+        reason: reason for an open outcome, or how a singular pose was computed; otherwise absent.
         machine: joint-centre errors of the robot that has the value at the pose; absent for the exact robot.
     """
 

@@ -72,7 +72,7 @@ class MotorData(JsonObject):
 class ScaleData(JsonObject):
     """Largest factor by which the box of poses can grow about its centre so that all claims stay proved.
 
-    The radius alone grows where the positions are a disc, ring, cylinder, ball or cone.
+    Only the radius grows if the positions are a disc, ring, cylinder, ball or cone.
 
     Attributes:
         factor: largest factor with a proof; null if no box is proved.
@@ -247,7 +247,7 @@ def scale_data(found: "Scale", units: Units) -> ScaleData:
 
 
 def _fixed(value: object) -> float:
-    """Return a fixed number."""
+    """Return a dimension as a number; refuse a free dimension."""
     if not isinstance(value, float):
         raise TypeError(f"a robot to be verified must have fixed dimensions, got {value!r}")
     return value

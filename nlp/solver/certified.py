@@ -174,13 +174,16 @@ def _check_writable(case: Case, *, is_rounded: bool) -> None:
         OptionError: a case file cannot represent the program.
     """
     if is_rounded:
-        fault = "proof: a proof file refers to the dimensions of a case, and rounded dimensions are not in it"
+        fault = "proof: a proof file refers to the dimensions in the case, but rounded dimensions are not in the case"
         raise OptionError(f"{fault}; give them with --set instead of rounding")
     if catalogue_dimensions(case):
-        raise OptionError("proof: each combination of listed values is a separate program; give the values with --set")
+        raise OptionError(
+            "proof: each combination of listed values is a separate nonlinear program; give the values with --set"
+        )
     if case.is_optimised_everywhere:
         raise OptionError(
-            f"proof: no case file contains the poses of the {case.limits_over} from which the bound follows"
+            f"proof: not supported with limits.over = {case.limits_over!r}: the case does not contain the poses "
+            "from which the bound follows"
         )
 
 
@@ -215,7 +218,9 @@ def _certify(
         except InputError as error:
             raise OptionError(str(error)) from None
     if several and with_proof and case.method is Method.AVERAGE:
-        raise OptionError("proof: averaged tasks have no common program whose optimum could be proved")
+        raise OptionError(
+            "proof: no optimum can be proved for averaged tasks: set combine.method to 'weighted-sum' or 'worst-case'"
+        )
     nlps = formulate_tasks(case) if given is None else [outcome.own.nlp for outcome in given.outcomes]
     with_mode = not all_assemblies and has_modes(case.model)
     if given is None and nlps[0].n:

@@ -256,7 +256,7 @@ def _is_unique(solution: ProgramSolution) -> bool:
 
 
 def _known_members(solution: ProgramSolution) -> list[FloatArray]:
-    """Return known points of an optimal set: one for each isolated optimum, all starts' points on a connected set."""
+    """Return known points of an optimal set: one for each isolated optimum; on a connected set, of all starts."""
     if not solution.optima:
         return [np.array(solution.x)]
     tolerance = same_value(solution.nlp)

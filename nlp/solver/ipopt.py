@@ -165,7 +165,7 @@ def _given_derivatives(nlp: Nlp) -> tuple[dict[str, MX], dict[str, Any]]:
 
 
 def constraint_sizes(nlp: Nlp, points: FloatArray) -> FloatArray:
-    """Return typical gradient lengths (c,) of the limits in scaled variables, by which Ipopt's rows are divided.
+    """Return the largest sampled gradient lengths (c,) of the limits in scaled variables, which divide Ipopt's rows.
 
     Other constraints have gradients of length about 1 and the divisor 1, unless narrow ranges make gradients small.
     """

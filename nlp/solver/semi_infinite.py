@@ -110,7 +110,7 @@ class SemiInfinite(NamedTuple):
 
     Attributes:
         nlp: nonlinear program without constraints at poses.
-        constraints: constraints at poses, none yet.
+        constraints: constraints at poses; none at the beginning.
         judge: function that judges the design of a solution, with a gap.
         in_world: function that converts the poses of a proof to the world frame, for a point (n,) of the program.
     """
@@ -254,7 +254,7 @@ def with_objective(design: Case, level: float) -> Case:
 
 
 def _judged(case: Case, gap: float) -> Judgement:
-    """Return the verdicts on a design over its workspace; only those on reach if a limb does not reach every pose."""
+    """Return the verdicts on a design over its workspace; only verdicts on reach if a limb cannot reach every pose."""
     closed, workspace = closed_form(case.model), workspace_of_case(case)
     # Poses that the robot cannot take are no evidence about the reach of its limbs.
     if workspace.position_set is not None:

@@ -231,8 +231,8 @@ class Solution(Whole, Shown, Answer):
     """The answer to a case.
 
     For a case with one task, ``F``, ``nlp``, ``starts``, ``optima`` and ``relaxation`` are those of its program. For
-    several tasks, ``F`` raises an error, and the others are those of the combined program; for an average they raise an
-    error too.
+    several tasks, ``F`` raises an error, and the other attributes are those of the combined program; for an average
+    they raise an error too.
 
     ``solution["x1"]`` is a parameter or pose coordinate at the point, in the units of the case, by its name for
     ``--set``: a parameter, a component such as ``base_1_x``, ``p_x``, ``p_y``, ``p_z``, ``angle``, or ``axis``.

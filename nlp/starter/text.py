@@ -338,7 +338,7 @@ def _workspace_lines(model: Model, home: Home, units: Units) -> list[str]:
 
 
 def _turning_about(model: Model, home: Home, reach: float, turn: float) -> list[str]:
-    """Return those of roll, pitch and yaw that a robot changes over a workspace about home: the others stay 0.
+    """Return which of roll, pitch and yaw a robot changes over a workspace about home; other angles stay 0.
 
     Args:
         model: the robot.

@@ -139,12 +139,12 @@ def sweep_designs(sweep: Sweep, rows: Sequence[Row]) -> Designs[Row]:
 
 
 def is_drawn(points: Points) -> bool:
-    """Return whether points are a grid over one or two varied names, over which F can be drawn."""
+    """Return whether points are a grid over one or two varied quantities, over which F can be drawn."""
     return 1 <= sum(len(axis) > 1 for axis in points.axes) <= 2
 
 
 def check_drawn(points: Points) -> None:
-    """Refuse a picture of a sweep that is not a grid over one or two varied names.
+    """Refuse a picture of a sweep that is not a grid over one or two varied quantities.
 
     Raises:
         InputError: the points are not such a grid.
@@ -286,7 +286,7 @@ def row_reader(sweep: Sweep, names: Sequence[str] | None = None) -> Callable[[Se
 
 
 def stated_pose_note(case: Case, notes: Iterable[str]) -> str | None:
-    """Return the note that limits over the workspace are only checked at the stated pose, if a row has it.
+    """Return the note that limits over the workspace are only checked at the stated pose, if a row has this note.
 
     Args:
         case: case at one of the points.

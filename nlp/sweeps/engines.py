@@ -51,7 +51,7 @@ def solve_point(
 
     Args:
         source: case as text.
-        settings: values of the varied names at the point.
+        settings: values of the varied quantities at the point, by name.
         index: index of the point.
         starts: number of starting points.
         seed: seed that replaces the seed of the case.
@@ -151,7 +151,7 @@ class CompiledEngine:
         self, source: CaseSource, chosen: Points, starts: int, seed: int | None, threads: int | None = None
     ) -> None:
         if starts > MOST_STARTS:
-            raise NotPlacedError(f"compiled C has at most {MOST_STARTS} starting points, and {starts} are requested")
+            raise NotPlacedError(f"compiled C has at most {MOST_STARTS} starting points, but {starts} are requested")
         self.source, self.names, self.starts, self.seed, self.threads = source, chosen.names, starts, seed, threads
         self.places: Places = place(source, chosen)
         self.library = _compile(self.places)
@@ -293,7 +293,6 @@ class Job(NamedTuple):
     """Sweep without points: case, names and settings.
 
     Attributes:
-        source: the case.
         source: case as text.
         names: varied parameters, bounds and limits.
         chosen: values at the points at which nonlinear programs are compared.
@@ -318,7 +317,7 @@ class Job(NamedTuple):
 
 
 class Choice(NamedTuple):
-    """Kind of engine, and the reason for Ipopt; empty for the compiled engine or a requested one."""
+    """Kind of engine, and the reason why Ipopt is used; the reason is empty for a compiled or a requested engine."""
 
     kind: EngineKind
     reason: str

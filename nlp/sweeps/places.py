@@ -171,7 +171,9 @@ def place(source: CaseSource, chosen: Points) -> Places:
     tables = tomllib.loads(source.text)
     programs = {k: _program(case) for k, case in existing_cases(source, chosen)}
     if not programs:
-        raise NotPlacedError("the robot does not exist at the points for the comparison of programs")
+        raise NotPlacedError(
+            "the robot cannot be assembled at any of the points that the sweep tests before it compiles the case"
+        )
     nlp = next(iter(programs.values()))
     program = nlp.program
     limits = run_time_limits(nlp, "sweep")
@@ -204,7 +206,7 @@ def place(source: CaseSource, chosen: Points) -> Places:
             k = keys.index(key) if key in keys else keys.index(f"{key}.max")
             limited[column] = (k, nlp.case.units.to_internal(1.0, limits.limits[k].dimension))
         else:
-            raise NotPlacedError(f"{name} changes the structure of the nonlinear program")
+            raise NotPlacedError(f"compiled C cannot vary {name}, which changes the structure of the nonlinear program")
     found = Places(nlp, limits, arguments, bounds, limited, task, written)
     for k, other in programs.items():
         _compare(found, other, chosen.values[[k]])
@@ -219,18 +221,18 @@ def _program(case: Case) -> Nlp:
         CaseError: the case contradicts itself.
     """
     if len(case.tasks) > 1:
-        raise NotPlacedError("the case has several tasks")
+        raise NotPlacedError("compiled C supports one task, but the case has several")
     nlp = formulate(case)
     if not nlp.n:
-        raise NotPlacedError("the case has no variables")
+        raise NotPlacedError("compiled C needs one variable or more, but the case has none")
     if nlp.program.places.epigraph is not None:
-        raise NotPlacedError("F is the worst case over several poses")
+        raise NotPlacedError("compiled C does not support the worst F of several poses")
     if nlp.program.model.closure or nlp.program.model.loops:
-        raise NotPlacedError("the robot has loop equations")
+        raise NotPlacedError("compiled C does not support robots with loop equations")
     if nlp.program.model.unknowns:
-        raise NotPlacedError("the robot has free actuator coordinates")
+        raise NotPlacedError("compiled C does not support robots with free actuator coordinates")
     if nlp.constant_limits:
-        raise NotPlacedError("the case has limits that involve only fixed parameters")
+        raise NotPlacedError("compiled C does not support limits that involve only fixed parameters")
     return with_all_pairs(nlp)
 
 
@@ -258,4 +260,4 @@ def _compare(places: Places, other: Nlp, values: FloatArray) -> None:
         close = np.allclose([one.F, *one.g], [two.F, *two.g], rtol=_SAME_VALUE, atol=_SAME_VALUE, equal_nan=True)
         is_same = is_same and bool(close)
     if not is_same:
-        raise NotPlacedError("the structure of the nonlinear program differs between points")
+        raise NotPlacedError("compiled C needs the same structure of the nonlinear program at all points")

@@ -73,7 +73,7 @@ def grid(texts: Sequence[str]) -> Points:
         texts: texts of the form ``NAME=FIRST:LAST:COUNT`` or ``NAME=V1,V2,...``.
 
     Raises:
-        InputError: a text has another form, a name occurs twice, or there are too many points.
+        InputError: a text does not have this form, a name occurs twice, or there are too many points.
     """
     read = [_read_axis(text) for text in texts]
     return grid_of(tuple(name for name, _ in read), [values for _, values in read])
@@ -101,7 +101,7 @@ def points_of_csv(text: str, source: str) -> Points:
         source: name of the file for messages.
 
     Raises:
-        InputError: the file has no points, a row has another length, or a value is not a finite number.
+        InputError: the file has no points, a row has not one cell for each name, or a value is not a finite number.
     """
     records = csv_rows(text, source)
     _, names = next(records, (0, []))

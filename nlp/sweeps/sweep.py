@@ -120,7 +120,7 @@ def run_sweep(
         notice: function called with the reason if Ipopt replaces the compiled engine.
 
     Raises:
-        CaseError: a name is unknown in the case, or its smallest or largest value is not allowed.
+        CaseError: a name is unknown in the case, or the smallest or largest value of a name is not allowed.
         InputError: the engine or the cluster is not available, or the journal cannot be written.
     """
     missing = journal.missing

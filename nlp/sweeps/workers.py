@@ -71,7 +71,7 @@ def answer_in_processes(job: Job, blocks: Iterable[PointBlock], count: int) -> I
                     first = block.indices[0]
                     deaths[first] = deaths.get(first, 0) + 1
                     if deaths[first] >= _DEATHS:
-                        fault = f"ended {_DEATHS} processes without a result; the results of earlier points are kept"
+                        fault = f"{_DEATHS} processes ended without a result; the results of earlier points are kept"
                         raise InputError(f"point {first}: {fault}") from None
                     workers.discard(worker)
                     waiting.append(block)
@@ -176,7 +176,10 @@ def answer_on_cluster(job: Job, blocks: Iterable[PointBlock], address: str) -> I
             error = future.exception() if future.status != "cancelled" else OSError("cancelled")
             if error is not None:
                 if tries >= _RETRIES:
-                    fault = f"point {block.indices[0]} was lost {tries + 1} times: {type(error).__name__}: {error}"
+                    fault = (
+                        f"the worker that solved point {block.indices[0]} was lost {tries + 1} times: "
+                        f"{type(error).__name__}: {error}"
+                    )
                     raise InputError(f"--dask {address}: {fault}; the results of earlier points are kept")
                 running.add(submit(block, tries + 1))
                 continue

@@ -157,8 +157,8 @@ class JsonObject:
     def entries(cls) -> tuple[Entry, ...]:
         """Return the fields that JSON has, for :func:`.entries_of`.
 
-        A type whose module few commands need stands in an annotation as text, such as ``Absent["ProofData"]``. Who
-        reads such a value, or makes its schema, has imported that module.
+        A type whose module few commands need stands in an annotation as text, such as ``Absent["ProofData"]``. Code
+        that reads such a value, or makes its schema, must have imported that module.
         """
         objects = {each.__name__: each for each in _subclasses(JsonObject)}
         kinds = get_type_hints(cls, localns=objects, include_extras=True)
@@ -191,7 +191,7 @@ def _field(name: str, kind: object) -> Field:
 
 
 def _entry(name: str, field: Field, kind: object) -> Entry:
-    """Return what JSON has of a field with an annotation.
+    """Return the declaration of a JSON field from its annotation.
 
     Raises:
         TypeError: a part that is no object stands inline.

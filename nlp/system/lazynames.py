@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def lazy_names(module: str, package: str, file: str) -> tuple[list[str], Callable[[str], object]]:
     """Return the names in a module's stub, sorted, and the module's ``__getattr__``.
 
-    Names with underscores are left to the module itself.
+    The module itself must define names that begin with an underscore.
 
     Args:
         module: full name of the module.

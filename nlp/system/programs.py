@@ -100,9 +100,12 @@ def _compiler() -> str:
     found = first_program(wanted)
     if found:
         return found
-    raise InputError(
-        f"no C compiler is installed: {' or '.join(wanted)} is needed; the variable CC may name another one"
-    )
+    if os.environ.get("CC"):
+        raise InputError(
+            f"the environment variable CC names {wanted[0]}, which is not installed; "
+            "correct CC, or unset it to use cc, gcc or clang"
+        )
+    raise InputError("no C compiler is installed: install cc, gcc or clang, or name another one in the variable CC")
 
 
 def _run(words: list[str]) -> str:

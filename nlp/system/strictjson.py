@@ -146,7 +146,7 @@ def _unique(pairs: Iterable[tuple[str, object]]) -> dict[str, object]:
 
 
 def value_of(kind: object, value: object, key: str = "") -> Any:  # noqa: ANN401 - kind's
-    """Return a value of JSON as an annotation has it; a list becomes a tuple.
+    """Return a JSON value converted to the type of an annotation; a list becomes a tuple.
 
     Args:
         kind: the annotation: a plain type, an enumeration, a class of :func:`object_of`, ``Literal``, a union, a tuple
@@ -237,7 +237,7 @@ def entries_of(kind: Any) -> tuple[Entry, ...]:  # noqa: ANN401 - a data class, 
 
 @cache
 def _entries_of(kind: Any) -> tuple[Entry, ...]:  # noqa: ANN401 - as above
-    """Return the same; they are wanted for each object of the class."""
+    """Return the fields as :func:`entries_of`, cached, because every object of the class needs them."""
     if not dataclasses.is_dataclass(kind):
         found: tuple[Entry, ...] = kind.entries()
         return found

@@ -85,17 +85,17 @@ def _factor_words(factor: float | None) -> str:
 
 
 def _pair_words(pair: PairRange) -> str:
-    """Return the claim that limits two coordinates."""
+    """Return, in words, the claim that limits two coordinates."""
     return "single-axis ranges only" if pair.stop is None else _stop_words(pair.stop)
 
 
 def _end_words(end: RangeEnd) -> str:
-    """Return the claim that limits an end of a range."""
+    """Return, in words, the claim that limits an end of a range."""
     return "the search range" if end.stop is None else _stop_words(end.stop)
 
 
 def _stop_words(stop: RangeStop) -> str:
-    """Return a claim that is not proved: a violation, or an undecided claim."""
+    """Return, in words, a claim that is not proved: a violation, or an undecided claim."""
     if stop.outcome is Outcome.OPEN:
         name = CLAIM_WORDS.get(stop.name, stop.name)
         return f"{OUTCOME_WORDS[Outcome.OPEN]}: {name}" + (f", {stop.reason}" if stop.reason else "")

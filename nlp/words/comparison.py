@@ -59,7 +59,7 @@ def comparison_columns(result: ComparisonResult) -> Iterator[Column[ComparedRobo
     for k, task in enumerate(tasks):
         yield from _task_columns(k, task, is_shown=several)
     yield Column("", _constraints, label="constraint wrenches", unit="% of F", text=_constraints)
-    yield Column("", _largest_rate, label="largest rate", text=_largest_rate)
+    yield Column("", _largest_rate, label="largest actuator rate", text=_largest_rate)
     yield Column("factor", lambda robot: robot.factor)
     yield Column("size", lambda robot: robot.size)
     yield Column(
@@ -73,10 +73,10 @@ def comparison_columns(result: ComparisonResult) -> Iterator[Column[ComparedRobo
     yield _joined("active", lambda robot: robot.active)
     yield Column(
         "limits_kept",
-        lambda robot: robot.limits_kept,
+        lambda robot: None if robot.part == "no answer" else robot.limits_kept,
         holds=int,
         label="limits satisfied" if result.limits > 0 else "",
-        text=lambda robot: f"{robot.limits_kept} of {result.limits}",
+        text=lambda robot: "" if robot.part == "no answer" else f"{robot.limits_kept} of {result.limits}",
     )
     yield _joined("limits_left_out", lambda robot: (each.key for each in robot.limits_left_out))
     yield _joined("singularities", lambda robot: robot.singularities)
@@ -117,7 +117,7 @@ def _task_columns(k: int, task: ComparedTaskData, *, is_shown: bool) -> Iterator
 
 
 def _joined(name: str, texts: Callable[[ComparedRobotData], Iterable[str]]) -> Column[ComparedRobotData]:
-    """Return a column of several texts in a cell."""
+    """Return a column whose cells list several texts."""
     return Column(name, lambda robot: SEPARATOR.join(texts(robot)), holds=str)
 
 

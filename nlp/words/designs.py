@@ -56,7 +56,7 @@ class Column(Generic[Row]):
         label: name in tables of text, pages and pictures; empty for a column that only CSV has.
         unit: unit of the values; empty for a plain number.
         text: returns the text of a row in tables.
-        series: name of the line in pictures; empty for the label.
+        series: name of the line in pictures; if empty, the line has the label as name.
     """
 
     name: str

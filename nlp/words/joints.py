@@ -94,7 +94,7 @@ def joint_lines(robot: RobotData, joints: JointsData, units: Units) -> Iterator[
         words = f"the platform cannot follow this motion exactly; {part} % of F is constraint wrenches, not actuation"
         yield Line(words, label="note")
     possible = ", including the task's motion" if joints.feasible and robot.task_is_free is False else ""
-    yield Line(f"{joints.freedoms} with free actuators{possible}", label="degrees of freedom")
+    yield Line(f"{joints.freedoms} with unlocked actuators{possible}", label="degrees of freedom")
     for each in joints.singularities:
         yield from _singularity_lines(each, robot, units)
     for sentence in joints.assembly:

@@ -376,12 +376,17 @@ def certificate_lines(certificate: CertificateData | None) -> Iterator[Line]:
     tone = Tone.ANSWER if certificate.status is CertificateStatus.PROVED else Tone.NO_ANSWER
     yield Line(certificate.statement, label="certificate", tone=tone)
     if certificate.gap is not None:
-        share = "" if certificate.relative_gap is None else f" (relative {certificate.relative_gap:.2e})"
-        yield Line(f"{certificate.gap:.3g}{share}", label="gap", part="search")
+        share = "" if certificate.relative_gap is None else f"{certificate.relative_gap:.2e} relative, "
+        yield Line(f"{share}{certificate.gap:.3g} in F", label="gap", part="search")
     left = f", {certificate.open:,} undecided," if certificate.open else ""
     word = "box" if certificate.boxes == 1 else "boxes"
     boxes = f"{certificate.boxes:,} {word} examined{left} in {certificate.seconds:.2f} s"
-    yield Line(f"{boxes}, engine {certificate.engine}", label="search", part="search")
+    yield Line(f"{boxes}{engine_words(certificate.engine)}", label="search", part="search")
+
+
+def engine_words(engine: str) -> str:
+    """Return the words about the engine of a search; empty without a search."""
+    return " by compiled C" if engine == "c" else ""
 
 
 def choice_lines(

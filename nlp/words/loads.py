@@ -51,10 +51,11 @@ def _force_table(case: Case, loads: Sequence[HeldLoad]) -> TextTable:
 
 
 def _constraint_table(case: Case, loads: Sequence[HeldLoad], length: float) -> Iterator[TextTable]:
-    """Yield the constraint wrenches of the limbs under loads, if statics determines one or more of these wrenches.
+    """Yield a table of the constraint wrenches of the limbs under loads, if statics determines at least one of them.
 
-    Constraint wrenches balance the part of a load that actuator forces do not balance. The rounding error is relative
-    to the load; for moments, to the load times the robot's ``length``.
+    Constraint wrenches balance the part of a load that actuator forces do not balance. A force within the rounding
+    error of the load is shown as 0, and so is a moment within the rounding error of the load times the robot's
+    ``length``.
     """
     rows = []
     for load in loads:
@@ -74,9 +75,10 @@ def _constraint_table(case: Case, loads: Sequence[HeldLoad], length: float) -> I
 
 
 def _deflection_table(case: Case, loads: Sequence[HeldLoad], length: float) -> Iterator[TextTable]:
-    """Yield the platform's displacement under every load, if the actuators' stiffness is known.
+    """Yield a table of the platform's displacements under every load, if the actuators' stiffness is known.
 
-    Rounding errors are relative to the larger of the translation and the rotation times the robot's ``length``.
+    A value is shown as 0 within the rounding error of the translation, or of the rotation times the robot's ``length``,
+    whichever is larger.
     """
     rows = []
     for load in loads:

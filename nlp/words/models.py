@@ -61,9 +61,11 @@ def model_words(name: str, model: Model | None, options: Sequence[ModelOption]) 
     if model.structure:
         yield from _freedom_lines(model)
         if model.legs:
-            words = f"{', '.join(leg.name for leg in model.legs)} (limits on leg lengths apply)"
+            words = f"{', '.join(leg.name for leg in model.legs)} (a case can limit their lengths: leg_length)"
             yield Line(words, label="straight legs")
-    words = "in the task, limb wrenches of magnitudes f_i have together a power of at most sqrt(sum f_i^2) sqrt(F)"
+    words = (
+        "in the motion of a task, limb wrenches of magnitudes f_i have a total power of at most sqrt(sum f_i^2) sqrt(F)"
+    )
     yield Line(words if not model.actuators else f"{words}; for actuator forces state [[load]]", label="power")
     if model.quantities:
         rows = [(item.name, item.dimension.value, item.description) for item in model.quantities]
@@ -87,7 +89,7 @@ def _freedom_lines(model: Model) -> Iterator[Line]:
     """Yield the degrees of freedom and the ranks of a robot defined by joints."""
     if model.generic is not None:
         freedoms, rank = 6 - model.generic.constraints, model.rank
-        yield Line(f"{freedoms} with free actuators", label="degrees of freedom")
+        yield Line(f"{freedoms} with unlocked actuators", label="degrees of freedom")
         yield Line(f"{rank} of J, {model.generic.constraints} of the constraint wrenches", label="ranks")
         if model.generic.undetermined:
             yield Line(idle_words(model.generic.undetermined), label="note")
@@ -110,7 +112,7 @@ def _loop_words(model: Model) -> Iterator[Line | TextTable]:
         (each.name, each.opened, str(each.unknowns), str(each.equations), str(each.equations - each.kept))
         for each in model.structure
     ]
-    yield TextTable(("loop", "opened at", "unknowns", "equations", "dropped"), tuple(loops))
+    yield TextTable(("loop", "opened at", "unknowns", "equations", "redundant"), tuple(loops))
     kept = len(model.closure)
     words = f"{unknowns} unknowns{', including these variables' if free else ''}, {every} equations"
     words += f", {every - kept} of them redundant" if kept < every else ", none of them redundant"

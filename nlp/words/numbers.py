@@ -59,7 +59,7 @@ def quantity_words(name: str) -> str:
     """Return the name of a limited quantity in words: the sense of its force and its load, separated by commas.
 
     ``actuator_force actuator 2- backwards load cutting`` becomes ``actuator_force actuator 2-, negative force, load
-    "cutting"``: the name itself is that of results in JSON and of proof records.
+    "cutting"``: results in JSON and proof records contain the name unchanged.
     """
     return _LOADED.sub(lambda found: f"{_SENSES[found[1]]}, {load_words(found[2])}", name)
 

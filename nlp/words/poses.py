@@ -62,7 +62,7 @@ def pose_words(case: Case, pose: WorkspacePose, form: RotationForm | None = None
     Args:
         case: the case.
         pose: the pose.
-        form: form of its rotation; None for the form of the case.
+        form: form of the rotation; None for the form of the case.
     """
     stated = () if case.workspace is None else case.workspace.position
     ends = [part for each in stated for part in ((each.lower, each.upper) if isinstance(each, Free) else (each,))]
@@ -123,7 +123,7 @@ def _shown(case: Case, position: Sequence[float], turn: Mapping[str, list[float]
 
 
 def _rounded(values: Sequence[float], digits: int) -> list[float]:
-    """Return numbers rounded at one decimal place, at which the largest number has the given number of digits."""
+    """Return numbers rounded to one common decimal place, which gives the largest number so many digits."""
     size = max(map(abs, values))
     if size == 0:
         return list(values)

@@ -57,7 +57,7 @@ class _Place(enum.IntEnum):
 
 
 class _Row(NamedTuple):
-    """Row of the table.
+    """Row of the design table.
 
     Attributes:
         place: place in the table.

@@ -47,7 +47,7 @@ class Line:
 
     @property
     def words(self) -> str:
-        """Everything but the label."""
+        """Text with the words around it, without the label."""
         return f"{self.before}{self.text}{self.after}"
 
 

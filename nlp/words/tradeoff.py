@@ -88,7 +88,7 @@ def _columns(result: TradeoffResult, throughout: Sequence[str]) -> Iterator[Colu
         lambda point: " ".join(point.active),
         ColumnKind.ACTIVE,
         holds=str,
-        label="other active limits" if throughout else "active",
+        label="further active limits" if throughout else "active",
         text=lambda point: _listed(name for name in point.active if name not in throughout),
     )
     answer = next((point for point in result.points if point.parameters is not None), None)

@@ -15,6 +15,7 @@ from ..interruption import STOPPED
 from ..proof.statement.claims import CONSTRAINTS, REGULAR
 from ..proof.workspace.verdict import EVERYWHERE, Outcome
 from .claims import CLAIM_WORDS, rank_line, unproved_ranks, violation_lines
+from .lines import engine_words
 from .motors import OUTCOME_WORDS, ends_of_motor, motor_tables
 from .numbers import number
 from .poses import pose_words
@@ -177,7 +178,9 @@ def _search_lines(case: Case, regular: RegularData, label: str) -> Iterator[Line
     if regular.machine is not None:
         yield violating_robot(case, "full rank of J", regular.machine)
     word = "box" if regular.boxes == 1 else "boxes"
-    yield Line(f"{regular.boxes:,} {word} examined in {regular.seconds:.2f} s, engine {regular.engine}", label=label)
+    yield Line(
+        f"{regular.boxes:,} {word} examined in {regular.seconds:.2f} s{engine_words(regular.engine)}", label=label
+    )
 
 
 def _scale_lines(case: Case, scale: ScaleData) -> Iterator[Line]:
@@ -202,7 +205,7 @@ def _scale_lines(case: Case, scale: ScaleData) -> Iterator[Line]:
 
 
 def _failed_words(claim: str) -> str:
-    """Return a claim and its outcome in words; the result has the name and the status."""
+    """Return a claim with its outcome in words, from a text with the name and the status of the claim."""
     name, comma, status = claim.rpartition(", ")
     words = {each.value: word for each, word in OUTCOME_WORDS.items()}
     return f"{CLAIM_WORDS.get(name, name)}{comma}{words.get(status, status)}"

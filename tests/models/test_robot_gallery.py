@@ -37,7 +37,7 @@ KEYS = {
     "dimension": {"typical", "kind", "description"},
     "limb": {"repeat", "points", "joints", "branch", "centre"},
     "repeat": {"count", "angles", "axis", "through"},
-    "joint": {"type", "at", "axis", "axes", "to", "pitch", "actuated"},
+    "joint": {"name", "type", "at", "axis", "axes", "to", "pitch", "actuated"},
 }
 
 

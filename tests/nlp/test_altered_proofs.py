@@ -321,11 +321,11 @@ def test_errors_of_legs_are_those_of_the_command(cli: Run, folder: Path) -> None
     for other in (-0.019999999999, 0.0, 0.0099999999, 0.02):
         code, out, err = checked(cli, folder, "machines", with_value(content, ("premises", "leg_error"), other))
         assert (code, out) == (1, "")
-        assert "see --leg-error" in err
+        assert "but --leg-error is 0.01" in err
     case, proof = str(folder / "machines.toml"), str(folder / "machines.json")
     code, out, err = cli("verify-proof", proof, case)
     assert (code, out) == (1, "")
-    assert "leg errors of at most 0.01 in, but 0 was given: see --leg-error" in err
+    assert "leg-length errors of at most 0.01 in, but --leg-error is 0" in err
     assert cli("verify-proof", proof, case, "--leg-error", "-0.019999999999")[0] == 2
     out = output_of(cli("verify-proof", proof, case, "--leg-error", "0.01", "--all"))
     assert "for every robot whose joint centres are off by at most 0.01 in" in out
@@ -361,7 +361,7 @@ def test_a_proof_is_no_proof_of_another_case(cli: Run, folder: Path, proof: str)
 def test_nothing_rests_on_the_fingerprint(cli: Run, folder: Path) -> None:
     content, other = written(cli, folder, "task"), edited(PLATFORM, ("x1 = 12", "x1 = 13"))
     case, proof = str(saved(folder / "other.toml", other)), folder / "other.json"
-    assert "other expressions" in cli("verify-proof", str(saved(proof, json.dumps(content))), case)[2]
+    assert "its expressions or bounds differ" in cli("verify-proof", str(saved(proof, json.dumps(content))), case)[2]
     nlp = program_of(case_from(other, "other"), Statement())
     best = max(nlp.evaluate(x).F for x in np.random.default_rng(0).uniform(nlp.lower, nlp.upper, (50, nlp.n)))
     for bound, status in ((content["claims"][0]["bound"], 1), (0.99 * best, 1), (2 * best, 0)):
@@ -421,7 +421,7 @@ def test_proofs_of_machines_with_settings_or_of_a_result(cli: Run, tmp_path: Pat
         assert "F: of the task 'push'" in out
         refusal_of(cli("verify-proof", proof, *options), "needs the argument CASE")
     code, _, err = cli("verify-proof", proof, free, "--set", "x2=11.6")
-    assert (code, err) == (1, "rejected: the proof is for other joint centres than this case's\n")
+    assert (code, err) == (1, "rejected: the proof is for other joint centres than those of this case\n")
     for option in (("--above", "1"), ("--all-assemblies",)):
         refusal_of(cli("verify-proof", proof, *option), "does not apply to this kind of proof")
 

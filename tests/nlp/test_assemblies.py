@@ -282,7 +282,7 @@ def test_a_certificate_speaks_of_the_modes_that_it_names() -> None:
     assert own.statement.in_home_mode
     nlp = own.certificate.nlp
     assert check_proof(proof, nlp).leaves > 1
-    with pytest.raises(ProofError, match="for other expressions or bounds"):
+    with pytest.raises(ProofError, match="its expressions or bounds differ"):
         check_proof(proof, replace(nlp, in_home_mode=False))
 
 

@@ -439,7 +439,7 @@ def test_what_was_tampered_with_is_rejected(proof: ProofClaim, nlp: Nlp) -> None
     leaf = middle_leaf(proof, nlp)
     node = leaf_bytes(leaf.bounds, leaf.g, leaf.Q)
     assert "ends before" in rejected(replace(proof, tree=proof.tree.replace(node, b"")), nlp)
-    assert "goes on" in rejected(replace(proof, tree=proof.tree + node), nlp)
+    assert "additional data after its last box" in rejected(replace(proof, tree=proof.tree + node), nlp)
     assert "does not exist" in rejected(replace(proof, tree=bytes([Node.SHARED, Node.HALF, 6])), nlp)
     assert "a node" in rejected(replace(proof, tree=bytes([Node.SHARED, Node.FACE_UPPER, 0])), nlp)
     nothing = replace(proof, tree=proof.tree.replace(node, bytes([Node.INFEASIBLE])))

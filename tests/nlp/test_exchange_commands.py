@@ -54,7 +54,7 @@ def test_shipped_cases_at_their_last_pose(name: str) -> None:
     solution = solve(load_case(name), starts=2)
     count = solution.case.pose_count
     assert Tree(export_robot(solution, ["mjcf"], pose=count)["robot.xml"], 50.0).open <= 1e-9
-    with pytest.raises(InputError, match=f"--pose {count + 1}: the case has {count} pose"):
+    with pytest.raises(InputError, match=f"--pose {count + 1}: no such pose; the case has {count} pose"):
         export_robot(solution, ["mjcf"], pose=count + 1)
     with pytest.raises(InputError, match="--format step: no such format"):
         export_robot(solution, ["step"])
@@ -68,7 +68,7 @@ def test_refusals_are_one_sentence_and_write_nothing(tmp_path: Path, cli: Run, m
     for words, fault in {
         ("--format", "stl", "--out", str(out)): "--format stl: no such format; allowed: mjcf, urdf, csv, dxf, all",
         ("--format", "mjcf", "--out", str(tmp_path / "full")): "contains mine.txt, not written by screwsynth",
-        ("--format", "mjcf", "--out", str(out), "--pose", "2"): "--pose 2: the case has 1 pose",
+        ("--format", "mjcf", "--out", str(out), "--pose", "2"): "--pose 2: no such pose; the case has 1 pose",
     }.items():
         refusal_of(cli("export", case, *words), fault)
     monkeypatch.setitem(sys.modules, "ezdxf", None)
@@ -210,9 +210,9 @@ FAULTS: list[tuple[str, str | bytes, tuple[str, ...], str]] = [
     ("m.xml", HEAD.replace('pos="0.0 0.0 ', 'pos="1e200 0.0 '), BODY, "must have finite coordinates of at most 1e+09"),
     ("m.urdf", URDF.replace('xyz="1.0 0.0 0.0"', 'xyz="1 0 inf"', 1), ALL, "must be three finite numbers"),
     ("m.urdf", URDF.replace('<link name="rod_2"/>', '<link name="rod_1"/>'), ALL, "has two elements <link> with the name 'rod_1'"),
-    ("m.urdf", URDF.replace('<link name="torso"/>', '<link name="torso"/><link name="spare"/>'), ALL, "must have exactly one root link, which is no joint's child, got torso, spare"),
+    ("m.urdf", URDF.replace('<link name="torso"/>', '<link name="torso"/><link name="spare"/>'), ALL, "must have exactly one root link (a link that is not the child of a joint), got torso, spare"),
     ("m.urdf", '<robot xmlns:xacro="http://ros.org/wiki/xacro"><xacro:include filename="a"/></robot>', ALL, "has xacro elements, which are not supported; convert it to plain URDF first"),
-    ("m.urdf", '<robot><link name="a"/><joint name="j" type="fixed"><parent link="a"/><child link="a"/></joint></robot>', ALL, "must have exactly one root link, which is no joint's child, got none"),
+    ("m.urdf", '<robot><link name="a"/><joint name="j" type="fixed"><parent link="a"/><child link="a"/></joint></robot>', ALL, "must have exactly one root link (a link that is not the child of a joint), got none"),
     ("m.urdf", URDF.replace('<child link="horn_1"/>', '<child link="horn_1"/><mimic joint="x"/>'), ALL, 'mimic = "x": must be the name of another joint'),
     # Dimensions.
     ("m.xml", HEAD, (*BODY, "--free", "circle9"), "--free circle9: no such joint, circle or symmetry; did you mean 'circle3'?"),

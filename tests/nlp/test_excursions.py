@@ -236,23 +236,23 @@ def test_a_case_is_written_as_it_is_stated() -> None:
     [
         (
             {"pose": [{"position": [0, 0, 1]}, {"position": [0, 0, 0.9]}]},
-            """workspace.about = "pose": must be 'world' for a case with several or displaced poses""",
+            """workspace.about = "pose": must be 'world' for a case with several poses or with displacements""",
         ),
         (
             {"pose": {"position": [0, 0, 1], "displacements": [{"translation": [0, 0, 0.1]}]}},
-            "must be 'world' for a case with several or displaced poses",
+            "must be 'world' for a case with several poses or with displacements",
         ),
         (
             {"pose": {"position": [0, 0, 1], "rotation": {"axis": [0, 1, 0], "angle": 10}}},
-            "workspace.rotation: must be left out, or about the axis of the pose: with about",
+            "workspace.rotation: must be left out, or rotate about the axis of the pose's rotation: with about",
         ),
         (
             {"pose": {"position": [0, 0, 1], "rotation": {"angle": {"min": -10, "max": 10}}}},
-            "workspace.rotation: must be left out, or about the axis of the pose",
+            "workspace.rotation: must be left out, or rotate about the axis of the pose's rotation",
         ),
         (
             {"pose": {"position": [0, 0, 1], "rotation": {"axis": [1, 0, 0], "angle": {"min": 0, "max": 145}}}},
-            "workspace.rotation.roll: must be at most 150 deg together with the angle of the pose, got 155 deg",
+            "workspace.rotation.roll: must be at most 150 deg when added to the rotation angle",
         ),
     ],
 )
@@ -292,7 +292,7 @@ def test_all_commands_take_the_workspace_at_the_pose_of_a_result(tmp_path: Path,
     assert low <= height - 0.1
     assert high >= height + 0.1
     code, _, err = cli("verify-proof", proof, str(file), "--of", result, "--set", "p_z=0.8")
-    assert (code, err) == (1, "rejected: the proof is for another workspace than this case's\n")
+    assert (code, err) == (1, "rejected: the proof is for another workspace than that of this case\n")
     assert "largest proved box  1 times the workspace" in output_of(
         cli("workspace", str(file), "--of", result, "--scale", "--time", "8")
     )

@@ -99,7 +99,7 @@ def test_an_unproved_claim_is_named_and_its_design_can_be_set(tmp_path: Path, cl
     named = f"proved bound {claim['bound']:.7g}, reached {claim['reached']:.7g}"
     sentence = f"not proved: 1 claim violated or undecided: smallest_singular_value >= 0.2 ({word}, {named})"
     assert sentence in unbroken(out)
-    error = refusal_of(cli("workspace", str(path), "--of", str(target)), "contains no answer: the solve has failed")
+    error = refusal_of(cli("workspace", str(path), "--of", str(target)), "contains no answer: the solve failed")
     assert "; its reached design: --set x3=" in error
     # The options of the message are those of the command.
     options = error.split("its reached design: ")[1].split()

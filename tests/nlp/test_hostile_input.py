@@ -323,10 +323,10 @@ def test_a_byte_order_mark_and_the_largest_case_file(tmp_path: Path, cli: Run) -
         ("x1/(p_x-p_x) >= 1", "no finite value"),
         ("x1^x1^x1^99999 >= 0", "99999"),
         ("x1^-101 >= 0", "-101"),
-        ("1e200*1e200 >= x1", "without a finite value"),
-        ("sqrt(0-1) <= x1", "without a finite value"),
-        ("(0-8)^0.5 <= x1", "without a finite value"),
-        ("10^99*10^99*10^99*10^99 >= x1", "without a finite value"),
+        ("1e200*1e200 >= x1", "gives no finite value"),
+        ("sqrt(0-1) <= x1", "gives no finite value"),
+        ("(0-8)^0.5 <= x1", "gives no finite value"),
+        ("10^99*10^99*10^99*10^99 >= x1", "gives no finite value"),
     ],
 )
 def test_constants_without_a_value(relation: str, words: str, tmp_path: Path, cli: Run) -> None:

@@ -12,6 +12,7 @@ import pytest
 from builders import Array, Run, output_of, refusal_of, saved, turn_about
 from generated import COMPILERS, STRICT, made, needs_compiler, run
 from kinematics_library import BAD_INPUT, LOOPS_OPEN, OK, OUT_OF_REACH, SINGULAR, Library, typical_case
+from position_cases import DELTA
 
 from screwsynth.models.catalog import gallery_names
 from screwsynth.nlp import Case, CaseError, case_text, inverse, load_case
@@ -49,27 +50,6 @@ length = "mm"
 angle = "deg"
 zero = 20
 rpy = [0, 0, 90]
-"""
-#: The commonest printer: three upright carriages with two rods each.
-LINEAR = """
-name = "linear delta"
-home = [0, 0, "h"]
-length_unit = "mm"
-[dimensions]
-R = { typical = 130.25 }
-rp = { typical = 33 }
-L = { typical = 269 }
-w = { typical = 50 }
-[derived]
-h = "-sqrt(L^2 - R^2)"
-[[limb]]
-repeat = { count = 3 }
-points = { E = ["R + rp", 0, 0], A = ["rp", 0, "h"] }
-joints = [{ type = "P", at = "E", axis = "z", actuated = true }]
-branch = [
-    { joints = [{ type = "S", at = "E + w/2*y" }, { type = "S", at = "A + w/2*y" }] },
-    { joints = [{ type = "S", at = "E - w/2*y" }, { type = "S", at = "A - w/2*y" }] },
-]
 """
 ANKLE = """
 name = "ankle"
@@ -347,7 +327,7 @@ def test_coordinates_of_linuxcnc_follow_from_the_table_of_the_controller() -> No
 
 def test_carriages_of_a_linear_delta_are_those_of_linuxcnc(tmp_path: Path) -> None:
     # LinuxCNC's lineardeltakins with its default radius 130.25 and rod 269; its x axis is the negative y axis here.
-    saved(tmp_path / "linear.toml", LINEAR)
+    saved(tmp_path / "linear.toml", DELTA)
     case = 'units.length = "mm"\nrobot.file = "linear.toml"\ncontroller.rpy = [0, 0, -90]\n'
     case += "robot.parameters = { R = 130.25, rp = 33, L = 269, w = 50 }\n"
     file = str(saved(tmp_path / "case.toml", case))
@@ -535,7 +515,7 @@ def test_a_task_is_not_needed(cli: Run, tmp_path: Path) -> None:
     [
         ("sign = 2", "controller.sign = 2.0: must be 1 or -1"),
         ('sign = { "7" = 1 }', "controller.sign.7: is no actuator"),
-        ('length = "furlong"', 'controller.length = "furlong": has no known size'),
+        ('length = "furlong"', 'controller.length = "furlong": must be one of'),
         ('angle = "grad"', "controller.angle"),
         ("rpy = [0, 0]", "controller.rpy"),
         ("zero = inf", "controller.zero"),

@@ -39,11 +39,13 @@ BESIDE = "conflicts with mass; write another [[load]]"
 #: What is added to the case, and the sentence after the file's name, or its beginning.
 FAULTS = {
     '[units]\nlength = "mm"\n[[load]]\nmass = 2': (
-        "gravity.acceleration: is missing: give [gravity] acceleration, with mass times acceleration in N, such as "
+        "gravity.acceleration: is missing: give [gravity] acceleration in units in which "
+        "mass times acceleration is in N, such as "
         "[0, 0, -9.81] for a mass in kg\n"
     ),
     '[units]\nforce = "lbf"\n[[load]]\nmass = 2': (
-        "gravity.acceleration: is missing: give [gravity] acceleration, with mass times acceleration in lbf\n"
+        "gravity.acceleration: is missing: give [gravity] acceleration in units in which "
+        "mass times acceleration is in lbf\n"
     ),
     '[units]\nlength = "mm"\n[gravity]\n[[load]]\nmass = 2': "gravity.acceleration: is missing",
     "[gravity]\nacceleration = [0, 0, 0]": "gravity.acceleration: must not be zero",

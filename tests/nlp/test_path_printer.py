@@ -414,8 +414,8 @@ def test_a_file_without_an_end_or_a_motion_says_so() -> None:
         ({"flavour": "prusa"}, "must be linuxcnc or printer"),
         ({"flavour": "printer", "unit": "in"}, "unit = 'in': has no meaning with the flavour printer"),
         ({"flavour": "printer", "offsets": {"G54": (0,) * 6}}, "offsets"),
-        ({"part": 2}, "part = 2: needs the flavour printer"),
-        ({"macros": ["A"]}, "needs the flavour printer"),
+        ({"part": 2}, "part = 2: is only for the flavour printer"),
+        ({"macros": ["A"]}, "is only for the flavour printer"),
         ({"flavour": "printer", "part": 0}, "1 or more"),
     ],
 )
@@ -471,7 +471,7 @@ def test_case_and_commands_read_a_printers_file_and_its_proof(cli: Run, tmp_path
     assert "flavour printer; macros START_PRINT" in " ".join(checked.split())
     status, _, error = cli("verify-proof", proof, "hexapod-linuxcnc", "--along", file, *words[:2])
     assert status == 1
-    assert "read with other options: see --macro" in error
+    assert "read with another value of --macro" in error
 
 
 def test_a_case_states_the_flavour_of_its_path(tmp_path: Path) -> None:
@@ -483,7 +483,7 @@ def test_a_case_states_the_flavour_of_its_path(tmp_path: Path) -> None:
     folder = {"folder": str(tmp_path), "file": "part.gcode"}
     stated = replace(case, path=PathFile(**folder, flavour="printer", macros=["START_PRINT", "END"]))
     np.testing.assert_allclose(path_of_case(stated).durations, [0.9])
-    with pytest.raises(CaseError, match="path: part = 2: needs the flavour printer"):
+    with pytest.raises(CaseError, match="path: part = 2: is only for the flavour printer"):
         path_of_case(replace(case, path=PathFile(**folder, part=2)))
 
 

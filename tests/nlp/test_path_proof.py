@@ -286,7 +286,7 @@ def test_bounds_of_lengths_are_as_sharp_as_dense_samples(proof: Proof) -> None:
 
 def test_a_bound_beyond_the_limit_is_rejected(proof: Proof) -> None:
     given = with_claim(alone(proof, "leg_length limb 1-", "max"), "leg_length limb 1-", "max", bound=44.0**2)
-    assert "does not satisfy the case's limit" in rejected(given, machine())
+    assert "of the proof does not satisfy the limit" in rejected(given, machine())
 
 
 @pytest.mark.parametrize(
@@ -294,10 +294,10 @@ def test_a_bound_beyond_the_limit_is_rejected(proof: Proof) -> None:
     [
         (b"", "ends before every box"),
         (bytes([Node.BOUNDED] * 2), "ends before every box"),
-        (bytes([Node.BOUNDED] * 4), "goes on after every box"),
-        (bytes([Node.BOUNDED] * 2 + [Node.OUTSIDE]), "where a piece must be proved or cut"),
+        (bytes([Node.BOUNDED] * 4), "additional data after its last box"),
+        (bytes([Node.BOUNDED] * 2 + [Node.OUTSIDE]), "a node OUTSIDE where only HALF, CUT or BOUNDED is allowed"),
         (node_bytes(Node.HALF, 1) + bytes([Node.BOUNDED] * 4), "variable 1, which does not exist"),
-        (node_bytes(Node.CUT, 0, value=1.5) + bytes([Node.BOUNDED] * 4), "cuts a box at 1.5, which is outside of it"),
+        (node_bytes(Node.CUT, 0, value=1.5) + bytes([Node.BOUNDED] * 4), "cuts a box at 1.5, a value outside this box"),
         (node_bytes(Node.CUT, 0, value=math.nan) + bytes([Node.BOUNDED] * 4), "cuts a box at nan"),
     ],
 )
@@ -316,16 +316,20 @@ def test_other_paths_are_rejected(proof: Proof) -> None:
     def carrying(given: Proof, **changes: object) -> Proof:
         return replace(given, premises=replace(premises, **changes))  # type: ignore[type-var, arg-type]
 
-    assert "segment 3 between" in rejected(carrying(lengths, text=edited(TIMED, ("4,3,4", "4,30,4"))), machine())
-    assert "segment 2 between" in rejected(carrying(speeds, text=edited(TIMED, ("4,3,3", "4,3,2.02"))), machine())
+    assert "on segment 3, for parameters" in rejected(
+        carrying(lengths, text=edited(TIMED, ("4,3,4", "4,30,4"))), machine()
+    )
+    assert "on segment 2, for parameters" in rejected(
+        carrying(speeds, text=edited(TIMED, ("4,3,3", "4,3,2.02"))), machine()
+    )
     rows = TIMED.splitlines()
     swapped = "\n".join([*rows[:2], rows[3].replace(",3,3", ",3,0.1"), rows[2], rows[4]])
-    assert "segment 1 between" in rejected(carrying(speeds, text=swapped), machine())
-    assert "goes on after every box" in rejected(carrying(lengths, text="\n".join(rows[:-1])), machine())
+    assert "on segment 1, for parameters" in rejected(carrying(speeds, text=swapped), machine())
+    assert "additional data after its last box" in rejected(carrying(lengths, text="\n".join(rows[:-1])), machine())
     assert "other joint centres" in rejected(carrying(lengths, legs=()), machine())
     assert "another joint-centre tolerance" in rejected(carrying(lengths, joint_centre=0.1), machine())
     assert "cannot be read" in rejected(carrying(lengths, text="x,y\n1,2"), machine())
-    assert "this case has no path" in rejected(carrying(lengths, of_case=True), machine())
+    assert "this case has no table [path]" in rejected(carrying(lengths, of_case=True), machine())
     slower = edited(TIMED, ("3,2\n", "3,1.5\n"))
     assert verified(carrying(lengths, text=slower), machine()).claims
 
@@ -333,8 +337,8 @@ def test_other_paths_are_rejected(proof: Proof) -> None:
 def test_claims_of_another_case_or_left_out_are_rejected(proof: Proof) -> None:
     fewer = hexapod(limits=LIMITS | {"leg_length": {"max": 43}}, load=LOAD)
     assert "does not satisfy" in rejected(proof, hexapod(limits=LIMITS | {"leg_length": {"max": 30}}, load=LOAD))
-    assert "each claim of the case exactly once" in rejected(proof, hexapod(limits=LIMITS))
-    assert "each claim of the case exactly once" in rejected(replace(proof, unproved=proof.unproved[1:]), machine())
+    assert "each claim of its case exactly once" in rejected(proof, hexapod(limits=LIMITS))
+    assert "each claim of its case exactly once" in rejected(replace(proof, unproved=proof.unproved[1:]), machine())
     assert verified(alone(proof, "leg_length limb 1-", "max"), fewer).claims
     assert "the proof has no claims" in rejected(replace(proof, claims=()), machine())
 
@@ -355,7 +359,7 @@ def test_a_tree_of_a_program_proves_nothing_of_a_path() -> None:
     others = tuple(Unproved(*each, "") for each in expected)
     proof = Proof("", case.name, premises, (claim,), (), others)
     assert leg_lengths(*path.poses_at([0] * 99, np.linspace(0, 1, 99))).max() > 32.8
-    assert "'program' is no known kind of proof for a claim about a path" in rejected(proof, case)
+    assert "a claim of this kind cannot be proved by the reason 'program' along a tool path" in rejected(proof, case)
 
 
 @pytest.mark.parametrize("turns", [1, 8, 16, 41])
@@ -366,7 +370,7 @@ def test_whole_turns_that_the_robot_cannot_make_are_rejected(turns: int) -> None
     case = case_from(tables)
     text = f"G0 Z1080 A2 B-3\nG1 Z1100 A0 B-1\nG3 X0 Y0 I-50 J0 P{turns}\nG1 Z1120 A-2 B1\nM2"
     path = path_of_text(f"G90 G94 F600 G21\nG0 X0 Y0 C0\n{text}", "part.ngc", case.units, PathOptions())
-    with pytest.raises(ProofError, match="the path moves x and y, which this robot cannot control"):
+    with pytest.raises(ProofError, match="the path changes x and y, but this robot cannot choose"):
         PathRoot(case, path)
 
 
@@ -383,10 +387,10 @@ def test_a_singular_pose_of_a_path_is_proved_by_two_places() -> None:
     assert low < judged.ranks[0].place.parameter < high
     for sides, words in (
         (((0.0,), (0.1,)), "opposite signs"),
-        (((low,), (2.5,)), "a pose is outside the workspace"),
-        (((low,),), "does not have two poses"),
-        (((low,), (high, 0.0)), "the claim is about the robot without one"),
-        (((low,), (1.5,)), "change continuously"),
+        (((low,), (2.5,)), "a pose that the proof states is outside the workspace"),
+        (((low,),), "must state two poses"),
+        (((low,), (high, 0.0)), "for robots within a joint-centre tolerance, but the case has no tolerance"),
+        (((low,), (1.5,)), "changes continuously"),
     ):
         assert words in rejected(with_claim(given, "regular", "", sides=sides), case)
     tree = bytes([Node.BOUNDED] * 2)
@@ -487,10 +491,10 @@ def test_the_commands_write_and_verify(cli: Run, tmp_path: Path) -> None:
     assert " ".join(shown.split()).count(untimed) == 1
     assert "path read from the proof file" in " ".join(output_of(cli(*own[:3])).split())
     code, _, said = cli(*own)
-    assert (code, "see --unit" in said) == (1, True)
+    assert (code, "another value of --unit" in said) == (1, True)
     saved(part, "G90 G94\nF60\nG1 X0 Y0 Z20 A0 B0 C0\nX1.1\nM2")
     code, _, said = cli(*own, "--unit", "in")
-    assert (code, "another path than that of" in said) == (1, True)
+    assert (code, "another tool path than that in" in said) == (1, True)
     refusal_of(cli("verify-proof", str(out), "--unit", "in"), "--along: is missing")
     refusal_of(
         cli("verify-proof", str(out), "--leg-error", "0.1"), "--leg-error", "does not apply to this kind of proof"
@@ -513,7 +517,7 @@ def test_a_path_of_a_case_is_held_to_its_file(cli: Run, tmp_path: Path) -> None:
     assert "speeds" not in shown
     output_of(cli("verify-proof", str(out)))
     code, _, said = cli("verify-proof", str(out), str(case), "--along", str(poses))
-    assert (code, "see --along" in said) == (1, True)
+    assert (code, "--along" in said) == (1, True)
     saved(poses, "x,y,z\n0,0,20\n1,0,22\n")
     code, _, said = cli("verify-proof", str(out), str(case))
-    assert (code, "another path" in said) == (1, True)
+    assert (code, "another tool path" in said) == (1, True)

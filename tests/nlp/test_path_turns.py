@@ -203,7 +203,7 @@ def test_one_reference_is_near_all_rotations_of_a_path() -> None:
         for each in turns.boxes(np.arange(3), np.tile([0.1, 0.2], (3, 1))):
             assert (each[:, 1:3] == 0).all()
             assert (each == 1).any(axis=1).all()
-    with pytest.raises(InputError, match=r"line 0: angles change by 1e\+08 degrees in all, most of them here"):
+    with pytest.raises(InputError, match=r"line 0: angles change by 1e\+08 degrees in total, mostly on this line"):
         reference([(0, 0, 0), (0, 0, 1e8)])
 
 

@@ -304,7 +304,7 @@ FAULTS = {
     "ring = { radius = 2, inner_radius = 1, angle = { min = 0, max = 360 } }": "workspace.position.ring.angle",
     "cone = { radius = 2, apex = [0, 0, 1], base = [0, 0, 1] }": "workspace.position.cone.base",
     "box = [0, 0, 0], half_spaces = [{ normal = [0, 0, 0], point = [0, 0, 0] }]": "half_spaces[0].normal",
-    "disc = { radius = 2 }, half_spaces = [{ normal = [1, 0, 0], point = [-9, 0, 0] }]": "leave no position",
+    "disc = { radius = 2 }, half_spaces = [{ normal = [1, 0, 0], point = [-9, 0, 0] }]": "exclude every position",
     "half_spaces = []": "must have one of disc, ring",
 }
 

@@ -354,7 +354,7 @@ def test_inverse_takes_roll_pitch_and_yaw(tmp_path: pytest.TempPathFactory) -> N
     [
         (
             {"rpy": [[0, 0, 0]], "rotations": [np.eye(3)]},
-            "rpy: conflicts with rotations; state the rotations in one form",
+            "rpy: conflicts with rotations; give only one of them",
         ),
         ({"rpy": [0, 0, 0]}, "rpy: must be an array (N, 3) of roll, pitch and yaw for N = 1 poses, got (3,)"),
         ({"rpy": [[0, 0, 0]] * 2}, "rpy: must be an array (N, 3) of roll, pitch and yaw for N = 1 poses, got (2, 3)"),

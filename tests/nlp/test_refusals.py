@@ -64,7 +64,7 @@ REFUSALS = {
     ),
     "missing robot": (
         changed('model = "stewart-gough", ', ""),
-        "case.toml: robot.model: is missing: give model, or the name of a robot file by file",
+        "case.toml: robot.model: is missing: give model, or file with the name of a robot file",
     ),
     "missing key": (
         changed("pitch = 1\n", ""),
@@ -145,7 +145,7 @@ REFUSALS = {
     ),
     "case as robot": (
         changed('"stewart-gough"', '"paper-4.2"'),
-        ("case.toml: robot.model = \"paper-4.2\": no such robot; 'paper-4.2' is a case; screwsynth solve takes it"),
+        ("case.toml: robot.model = \"paper-4.2\": no such robot; 'paper-4.2' is a case; use it with screwsynth solve"),
     ),
     "unknown option": (
         changed("model =", 'layuot = "aligned", model ='),
@@ -168,11 +168,11 @@ REFUSALS = {
     ),
     "two robots": (
         changed("model =", 'file = "robot.toml", model ='),
-        "case.toml: robot.model: conflicts with file: give the robot in one way",
+        "case.toml: robot.model: conflicts with robot.file; give only one of them",
     ),
     "not a robot file": (
         changed('model = "stewart-gough", ', 'file = "robot.toml", ', "robot.toml", "robot = 3\ntask = 3\n"),
-        "robot.toml: the file: is a case, not a robot file; screwsynth solve takes it",
+        "robot.toml: the file: is a case, not a robot file; use it with screwsynth solve",
     ),
     "joint without type": (
         changed(
@@ -326,8 +326,8 @@ REFUSALS = {
     "mass without gravity": (
         above("load = [{ mass = 3 }]"),
         (
-            "case.toml: gravity.acceleration: is missing: give [gravity] acceleration, with mass "
-            "times acceleration in N, such as [0, 0, -9.81] for a mass in kg"
+            "case.toml: gravity.acceleration: is missing: give [gravity] acceleration in units in which mass "
+            "times acceleration is in N, such as [0, 0, -9.81] for a mass in kg"
         ),
     ),
     "two forms of a load": (
@@ -379,8 +379,8 @@ REFUSALS = {
             "axis = [1, 0, 0], angle = 5 } }"
         ),
         (
-            "case.toml: workspace.rotation: must be left out, or about the axis of the pose: with "
-            "about = 'pose', two axes are not supported"
+            "case.toml: workspace.rotation: must be left out, or rotate about the axis of the pose's rotation: with "
+            "about = 'pose', rotations about different axes cannot be combined"
         ),
     ),
     "path place": (

@@ -70,7 +70,7 @@ DRIVEN = '{ type = "R", at = "B", axis = "y", actuated = true }'
 #: Text that is replaced, its replacement, and the sentence behind the name of the file.
 FAULTS: list[tuple[str, str | bytes, str]] = [
     # A robot that contradicts itself.
-    (LAST, 'at = "A", actuated = true }', "limb 1, joint 3 (S), actuated: is not allowed: write its axes as joints R or P"),
+    (LAST, 'at = "A", actuated = true }', "limb 1, joint 3 (S), actuated: is not allowed for this type: write each axis"),
     ('"R", at = "B", axis = "y"', '"U", at = "B", axes = ["x", "y"], actuated = true', "joint 1 (U), actuated: is not allowed"),
     ('"R"', '"C", actuated = true', "limb 1, joint 1 (C), actuated: is not allowed"),
     (", actuated = true", "", "actuated: is given at no joint of the robot; write actuated = true at each joint that"),
@@ -88,7 +88,7 @@ FAULTS: list[tuple[str, str | bytes, str]] = [
     (JOINTS, "", "limb 1, joints: is missing: a limb needs at least one joint"),
     (JOINTS, "joints = []", "limb 1, joints: is missing: a limb needs at least one joint"),
     (JOINTS, f"joints = [{', '.join([DRIVEN] * 13)}]", "limb 1, joints: has 13 joints; at most 12 are allowed"),
-    (JOINTS, f'joints = [{DRIVEN}]\nbranch = [{{ joints = [{{ type = "S", at = "A" }}] }}]', "limb 1, branch: has one branch: write its joints"),
+    (JOINTS, f'joints = [{DRIVEN}]\nbranch = [{{ joints = [{{ type = "S", at = "A" }}] }}]', "limb 1, branch: has only one branch: write its joints"),
     (JOINTS, f"joints = [{DRIVEN}]\nbranch = [{{ joints = [] }}]", "limb 1, branch 1, joints: must have at least 1 entry, got 0"),
     (JOINTS, f"joints = [{DRIVEN}]\nbranch = [{', '.join(['{ joints = [' + DRIVEN + '] }'] * 7)}]", "limb 1, branch: has 7 branches; at most 6"),
     (JOINTS, 'joints = [{ type = "R", at = "B", axis = "y" }]\nbranch = [{ joints = [{ type = "S", at = "A" }] }, { joints = [{ type = "S", at = "B" }] }]', "limb 1, joint 1 (R): is passive and before the branches of its limb; only actuated joints are allowed there"),
@@ -100,7 +100,7 @@ FAULTS: list[tuple[str, str | bytes, str]] = [
     ("count = 1", "count = 1_000_000_000", "limb 1, repeat, count = 1000000000: must be a whole number from 1 to 24"),
     ("count = 1", "count = 3.0", "limb 1, repeat, count = 3.0: must be a whole number"),
     ("count = 1", "count = true", "limb 1, repeat, count = true: must be a whole number"),
-    ("count = 1", "count = 3, angles = [0]", "limb 1, repeat: needs either count or angles"),
+    ("count = 1", "count = 3, angles = [0]", "limb 1, repeat: needs count or angles, and not both"),
     ("count = 1", "angles = []", "limb 1, repeat, angles: must have at least 1 entry, got 0"),
     ("count = 1", "angles = [0, nan]", "limb 1, repeat, angle 2 = nan: must be finite"),
     ("count = 1", "count = 2, axis = [0, 0, 0]", "limb 1, repeat, axis: is zero: it needs a direction"),
@@ -185,7 +185,7 @@ FAULTS: list[tuple[str, str | bytes, str]] = [
     (AXIS, '"1_0*A"', GRAMMAR),
     (AXIS, '"A*\u0663"', GRAMMAR),
     (AXIS, '"\uff21 - B"', GRAMMAR),
-    (AXIS, '"A**2"', "which has '**': a power is written '^'"),
+    (AXIS, '"A**2"', "which has '**'; write a power with '^'"),
     (AXIS, '"A -"', "which is not an expression of numbers, names, + - * / ^ and functions"),
     (AXIS, f'"{"(" * 500}A{")" * 500}"', "which is not an expression of numbers, names"),
     (AXIS, f'"{"-" * 500}A"', "which has more than 60 nested operations"),
@@ -321,18 +321,18 @@ def test_nested_loops_are_evaluated_and_solved_and_c_is_refused(tmp_path: Path, 
     assert str(slides["2"]) == "@1=0, [@1, @1, 1]"
     assert slides["1"] is not None
     out = output_of(cli("evaluate", name))
-    assert "degrees of freedom  2 with free actuators" in out
+    assert "degrees of freedom  2 with unlocked actuators" in out
     assert "rates  1: " in out
     assert "motor: " in out
     refusal_of(
         cli("codegen", name, "--out", str(tmp_path / "c")),
-        "robot: has joints outside limbs with branches (motor, knee, wrist, pivot, hand)",
+        "robot: has loops within a limb (joints motor, knee, wrist, pivot, hand)",
     )
     assert not (tmp_path / "c").exists()
     # With a coupling the rest is one network too.
     coupled = LINKS + COUPLING.replace('pivot = "-s"', "slide = 2")
     out = output_of(cli("evaluate", saved_with_robot(tmp_path, coupled, LINKS_CASE)))
-    assert "degrees of freedom  1 with free actuators" in out
+    assert "degrees of freedom  1 with unlocked actuators" in out
 
 
 SHIPPED = Path(screwsynth.models.__file__).parent / "robots"
@@ -364,7 +364,7 @@ def test_a_robot_file_of_a_case_is_solved(tmp_path: Path, cli: Run, robot_text: 
     name = saved_with_robot(tmp_path, robot_text, case_text)
     result = tmp_path / "result.json"
     out = output_of(cli("solve", name, "--starts", "6", "--json", str(result)))
-    assert "degrees of freedom  3 with free actuators" in out
+    assert "degrees of freedom  3 with unlocked actuators" in out
     data = json.loads(result.read_text(encoding="utf-8"))
     assert data["F"] == pytest.approx(F, abs=1e-6)
     assert len(data["joints"]["actuators"]) == 3
@@ -424,7 +424,7 @@ def test_actuator_rates_are_those_of_finite_differences(tmp_path: Path) -> None:
     ("old", "new", "fault"),
     [
         ('file = "robot.toml"', "file = 3", "case.toml: robot.file: must be the name of a robot file"),
-        ('file = "robot.toml"', 'file = "robot.toml"\nmodel = "hexapod"', "robot.model: conflicts with file"),
+        ('file = "robot.toml"', 'file = "robot.toml"\nmodel = "hexapod"', "robot.model: conflicts with robot.file"),
         ('file = "robot.toml"', 'file = "robot.toml"\naxes = "free"', "case.toml: robot.axes: no such key"),
         ('file = "robot.toml"', "", "case.toml: robot.model: is missing"),
         ('file = "robot.toml"', 'model = "3-rpz"', "did you mean '3-rps'?"),

@@ -603,7 +603,7 @@ def test_csv_that_cannot_be_is_refused_first(command: str, tmp_path: Path, cli: 
     for options, words in (
         ("--table limbs", "--table limbs: needs --csv FILE"),
         ("--csv x.csv --table legs", "--table legs: must be one of design, limbs"),
-        ("--csv - --json -", "one of --json - and --csv -"),
+        ("--csv - --json -", "one of --json - and --csv - can go to standard output"),
         ("--csv nowhere/x.csv", "nowhere/x.csv: cannot be written"),
     ):
         refusal_of(cli(command, "paper-4.1-helical", *options.split()), words)

@@ -138,7 +138,7 @@ def test_files_of_another_kind_are_named(tmp_path: Path, cli: Run) -> None:
     robot, case = str(tmp_path / "robot.toml"), str(saved(tmp_path / "mine.toml", CASE))
     refusal_of(cli("solve", robot), 'is a robot file, not a case; write [robot] file = "robot.toml" in a case')
     for arguments in (("models", case), ("new", case), ("compare", "paper-4.2", "case", case)):
-        refusal_of(cli(*arguments), "is a case, not a robot file; screwsynth solve takes it")
+        refusal_of(cli(*arguments), "is a case, not a robot file; use it with screwsynth solve")
 
 
 def test_units_and_decimal_commas_in_toml_are_named_with_their_lines(tmp_path: Path, cli: Run) -> None:

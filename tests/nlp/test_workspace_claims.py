@@ -1,5 +1,6 @@
 """Claims about a workspace, one a statement, the largest box, and what a user sees: slices, pages, poses, commands."""
 
+import itertools
 import json
 import math
 import re
@@ -12,8 +13,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 import pytest
-from builders import Run, case_from, commands_in, edited, output_of, ran, refusal_of, saved, soaked, unbroken
+from builders import Run, case_from, commands_in, edited, ends, output_of, ran, refusal_of, saved, soaked, unbroken
 from hexapods import SMALL, hexapod_text
+from measures import circle_joints
 from workspace_cases import gallery_case
 
 from screwsynth.models import FloatArray
@@ -497,7 +499,7 @@ def test_the_shipped_hexapod_is_proved(cli: Run) -> None:
     [
         (
             ["--html", "-", "--json", "-"],
-            "standard output can take one of --json -, --csv -, --html - and --proof - only",
+            "only one of --json -, --csv -, --html - and --proof - can go to standard output",
         ),
         (["--plot-pose", "a.txt"], "a.txt"),
         (["--html", "nowhere/page.html"], "nowhere/page.html"),
@@ -505,3 +507,31 @@ def test_the_shipped_hexapod_is_proved(cli: Run) -> None:
 )
 def test_files_are_refused_in_a_sentence(cli: Run, flags: list[str], words: str) -> None:
     refusal_of(cli("workspace", "hexapod-linuxcnc", *flags), words)
+
+
+@pytest.mark.parametrize("metre", [1.0, 1e3])
+def test_a_bound_of_equal_singular_values_is_close_to_their_smallest_value(metre: float) -> None:
+    """A threefold hexapod: two smallest singular values are equal in the middle, where a sum of powers counts both."""
+    tables = {
+        "robot": {
+            "model": "stewart-gough",
+            "layout": "octahedral",
+            "parameters": {"x1": 0.18 * metre, "x2": 0.11 * metre, "x3": 29.46, "x4": 20.28},
+        },
+        "units": {"angle": "deg"},
+        "pose": {"position": [0, 0, 0.25 * metre]},
+        "task": [{"sense": "max", "axis": [0, 0, 1], "pitch": math.inf}],
+        "limits": {"smallest_singular_value": {"min": 0.2, "length": 0.11 * metre}},
+        "workspace": {"position": [ends(0.03 * metre), ends(0.03 * metre), 0.25 * metre]},
+    }
+    judged = judge_workspace(case_from(tables), with_objective=False)
+    (found,) = (each for each in judged.extremes if each.name == "smallest_singular_value")
+    assert found.outcome is Outcome.PROVED
+    # Columns of moments are divided by the length; legs from the closed form of both circles.
+    base, platform = circle_joints({"x1": 0.18, "x2": 0.11, "x3": math.radians(29.46), "x4": math.radians(20.28)})
+    smallest = []
+    for x, y in itertools.product(np.linspace(-0.03, 0.03, 21), repeat=2):
+        spans = platform + np.array([x, y, 0.25]) - base
+        legs = spans / np.linalg.norm(spans, axis=1, keepdims=True)
+        smallest.append(np.linalg.svd(np.hstack([legs, np.cross(platform, legs) / 0.11]), compute_uv=False)[-1])
+    assert min(smallest) * (1 - 1e-3) <= found.bound <= min(smallest) * (1 + 1e-9)

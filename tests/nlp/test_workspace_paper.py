@@ -164,10 +164,10 @@ def test_other_trees_are_rejected(proof: Proof) -> None:
     tree = node_bytes(Node.CUT, 0, value=0.0) + bytes([Node.BOUNDED] * 2)
     for name, other, fault in (
         ("position error", tree[:-1], "ends"),
-        ("position error", tree + tree[-1:], "goes on"),
-        ("position error", node_bytes(Node.CUT, 0, value=4.0) + tree[10:], "outside of it"),
-        ("regular", b"\x07", "where a box must be"),
-        ("regular", bytes([Node.CUT, 6]) + bytes(8), "names variable 6"),
+        ("position error", tree + tree[-1:], "additional data after its last box"),
+        ("position error", node_bytes(Node.CUT, 0, value=4.0) + tree[10:], "outside this box"),
+        ("regular", b"\x07", "where only CUT, BOUNDED or OUTSIDE is allowed"),
+        ("regular", bytes([Node.CUT, 6]) + bytes(8), "refers to variable 6"),
         ("regular", bytes([Node.OUTSIDE]), "not outside"),
     ):
         assert fault in refused(changed(proof, name, tree=other))
@@ -176,11 +176,11 @@ def test_other_trees_are_rejected(proof: Proof) -> None:
 def test_a_proof_is_for_its_case_only(proof: Proof) -> None:
     assert "another workspace" in refused(proof, ("max = 9 }", "max = 9.5 }"))
     assert "other joint centres" in refused(proof, ("11.543", "11.544"))
-    assert "other expressions" in refused(alone(proof, "F"), ("axis = [0, 0, 1]", "axis = [0, 1, 1]"))
-    assert "see regular" in refused(replace(proof, claims=proof.claims[1:]))
+    assert "its expressions or bounds differ" in refused(alone(proof, "F"), ("axis = [0, 0, 1]", "axis = [0, 1, 1]"))
+    assert "lacks the claim regular" in refused(replace(proof, claims=proof.claims[1:]))
     assert "exactly once" in refused(replace(proof, claims=(*proof.claims, proof.claims[0])))
     assert "leg_clearance" in refused(proof, ("leg_clearance = { min = 0.5 }", ""))
-    assert "not a valid reason" in refused(
+    assert "cannot be proved by the reason" in refused(
         changed(alone(proof, "condition_number"), "condition_number", reason="lengths")
     )
     assert "quantity" in refused(stating(proof, quantities=("none",)))
@@ -213,13 +213,13 @@ def test_a_refuted_workspace_carries_two_poses(tolerance: str) -> None:
     given = on_paper(case, text, with_limits=False)[1]
     (found,) = check.check_workspace_proof(given, case).claims
     assert found.is_refuted
-    missing = {"the claim was not judged", "the claim requires bounds of leg lengths, which have no proof"}
+    missing = {"no search for this claim was made", "the claim needs bounds of leg lengths, which are not proved"}
     assert {each.reason for each in given.unproved} <= missing
     first, second = claim(given, "regular").sides
     for sides, fault in (
         ((first, first), "opposite signs"),
         ((first, (9.0, *second[1:])), "outside the workspace"),
-        ((first,), "does not have two poses"),
+        ((first,), "must state two poses"),
     ):
         assert fault in rejected(changed(given, "regular", sides=sides), case)
 
@@ -242,7 +242,7 @@ def test_the_commands_write_and_check_proofs(cli: Run, tmp_path: Path) -> None:
         assert missing in out
     saved(file, edited(text, ("min = -2, max = 2", "min = -2, max = 3")))
     code, _, err = cli("verify-proof", str(target), str(file))
-    assert (code, err) == (1, "rejected: the proof is for another workspace than this case's\n")
+    assert (code, err) == (1, "rejected: the proof is for another workspace than that of this case\n")
     content = json.loads(target.read_text(encoding="utf-8"))
     nodes = bytes([Node.OUTSIDE])
     content["claims"][0]["tree"] = packed_text(nodes)

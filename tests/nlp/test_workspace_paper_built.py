@@ -132,12 +132,14 @@ def test_another_tolerance_is_rejected(proof: Proof) -> None:
     reject = rejections(stating(proof, joint_centre=0.06), larger)
     names = ("leg_length limb 2-", "F", "rate_share limb 1-", "base_joint_angle limb 1-", "radius_ratio")
     for name in (*names, "actuator.stroke_max limb 2+"):
-        assert "other expressions" in reject(name, "max")
+        assert "its expressions or bounds differ" in reject(name, "max")
     smaller = TEXT.replace("max = 60 }", f"max = {math.sqrt(longest) - 0.01} }}", 1)
     assert "does not satisfy" in rejections(proof, smaller)("leg_length limb 2-", "max")
     reject = rejections(stating(proof, joint_centre=0.0), without)
-    assert "other expressions" in reject("F", "max")
-    assert "the claim is about the robot without one" in reject("actuator.stroke_max limb 2+", "max")
+    assert "its expressions or bounds differ" in reject("F", "max")
+    assert "for robots within a joint-centre tolerance, but the case has no tolerance" in reject(
+        "actuator.stroke_max limb 2+", "max"
+    )
 
 
 def value_of(name: str, sense: str, number: float) -> float:
@@ -173,17 +175,17 @@ def test_other_lemmas_and_directions_are_rejected(proof: Proof) -> None:
     name, rest = "actuator.stroke_max limb 2+", claim(proof, second_order_name("F"), "max")
     smaller = replace(rest, bound=0.5 * rest.bound)
     kept = tuple(each for each in proof.lemmas if each is not rest and not each.name.startswith(name))
-    assert "other expressions" in rejections(replace(proof, lemmas=(*kept, smaller)))("F", "max")
+    assert "its expressions or bounds differ" in rejections(replace(proof, lemmas=(*kept, smaller)))("F", "max")
     reject = rejections(replace(proof, lemmas=kept))
-    assert f"{second_order_name('F')}: has no proof" in reject("F", "max")
-    assert "has no proof" in reject(name, "max")
+    assert f"the proof lacks the lemma {second_order_name('F')}" in reject("F", "max")
+    assert "the proof lacks the lemma" in reject(name, "max")
     reject, stroke = rejections(proof), claim(proof, name, "max")
     turned = (stroke.sides[0], (0.0, 0.6, 0.8))
-    assert "other expressions" in reject(name, "max", sides=turned)
-    assert "does not have two directions" in reject(name, "max", sides=turned[:1])
-    assert "not a valid reason" in reject("F", "max", reason="one machine")
+    assert "its expressions or bounds differ" in reject(name, "max", sides=turned)
+    assert "must state two directions" in reject(name, "max", sides=turned[:1])
+    assert "cannot be proved by the reason" in reject("F", "max", reason="one machine")
     # Of no leg is a length known.
-    assert "have no proof" in reject("smallest_singular_value", "min")
+    assert "has no bound of the leg length" in reject("smallest_singular_value", "min")
 
 
 def machines_of(case: Case) -> tuple[RobotsWithinTolerance, PoseRoot]:
@@ -379,15 +381,15 @@ def test_a_singular_machine_within_the_tolerance_is_on_paper() -> None:
         ((design, design), "not have opposite signs"),
         (
             (design, (*machine[:6], *(2.0 * part for part in machine[6:]))),
-            "the error of a joint centre exceeds the tolerance",
+            "a joint-centre error that the proof states exceeds the tolerance",
         ),
         ((design, (*[9.0] * 6, *machine[6:])), "outside the workspace"),
-        ((design, machine[:-3]), "does not have two poses"),
-        ((design[:6], machine), "does not have two poses"),
+        ((design, machine[:-3]), "must state two poses"),
+        ((design[:6], machine), "must state two poses"),
     ):
         assert fault in rejected(changed(given, "regular", sides=sides), case_of(text))
     smaller = text.replace("joint_centre = 0.8", "joint_centre = 0.1")
-    assert "the error of a joint centre exceeds the tolerance" in rejected(
+    assert "a joint-centre error that the proof states exceeds the tolerance" in rejected(
         stating(given, joint_centre=0.1), case_of(smaller)
     )
 

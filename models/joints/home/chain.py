@@ -1,8 +1,8 @@
 """Joints and limbs at home, as expressions of the robot's dimensions.
 
-A limb is one path of joints from base to platform, or several that share the joints of a stem. The copies of a repeated
-limb are its rotations about the axis of repetition. A robot given by links and joints has limbs where its graph has
-such paths; the remaining joints form networks.
+A limb is one chain of joints from base to platform, or several chains that share the joints of a stem. The copies of a
+repeated limb are its rotations about the axis of repetition. A robot given by links and joints has limbs where its
+graph has such chains; the remaining joints form networks.
 """
 
 from __future__ import annotations
@@ -64,8 +64,8 @@ class Limb:
         name: name of the limb.
         place: place of the limb in the robot file, for messages.
         group: index of the limb in the robot file of which this limb is a copy.
-        stem: joints from the base on that all paths share.
-        branches: joints of each path after the stem; one empty path for a limb without branches.
+        stem: joints from the base on that all chains share.
+        branches: joints of each chain after the stem; one empty chain for a limb without branches.
         centre: (3, 1) centre given by the user, length; None for the centre by rule.
         turn: (3, 3) rotation of this copy relative to the limb in the robot file.
     """
@@ -79,16 +79,16 @@ class Limb:
     turn: FloatArray
 
     def member(self, path: int) -> str:
-        """Return the name of a path by its index: the limb's name, with a number if the limb has several paths."""
+        """Return the name of a chain by its index: the limb's name, with a number if the limb has several chains."""
         return f"{self.name}.{path + 1}" if len(self.branches) > 1 else self.name
 
     def label(self, path: int, joint: int) -> str:
-        """Return the label of a joint of a path by their indices, such as ``2:3``, or ``2.1:3`` on a branch."""
+        """Return the label of a joint of a chain by their indices, such as ``2:3``, or ``2.1:3`` on a branch."""
         return f"{self.name if joint < len(self.stem) else self.member(path)}:{joint + 1}"
 
     @property
     def paths(self) -> list[tuple[Joint, ...]]:
-        """Joints of each path from base to platform."""
+        """Joints of each chain from base to platform."""
         return [(*self.stem, *branch) for branch in self.branches]
 
 
@@ -147,7 +147,7 @@ class HomeRobot:
 
     @property
     def joints(self) -> list[Joint]:
-        """All joints, of the graph or of all paths of all limbs."""
+        """All joints, of the graph or of all chains of all limbs."""
         if self.graph is not None:
             return [each.joint for each in self.graph.joints if each.joint is not None]
         return [joint for limb in self.limbs for path in limb.paths for joint in path]

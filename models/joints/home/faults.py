@@ -69,7 +69,7 @@ def examine_geometry(frame: PathFrame) -> list[str]:
 
 
 def _joint_faults(robot: HomeRobot, path: Sequence[Joint]) -> list[_Pair]:
-    """Return the distances and angles within single joints of a path."""
+    """Return the distances and angles within single joints of a chain."""
     found = []
     for joint in path:
         if joint.type == "U":
@@ -92,7 +92,7 @@ def _joint_faults(robot: HomeRobot, path: Sequence[Joint]) -> list[_Pair]:
 
 
 def _rods(robot: HomeRobot, path: Sequence[Joint]) -> list[_Pair]:
-    """Return the lengths of a path's rods: between two spherical joints, or a spherical and a universal joint."""
+    """Return the lengths of a chain's rods: between two spherical joints, or a spherical and a universal joint."""
     found = []
     for one, other in pairwise(path):
         if {one.type, other.type} in ({"S"}, {"S", "U"}):
@@ -103,7 +103,7 @@ def _rods(robot: HomeRobot, path: Sequence[Joint]) -> list[_Pair]:
 
 
 def _axes(robot: HomeRobot, path: Sequence[Joint]) -> list[_Pair]:
-    """Return the angles between all rotation axes of a path, and the distances of successive ones."""
+    """Return the angles between all rotation axes of a chain, and the distances of successive ones."""
     axes = [
         (joint, axis) for joint in path for axis in joint.axes if joint.type != "S" and axis.kind is AxisKind.ROTATION
     ]

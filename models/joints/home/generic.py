@@ -69,7 +69,7 @@ def sampled_dimensions(robot: HomeRobot) -> FloatArray:
 
 
 class PathFrame:
-    """Common data of all paths of a robot: robot at home, platform displacement, and sampled dimensions.
+    """Common data of all chains of a robot: robot at home, platform displacement, and sampled dimensions.
 
     Args:
         robot: robot at home.
@@ -150,7 +150,7 @@ def generic_rank(frame: PathFrame, joints: Sequence[Joint], columns: SX, values:
     """Return the largest rank of columns, made of a limb's screws, at random dimensions and joint coordinates.
 
     Args:
-        frame: common data of all paths of the robot.
+        frame: common data of all chains of the robot.
         joints: joints of the limb.
         columns: (k, n) expressions of the dimensions and of the joint coordinates.
         values: (v, 1) symbols of the joint coordinates.
@@ -172,7 +172,7 @@ def meeting_point(frame: PathFrame, lines: Sequence[tuple[SX, SX]]) -> SX | None
     """Return the common point (3, 1) of lines for all dimensions; None if they do not intersect in one point.
 
     Args:
-        frame: common data of all paths of the robot.
+        frame: common data of all chains of the robot.
         lines: two or more lines, each a point (3, 1) and a unit direction (3, 1); the first two must not be parallel.
     """
     (p1, a1), (p2, a2), *_ = lines

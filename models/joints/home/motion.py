@@ -124,7 +124,7 @@ class JointAxis:
         return ca.vertcat(direction, ca.cross(at.point(self.point), direction) + self.pitch * direction)
 
     def direction(self, screw: SX) -> SX:
-        """Return the current direction (3, 1) from the current screw (6, 1); for a parallelogram that of the motion."""
+        """Return the current direction (3, 1) from the current screw (6, 1); for a parallelogram, of the motion."""
         return screw[:3] if self.kind is AxisKind.ROTATION else screw[3:]
 
     @property

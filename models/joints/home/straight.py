@@ -1,6 +1,6 @@
 """Straight legs of a robot given joint by joint: limbs with an actuated slide along the line of two joint centres.
 
-A limb is a straight leg if it is one path with one slide, which is actuated, and
+A limb is a straight leg if it is one chain with one slide, which is actuated, and
 
 * the axes of all rotations before the slide intersect in one point, the *centre* on the base, and those after it in one
   on the platform;
@@ -32,7 +32,7 @@ def straight_legs(frame: PathFrame) -> tuple[Leg, ...]:
     """Return the straight legs among the limbs of a robot.
 
     Args:
-        frame: common data of all paths of the robot.
+        frame: common data of all chains of the robot.
     """
     every = (_straight_leg(limb, frame) for limb in frame.robot.limbs)
     return tuple(leg for leg in every if leg is not None)

@@ -43,12 +43,13 @@ def displaced_robot(model: Model, definition: Mapping[str, object]) -> Displaced
     """
     if not definition:
         raise RobotError(
-            "joint", "is known only as a row of the Jacobian; joint-centre errors need a robot given joint by joint"
+            "joint",
+            "is missing: the limbs are rows of the Jacobian, but a tolerance needs a robot given joint by joint",
         )
     robot = home_of(read_robot(definition))
     if robot.graph is not None:
         raise RobotError(
-            "joint", "belongs to a robot of links and joints: joint-centre errors need a robot given by limbs"
+            "joint", "belongs to a robot given by links and joints, but a tolerance needs a robot given by limbs"
         )
     exact = sampled_dimensions(robot)
     displaced = _Displaced(PathFrame(robot, exact, Motion.none()))
@@ -93,7 +94,7 @@ class _Displaced:
     """Adds joint-centre errors to joints, one limb after the other.
 
     Args:
-        frame: common data of all paths of the robot.
+        frame: common data of all chains of the robot.
 
     Attributes:
         centres: joint centres with an error so far.

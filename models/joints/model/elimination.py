@@ -152,7 +152,7 @@ class _Elimination:
 def eliminated(
     model: Model, rotation: tuple[float, ...] | None = None, held: frozenset[int] = frozenset()
 ) -> tuple[Eliminated, ...]:
-    """Return the unknowns of a robot with a closed form in dimensions and pose, in the solution of home.
+    """Return the unknowns of a robot that have a closed form in dimensions and pose, for the solution of home.
 
     Args:
         model: the robot.
@@ -338,9 +338,9 @@ class Equation(NamedTuple):
 
 
 def gaps_of(model: Model) -> dict[str, Equation]:
-    """Return the gap (3, 1) of each path that is opened at the centre of a joint, by the path's name.
+    """Return the gap (3, 1) of each chain that is opened at the centre of a joint, by the chain's name.
 
-    Any three equations of a path may be tried as a gap, because an unknown is identified by the form of its equation.
+    Any three equations of a chain may be tried as a gap, because an unknown is identified by the form of its equation.
     """
     parts: dict[str, dict[int, Equation]] = {}
     for each in (*model.loops, *model.closure):
@@ -364,7 +364,7 @@ def limb_of(name: str) -> str:
 
 
 def axes_of(model: Model, name: str) -> Iterator[SX]:
-    """Yield the current direction (3, 1) of each rotation of a path's limb."""
+    """Yield the current direction (3, 1) of each rotation of a chain's limb."""
     for each in model.joint_screws:
         if each.limb == name.partition(".")[0] and not each.is_nested:
             for k in range(each.all.shape[1]):

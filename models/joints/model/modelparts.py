@@ -1,6 +1,6 @@
 """Properties of a robot's model: ranks measured at closed configurations, parameters, quantities and structure.
 
-The structure of a path is for people: joints of the path, the joint at which its loop is opened, and dimensions of
+The structure of a chain is for people: joints of the chain, the joint at which its loop is opened, and dimensions of
 its wrench spaces.
 """
 
@@ -179,14 +179,14 @@ def with_all_relations(actuators: Sequence[Actuator]) -> tuple[Actuator, ...]:
 
 
 def structure_of(limb: str, name: str, path: OpenedPath, ranks: Ranks, unknowns: int) -> PathStructure:
-    """Return the structure of a path with all its loop equations counted as kept.
+    """Return the structure of a chain with all its loop equations counted as kept.
 
     Args:
         limb: name of the limb.
-        name: name of the path: that of the limb, with the number of the branch if there are several.
-        path: the path.
-        ranks: ranks of the path's screws.
-        unknowns: number of joint coordinates that are unknowns and belong to no earlier path.
+        name: name of the chain: that of the limb, with the number of the branch if there are several.
+        path: the chain.
+        ranks: ranks of the chain's screws.
+        unknowns: number of joint coordinates that are unknowns and belong to no earlier chain.
     """
     written = [part for joint in path.joints for part in (joint.parts or (joint,))]
     count = len(path.equations)
@@ -204,12 +204,12 @@ def structure_of(limb: str, name: str, path: OpenedPath, ranks: Ranks, unknowns:
 
 
 def joint_screws(limb: str, path: OpenedPath, ranks: Ranks, labels: Mapping[int, str]) -> JointScrews | None:
-    """Return the current screws of a path's joints; None if a joint has unknown screws.
+    """Return the current screws of the joints of a chain; None if a joint has unknown screws.
 
     Args:
         limb: name of the limb.
-        path: the path.
-        ranks: ranks of the path's screws.
+        path: the chain.
+        ranks: ranks of the chain's screws.
         labels: labels of the written joints, by identity.
     """
     if any(len(own) != len(joint.axes) for joint, own in zip(path.joints, path.screws, strict=True)):
@@ -230,7 +230,7 @@ def _column_labels(joint: Joint, labels: Mapping[int, str]) -> list[str]:
 
 
 def with_kept(structures: Iterable[PathStructure], kept: Collection[Closure]) -> tuple[PathStructure, ...]:
-    """Return the structures of paths with the number of loop equations that a program keeps."""
+    """Return the structures of chains with the number of loop equations that a program keeps."""
     names = {each.name for each in kept}
     return tuple(
         replace(each, kept=sum(f"loop {each.name} ({k + 1})" in names for k in range(each.equations)))
@@ -265,7 +265,7 @@ def rank_remarks(rank: int, structures: Sequence[PathStructure]) -> list[str]:
 
 
 def _opened(path: OpenedPath) -> str:
-    """Return in words where a path is opened, with the numbers of the joints as they are written."""
+    """Return in words where a chain is opened, with the numbers of the joints as they are written."""
     first: list[int] = [1]
     for joint in path.joints:
         first.append(first[-1] + (len(joint.parts) or 1))

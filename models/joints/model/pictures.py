@@ -33,13 +33,13 @@ _ROD_ENDS = (JointKind.UNIVERSAL, JointKind.SPHERICAL)
 
 
 class DrawnPath(NamedTuple):
-    """Path of a limb to be drawn.
+    """Chain of a limb to be drawn.
 
     Attributes:
         limb: the limb.
-        number: index of the path in the limb.
-        path: the path.
-        row: index, among the rows of J that belong to the limb, of the path's row; only if the path has one row and
+        number: index of the chain in the limb.
+        path: the chain.
+        row: index, among the rows of J that belong to the limb, of the chain's row; only if the chain has one row and
             the limb several.
     """
 
@@ -73,14 +73,14 @@ class _Sketch:
     nodes: dict[str, _Node] = field(default_factory=dict)
 
     def node(self, name: str, place: Place, body: Body, kind: JointKind | None = None) -> _Node:
-        """Return the point with a name; the point is added unless another path has added it."""
+        """Return the point with a name; the point is added unless another chain has added it."""
         if name not in self.nodes:
             self.points[name] = Point(name, place.now, body)
             self.nodes[name] = _Node(name, self.frame.typical_value(place.home).ravel(), kind)
         return self.nodes[name]
 
     def link(self, start: _Node | None, end: _Node, drawn: DrawnPath | None, kind: LinkKind, body: Body) -> None:
-        """Add a line between two points, unless it has zero length or another path has added it."""
+        """Add a line between two points, unless it has zero length or another chain has added it."""
         if start is None or np.linalg.norm(end.at_home - start.at_home) <= _SAME * self.size:
             return
         if any((each.start, each.end) == (start.name, end.name) for each in self.links):
@@ -90,7 +90,7 @@ class _Sketch:
         self.links.append(Link(start.name, end.name, body, limb, kind, row))
 
     def symbol(self, name: str, joint: PlacedJoint, place: Place, body: Body, limb: Limb) -> None:
-        """Add the symbol of a joint, unless another path has added it."""
+        """Add the symbol of a joint, unless another chain has added it."""
         axes, owner = tuple(axis.now for axis in joint.axes), limb.name if limb.name in self.carrying else None
         self.joints.setdefault(name, JointSymbol(name, joint.kind, place.now, axes, body, owner, joint.is_actuated))
 
@@ -115,13 +115,13 @@ def scene_of(
     carrying: Collection[str],
     networks: Sequence[OpenNetwork] = (),
 ) -> Scene:
-    """Return the drawing of paths and networks at a pose.
+    """Return the drawing of chains and networks at a pose.
 
     Args:
-        paths: paths of all limbs.
+        paths: chains of all limbs.
         pose: symbols of the pose.
         origin: (3, 1) origin of the platform frame at home, length.
-        frame: common data of all paths of the robot.
+        frame: common data of all chains of the robot.
         carrying: names of the limbs with a wrench.
         networks: limbs that are networks.
     """
@@ -137,7 +137,7 @@ def scene_of(
 
 
 def _add_path(sketch: _Sketch, drawn: DrawnPath, siblings: Sequence[DrawnPath]) -> None:
-    """Add a path to the drawing; ``siblings`` are all paths of the same limb."""
+    """Add a chain to the drawing; ``siblings`` are all chains of the same limb."""
     joints = placed_joints(drawn.path, sketch.frame)
     stem = len(drawn.limb.stem) if len(drawn.limb.branches) > 1 else 0
     previous: _Node | None = None
@@ -272,7 +272,7 @@ def _tip(sketch: _Sketch, joint: PlacedJoint) -> Place:
 
 
 def _rail_end(sketch: _Sketch, name: str) -> _Node | None:
-    """Return the end of a rail that is farther from the platform at home; None for a slide without a rail."""
+    """Return the end of a slide's rail, the farther one from the platform at home; None for a slide without a rail."""
     origin = sketch.frame.typical_value(sketch.origin).ravel()
     ends = [sketch.nodes[end] for end in (f"{name} rail start", f"{name} rail end") if end in sketch.nodes]
     return max(ends, key=lambda each: float(np.linalg.norm(each.at_home - origin)), default=None)

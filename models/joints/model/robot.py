@@ -127,7 +127,7 @@ class _LimbModes(NamedTuple):
     Attributes:
         place: index of the sign among all signs of the model.
         limb: name of the limb.
-        paths: opened paths of the limb.
+        paths: opened chains of the limb.
         unknowns: range of the limb's unknowns in the model.
     """
 
@@ -244,7 +244,7 @@ class _Builder(ResistingParts):
     def _path(
         self, limb: Limb, index: int, joints: Sequence[Joint], variables: Variables, labels: Mapping[int, str]
     ) -> OpenedPath | None:
-        """Add one path of a limb and return it; None for a path that neither constrains nor drives the platform."""
+        """Add one chain of a limb and return it; None for a chain that neither constrains nor drives the platform."""
         joints = simplified(self.frame, joints)
         cut = choose_cut(joints, len(limb.stem) if len(limb.branches) > 1 else 0, with_rods=limb.centre is None)
         key = limb.group, index
@@ -291,13 +291,13 @@ class _Builder(ResistingParts):
 
 
 def joint_labels(limb: Limb, index: int, joints: Sequence[Joint], known: Mapping[int, str]) -> dict[int, str]:
-    """Return a label, such as ``2:3``, for each unlabelled joint of a path, by the joint's identity.
+    """Return a label, such as ``2:3``, for each unlabelled joint of a chain, by the joint's identity.
 
     Args:
         limb: the limb.
-        index: index of the path in the limb.
-        joints: joints of the path.
-        known: labels of joints of other paths, which share the joints of the stem.
+        index: index of the chain in the limb.
+        joints: joints of the chain.
+        known: labels of joints of other chains, which share the joints of the stem.
     """
     return {id(joint): limb.label(index, j) for j, joint in enumerate(joints) if id(joint) not in known}
 

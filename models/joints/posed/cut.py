@@ -19,7 +19,7 @@ from ..home.motion import UNIT_VECTORS, AxisKind, JointAxis
 
 
 class Cut(NamedTuple):
-    """Place at which a path of joints is opened: joints ``first`` to ``last`` belong to neither side.
+    """Place at which a chain of joints is opened: joints ``first`` to ``last`` belong to neither side.
 
     Attributes:
         type: letter of the joint at the cut; empty if no joint is cut.
@@ -83,14 +83,14 @@ def _merged(joints: Sequence[Joint], kind: str, point: SX) -> Joint:
 
 
 def choose_cut(joints: Sequence[Joint], stem: int, *, with_rods: bool = True) -> Cut:
-    """Return the place at which a path is opened.
+    """Return the place at which a chain is opened.
 
     The cut is at the passive spherical joint nearest the platform; without one at a universal joint; without one at the
     revolute joint with the most equal numbers of coordinates on both sides.
 
     Args:
         joints: joints from base to platform.
-        stem: number of joints from the base on that are shared with other paths, and stay on the base side.
+        stem: number of joints from the base on that are shared with other chains, and stay on the base side.
         with_rods: If true, a whole rod may be the cut.
     """
     spherical = [j for j in range(stem, len(joints)) if joints[j].type == "S"]

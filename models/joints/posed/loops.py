@@ -71,7 +71,7 @@ def examine_loops(
     """Return closed configurations near home, with the independent loop equations and the free actuator coordinates.
 
     Args:
-        frame: common data of all paths of the robot.
+        frame: common data of all chains of the robot.
         equations: loop equations in dimensions, pose and unknowns.
         unknowns: unknowns with their symbols and scales.
         driven: indices of the unknowns that are actuator coordinates.

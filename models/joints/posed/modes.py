@@ -5,7 +5,7 @@ solutions in which joints hold together, those of one *working mode* are connect
 elbow bent to one side. The sign of a mode is that of the determinant of the equations' derivatives with respect to the
 limb's unknowns, which is zero only at such singularities:
 
-* one unknown and one equation of each path that depends on it, such as that of a rod: the sum of the derivatives;
+* one unknown and one equation of each chain that depends on it, such as that of a rod: the sum of the derivatives;
 * two unknowns of a planar limb: the derivatives of the point at the cut, and the plane's normal;
 * three unknowns: the derivatives of the point at the cut.
 
@@ -29,7 +29,7 @@ _SINGULAR = 1e-6
 
 
 def joint_signs(limb: str, name: str, path: OpenedPath) -> list[AssemblySign]:
-    """Return the signs of a path's joints that the loop equations leave open; 1 where the joints hold together."""
+    """Return the signs of a chain's joints that the loop equations leave open; 1 where the joints hold together."""
     return [AssemblySign(f"sign {name} ({k + 1})", limb, 1 - each, is_mode=False) for k, each in enumerate(path.checks)]
 
 
@@ -42,9 +42,9 @@ def mode_signs(
 
     Args:
         limb: name of the limb.
-        paths: opened paths of the limb.
+        paths: opened chains of the limb.
         unknowns: unknowns of the limb.
-        frame: common data of all paths of the robot.
+        frame: common data of all chains of the robot.
     """
     every = ca.vertcat(SX(0, 1), *[item.symbol for item in unknowns])
     unknowns = [item for item in unknowns if not item.is_free]
@@ -73,9 +73,9 @@ def mode_signs(
 
 
 def _normal(path: OpenedPath, frame: PathFrame) -> SX | None:
-    """Return the current axis (3, 1) normal to all motions of a path's unknowns; None if there is none.
+    """Return the current axis (3, 1) normal to all motions of a chain's unknowns; None if there is none.
 
-    The path is planar if all rotations have one direction, and its slides are perpendicular to it.
+    The chain is planar if all rotations have one direction, and its slides are perpendicular to it.
     """
     cut = range(path.cut.first, path.cut.last + 1)
     pairs = [

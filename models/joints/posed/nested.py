@@ -327,8 +327,8 @@ class ResistingParts:
         members: members that resist the platform.
         actuators: all actuated joints.
         positions: (1, 1) coordinate of each actuator from home.
-        screws: screws of the joints of paths, and of each member of networks.
-        structure: structure of these paths and members.
+        screws: screws of the joints of chains, and of each member of networks.
+        structure: structure of these chains and members.
     """
 
     members: list[Member] = field(default_factory=list)

@@ -1,4 +1,4 @@
-"""Opened path of joints: current screws, and the equations that close its loop through base and platform.
+"""Opened chain of joints: current screws, and the equations that close its loop through base and platform.
 
 Bodies on the base side are displaced by the joints before them; those on the platform side by the pose and the joints
 after them. At the cut, equations state that the joint there holds together:
@@ -49,7 +49,7 @@ class LoopEquation(NamedTuple):
 
 @dataclass(eq=False, kw_only=True)
 class Opened:
-    """Path or network with opened loops.
+    """Chain or network with opened loops.
 
     Attributes:
         equations: equations of the closed loops.
@@ -62,11 +62,11 @@ class Opened:
 
 @dataclass(eq=False)
 class OpenedPath(Opened):
-    """Path of joints at any pose, opened at its cut.
+    """Chain of joints at any pose, opened at its cut.
 
     Attributes:
         joints: joints from base to platform.
-        cut: place at which the path is opened.
+        cut: place at which the chain is opened.
         screws: current screws (6, 1) of the axes of each joint; empty for a joint of a rod with unknown axes.
         behind: displacement of the body on the platform side of each joint; None for joints between the two sides.
         points: (3, 1) current position of each joint on the body on its base side, length.
@@ -94,13 +94,13 @@ class OpenedPath(Opened):
 
 
 def open_path(joints: Sequence[Joint], cut: Cut, variables: Variables, frame: PathFrame) -> OpenedPath:
-    """Return a path opened at a cut.
+    """Return a chain opened at a cut.
 
     Args:
         joints: joints from base to platform.
-        cut: place at which the path is opened.
+        cut: place at which the chain is opened.
         variables: function that returns the coordinates of the axes outside the cut.
-        frame: common data of all paths of the robot.
+        frame: common data of all chains of the robot.
     """
     count = len(joints)
     ends = Motion.none(), frame.platform
@@ -132,11 +132,11 @@ def open_path(joints: Sequence[Joint], cut: Cut, variables: Variables, frame: Pa
 
 
 def closures(kind: str, name: str, sides: Iterable[tuple[SX, ...]]) -> list[Closure]:
-    """Return loop equations with names by limb or path, such as ``loop 1.2 (3)``.
+    """Return loop equations with names by limb or chain, such as ``loop 1.2 (3)``.
 
     Args:
         kind: first word of the names.
-        name: name of the limb or path.
+        name: name of the limb or chain.
         sides: left side of each equation, and its size unless this is 1.
     """
     return [Closure(f"{kind} {name} ({k + 1})", *each) for k, each in enumerate(sides)]
@@ -222,14 +222,14 @@ def directions_at_rod(path: OpenedPath, side: Motion, frame: PathFrame, *, is_bo
     expressions are undefined where the rod is along the first axis, or beyond the reach.
 
     Args:
-        path: the path, with its rod.
+        path: the chain, with its rod.
         side: displacement of the body with the first axis.
-        frame: common data of all paths of the robot.
+        frame: common data of all chains of the robot.
         is_bounded: If true, the axes are also defined beyond the reach.
     """
     j, far, rod = path.cut.joint, path.cut.far, path.rod
     if far is None or rod is None:
-        raise ValueError("the path has no rod")
+        raise ValueError("the opened loop has no rod, so the axes at the ends of a rod are undefined")
     home = path.joints[j].point - path.joints[far].point
     axes = path.joints[far].axes if far < j else path.joints[far].axes[::-1]
     first, second = (axis.axis for axis in axes)
@@ -244,7 +244,7 @@ def directions_at_rod(path: OpenedPath, side: Motion, frame: PathFrame, *, is_bo
 
 
 def slide_length(path: OpenedPath, frame: PathFrame) -> SX | None:
-    """Return the travel (1, 1) from home of the actuated slide of a path's rod, length; None without such a slide."""
+    """Return the travel (1, 1) from home of the actuated slide of a chain's rod, length; None without such a slide."""
     cut = path.cut
     if path.rod is None or cut.slide is None or cut.far is None:
         return None
@@ -255,7 +255,7 @@ def slide_length(path: OpenedPath, frame: PathFrame) -> SX | None:
 
 
 def _slide_sign(path: OpenedPath, frame: PathFrame) -> float:
-    """Return 1 if the slide of a path's rod points along the rod, -1 if against it."""
+    """Return 1 if the slide of a chain's rod points along the rod, -1 if against it."""
     cut = path.cut
     if cut.slide is None or cut.far is None:
         return 1.0
@@ -277,12 +277,12 @@ def normals_of(axis: SX, frame: PathFrame) -> list[SX]:
 
 
 def distance_equations(path: OpenedPath, variables: Variables, frame: PathFrame) -> list[LoopEquation]:
-    """Return the distance equations of a path opened at a joint; none for a path with a rod, or opened at no joint.
+    """Return the distance equations of a chain opened at a joint; none for a chain with a rod, or opened at no joint.
 
     Args:
-        path: the path.
+        path: the chain.
         variables: function that returns the coordinates of the axes outside the cut.
-        frame: common data of all paths of the robot.
+        frame: common data of all chains of the robot.
     """
     cut = path.cut
     if cut.far is not None or not cut.type:

@@ -1,4 +1,4 @@
-"""Joints of a path for drawings: positions and axes, at any pose, of the joints as they are written."""
+"""Joints of a chain for drawings: positions and axes, at any pose, of the joints as they are written."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Place:
 
 @dataclass(frozen=True, eq=False)
 class PlacedJoint:
-    """Joint of a path at any pose.
+    """Joint of a chain at any pose.
 
     Attributes:
         number: number of the written joint, 1 at the base.
@@ -85,7 +85,7 @@ class PlacedJoint:
 
 
 def placed_joints(path: OpenedPath, frame: PathFrame) -> list[PlacedJoint]:
-    """Return the joints of a path from base to platform.
+    """Return the joints of a chain from base to platform.
 
     Two hinges merged into a universal joint are shown as they are written. Three hinges merged into a spherical joint
     are shown as that joint, because the middle axis is on neither side of the cut.

@@ -1,4 +1,4 @@
-"""Rows of J and members of a path of joints: its wrenches on the platform with locked actuators."""
+"""Rows of J and members of a chain of joints: the chain's wrenches on the platform with locked actuators."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .opened import OpenedPath
 
 
 class Ranks(NamedTuple):
-    """Ranks of a path at almost all dimensions and joint coordinates.
+    """Ranks of a chain at almost all dimensions and joint coordinates.
 
     Attributes:
         passive: rank of the screws of the passive joints.
@@ -33,7 +33,7 @@ class Ranks(NamedTuple):
 
 
 class Centre(NamedTuple):
-    """Centre of a path: point (3, 1) at home on the body after a joint.
+    """Centre of a chain: point (3, 1) at home on the body after a joint.
 
     If ``slides`` is true, the centre is arbitrary along the joint's axis.
     """
@@ -44,7 +44,7 @@ class Centre(NamedTuple):
 
 
 def path_ranks(frame: PathFrame, joints: Sequence[Joint], cut: Cut) -> Ranks:
-    """Return the ranks of a path of joints."""
+    """Return the ranks of a chain of joints."""
     values = SX.sym("q", sum(len(joint.axes) for joint in joints))
     screws = free_screws(joints, values)
     passive = [j for j, joint in enumerate(joints) if not joint.actuated]
@@ -70,12 +70,12 @@ def path_ranks(frame: PathFrame, joints: Sequence[Joint], cut: Cut) -> Ranks:
 
 
 def resistance(limb: str, path: OpenedPath, ranks: Ranks, given: SX | None) -> tuple[list[Wrench], Member | None]:
-    """Return the rows of J of a path, and its member; no member if the path resists by a few single rows.
+    """Return the rows of J of a chain, and its member; no member if the chain resists by a few single rows.
 
     Args:
         limb: name of the limb.
-        path: the path.
-        ranks: ranks of the path.
+        path: the chain.
+        ranks: ranks of the chain.
         given: (3, 1) centre given by the user at home, length; None for the centre by rule.
     """
     if ranks.pinned is not None and given is None:
@@ -96,7 +96,7 @@ def resistance(limb: str, path: OpenedPath, ranks: Ranks, given: SX | None) -> t
 
 
 def _pinned(limb: str, path: OpenedPath, rank: int) -> tuple[list[Wrench], Member | None]:
-    """Return the rows or the member of a path with a spherical joint at the cut: forces through its centre."""
+    """Return the rows or the member of a chain with a spherical joint at the cut: forces through its centre."""
     centre = path.points[path.cut.joint]
     if rank == 3:
         return [], None
@@ -123,7 +123,7 @@ def _pinned(limb: str, path: OpenedPath, rank: int) -> tuple[list[Wrench], Membe
 
 
 def _centre_of(joints: Sequence[Joint], given: SX | None) -> Centre:
-    """Return the centre of a path without a spherical joint at the cut.
+    """Return the centre of a chain without a spherical joint at the cut.
 
     In this order: the user's centre; the intersection of two successive passive rotations nearest the platform; the
     point of the last passive joint.

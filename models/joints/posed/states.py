@@ -1,6 +1,6 @@
-"""Joints and links of a path for limits: coordinates from home, cone directions, and segments.
+"""Joints and links of a chain for limits: coordinates from home, cone directions, and segments.
 
-Unknowns are coordinates of their joint. A joint at which the path is opened, and rotations merged into a spherical
+Unknowns are coordinates of their joint. A joint at which the chain is opened, and rotations merged into a spherical
 joint, have coordinates from the displacements of both adjacent bodies: sine and cosine in closed form, each times one
 positive factor. For a universal joint at the end of a rod they follow from the rod's direction. A rod between two
 spherical joints spins freely. Links are segments between joint centres.
@@ -29,8 +29,8 @@ COORDINATE_PARTS: Mapping[str, tuple[str, ...]] = {"U": ("first", "second"), "C"
 #: Value of ``a1 . (a2 x d)`` at home above which the solution of an angle that is 0 at home differs from the other one:
 #: rounding leaves 1e-16.
 _DISTINCT = 1e-6
-_ROD = "the joint ends a rod between two spherical joints, which spins freely"
-_PLANE = "the joint's axes are in one plane at home, where the angles of three rotations are not determined"
+_ROD = "the joint is at an end of a rod between two spherical joints, and this rod spins freely"
+_PLANE = "the three axes of the joint are in one plane at home, where its three angles are not determined"
 
 
 class Angle(NamedTuple):
@@ -91,20 +91,20 @@ class _Coordinates(NamedTuple):
 
 
 class PathJoints:
-    """Coordinates and cone directions of the joints of an opened path, for limits.
+    """Coordinates and cone directions of the joints of an opened chain, for limits.
 
     Args:
         limb: the limb.
-        path: the path.
+        path: the chain.
         known: coordinates that are unknowns, by the joint's identity and the number of the axis.
-        frame: common data of all paths of the robot.
+        frame: common data of all chains of the robot.
     """
 
     def __init__(self, limb: Limb, path: OpenedPath, known: Mapping[tuple[Joint, int], SX], frame: PathFrame) -> None:
         self._limb, self._path, self._known, self._frame = limb, path, known, frame
 
     def states(self, labels: Mapping[int, str]) -> list[LimbJoint]:
-        """Return the states of the path's joints as they are written; ``labels`` has a label by a joint's identity."""
+        """Return the states of the chain's joints as they are written; ``labels`` has a label by a joint's identity."""
         found = []
         for j, joint in enumerate(self._path.joints):
             coordinates = self._coordinates(j)
@@ -162,7 +162,7 @@ class PathJoints:
         return _Coordinates([_angle(first), _angle(second), _angle(angle_about(a[2], turn.T @ a[0], back))])
 
     def _at_rod(self, j: int) -> _Coordinates:
-        """Return the angles of a universal joint at an end of the path's rod."""
+        """Return the angles of a universal joint at an end of the chain's rod."""
         path, joint = self._path, self._path.joints[j]
         rod, end = path.rod, path.cut.joint if j == path.cut.far else path.cut.far
         if joint.type != "U" or rod is None or end is None:
@@ -245,15 +245,15 @@ def _coordinate(axis: JointAxis, value: SX) -> JointCoordinate:
 
 
 def limb_links(path: OpenedPath, labels: Mapping[int, str], frame: PathFrame) -> list[LimbLink]:
-    """Return the links of a path, from the base on.
+    """Return the links of a chain, from the base on.
 
     Links end at joints; of several joints with a common centre at home, only at the joint nearest the base. A slide
     along the line between its neighbours is not an end of a link: the link includes the travel of the slide.
 
     Args:
-        path: the path.
+        path: the chain.
         labels: labels of the joints, by identity.
-        frame: common data of all paths of the robot.
+        frame: common data of all chains of the robot.
     """
     ends: list[int] = []
     for j, joint in enumerate(path.joints):
@@ -287,11 +287,11 @@ def _is_along(path: OpenedPath, joints: Sequence[int], frame: PathFrame) -> bool
 
 
 def with_shared_places(paths: Sequence[tuple[OpenedPath, list[LimbLink]]], frame: PathFrame) -> tuple[LimbLink, ...]:
-    """Return the links of all paths, with one name for joints of the base, or of the platform, with a common centre.
+    """Return the links of all chains, with one name for joints of the base, or of the platform, with a common centre.
 
     Args:
-        paths: each path with its links.
-        frame: common data of all paths of the robot.
+        paths: each chain with its links.
+        frame: common data of all chains of the robot.
     """
     found = [link for _, links in paths for link in links]
     names: dict[str, str] = {}

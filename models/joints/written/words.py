@@ -244,13 +244,13 @@ def _limb(place: str, table: Mapping[str, object], before: int) -> LimbWords:
     if not stem and not branches:
         raise RobotError(f"{place}, joints", "is missing: a limb needs at least one joint")
     if len(branches) == 1:
-        raise RobotError(f"{place}, branch", "has one branch: write its joints among those of the limb")
+        raise RobotError(f"{place}, branch", "has only one branch: write its joints into the list of the limb")
     centre = None if table.get("centre") is None else vector_of(f"{place}, centre", table["centre"])
     return LimbWords(place, tuple(names), repeat, points, stem, tuple(branches), centre)
 
 
 def _check_path(place: str, joints: Sequence[JointWords]) -> None:
-    """Refuse too many joints of one path, invalid joint names, and repeated ones."""
+    """Refuse too many joints of one chain, invalid joint names, and repeated ones."""
     if len(joints) > _MOST_JOINTS:
         raise RobotError(f"{place}, joints", f"has {len(joints)} joints; at most {_MOST_JOINTS} are allowed")
     names = [joint.name for joint in joints if joint.name]
@@ -286,7 +286,9 @@ def _joint_words(place: str, table: Mapping[str, object]) -> JointWords:
     place = f"{place} ({kind})"
     allowed = ("type", "name", "at", *_JOINT_KEYS[kind])
     if "actuated" in table and "actuated" not in allowed:
-        raise RobotError(f"{place}, actuated", "is not allowed: write its axes as joints R or P of their own")
+        raise RobotError(
+            f"{place}, actuated", "is not allowed for this type: write each axis as a separate joint R or P"
+        )
     refuse_other_keys(place, table, allowed)
     for key in allowed:
         if key not in ("actuated", "name") and key not in table:
@@ -319,7 +321,7 @@ def _repeat(place: str, value: object) -> RepeatWords:
     table = table_of(place, value)
     refuse_other_keys(place, table, ("count", "angles", "axis", "through"))
     if ("count" in table) == ("angles" in table):
-        raise RobotError(place, "needs either count or angles")
+        raise RobotError(place, "needs count or angles, and not both")
     if "count" in table:
         count = table["count"]
         if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_LIMBS:
@@ -371,7 +373,7 @@ def _graph(tables: Mapping[str, object]) -> GraphWords:
             raise RobotError(joint.place, "is given twice; each joint needs a name of its own")
     unused = [link for link in links if not any(link in joint.between for joint in joints)]
     if unused:
-        raise RobotError(f"links, {unused[0]}", "has no joint; each link needs one, or is left out")
+        raise RobotError(f"links, {unused[0]}", "has no joint; give this link a joint, or remove it from links")
     couplings = list_of("coupling", tables.get("coupling") or ())
     if len(couplings) > _MOST_COUPLINGS:
         raise RobotError("coupling", f"has {len(couplings)} couplings; at most {_MOST_COUPLINGS} are allowed")
@@ -416,7 +418,10 @@ def _joint(number: int, table: Mapping[str, object], links: Sequence[str]) -> Li
     place = f"joint {name}"
     between = [text_of(f"{place}, between", each) for each in list_of(f"{place}, between", table.get("between", ()))]
     if len(between) != 2:
-        raise RobotError(f"{place}, between", f"has {len(between)} links; a joint is between 2, the base's side first")
+        raise RobotError(
+            f"{place}, between",
+            f"has {len(between)} links; a joint connects 2 links: give first the link nearer to the base",
+        )
     for link in between:
         if link not in links:
             raise RobotError(f"{place}, between", f"has {link!r}, which is not a link; links are {', '.join(links)}")

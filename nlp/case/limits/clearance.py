@@ -110,7 +110,7 @@ def _distance(far: float, value: float) -> float:
 
 
 def _slope(far: float, value: float) -> float:
-    """Return the derivative of :func:`_near` with respect to the distance, at a value of it."""
+    """Return the derivative of :func:`_near` with respect to the distance, at a value of :func:`_near`."""
     return float(6 * max(1 - value, 0.0) ** (2 / 3) * _distance(far, value) / far)
 
 

@@ -40,7 +40,7 @@ class Form:
 
 @dataclass(frozen=True, eq=False)
 class Call:
-    """Call of a form.
+    """Call of a :class:`Form` with its arguments.
 
     Attributes:
         form: called function.
@@ -117,7 +117,7 @@ def _square(number: SX) -> SX:
 
 
 def in_parts(part: float) -> Reading:
-    """Return the reading of ``part`` times a plain number as the number."""
+    """Return the conversion for a limited plain number of which the program bounds ``part`` times the number."""
     return Reading(
         Dimension.NUMBER, from_value=partial(mul, 1 / part), slope=partial(_slope, part), to_value=partial(mul, part)
     )

@@ -208,7 +208,7 @@ class ActuatorForce(ActuatorLimit):
         return dimension_of_force(joint)
 
     def ranges(self, model: Model) -> Ranges:
-        """Return the allowed ranges of both values."""
+        """Return the allowed ranges of ``min`` and ``max``."""
         size = super().ranges(model)["max"]
         signed = size._replace(above=-math.inf)
         # Without min, max limits the magnitude.

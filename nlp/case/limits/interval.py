@@ -76,7 +76,7 @@ class LowerLimit(Limit[AtLeast], abc.ABC):
 
 
 def two_sided(allowed: NumberRange) -> Ranges:
-    """Return the allowed ranges of ``min`` and ``max``, both equal."""
+    """Return the allowed ranges of ``min`` and of ``max``: the same range for both."""
     return {"min": allowed, "max": allowed}
 
 
@@ -139,7 +139,7 @@ class QuantityLimit(IntervalLimit):
         return self.measure
 
     def ranges(self, model: Model) -> Ranges:
-        """Return the allowed range of both values; of plain numbers if the robot has no such quantity."""
+        """Return the allowed ranges of ``min`` and ``max``; those of plain numbers if the robot lacks the quantity."""
         quantity = quantity_named(self.measure, model)
         return two_sided(NumberRange(Dimension.NUMBER if quantity is None else quantity.dimension, above=-math.inf))
 

@@ -96,7 +96,7 @@ class LimitOnJoint(Limit[StatedMotion], abc.ABC):
     @classmethod
     @abc.abstractmethod
     def stated(cls, joint: str, table: JointTable) -> list[str]:
-        """Return the keys within a joint's table that are limits of this type; empty for its min and max.
+        """Return the keys within a joint's table that are limits of this type; an empty key stands for min and max.
 
         Raises:
             CaseError: the table contradicts itself.
@@ -176,7 +176,7 @@ class JointMotion(LimitOnJoint):
 
     @classmethod
     def stated(cls, joint: str, table: JointTable) -> list[str]:
-        """Return the keys within a joint's table with a range; empty for its min and max.
+        """Return the keys within a joint's table with a range; an empty key stands for min and max.
 
         Raises:
             CaseError: the table has neither a range nor a cone.
@@ -204,7 +204,7 @@ class JointMotion(LimitOnJoint):
         return {self.key: {self.joint: {self.part: interval} if self.part else interval}}
 
     def ranges(self, model: Model) -> Ranges:
-        """Return the allowed range of both values.
+        """Return the allowed ranges of ``min`` and ``max``.
 
         Raises:
             CaseError: there is no such joint, a joint does not have the coordinate, or the coordinate is an angle for

@@ -36,7 +36,7 @@ class Limits:
         items: limits, in the order of the registry.
 
     Raises:
-        CaseError: a limit is given twice, or the value of a key has another form.
+        CaseError: a limit is given twice, or the value of a key has a wrong form.
     """
 
     items: tuple[Limit[Any], ...]
@@ -104,7 +104,7 @@ def _limit_of(key: str, value: LimitValue) -> Limit[Any]:
     """Return the limit of a key in ``[limits]``.
 
     Raises:
-        CaseError: the value has another form, or a value is missing.
+        CaseError: the value has a wrong form, or a value is missing.
     """
     from .registry import LIMIT_TYPES  # noqa: PLC0415 - a case without limits starts without their tables
 

@@ -129,12 +129,12 @@ def _constant(tree: ast.expr, angle: float) -> float | None:
         return None
     value = float(expression(tree, {}, angle))
     if not math.isfinite(value):
-        raise ExpressionError(f"has a constant part with {sign!r} without a finite value")
+        raise ExpressionError(f"has constants for which {sign!r} gives no finite value")
     return value
 
 
 class _Reader:
-    """Recursive-descent parser of a text."""
+    """Recursive-descent parser of the text of a relation."""
 
     def __init__(self, text: str, names: Collection[str]) -> None:
         self._text, self._names = text, names
@@ -215,7 +215,9 @@ class _Reader:
         tree = self.sum()
         token = self.next()
         if token.text != ")":
-            raise self.wrong(token, f"expected an operator or the bracket that closes position {opened.place + 1}")
+            raise self.wrong(
+                token, f"expected an operator or the bracket that closes the one at position {opened.place + 1}"
+            )
         return tree
 
     def _split(self) -> Iterator[_Token]:

@@ -116,7 +116,7 @@ def _equations(closure: LoopClosure, A: Frame, B: Frame, kept: float | None, twi
         closure: the closure.
         A: frame of the closure on the first body, in world coordinates.
         B: frame of the closure on the second body, in world coordinates.
-        kept: required cosine between the axes of a universal joint; None for the present one.
+        kept: required cosine between the axes of a universal joint; None for the present cosine.
         twist: (6, n) twists of the second body minus twists of the first body, with velocities at the world origin.
     """
     w, v = twist[:3], twist[3:]
@@ -215,7 +215,7 @@ class _Loops:
             yield self.random(rng, _FAR[k % len(_FAR)])
 
     def closed(self, found: Reached) -> Closed:
-        """Return the description with all bodies and joints at the result's coordinates."""
+        """Return the description with all bodies and joints at the coordinates of a solution."""
         given, values = self.given, found.at.values * self.motions.units
         coordinates = {each.name: float(values[self._columns[each.name]].sum()) for each in given.joints}
 
@@ -306,7 +306,7 @@ def close_from_other_starts(given: Description, size: float) -> Closed | None:
 
 
 def least_gaps(given: Description, size: float) -> dict[str, float]:
-    """Return the loops that cannot be closed even if all other loops are cut and all actuators are free.
+    """Return the loops that cannot be closed even if all other loops are cut and all actuators are unlocked.
 
     Returns:
         Smallest gap of each of these loops by name, relative to the size.

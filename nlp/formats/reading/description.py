@@ -17,7 +17,7 @@ LARGEST = 1e9
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """Body of the tree.
+    """Body of the tree of a description.
 
     Attributes:
         name: name of the body, unique among all bodies.

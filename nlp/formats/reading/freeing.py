@@ -65,7 +65,7 @@ def _joint(tables: Mapping[str, Any], name: str, offers: Offers) -> tuple[int, d
 
 
 def _dimension(tables: dict[str, Any], name: str, value: float, kind: str, words: str) -> None:
-    """Add a dimension.
+    """Add a dimension to the tables of a robot file.
 
     Raises:
         InputError: a dimension with this name exists.
@@ -78,7 +78,7 @@ def _dimension(tables: dict[str, Any], name: str, value: float, kind: str, words
 
 
 def _put(tables: Mapping[str, Any], index: int, joint: dict[str, Any], place: list[Any], name: str) -> None:
-    """Replace the centre of a joint by expressions, and that of all joints of its limb with the same centre.
+    """Replace the centre of a joint by expressions, and the equal centres of other joints of its limb.
 
     Raises:
         InputError: the centre is a dimension already.

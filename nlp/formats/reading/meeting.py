@@ -193,7 +193,7 @@ def _limb(limb: Mapping[str, Any], size: float) -> dict[str, Any]:
 
 
 def _paired(joints: Sequence[Mapping[str, Any]], size: float) -> list[dict[str, Any]]:
-    """Return joints with pairs merged."""
+    """Return joints with pairs of neighbouring joints merged."""
     found: list[dict[str, Any]] = []
     rest = [dict(joint) for joint in joints]
     while rest:

@@ -255,7 +255,7 @@ class _Reader:
 
         Args:
             name: name of the tendon.
-            couplings: couplings of the robot; that of the motor is added.
+            couplings: couplings of the robot; the coupling of the motor is added.
         """
         pulls = [(joint, factor) for joint, factor in self._pulls(self.model.tendon(name).id) if factor]
         if len(pulls) == 1:

@@ -45,7 +45,7 @@ _ROOTS = ("mujoco", "mujocoinclude")
 
 
 class CleanModel(NamedTuple):
-    """Reduced model.
+    """MuJoCo model reduced to its geometry.
 
     Attributes:
         root: root element of a model that MuJoCo compiles without other files, with only the requested keyframe.
@@ -145,7 +145,7 @@ class _Files:
 
 
 def _without_other_tendons(root: Element) -> set[str]:
-    """Remove fixed tendons without a name, or of a joint that the model lacks; return the names of the others."""
+    """Remove fixed tendons without a name, or of a joint that the model lacks; return the names of the kept tendons."""
     sections = [*root.iter("worldbody")]
     joints = {joint.get("name") for section in sections for joint in section.iter("joint")}
     kept: set[str] = set()
@@ -160,7 +160,7 @@ def _without_other_tendons(root: Element) -> set[str]:
 
 
 def _is_read(equality: Element, fixed: set[str]) -> bool:
-    """Return whether an equality is none of tendons, or one of fixed tendons alone."""
+    """Return whether an equality involves no tendons, or fixed tendons only."""
     names = [equality.get(key) for key in ("tendon1", "tendon2")]
     return equality.tag != "tendon" or all(name in fixed for name in names if name is not None)
 

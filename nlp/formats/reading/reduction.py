@@ -215,10 +215,10 @@ def _refuse_open(
 def _coupled_motors(
     given: Description, moving: list[MechanismJoint], kept: list[MechanismJoint], leader: dict[str, str]
 ) -> list[MechanismJoint]:
-    """Return joints beside the mechanism that couplings tie to several of its joints, such as motors of a differential.
+    """Return joints outside of the mechanism that couplings tie to several joints of it, such as differential motors.
 
-    Such a coupling closes a loop. A joint counts that has a link of the mechanism; a coupling does whose other joints
-    all count.
+    Such a coupling closes a loop. A joint counts if one of its links belongs to the mechanism. A coupling counts if all
+    its other joints count.
 
     Args:
         given: the description.

@@ -112,7 +112,7 @@ def _rounded_up(value: float) -> float:
 
 
 def _parallelograms(given: Mechanism, joints: Sequence[MechanismJoint], within: float) -> Iterator[tuple[int, ...]]:
-    """Yield the indices of four hinges that are a parallelogram up to an error: two of a rod, two of the other rod."""
+    """Yield the indices of four hinges that form a parallelogram up to an error: two of one rod, two of the other."""
     rods: dict[tuple[str, ...], list[tuple[int, int]]] = {}
     for link in given.links:
         hinges = [(k, each) for k, each in enumerate(joints) if link.name in (each.inner, each.outer)]

@@ -98,7 +98,7 @@ class _Reader:
             if name not in parents
         ]
         if len(roots) != 1:
-            fault = "must have exactly one root link, which is no joint's child"
+            fault = "must have exactly one root link (a link that is not the child of a joint)"
             raise InputError(f"{self.source}: {fault}, got {listing(roots[:10])}")
         self.bodies.append(Body(roots[0], "", Frame()))
         waiting = [(roots[0], Frame())]

@@ -2,13 +2,12 @@
 
 - a YAML file beside the URDF with pairs of frames ``closed_loop``, their ``type`` (``3d`` or ``6d``), the actuated
   joints ``name_mot``, and joints of another kind ``joint_name`` and ``joint_type``
-  (github.com/Gepetto/example-parallel-robots),
-- frames ``closing_NAME_1`` and ``closing_NAME_2``, with a second pair ``closing_NAME_1_z`` for a hinge
-  (github.com/Rhoban/onshape-to-robot, docs/source/kinematic_loops.rst and onshape_to_robot/assembly.py),
-- elements ``<constraint>`` with ``parent``, ``parent_origin``, ``parent_axis`` and the same for ``child``, as
-  github.com/ros/urdfdom/pull/264 proposes (open: which types there are is not agreed),
-- elements ``<loop_joint>`` with ``link1`` and ``link2``, each with ``link``, ``xyz`` and ``rpy``, as in Isaac
-  Sim, and with an ``axis`` in both, as Drake had.
+  (github.com/Gepetto/example-parallel-robots), - frames ``closing_NAME_1`` and ``closing_NAME_2``, with a second pair
+  ``closing_NAME_1_z`` for a hinge (github.com/Rhoban/onshape-to-robot, docs/source/kinematic_loops.rst and
+  onshape_to_robot/assembly.py), - elements ``<constraint>`` with ``parent``, ``parent_origin``, ``parent_axis`` and the
+  same for ``child``, as github.com/ros/urdfdom/pull/264 proposes (the allowed types are not agreed yet), - elements
+  ``<loop_joint>`` with ``link1`` and ``link2``, each with ``link``, ``xyz`` and ``rpy``, as in Isaac Sim, and with an
+  ``axis`` in both, as Drake had.
 """
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ def summary_lines(found: Imported) -> Iterator[tuple[str, str]]:
         yield f"member {number}", f"{wrench_dims}; joints: {shown}"
     ranks = wrenches.ranks
     where = "at the stated configuration"
-    yield "degrees of freedom", f"{ranks.freedoms} with free actuators, {ranks.locked} with locked ones, {where}"
+    yield "degrees of freedom", f"{ranks.freedoms} with unlocked actuators, {ranks.locked} with locked ones, {where}"
     yield "ranks", f"{ranks.jacobian} of all wrenches, {ranks.constraints} of the constraint wrenches"
     yield "size", f"{found.size:.6g}, the largest distance between two joints"
     yield "loops", _loops(found)

@@ -23,12 +23,12 @@ _WEIGHTS = {"weld": 0, "R": 1, "P": 1, "H": 1, "S": 2}
 
 @dataclass(frozen=True, eq=False)
 class Edge:
-    """Joint of the tree.
+    """Joint of the spanning tree.
 
     Attributes:
         joint: joint of the mechanism.
         parent: name of the link on the base side of the tree.
-        child: other link of the joint, or a copy of it.
+        child: other link of the joint, or a copy of this link.
         axis: (3,) axis of rotation or direction of translation of the child for a positive joint coordinate; opposite
             to the joint's axis if the child is the joint's inner link.
         is_copy: True if the child is a copy of a link.

@@ -52,7 +52,7 @@ class Canvas:
         limb: str = "",
         **style: Any,  # noqa: ANN401 - Matplotlib's keywords
     ) -> Line2D:
-        """Draw a line through points (k, 3) and keep labels away from it; ``limb`` is the name of its limb."""
+        """Draw a line through points (k, 3) and keep labels away from it; ``limb`` is the name of the line's limb."""
         flat = self.view.project(points)
         (line,) = self._axes.plot(flat[:, 0], flat[:, 1], gid=name, **{"solid_capstyle": "round", **style})
         self.keep_free(points, limb)
@@ -86,7 +86,7 @@ class Canvas:
     ) -> None:
         """Draw an arrow between two points (3,), with two heads for a moment.
 
-        Seen from its end, an arrow is a circle, with a dot if it points towards the viewer, else with a cross.
+        Seen from its end, an arrow is a circle, with a dot if it points towards the viewer, and otherwise with a cross.
         """
         if self.is_end_on(start, end):
             size, is_near = 5.0 + 2.4 * width, self.view.depth(end) > self.view.depth(start)

@@ -165,7 +165,7 @@ class Drawing:
         return [self.rows[k] for k in sorted({k for k in found if k is not None})]
 
     def attachment(self, limb: str) -> int | None:
-        """Return the index of the point that joins a limb to the platform; None if no line of the limb has one."""
+        """Return the index of the point that joins a limb to the platform; None if no line of the limb ends there."""
         for start, end, link in self.links:
             if link.limb == limb:
                 for index in (end, start):
@@ -207,7 +207,7 @@ def drawing_of(
     Args:
         nlp: nonlinear program of a case.
         x: (n,) point.
-        state: state of the robot at the point; None if it does not exist.
+        state: state of the robot at the point; None if the robot does not exist there.
         task: index of the task in the case.
         pose: index of the pose of the state.
         headline: result in one line.
@@ -219,7 +219,8 @@ def drawing_of(
     case, model = nlp.case, nlp.program.model
     if state is None:
         raise EvaluationError(
-            f"{case.source or case.name}: no picture: the robot has no configuration at the last point"
+            f"{case.source or case.name}: no picture: "
+            "the search ended at a point at which the robot cannot be assembled"
         )
     linkage, posture = _posture(nlp, x, state, pose)
     chosen = case.tasks[task]

@@ -133,7 +133,7 @@ def _heading(drawing: Drawing) -> list[_HeadingLine]:
 
 
 def _write_heading(figure: Figure, left: float, top: float, height: float, drawing: Drawing) -> None:
-    """Write the heading above a panel, at a position in fractions of the figure, whose height is in inches."""
+    """Write the heading above a panel; the position is in fractions of the figure, the figure's height in inches."""
     top -= 0.3 / height
     for text, size, colour, bold in _heading(drawing):
         lines = textwrap.wrap(legible(text), int(0.98 * _WIDTH * 72 / (0.58 * size)), max_lines=2, placeholder=" …")

@@ -288,7 +288,7 @@ class Panel:
         return float(np.linalg.norm(motion.twist[:3])) * self.drawing.size + float(np.linalg.norm(motion.twist[3:]))
 
     def _paint_velocities(self) -> None:
-        """Paint the velocities of the platform's corners, with a fixed length of the largest."""
+        """Paint the velocities of the platform's corners; the largest one has a fixed length."""
         velocities = self.drawing.velocities_at(self.drawing.posture)
         fastest = float(np.max(np.linalg.norm(velocities, axis=1), initial=0.0))
         if fastest <= _NOISE * self._most:

@@ -51,7 +51,7 @@ class PathCurve(NamedTuple):
         name: name of the actuator.
         place: index of the actuator, which selects the colour.
         values: (P,) values in the case's unit; NaN for missing ones.
-        is_other: True for the smaller of two values; another curve has the larger one.
+        is_other: True for the curve of the smaller of two values; another curve has the larger value.
     """
 
     name: str
@@ -290,7 +290,7 @@ def _marks(result: PathResult, way: Progress) -> Iterator[PathMark]:
 
 
 def _bands(samples: PathSamples, result: PathResult, way: Progress) -> Iterator[PathBand]:
-    """Yield the known segments without a proof."""
+    """Yield the segments with a known violation or an undecided claim."""
     state = np.zeros(len(way.knots) - 1, dtype=int)
     state[samples.points.segments[samples.is_apart]] = 1
     for each in checked_claims(result):

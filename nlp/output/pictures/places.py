@@ -188,7 +188,7 @@ class _Candidates:
         return np.hstack([places, self._middle + np.minimum(part, 1.0) * way])
 
     def best(self, taken: _Taken) -> Placed:
-        """Return the cheapest candidate, given other labels; the first candidate of equal cost."""
+        """Return the cheapest candidate, given the other labels; among candidates of equal cost, the first."""
         costs = np.full(len(self._least), math.inf)
         least = math.inf
         for first in range(0, len(costs), _AT_ONCE):

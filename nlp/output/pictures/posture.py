@@ -46,7 +46,7 @@ def pose_index(nlp: Nlp, pose: int) -> int:
 
 
 def states_at_poses(outcome: TaskOutcome) -> list[RobotState | None]:
-    """Return the state of the robot of a task's outcome at every pose; None if it does not exist."""
+    """Return the robot's state at every pose, for the outcome of a task; None where the robot does not exist."""
     nlp, x = outcome.own.nlp, outcome.at
     return [outcome.state, *(state_at_pose(nlp, x, k) for k in range(1, len(nlp.program.robots)))]
 
@@ -60,7 +60,7 @@ def worst_pose(states: Sequence[RobotState | None], sense: Sense) -> int | None:
 
 
 def state_at_pose(nlp: Nlp, x: FloatArray, pose: int) -> RobotState | None:
-    """Return the state of the robot at a point (n,) and one of its poses; None if it does not exist."""
+    """Return the robot's state at one pose of a point (n,); None if the robot does not exist there."""
     try:
         return evaluate(nlp, x, pose)
     except EvaluationError:

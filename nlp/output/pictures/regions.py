@@ -1,4 +1,4 @@
-"""F over one or two varied names of a grid, with numbered regions that have the same active limits."""
+"""F over one or two varied quantities of a grid, with numbered regions that have the same active limits."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def _counted(F: FloatArray, active: Sequence[str]) -> list[tuple[str, int]]:
 
 
 def regions_figure(designs: Designs[Row], legend: Sequence[str]) -> Figure:
-    """Return F over one or two varied names as a Matplotlib figure, with sentences below it.
+    """Return F over one or two varied quantities as a Matplotlib figure, with sentences below it.
 
     Args:
         designs: table of designs on a grid.
@@ -118,7 +118,7 @@ def _grouped(sides: Sequence[str]) -> str:
 
 
 def _draw_curve(axes: Axes, x: FloatArray, F: FloatArray, sets: NDArray[np.intp], label: str) -> None:
-    """Draw F over one varied name, with lines at changes of the active set, and the numbers of the regions."""
+    """Draw F over one varied quantity, with lines at changes of the active set, and the numbers of the regions."""
     by_x = np.argsort(x)
     x, F, sets = x[by_x], F[by_x], sets[by_x]
     axes.plot(x, F, color="#08519c", linewidth=1.4, marker="o", markersize=3 if len(x) <= 100 else 0, gid="F")
@@ -150,7 +150,7 @@ def _draw_map(
     sets: NDArray[np.intp],
     label: str,
 ) -> None:
-    """Draw F over two varied names in colours, a cell per point; lines divide regions with different active limits."""
+    """Draw F over two varied quantities in colours, one cell per point; lines divide regions of active limits."""
     sorting = [np.argsort(axis) for axis in at]
     F, sets = F[np.ix_(*sorting)], sets[np.ix_(*sorting)]
     x, y = (_edges(axis[by_value]) for axis, by_value in zip(at, sorting, strict=True))
@@ -187,9 +187,9 @@ def _write_number(axes: Axes, place: int, x: float, y: float, *, is_on_top: bool
 
 
 def _regions(sets: NDArray[np.intp]) -> list[NDArray[np.intp]]:
-    """Return the cells (k, 2) of each numbered region, the deepest cells first.
+    """Return the cells (k, 2) of each region that shows a number, farthest from the region's edge first.
 
-    For each numbered set of active limits, the largest region and further large regions have the number.
+    The number of a set of active limits is shown in the largest region of the set, and in its other large regions.
 
     Args:
         sets: (n, m) index of the set of active limits of each cell; -1 for none.

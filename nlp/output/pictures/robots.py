@@ -93,7 +93,7 @@ def robot_pictures(designs: Designs[Row]) -> list[bytes]:
 
 
 def _pairs(designs: Designs[Row]) -> list[_Pair]:
-    """Return the designs that can be drawn; the drawing of a feasible design may have points that are not finite.
+    """Return the designs that can be drawn; even a feasible design may give points that are not finite.
 
     Raises:
         EvaluationError: no design can be drawn.

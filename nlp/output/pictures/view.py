@@ -139,7 +139,7 @@ def _clearness(view: View, drawing: Drawing) -> float:
 
 
 def _clearness_of_joints(view: View, drawing: Drawing) -> float:
-    """Return the same score for a robot defined by joints, whose limbs have several links.
+    """Return the score of :func:`_clearness` for a robot defined by joints, whose limbs have several links.
 
     Rods of one limb, as in a parallelogram, are close together in every view, and are ignored.
     """

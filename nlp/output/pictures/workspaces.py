@@ -58,7 +58,7 @@ def drawing_at(case: Case, claim: PosedClaim) -> Drawing:
         # Dependent coordinates of the pose belong to the other robot: the nominal robot's loops do not close there.
         raise EvaluationError(
             "the worst pose was found for joint centres displaced within the tolerance, and the "
-            "nominal robot does not reach it"
+            "nominal robot does not reach this pose"
         ) from None
     x = closed_start(nlp)
     headline = f"{claim.outcome.value}: {claim_words(claim)}; at {pose_words(case, pose)}"

@@ -12,11 +12,11 @@ from .markup import Markup, tag
 
 
 def curve_figures(*designs: Designs[Row], here: Mapping[str, float] | None = None) -> Markup:
-    """Return charts of F over a varied value side by side, one for each table and task.
+    """Return charts of F over a varied value, side by side: one for each table and task.
 
     Args:
         designs: tables of designs over one varied value.
-        here: values of varied names in the case of the page; a mark in the chart.
+        here: values of the varied quantities in the case of the page, which the chart marks.
     """
     charts = [
         _chart(each, column, None if here is None else here.get(_over(each).name))

@@ -112,7 +112,7 @@ def bends(active: Sequence[frozenset[str]]) -> list[int]:
 
 
 def chosen_designs(active: Sequence[frozenset[str]]) -> list[int]:
-    """Return the indices of the drawn designs: both ends, both sides of each change of active limits, then others."""
+    """Return the indices of the drawn designs: both ends, both sides of changes of active limits, further designs."""
     count = len(active)
     sides = [each for k in bends(active) for each in (k - 1, k)]
     spread = np.rint(np.linspace(0, count - 1, min(count, _MOST))).astype(int).tolist()

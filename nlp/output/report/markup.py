@@ -97,7 +97,7 @@ def html_table(table: TextTable, caption: str, **attributes: object) -> Markup:
 
 
 def script_frame(key: str, name: str, words: str) -> Markup:
-    """Return the frame of a picture that a script draws, with a text until then.
+    """Return the frame of a picture that a script draws, with a text that is shown until then.
 
     Args:
         key: identifier and class of the frame.

@@ -69,7 +69,7 @@ class Plane:
 
 
 def slices_of(nlp: Nlp, x: FloatArray) -> list[Slice]:
-    """Return F through a point (n,) along every variable, from bound to bound."""
+    """Return F along lines through a point (n,): for each variable, from bound to bound."""
     found = []
     for k in _movable(nlp):
         values = _range(nlp, k, _LINE, x)
@@ -80,7 +80,7 @@ def slices_of(nlp: Nlp, x: FloatArray) -> list[Slice]:
 
 
 def planes_of(nlp: Nlp, x: FloatArray, most: int) -> list[Plane]:
-    """Return F through a point (n,) over pairs of variables, at most the first ``most`` pairs."""
+    """Return F on planes through a point (n,): for pairs of variables, at most the first ``most`` pairs."""
     found = []
     for i, j in list(combinations(_movable(nlp), 2))[:most]:
         first, second = _range(nlp, i, _PLANE, x), _range(nlp, j, _PLANE, x)

@@ -58,7 +58,7 @@ class Incumbent:
 
     @property
     def value(self) -> float:
-        """Maximised value at the point; -inf without one."""
+        """Maximised value at the point; -inf without a point."""
         return self._best.value
 
     @property
@@ -91,7 +91,10 @@ class Incumbent:
         value = form.value_at(point)
         violation = self._violation(point, value)
         if not violation <= FEASIBLE:
-            raise IncumbentError(f"the given point violates the limits by up to {violation:.3g} half ranges")
+            raise IncumbentError(
+                f"the given point violates the limits by up to {violation:.3g}, "
+                "with each variable scaled to half its range"
+            )
         if claimed is not None and form.value_of(claimed) > value + _SAME_VALUE * form.size:
             raise IncumbentError(
                 f"the given point has F = {form.objective_of(value):.10g}, but {claimed:.10g} was claimed"

@@ -83,7 +83,7 @@ def certify_program(
         InputError: the C kernel was not built.
     """
     if above is not None and nlp.sense is not Sense.MIN:
-        raise ValueError("above is proved by minimising: the program's sense must be min")
+        raise ValueError("above needs a nonlinear program that minimises F, but this one maximises F")
     with one_search(time_limit):
         effort = Effort()
         if nlp.n == 0:

@@ -59,7 +59,7 @@ def check_proof(claim: ProofClaim, nlp: Nlp) -> VerifiedProof:
         ProofError: the proof is for another program, its bytes are no tree, or a claim could not be proved.
     """
     if not is_same_program(fingerprint(nlp), claim.graph):
-        raise ProofError("the proof is for other expressions or bounds than those of this case")
+        raise ProofError("the proof is for another case: its expressions or bounds differ from those of this case")
     form = standard_form(nlp)
     refuse_jumps(form.expressions, form.x)
     bound, tree = -np.inf if claim.bound is None else claim.bound, claim.unpacked()
@@ -96,12 +96,13 @@ def _of_limbs(tree: bytes, form: StandardForm, bound: float) -> Iterator[_Block]
     separation = separate(form)
     if separation is None or separation.shared:
         raise ProofError(
-            "the tree needs limbs that share no variables, but the limbs of this case share some or cannot be separated"
+            "the proof has one tree of boxes for each limb, which is valid only for limbs without common variables; "
+            "the limbs of this case share variables or cannot be separated"
         )
     reader, bounds, fault = (
         TreeReader(tree, 1),
         list[float](),
-        "the bounds of the limbs together exceed the proven bound",
+        "the sum of the bounds of all limbs exceeds the bound that the proof states",
     )
     for limb in separation.limbs:
         bounds.append(reader.number())
@@ -122,26 +123,29 @@ def _claims_of(claims: dict[tuple[Node, int], Box], form: StandardForm, bound: f
     """Return the number of boxes of a tree, and the claims about them.
 
     Raises:
-        ProofError: a box collapses on a face that is not a face of the form.
+        ProofError: a box is reduced to a face that is not a face of the form.
     """
     every = []
     for (kind, i), (lower, upper) in claims.items():
         ends, whole = (upper, form.upper) if kind == Node.FACE_UPPER else (lower, form.lower)
         if kind in FACES and (ends[i] != whole[i]).any():
-            raise ProofError(f"a box collapses on a bound of {form.names[i]} that is not a bound of the case")
+            raise ProofError(
+                f"the proof reduces a box to one value of {form.names[i]}, which is neither the smallest nor the "
+                f"largest value of {form.names[i]} in the case"
+            )
         every.append(Claims(form, kind, i, lower, upper, np.full(lower.shape[1], bound)))
     return sum(each.bounds.size for each in every), every
 
 
 def _of_shared_limbs(tree: bytes, form: StandardForm, bound: float) -> Iterator[_Block]:
-    """Yield the claims of a tree of limbs that share variables.
+    """Yield the claims of a tree of boxes for a robot whose limbs share variables.
 
     Raises:
         ProofError: the bytes are no tree.
     """
     separation = separate(form)
     if separation is None or separation.common is None:
-        raise ProofError("the tree is for limbs with shared variables, which this case does not have")
+        raise ProofError("the proof is for limbs with common variables, but the limbs of this case have none")
     common, limbs = separation.common, [limb.form for limb in separation.limbs]
     for leaves in read_shared(tree, common.lower, common.upper, len(limbs)):
         # The sums come first: they are quick, and the limbs' bounds prove nothing without them.

@@ -80,13 +80,15 @@ class FormRule:
     def sentence(self, claim: int) -> str:
         """Return the message for a claim that could not be proved."""
         claims, names = self._claims, self._form.names
-        what = f"the reason '{claims.kind.name.lower()} {claims.index}'"
+        what = f"the objective is monotone in {names[claims.index]}"
+        if claims.kind in (Node.BOUNDED, Node.INFEASIBLE):
+            what = "the bound" if claims.kind == Node.BOUNDED else f"condition {claims.index} excludes every point"
         if claims.tilts is not None:
             names, own = names[: len(claims.tilts.g)], names[len(claims.tilts.g) :]
             what = f"the bound of {f'the limb with {own[0]}' if own else 'the sum of the limbs'}"
         ends = zip(names, claims.lower[:, claim], claims.upper[:, claim], strict=False)
         box = ", ".join(f"{name} in [{low:.6g}, {high:.6g}]" for name, low, high in ends)
-        return f"{what} could not be proved for the box {box}"
+        return f"could not be proved for the box {box}: {what}"
 
     def _use_conditions(
         self, shown: Shown, which: NDArray[np.intp], forms: Forms, lower: FloatArray, upper: FloatArray

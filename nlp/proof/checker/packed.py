@@ -73,8 +73,8 @@ class PackedTree:
         except (ValueError, zlib.error):
             raise DamagedProofError(f"{damaged}: its tree cannot be unpacked") from None
         if len(tree) > most:
-            size = f"{LARGEST_TREES // 2**20} MB, the allowed total for a file"
-            raise DamagedProofError(f"{self.source}: the trees up to that of '{self.claim}' unpack to more than {size}")
+            size = f"{LARGEST_TREES // 2**20} MB, the largest allowed total of a proof file"
+            raise DamagedProofError(f"{self.source}: the unpacked trees, up to that of '{self.claim}', exceed {size}")
         if not reader.eof or reader.unused_data:
             raise DamagedProofError(f"{damaged}: its tree is incomplete")
         if self.digest != hashlib.sha256(tree).hexdigest():

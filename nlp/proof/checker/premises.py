@@ -70,13 +70,17 @@ def _program(case: Case, statement: Statement) -> Nlp:
     if statement.is_minimum:
         check_minimum(case)
     if len(statement.best) != (len(case.tasks) if _has_losses(case) else 0):
-        raise ProofError("the proof is for other tasks, or for another combination of tasks, than this case")
+        raise ProofError(
+            "the proof is for another case: its tasks, or their combination, differ from those of this case"
+        )
     if len(case.tasks) == 1:
         nlp = formulate(case)
         return replace(nlp, sense=Sense.MIN) if statement.is_minimum else nlp
     weights = scaled_weights(case)
     if case.method is Method.AVERAGE:
-        raise InputError("averaged tasks have no common program whose optimum could be proved")
+        raise InputError(
+            "no optimum can be proved for averaged tasks: set combine.method to 'weighted-sum' or 'worst-case'"
+        )
     if case.method is Method.WEIGHTED_SUM:
         return formulate_weighted(case, weights)
     # The level's size matters only to local solvers: the bounded functions do not depend on it.
@@ -145,7 +149,9 @@ def check_statement(case: Case, statement: Statement, *, above: float | None, al
     if above is not None:
         check_minimum(case)
     if statement.is_minimum and above is None:
-        raise ProofError("the proof bounds the smallest F, but the case maximises F: give --above to check it")
+        raise ProofError(
+            "the proof has a lower bound of F, not a bound of the optimum: give --above to check the lower bound"
+        )
     if above is not None and case.tasks[0].sense is Sense.MAX and not statement.is_minimum:
         raise ProofError("the proof bounds the largest F, but --above requests a bound of the smallest F")
     if statement.in_home_mode and all_assemblies:

@@ -215,7 +215,8 @@ class Proof:
         size = sum(map(len, {each.tree for each in (*self.claims, *self.lemmas)}))
         if size > LARGEST_TREES:
             raise ProofError(
-                f"the trees of the proof have {size // 2**20} MB; at most {LARGEST_TREES // 2**20} MB can be read"
+                f"the trees of boxes in the proof have {size // 2**20} MB; "
+                f"at most {LARGEST_TREES // 2**20} MB are allowed in a proof file"
             )
         about = next(word for word, kind in _PREMISES.items() if isinstance(self.premises, kind))
         claims, lemmas = (tuple(map(_table_of, some)) for some in (self.claims, self.lemmas))
@@ -302,7 +303,7 @@ def read_proof(text: str | bytes, source: str) -> Proof:
             raise ValueError(f"premises.text: has {len(premises.text)} characters, and at most {LARGEST_CASE} are read")
         kinds = [(each.name, each.reason) for each in found.claims]
         if is_program and (kinds != [(OPTIMUM, "program")] or found.lemmas or found.not_on_paper):
-            raise ValueError(f"claims: expected one claim, {OPTIMUM}, in a proof about a program")
+            raise ValueError(f"claims: expected one claim, {OPTIMUM}, in a proof about a nonlinear program")
     except CaseError as error:
         raise ProofError(str(error)) from None
     except ValueError as error:
@@ -325,7 +326,7 @@ def _check_texts(found: _File, quantities: tuple[str, ...]) -> None:
         raise ValueError(f"case: has {len(found.case)} characters, and at most {LARGEST_CASE} are read")
     texts = {"name": found.name, **{f"premises.quantities[{k}]": each for k, each in enumerate(quantities)}}
     if len(set(quantities)) < len(quantities):
-        raise ValueError("premises.quantities: has a name twice")
+        raise ValueError("premises.quantities: contains a name twice")
     for key in ("claims", "lemmas", "not_on_paper"):
         tables: tuple[_ClaimTable | Unproved, ...] = getattr(found, key)
         if len(tables) > _MOST_CLAIMS:

@@ -37,7 +37,7 @@ import enum
 import itertools
 import struct
 from collections import deque
-from collections.abc import Callable, Iterator, Set
+from collections.abc import Callable, Iterator, Sequence, Set
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
@@ -104,6 +104,13 @@ def with_end(ends: FloatArray, i: int, value: float) -> FloatArray:
     return changed
 
 
+def wrong_node(kind: int, allowed: Sequence[Node]) -> ProofError:
+    """Return the error of a tree with a node of a kind that is not allowed at this place."""
+    name = next((each.name for each in Node if each == kind), f"of the unknown kind {kind}")
+    names = f"{', '.join(each.name for each in allowed[:-1])} or {allowed[-1].name}"
+    return ProofError(f"the tree of boxes has a node {name} where only {names} is allowed")
+
+
 class TreeReader:
     """A reader of nodes from a tree's bytes; ``at`` is the number of bytes read so far."""
 
@@ -118,7 +125,7 @@ class TreeReader:
         """
         self.at += count
         if self.at > len(self._tree):
-            raise ProofError("the tree ends before every box is closed")
+            raise ProofError("the tree of boxes is incomplete: it ends before every box is proved or excluded")
         return self._tree[self.at - count : self.at]
 
     def index(self, allowed: range, kind: str) -> int:
@@ -129,7 +136,7 @@ class TreeReader:
         """
         (number,) = self.read(1)
         if number not in allowed:
-            raise ProofError(f"the tree names {kind} {number}, which does not exist")
+            raise ProofError(f"the tree of boxes refers to {kind} {number}, which does not exist")
         return int(number)
 
     def number(self) -> float:
@@ -143,7 +150,7 @@ class TreeReader:
             ProofError: further bytes remain.
         """
         if self.at != len(self._tree):
-            raise ProofError("the tree goes on after every box is closed")
+            raise ProofError("the tree of boxes has additional data after its last box")
 
     def walk(self, lower: FloatArray, upper: FloatArray, inner: Set[Node]) -> Iterator[Leaf]:
         """Read the nodes of the tree of a box with ends (n,), and yield its leaves and faces.
@@ -160,7 +167,7 @@ class TreeReader:
         waiting = [(np.array(lower), np.array(upper))]
         while waiting:
             if len(waiting) > _DEEPEST:
-                raise ProofError(f"the tree is deeper than {_DEEPEST} bisections")
+                raise ProofError(f"the tree of boxes has more than {_DEEPEST} nested bisections")
             low, high = waiting.pop()
             (kind,) = self.read(1)
             if kind not in inner:
@@ -172,7 +179,7 @@ class TreeReader:
             elif kind == Node.CUT:
                 value = self.number()
                 if not low[i] <= value <= high[i]:
-                    raise ProofError(f"the tree cuts a box at {value:.6g}, which is outside of it")
+                    raise ProofError(f"the tree of boxes cuts a box at {value:.6g}, a value outside this box")
                 waiting += halves(low, high, i, value)[::-1]
             elif kind in FACES:
                 yield kind, i, low, high
@@ -181,7 +188,7 @@ class TreeReader:
             else:
                 value = self.number()
                 if not np.isfinite(value):
-                    raise ProofError("the tree cuts a box at a number that is not finite")
+                    raise ProofError("the tree of boxes cuts a box at a value that is not finite")
                 (reason,) = self.read(1)
                 parts = halves(low, high, i, min(max(value, low[i]), high[i]))
                 closed, rest = parts if kind == Node.BELOW else parts[::-1]
@@ -224,11 +231,11 @@ def read_claims(reader: TreeReader, form: StandardForm) -> Iterator[dict[tuple[N
         for kind, i, lower, upper in block:
             index = max(i, 0)
             if kind == Node.INFEASIBLE:
-                index = reader.index(conditions, "row")
+                index = reader.index(conditions, "condition")
             elif kind == Node.MONOTONE:
                 index = reader.index(range(form.n), "variable")
             elif kind not in (Node.BOUNDED, *FACES) or (kind in FACES) != (i >= 0):
-                raise ProofError(f"the tree has {kind} where a reason is expected")
+                raise wrong_node(kind, (Node.INFEASIBLE, Node.MONOTONE, Node.BOUNDED))
             claims.setdefault((Node(kind), index), []).append((lower, upper))
         yield {
             key: (np.array([low for low, _ in some]).T, np.array([up for _, up in some]).T)
@@ -267,7 +274,7 @@ class SharedLeaves(NamedTuple):
     Q: FloatArray
 
     def select(self, which: NDArray[np.bool_]) -> SharedLeaves:
-        """Return some of the leaves."""
+        """Return the leaves that ``which`` marks."""
         return SharedLeaves(*(each[..., which] for each in self))
 
 
@@ -294,7 +301,7 @@ def read_shared(tree: bytes, lower: FloatArray, upper: FloatArray, limbs: int) -
         leaves = []
         for kind, _, low, high in block:
             if kind not in (Node.INFEASIBLE, Node.BOUNDED):
-                raise ProofError(f"the tree has {kind} where a node of shared variables is expected")
+                raise wrong_node(kind, (Node.INFEASIBLE, Node.BOUNDED))
             leaves.append((low, high, *_numbers_of_leaf(reader if kind == Node.BOUNDED else None, limbs, m)))
         yield SharedLeaves(*(np.stack(each, axis=-1) for each in zip(*leaves, strict=True)))
     reader.finish()

@@ -60,7 +60,7 @@ def workspace_of_case(case: Case) -> Workspace:
             :func:`~...evidence.dependent.with_dependent`.
     """
     if case.workspace is None:
-        raise CaseError("workspace", "is missing: state the poses to be judged in [workspace]", source=case.source)
+        raise CaseError("workspace", "is missing: state the poses to be verified in [workspace]", source=case.source)
     case.fixed_parameters("a workspace is judged with fixed dimensions")
     case.require_motion()
     check_determined_joints(case.model, "workspace", case.source)

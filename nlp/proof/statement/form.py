@@ -163,7 +163,7 @@ class StandardForm:
 
     @property
     def follows(self) -> tuple[bool, ...]:
-        """Whether each of the R expressions is a redundant condition that follows from others."""
+        """Whether each of the R expressions is a redundant condition that follows from other conditions."""
         return (*(False for _ in self.functions), *(each.kind is Kind.FOLLOWS for each in self.conditions))
 
     @cached_property

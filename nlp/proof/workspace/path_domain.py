@@ -78,7 +78,7 @@ def design_along(case: Case, closed: ClosedForm, box: PoseBox, cover: PathCover)
     design = replace(build_problem(case, closed.model, box, first, near), cover=cover)
     # An equation whose coordinate hardly changes counts as dependent on other equations, but must be satisfied.
     if not np.array_equal(design.start[design.stated], first[[design.free[j] for j in design.stated]]):
-        raise NotJudgedError("no solution of its loop equations at the first point of the path")
+        raise NotJudgedError("the loop equations of the robot have no known solution at the first point of the path")
     return design
 
 
@@ -104,9 +104,7 @@ def with_dependent(case: Case, box: PoseBox, workspace: Workspace) -> tuple[Pose
         names, chosen = (
             " and ".join(found.names[k] for k in which) for which in (moved, [k for k in range(6) if k not in places])
         )
-        raise NotJudgedError(
-            f"the path moves {names}, which this robot does not control; its independent coordinates are {chosen}"
-        )
+        raise NotJudgedError(f"the path changes {names}, but this robot can choose only {chosen} independently")
     wide = pose_box(found)
     lower, upper = box.lower.copy(), box.upper.copy()
     lower[places], upper[places] = wide.lower[places], wide.upper[places]

@@ -49,7 +49,7 @@ TIME_LIMIT = 600.0
 #: Largest fraction of the remaining time for one search; and relative gap of a quantity without a limit.
 _PART, GAP = 0.5, 1e-3
 #: Reason for quantities with an operation without an interval rule.
-_NO_RULE = "one of its operations has no interval rule"
+_NO_RULE = "its expression contains an operation without an interval rule"
 
 
 @one_call
@@ -196,7 +196,7 @@ class _AlongPath(Judging):
         return Subject(self.case, robots.model, robots.family, "", shortest)
 
     def actuators(self, subject: Subject) -> Iterator[Verdict]:
-        """Yield the verdicts on actuators; a path with times defines its motion."""
+        """Yield the verdicts on actuators; if the path has times, its motion replaces the motion of the case."""
         for each in refuted(list(self.verdicts.values())).values():
             if each.claim.kind in (ClaimKind.CLEARANCE, ClaimKind.SPECTRUM):
                 self._keep_faults(subject.number(each.claim), {0: each})
@@ -222,7 +222,7 @@ class _AlongPath(Judging):
             yield from (verdict_of(each, Minimum(reason=reason)) for each in powers if each.limit is not None)
 
     def finer(self, claim: Claim, gap: float, about: Directions | None) -> Verdict | None:
-        """Return the verdict on a leg length with a smaller gap; None with directions."""
+        """Return the verdict on a leg length with a smaller gap; None if ``about`` states directions."""
         search = replace(self.search, gap=gap)
         return None if about is not None else self._robots.searched([claim], search, is_enough=False)[0]
 

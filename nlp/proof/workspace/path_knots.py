@@ -130,7 +130,7 @@ def stepped_knots(case: Case, path: ProgrammedPath, step: float) -> Knots:
     parts = np.maximum(np.ceil(np.maximum(path.lengths / step, turns / _TURN) * (1 - 1e-12)), 1.0)
     if not parts.sum() <= _MOST:
         raise InputError(
-            f"{path.source}: steps of {step:g} make {parts.sum():.3g} knots; at most {_MOST:,} are allowed"
+            f"{path.source}: steps of {step:g} give {parts.sum():.3g} knots; at most {_MOST:,} are allowed"
         )
     count = parts.astype(int)
     segments = np.repeat(np.arange(len(path)), count)
@@ -210,7 +210,8 @@ def _robot_about(case: Case, cover: PathCover, workspace: Workspace) -> tuple[Pr
     if coordinates.numel() != len(problem.independent):
         freedoms = len(problem.independent)
         raise NotJudgedError(
-            f"it has {coordinates.numel()} actuators for {freedoms} degrees of freedom; both numbers must be equal"
+            f"the robot has {coordinates.numel()} actuators for {freedoms} degrees of freedom; "
+            "these numbers must be equal"
         )
     return problem, coordinates
 

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from .proof_record import Key, ProofRecord
 
 #: Reasons for claims without a proof: claims of this kind have no proof record, or the singular pose is only computed.
-_NO_RECORD = "claims of this kind along a path have no proof record"
-_COMPUTED = "a pose that is only computed in floating point has no proof"
+_NO_RECORD = "proof files do not support claims of this kind along a tool path"
+_COMPUTED = "the pose was only computed in floating point, so it is not proved"
 
 
 def path_proof_of(case: Case, judged: Judgement, record: ProofRecord, text: str, premises: PathPremises) -> Proof:

@@ -30,11 +30,11 @@ _AS_BUILT = "the robot cannot be assembled with joint-centre errors"
 _BY_BOXES = "proved by one search of boxes for all robots within the tolerance, which proof files do not support"
 #: Reason for claims of kinds that the checker does not know.
 _NO_RULES = "proof files do not support claims of this kind"
-NOT_JUDGED = "the claim was not judged"
-_NO_BOUND = "the search has no bound"
+NOT_JUDGED = "no search for this claim was made"
+_NO_BOUND = "the search found no bound"
 _ONE_ASSEMBLY = "proved for the home assembly mode; proof files support only claims about all assembly modes"
-_NO_REACH = "the claim requires that all limbs reach every pose, which has no proof"
-NO_LENGTHS = "the claim requires bounds of leg lengths, which have no proof"
+_NO_REACH = "the claim assumes that all limbs reach every pose, which is not proved"
+NO_LENGTHS = "the claim needs bounds of leg lengths, which are not proved"
 
 
 def proof_of(
@@ -128,7 +128,7 @@ class _Writer:
         self.proved: dict[Key, ProofClaim] = {}
 
     def proof(self, each: Claim) -> ProofClaim:
-        """Return a claim with its proof; a claim that depends on others comes after them.
+        """Return a claim with its proof; a claim that depends on other claims comes after them.
 
         Raises:
             ProofError: the claim has no proof; the message is the reason.
@@ -165,7 +165,7 @@ class _Writer:
             return ProofClaim(name, "", "singular", sides=tuple(map(tuple, found.sides.tolist())))
         robots = self.robot.within_tolerance
         if robots is None or found.reason:
-            raise ProofError(f"{words_of(found)}; a pose that is only computed in floating point has no proof")
+            raise ProofError(f"{words_of(found)}; the pose was only computed in floating point, so it is not proved")
         # With the largest errors in these directions, the determinant keeps the opposite sign and is farther from 0.
         if found.errors is None:
             raise ProofError(words_of(found))

@@ -117,7 +117,7 @@ def _accuracy_of(case: Case, workspace: Workspace) -> float:
     try:
         _ = positions.scaled(_LEAST).middle
     except CaseError:
-        fault = "exclude the centre of the shape: --scale needs it inside of them"
+        fault = "exclude the centre of the shape; with --scale, every half-space must contain this centre"
         raise CaseError(f"{KEY}.half_spaces", fault, source=case.source) from None
     return ACCURACY_OF_RADIUS if positions.has_radius else ACCURACY
 

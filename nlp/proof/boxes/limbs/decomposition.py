@@ -49,7 +49,7 @@ class OwnBoxes:
         return np.flatnonzero(np.diff(self.of, prepend=-1))
 
     def some(self, which: NDArray[np.bool_] | NDArray[np.intp]) -> OwnBoxes:
-        """Return the lists of some of the shared boxes, which may repeat."""
+        """Return the lists of the shared boxes of given indices; an index may repeat."""
         chosen = np.flatnonzero(which) if which.dtype == np.bool_ else which
         sizes = np.bincount(self.of, minlength=self.count)
         starts, counts = (np.cumsum(sizes) - sizes)[chosen], sizes[chosen]

@@ -70,10 +70,12 @@ _ON_LIMIT = 1e-9
 _FIRSTS = tuple(each.name for each in ERRORS)
 #: Reasons of claims about a path.
 _ALONG_PATH = ("regular", "singular", "boxes", "lengths")
+#: Beginning of the message for a kind of proof that does not fit a claim.
+_WRONG_REASON = "a claim of this kind cannot be proved by the reason"
 #: A tree with a single leaf.
 _WHOLE = bytes([Node.BOUNDED])
 #: Message about a proof with displaced joint centres of a claim about the nominal robot.
-_WITHOUT_TOLERANCE = "the proof of this claim needs a tolerance, and the claim is about the robot without one"
+_WITHOUT_TOLERANCE = "the proof is for robots within a joint-centre tolerance, but the case has no tolerance"
 
 
 @dataclass(frozen=True)
@@ -162,8 +164,10 @@ def _check(proof: Proof, begun: Callable[[], _Checker]) -> VerifiedWorkspace:
     named = [*given, *(key for each in proof.unproved if (key := (each.name, each.sense)) in expected)]
     if sorted(named) != sorted(expected) or len(given) != len(proof.claims):
         wrong = [*(set(expected) - set(named)), *(set(given) - set(expected))]
-        name = " ".join(min(wrong)).strip() if wrong else "a claim that occurs twice"
-        raise ProofError(f"the proof must have each claim of the case exactly once: see {name}")
+        name = " ".join(min(wrong)).strip() if wrong else ""
+        fault = "lacks the claim" if wrong and min(wrong) in expected else "has the additional claim"
+        found = f"the proof {fault} {name}" if wrong else "a claim occurs twice in the proof"
+        raise ProofError(f"{found}; a proof must have each claim of its case exactly once")
     refuse_other_lemmas(proof.lemmas, checker.expected)
     claims = []
     for key in (each for each in expected if each in given):
@@ -216,17 +220,22 @@ class _Checker:
             (ClaimKind.MOTOR, "boxes"): self._motor,
         }
         if self._tolerance and self.robot.within_tolerance is None:
-            raise ProofError("joint-centre errors remove degrees of freedom from this overconstrained robot")
+            raise ProofError(
+                "joint-centre errors remove degrees of freedom from this overconstrained robot: "
+                "the tolerance cannot be verified"
+            )
         if each.kind is ClaimKind.RANK and given.reason in ("regular", "singular"):
             return self._rank(each, given)
         if (each.kind, given.reason) not in rules:
-            raise ProofError(f"'{given.reason}' is not a valid reason for this claim")
+            raise ProofError(f"{_WRONG_REASON} '{given.reason}'")
         _stated(given)
         bound, limit, read = rules[each.kind, given.reason](each, given), each.limit, each.reading.from_value
         if limit is not None:
             beyond = bound - limit if each.sense is Sense.MAX else limit - bound
             if not beyond <= _ON_LIMIT * max(abs(limit), abs(bound)):
-                raise ProofError(f"the bound {bound:.10g} does not satisfy the case's limit {limit:.10g}")
+                raise ProofError(
+                    f"the bound {bound:.10g} of the proof does not satisfy the limit {limit:.10g} of the case"
+                )
         self._bounds[each.label] = bound
         kept = None if limit is None else read(limit)
         return CheckedClaim(*each.label, each.reading.dimension, read(bound), kept)
@@ -278,18 +287,22 @@ class _Checker:
         """
         layout = self.robot.place if claim.key == REACH else self.robot.layout
         if self.robot.dependent:
-            raise ProofError("the proof has no tree of boxes, which a quantity with dependent pose coordinates needs")
+            raise ProofError(
+                "the proof has no tree of boxes for this claim; a robot with dependent pose coordinates needs one"
+            )
         if self.robot.within_tolerance is None:
             return self._program(claim.expression, claim.sense, given, layout)
         if claim.key != REACH and any(reach.label not in self._bounds for reach in self.robot.reaches):
-            raise ProofError("the proof does not prove that all limbs reach every pose within the tolerance")
+            raise ProofError(
+                "the proof does not show that, in every robot within the tolerance, all limbs reach every pose"
+            )
         return self._within_tolerance(self.robot.within_tolerance, claim, given)
 
     def _followed(self, claim: Claim, given: ProofClaim) -> float:
         """Return the proved bound of a quantity from a tree of boxes in which the checker closes the loops itself."""
         symbols = self.robot.followed
         if symbols is None:
-            raise ProofError("'boxes' is not a valid reason for this claim")
+            raise ProofError(f"{_WRONG_REASON} 'boxes'")
         bound, loops = _stated(given), self._loops
         expression = symbols.of(claim.expression, loops.robot.of_errors, loops.robot.varying)
         number = NumberClaim(loops, expression, claim.sense, bound)
@@ -307,7 +320,7 @@ class _Checker:
         try:
             self._show(SecondOrderClaim(robots, claim.expression, rest), _WHOLE)
         except UncoveredError as error:
-            raise ProofError(f"the checker has no rule for {error}") from None
+            raise ProofError(f"the checker has no rule for {error.operation}") from None
         except ProofError as error:
             raise ProofError(f"{lemma.name}: {error}") from None
         return bound
@@ -315,21 +328,21 @@ class _Checker:
     def _lemma(self, name: str, sense: Sense) -> ProofClaim:
         """Return the lemma of the proof with a name and a sense; refuse a proof without this lemma."""
         if (name, sense.value) not in self._lemmas:
-            raise ProofError(f"{name}: has no proof")
+            raise ProofError(f"the proof lacks the lemma {name} {sense.value}")
         return self._lemmas[name, sense.value]
 
     def _length(self, leg: str, sense: Sense) -> float:
         """Return the proven shortest or longest length of a leg, over all robots within the tolerance."""
         key = f"leg_length limb {leg}", sense.value
         if key not in self._bounds:
-            raise ProofError(f"the lengths of limb {leg} have no proof")
+            raise ProofError(f"the proof has no bound of the leg length of limb {leg}, which this claim needs")
         outwards = _ROUNDING if sense is Sense.MAX else -_ROUNDING
         return math.sqrt(max(self._bounds[key], 0.0)) * (1 + outwards)
 
     def _of_legs(self) -> tuple[Legs, float]:
         """Return the joint centres of six straight legs, and a lower bound of their lengths within the tolerance."""
         if self.robot.legs is None:
-            raise ProofError("the robot of the case does not have six straight legs")
+            raise ProofError("this claim needs six straight legs, which the robot of the case does not have")
         return self.robot.legs, min(self._length(leg.name, Sense.MIN) for leg in self._case.model.legs)
 
     def _lengths(self, each: Claim, given: ProofClaim) -> float:
@@ -345,7 +358,9 @@ class _Checker:
             if robots is None:
                 raise ProofError(_WITHOUT_TOLERANCE)
             if len(about) != 2 or any(side.shape != (3,) or not np.isfinite(side).all() for side in about):
-                raise ProofError("the claim does not have two directions")
+                raise ProofError(
+                    "the proof must state two directions for this claim, each with three finite components"
+                )
             directions = Directions(each.name, *about)
             claims = [length_of_one_robot(robots.symbols, leg, sense, directions) for sense in senses]
             lengths = [self._within_tolerance(robots, one, self._lemma(one.name, one.sense)) for one in claims]
@@ -377,7 +392,9 @@ class _Checker:
     def _error(self, each: Claim, given: ProofClaim) -> float:
         """Return the bound of a pose error; trees prove the first-order parts, and these bound the whole error."""
         if len(self._firsts) < len(_FIRSTS):
-            raise ProofError("the proof has only one of the two pose errors")
+            raise ProofError(
+                "the proof must have a bound of the position error and of the rotation error, but one is missing"
+            )
         position, rotation = (self._firsts[name] for name in _FIRSTS)
         is_rotation = each.reading is not LENGTH
         self._show(ErrorClaim(self._posed, self._firsts[each.name], is_rotation=is_rotation), given.unpacked())
@@ -387,15 +404,17 @@ class _Checker:
         reach = float(np.linalg.norm(legs.platform, axis=1).max()) * (1 + _ROUNDING)
         whole = whole_errors(position, rotation, self._eps * (1 + _ROUNDING), shortest, reach)[is_rotation]
         if not math.isfinite(whole):
-            raise ProofError("the errors are too large: the second-order part of the pose error has no bound")
+            raise ProofError(
+                "the leg-length errors are too large: the second-order part of the pose error has no bound"
+            )
         return whole
 
     def _motor(self, each: Claim, given: ProofClaim) -> float:
         """Return the bound of an actuator quantity; quantities with one tree are proved together."""
         if rate_relations(self.robot.model.actuators).shape[0]:
             raise ProofError(
-                "the robot's loops impose relations between actuator rates: forces and speeds of such a "
-                "robot have no proof"
+                "the actuator rates of this robot are not independent, because its loops impose equations on them; "
+                "forces and speeds cannot be proved for such a robot"
             )
         if each.label not in self._shown:
             # Quantities of an actuator under one load share the tree of one search.
@@ -414,7 +433,7 @@ class _Checker:
         return _stated(given)
 
     def _coordinate(self, motor: Motor | None) -> SX | None:  # noqa: ARG002 - of a path with times
-        """Return the coordinate of an actuator whose rate is its speed; None for speeds in any motion of the case."""
+        """Return the actuator coordinate whose rate is the claimed speed; None for speeds in any motion of the case."""
         return None
 
     @cached_property
@@ -436,7 +455,7 @@ class _PathChecker(_Checker):
     def __init__(self, proof: Proof, case: Case, path: ProgrammedPath) -> None:
         premises = proof.premises
         if not isinstance(premises, PathPremises):
-            raise ProofError("the proof is not about a path")
+            raise ProofError("the proof is not about a tool path")
         case = case_along_path(case, path)
         root = PathRoot(case, path)
         robot = robot_along_path(case, root, with_angles=premises.with_angles)
@@ -450,23 +469,23 @@ class _PathChecker(_Checker):
     def check(self, each: Claim, given: ProofClaim) -> CheckedClaim:
         """Check one claim; trees of ``certify`` are refused, as their boxes do not cover the whole path."""
         if given.reason not in _ALONG_PATH:
-            raise ProofError(f"'{given.reason}' is no known kind of proof for a claim about a path")
+            raise ProofError(f"{_WRONG_REASON} '{given.reason}' along a tool path")
         return super().check(each, given)
 
     def _coordinate(self, motor: Motor | None) -> SX | None:
-        """Return the coordinate of an actuator whose rate is its speed; None for speeds in any motion of the case."""
+        """Return the actuator coordinate whose rate is the claimed speed; None for speeds in any motion of the case."""
         symbols = self.robot.followed
         if motor is None or symbols is None or not self._is_timed:
             return None
         known, robot = actuator_coordinates(symbols.layout), self._loops.robot
         if motor.actuator not in known:
             fault = f"the checker knows no formula for the coordinate of actuator {motor.actuator}"
-            raise ProofError(f"{fault}, so its speed along the path cannot be checked")
+            raise ProofError(f"{fault}, so the speed of this actuator cannot be checked")
         return symbols.of(known[motor.actuator], robot.of_errors, robot.varying)
 
 
 def _stated(given: ProofClaim) -> float:
     """Return the bound of a claim, or refuse a claim without a bound."""
     if given.bound is None or not math.isfinite(given.bound):
-        raise ProofError("the claim has no bound")
+        raise ProofError("the proof states no finite bound for this claim")
     return given.bound

@@ -214,11 +214,11 @@ class Assembly:
         poses, count = len(self._robot.free), self._count
         unknowns = list(range(poses, len(start) - self._robot.errors))
         if count < len(unknowns):
-            raise ProofError("the pose does not determine every joint")
+            raise ProofError("the pose does not determine every joint coordinate")
         J, chosen = self.points.at(start[None])[1][0], [*self._robot.dependent, *unknowns]
         values = np.linalg.svd(J[:, chosen], compute_uv=False) if len(chosen) == count else np.zeros(1)
         if not values.min(initial=1.0) > _ZERO * values.max(initial=0.0):
-            raise ProofError("the loops are singular at the workspace centre")
+            raise ProofError("the loop equations are singular at the workspace centre")
         return chosen
 
     def moved(self, z: FloatArray, to: FloatArray) -> FloatArray:
@@ -331,7 +331,7 @@ class Assembly:
         if not is_reached.all():
             box = box_words(lower[~is_reached][0], upper[~is_reached][0])
             raise ProofError(
-                f"the loops closed in the box {box} are not proved to belong to the assembly mode of the start"
+                f"in the box {box}, it is not proved that the joints are in the assembly mode of the workspace centre"
             )
 
     def _reach(

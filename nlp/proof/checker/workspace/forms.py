@@ -48,7 +48,7 @@ class AffineMatrix(NamedTuple):
         return np.asarray(np.abs(self.A).sum(axis=1))
 
     def part(self, rows: slice, columns: slice = slice(None)) -> AffineMatrix:
-        """Return some rows and columns."""
+        """Return the rows and columns of two slices."""
         return AffineMatrix(self.M[:, rows, columns], self.A[:, :, rows, columns], self.E[:, rows, columns])
 
     def corners(self, count: int | None = None) -> FloatArray:

@@ -86,7 +86,7 @@ def posed_loops(
     try:
         assembly = Assembly(robot, robot.equations[needed] if needed else SX(0, 1), start)
     except UncoveredError as error:
-        raise ProofError(f"the checker has no rule for {error}") from None
+        raise ProofError(f"the checker has no rule for {error.operation}") from None
     if built is not None:
         _refuse_other_mobility(robot, assembly)
     if len(needed) < robot.equations.numel():
@@ -102,7 +102,7 @@ def _along_path(case: Case, model: Model, root: PathRoot, about: PosedLoops, bui
     try:
         assembly = PathAssembly(robot, robot.equations[about.needed, :], start, len(root.poses))
     except UncoveredError as error:
-        raise ProofError(f"the checker has no rule for {error}") from None
+        raise ProofError(f"the checker has no rule for {error.operation}") from None
     return PosedLoops(robot, assembly.start, assembly, about.tolerance, about.needed)
 
 
@@ -120,7 +120,7 @@ def _refuse_narrow(robot: PosedRobot, assembly: Assembly, root: PoseRoot) -> Non
             (z,) = assembly.moved(assembly.start[None], to[:, assembly.independent])
             off = np.abs(robot.at(equations, z) - first)
             if np.isfinite(z).all() and not off.max(initial=0.0) <= _ROUNDING:
-                raise ProofError("the loops do not close everywhere in the workspace")
+                raise ProofError("the loops of the robot do not close at every pose of the workspace")
 
 
 def _refuse_other_mobility(robot: PosedRobot, assembly: Assembly) -> None:
@@ -134,12 +134,15 @@ def _refuse_other_mobility(robot: PosedRobot, assembly: Assembly) -> None:
         (z,) = assembly.moved(assembly.start[None], to[:, assembly.independent])
         every = robot.at(ca.vertcat(robot.equations, robot.loops), z)
         if not (np.isfinite(z).all() and np.abs(every).max(initial=0.0) <= _CLOSED):
-            raise ProofError("with joint-centre errors the robot cannot reach the poses of the workspace")
+            raise ProofError("with joint-centre errors the robot cannot reach the poses of the workspace exactly")
         for each in (one for one in robot.members if one.rank < one.screws.shape[1]):
             columns = scaled_twists(each.screws, each.centre, SX(robot.length), each.size)
             sizes = np.linalg.svd(robot.at(columns, z), compute_uv=False)
             if int(np.count_nonzero(sizes > _ZERO * sizes.max(initial=0.0))) != each.rank:
-                raise ProofError("joint-centre errors remove degrees of freedom from this overconstrained robot")
+                raise ProofError(
+                    "joint-centre errors remove degrees of freedom from this overconstrained robot: "
+                    "the tolerance cannot be verified"
+                )
 
 
 class LoopClaim(ABC):
@@ -158,7 +161,7 @@ class LoopClaim(ABC):
         try:
             self._entries = robot.forms(expressions)
         except UncoveredError as error:
-            raise ProofError(f"the checker has no rule for {error}") from None
+            raise ProofError(f"the checker has no rule for {error.operation}") from None
 
     @np.errstate(all="ignore")
     def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
@@ -193,8 +196,7 @@ class LoopClaim(ABC):
         if self._kept > _MOST_KEPT:
             most = _MOST_KEPT // sum(each.shape[1] for each in boxes)
             raise ProofError(
-                f"the claim needs more than {most:,} boxes with closed loops, the largest number that the "
-                f"checker stores"
+                f"this claim needs more than {most:,} boxes with closed loops, the largest number that can be checked"
             )
 
     def closed(self, lower: FloatArray, upper: FloatArray) -> Enclosed:

@@ -7,9 +7,9 @@ platform's origin and its angular velocity, here ``x = (v, length omega)``, and 
 * the passive joints of a member can follow the motion, ``x - sum_j w_j S_j = 0`` with rates w; for a pinned member only
   the velocity of its centre.
 
-With free actuators, x minus the motion ``sum_k u_k A_k`` of the actuators that move a member replaces x in its
+With unlocked actuators, x minus the motion ``sum_k u_k A_k`` of the actuators that move a member replaces x in its
 conditions; relations ``B u = 0`` between actuator rates are conditions too. With locked actuators the matrix has full
-column rank where J has full rank and the passive screws of each member are independent. With free actuators, the
+column rank where J has full rank and the passive screws of each member are independent. With unlocked actuators, the
 dimension of the null space is the number of degrees of freedom plus the number of idle rates ``u``. It is larger only
 where the constraint wrenches or the passive screws lose rank.
 
@@ -204,7 +204,8 @@ def motion_matrix(robot: PosedRobot, start: FloatArray, *, is_locked: bool) -> t
 
     The dimension is the number of degrees of freedom and idle rates.
 
-    With locked actuators the dimension is 0. With free actuators, the matrix of a robot given by rows has only couples.
+    With locked actuators the dimension is 0. With unlocked actuators, the matrix of a robot given by rows has only
+    couples.
 
     Args:
         robot: expressions of the robot.
@@ -229,7 +230,9 @@ def motion_matrix(robot: PosedRobot, start: FloatArray, *, is_locked: bool) -> t
         spectra = np.linalg.svd(np.hsplit(robot.at(matrix, (start + away).T), len(away)), compute_uv=False)
         mobility, idle = matrix.shape[1] - max(int(np.count_nonzero(each > _ZERO * each[0])) for each in spectra), 0
     if not 0 < mobility < 6:
-        raise ProofError("the robot has no constraint wrenches whose rank could be claimed")
+        raise ProofError(
+            "the proof claims a rank of the constraint wrenches, but this robot has none, or has no degree of freedom"
+        )
     return matrix, mobility + idle
 
 

@@ -69,7 +69,7 @@ class PathAssembly(Assembly):
             tied = meets & self.holds(boxes, first, near) & self.holds(boxes, first + 1, near)
             good = good and bool(tied.all())
         if not good:
-            raise ProofError("the loops closed along the path are not proved to stay in one assembly mode")
+            raise ProofError("it is not proved that the joints stay in one assembly mode along the path")
 
     def enclosed(self, lower: FloatArray, upper: FloatArray, near: FloatArray | None = None) -> Enclosed:
         """Return the closed points over pieces; results for the same pieces from other claims are reused."""

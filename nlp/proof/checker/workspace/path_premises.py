@@ -75,7 +75,7 @@ def carried_path(case: Case, given: PathPremises) -> ProgrammedPath:
     if not given.of_case:
         return path
     if case.path is None:
-        raise ProofError("the proof is for the path of its case, but this case has no path")
+        raise ProofError("the proof is for the tool path of its case, but this case has no table [path]")
     try:
         return in_place_of_case(path, case)
     except CaseError as error:
@@ -85,11 +85,15 @@ def carried_path(case: Case, given: PathPremises) -> ProgrammedPath:
 def check_path_premises(given: PathPremises, own: PathPremises) -> None:
     """Refuse a proof about another path, or with other reading options, than given."""
     if given.of_case != own.of_case:
-        whose = "the path of its case" if given.of_case else "a path that was given in addition to the case"
-        raise ProofError(f"the proof is for {whose}: see --along")
+        whose = (
+            "the tool path of its case: leave out --along"
+            if given.of_case
+            else "a tool path that is not in its case: give this path with --along"
+        )
+        raise ProofError(f"the proof is for {whose}")
     if given.text != own.text or is_table(given.file) != is_table(own.file):
-        raise ProofError(f"the proof is for another path than that of {own.file}")
+        raise ProofError(f"the proof is for another tool path than that in {own.file}")
     for option, name in _OPTIONS.items():
         stated, requested = getattr(given, option), getattr(own, option)
         if stated != requested:
-            raise ProofError(f"the proof is for a path that is read with other options: see {name}")
+            raise ProofError(f"the path of the proof was read with another value of {name}")

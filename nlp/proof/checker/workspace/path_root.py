@@ -24,7 +24,7 @@ from ....path.path import ProgrammedPath
 from ..bisection import Shown, show
 from ..polynomials import Polynomial
 from ..proof_file import ProofError
-from ..tree import Node, TreeReader, ahead, blocks_of
+from ..tree import Node, TreeReader, ahead, blocks_of, wrong_node
 from .path_poses import PathPoses
 from .pose_boxes import POSITION, BoxClaim, PoseRoot, PoseSymbols
 
@@ -147,7 +147,7 @@ class PathRoot:
             pieces = list[tuple[FloatArray, FloatArray]]()
             for kind, _, low, high in block:
                 if kind != Node.BOUNDED:
-                    raise ProofError(f"the tree has {kind} where a piece must be proved or cut")
+                    raise wrong_node(kind, (Node.HALF, Node.CUT, Node.BOUNDED))
                 pieces.append((low, high))
             yield np.array(pieces).transpose(1, 2, 0)
         reader.finish()
@@ -171,7 +171,8 @@ class _PieceRule:
         """Return the message for a claim that could not be proved."""
         k = int(np.floor(0.5 * self.lower[0, claim] + 0.5 * self.upper[0, claim]))
         low, high = (each[0, claim] - k for each in (self.lower, self.upper))
-        return f"the claim could not be proved on segment {k + 1} between its parameters {low:.6g} and {high:.6g}"
+        where = f"segment {k + 1}, for parameters of this segment from {low:.6g} to {high:.6g}"
+        return f"the claim could not be proved on {where}"
 
 
 def _workspace(case: Case, low: FloatArray, high: FloatArray, *, is_tangents: bool) -> Workspace:
@@ -195,7 +196,9 @@ def _workspace(case: Case, low: FloatArray, high: FloatArray, *, is_tangents: bo
     length = _STILL * robot_size(case, [sum(ends_of(each)) / 2 for each in position])
     moved = [found.names[k] for k in following if np.ptp(ends_of(stated[k])) > (length if k < POSITION else _STILL)]
     if moved:
-        raise ProofError(f"the path moves {' and '.join(moved)}, which this robot cannot control")
+        raise ProofError(
+            f"the path changes {' and '.join(moved)}, but this robot cannot choose these coordinates independently"
+        )
     still = [sum(ends_of(each)) / 2 if k in following else each for k, each in enumerate(stated)]
     return replace(found, position=still[:POSITION], turns=replace(found.turns, angles=tuple(still[POSITION:])))
 

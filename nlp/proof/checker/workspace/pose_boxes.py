@@ -24,7 +24,7 @@ from ..bisection import Shown, show
 from ..fractions import tangent_ends
 from ..polynomials import Polynomial
 from ..proof_file import ProofError
-from ..tree import Node, TreeReader, ahead, blocks_of
+from ..tree import Node, TreeReader, ahead, blocks_of, wrong_node
 from .position_conditions import PositionConditions, position_conditions
 
 #: Number of coordinates of a pose.
@@ -283,9 +283,10 @@ def _read_boxes(root: PoseRoot, tree: bytes) -> Iterator[tuple[int, FloatArray]]
             if kind == Node.BOUNDED:
                 boxes.append((low, high))
             elif kind != Node.OUTSIDE:
-                raise ProofError(f"the tree has {kind} where a box must be proved or cut")
+                raise wrong_node(kind, (Node.CUT, Node.BOUNDED, Node.OUTSIDE))
             elif not root.is_outside(low, high):
-                raise ProofError(f"the box {box_words(low, high)} is not outside the workspace")
+                box = box_words(low, high)
+                raise ProofError(f"the proof excludes the box {box}, which is not outside the workspace")
         yield count, np.array(boxes).reshape(-1, 2, COORDINATES).transpose(1, 2, 0)
     reader.finish()
 

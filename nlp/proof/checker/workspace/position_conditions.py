@@ -31,13 +31,13 @@ _ZERO: _Exact = (Fraction(0), Fraction(0), Fraction(0))
 
 @dataclass(frozen=True)
 class _Condition:
-    """Condition ``d' Q d + b . d <= c`` on the distance d from an origin.
+    """Condition ``d' Q d + b . d <= c`` on the vector d from an origin, for every b in an interval.
 
     Attributes:
         origin: (3,) origin.
         Q: (3, 3) symmetric matrix.
-        b: (3,) vector; with rounded ends it is any vector between them.
-        above: (3,) upper ends of b.
+        b: (3,) lower ends of b.
+        above: (3,) upper ends of b; equal to the lower ends if b is exact.
         c: right side.
     """
 
@@ -114,7 +114,7 @@ class _Rounded:
         self._room = _ROUNDING * float(size @ np.abs(self._Q) @ size + b @ size + abs(self._c))
 
     def contracted(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-        """Return boxes (B, 3) with their ends moved to the condition, and which (B,) may have positions."""
+        """Return boxes (B, 3) contracted to the condition, and (B,) True for each box that may have positions."""
         low, high = lower - self._origin - self._near, upper - self._origin + self._near
         kept = np.maximum(self._least(low, high, -1), self._centred(low, high)) <= self._c + self._room
         lower, upper = lower.copy(), upper.copy()

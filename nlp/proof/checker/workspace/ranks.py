@@ -94,17 +94,19 @@ class RankClaim(LoopClaim):
         """
         # The matrix must be J itself, with rows that are neither normalised nor zero, for a robot without loops.
         if self._shape != (6, 6) or self._nullity or self.assembly.dependent:
-            raise ProofError("singular poses can be proved only for robots with six rows and without loops")
+            raise ProofError("a singular pose can be proved only for a robot with six rows of J and without loops")
         if not root.is_convex:
-            raise ProofError("singular poses can be proved only in sets that contain the line between two poses")
+            raise ProofError(
+                "a singular pose can be proved only in a workspace that contains the line between any two of its poses"
+            )
         points, poses = [np.array(each, dtype=float) for each in sides], self.coordinates
         if len(points) != 2 or any(y.shape != (poses + self.errors,) for y in points):
-            raise ProofError("the claim does not have two poses")
+            raise ProofError("the proof must state two poses for the claim that a pose is singular")
         if not all(np.isfinite(y).all() and root.holds(y[:poses]) for y in points):
-            raise ProofError("a pose is outside the workspace")
+            raise ProofError("a pose that the proof states is outside the workspace")
         for error in np.concatenate([y[poses:] for y in points]).reshape(-1, 3).tolist():
             if sum(Fraction(each) ** 2 for each in error) > Fraction(self.tolerance) ** 2:
-                raise ProofError("the error of a joint centre exceeds the tolerance")
+                raise ProofError("a joint-centre error that the proof states exceeds the tolerance")
         signs = self._signs_at(np.stack(points))
         if signs[0] * signs[1] >= 0:
             raise ProofError(
@@ -116,7 +118,7 @@ class RankClaim(LoopClaim):
             matrices = self._matrices(self.closed(np.minimum(way[:-1], way[1:]), np.maximum(way[:-1], way[1:])))
             if all(np.isfinite(each).all() for each in matrices) and all(root.holds(y[:poses]) for y in way):
                 return
-        raise ProofError("the determinant is not proved to change continuously between the two poses")
+        raise ProofError("it is not proved that det J changes continuously between the two poses")
 
     @np.errstate(all="ignore")
     def _signs_at(self, y: FloatArray) -> list[int]:

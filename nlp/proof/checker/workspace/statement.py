@@ -91,7 +91,8 @@ class RobotsWithinTolerance:
         """Nominal design as expressions of the pose; raises an error for a robot with dependent coordinates."""
         if self.model.unknowns:
             raise ProofError(
-                "the proof has no tree of boxes, which loops without a closed form need within a tolerance"
+                "the proof has no tree of boxes for this claim; a robot with a tolerance and with loops without a "
+                "closed form needs one"
             )
         return design_layout(self._case, self.model, self._at)
 
@@ -298,7 +299,9 @@ def refuse_other_lemmas(lemmas: Sequence[ProofClaim], expected: Sequence[Claim])
     allowed = {*strokes, *((second_order_name(name), sense) for name, sense in claims + strokes)}
     for each in lemmas:
         if (each.name, each.sense) not in allowed:
-            raise ProofError(f"no claim rests on the lemma {each.name} {each.sense}".rstrip())
+            raise ProofError(
+                f"the proof has a lemma that no claim of this case uses: {each.name} {each.sense}".rstrip()
+            )
 
 
 def _has_constraints(model: Model) -> bool:
@@ -326,10 +329,10 @@ def refuse_other_premises(
     The check itself uses only the premises of the case.
     """
     if workspace_premise(workspace) != given.workspace or set_premise(workspace) != given.position_set:
-        raise ProofError("the proof is for another workspace than this case's")
+        raise ProofError("the proof is for another workspace than that of this case")
     if given.leg_error != leg_error:
-        stated = f"the proof is for leg errors of at most {exact(given.leg_error)} {case.units.length}"
-        raise ProofError(f"{stated}, but {exact(leg_error)} was given: see --leg-error")
+        stated = f"the proof is for leg-length errors of at most {exact(given.leg_error)} {case.units.length}"
+        raise ProofError(f"{stated}, but --leg-error is {exact(leg_error)}")
     refuse_other_robot(case, legs, given)
 
 
@@ -338,6 +341,6 @@ def refuse_other_robot(case: Case, legs: Legs | None, given: Premises | PathPrem
     numbers = legs_premise(legs)
     same = list(map(len, numbers)) == list(map(len, given.legs))
     if not same or not np.allclose(given.legs, numbers, rtol=0.0, atol=_SAME * np.abs(numbers).max(initial=0.0)):
-        raise ProofError("the proof is for other joint centres than this case's")
+        raise ProofError("the proof is for other joint centres than those of this case")
     if (case.joint_centre_tolerance or 0.0) != given.joint_centre:
-        raise ProofError("the proof is for another joint-centre tolerance than this case's")
+        raise ProofError("the proof is for another joint-centre tolerance than that of this case")

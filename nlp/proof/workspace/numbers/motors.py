@@ -69,7 +69,8 @@ class Motors(Number):
         posed, self._loading = problem.posed, case.loading
         if rate_relations(case.model.actuators).shape[0]:
             raise NotJudgedError(
-                "the robot's loops impose relations between actuator rates; such robots are not supported"
+                "the actuator rates of this robot are not independent, because its loops impose equations on them; "
+                "such robots are not supported"
             )
         motor, R = claims[0].motor or Motor(), posed.turned[0]
         self._actuator, self._length, self._is_six = motor.place, problem.length, degrees_of_freedom(case.model) == 6

@@ -178,7 +178,7 @@ class RankRule(LoopRule):
         return BoxResults(self.boxes_of(found, np.zeros(len(split)), split, found.shares), 0.0, count)
 
     def divided(self, boxes: Boxes[Followed]) -> Boxes[Followed]:
-        """Return the halves of boxes, or quarters if the linear part alone shows that the test of a half fails."""
+        """Return the halves of boxes; quarters if the first-order terms show that a half fails the rank test."""
         parts = super().divided(boxes)
         if self._problem.dependent:
             return parts

@@ -163,7 +163,7 @@ def turns_of_path(path: ProgrammedPath) -> PathTurns:
         width = np.abs(change).sum(axis=1)
         if np.ceil(width / CHORD).sum() > _MOST + len(path):
             line = path.lines[int(np.argmax(width))]
-            fault = f"angles change by {math.degrees(float(width.sum())):.4g} degrees in all, most of them here"
+            fault = f"angles change by {math.degrees(float(width.sum())):.4g} degrees in total, mostly on this line"
             raise InputError(
                 f"{path.source}: line {line}: {fault}; at most {math.degrees(_MOST * CHORD):.4g} are allowed"
             )

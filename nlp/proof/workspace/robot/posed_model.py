@@ -6,9 +6,9 @@ in the twist: ``L.x = 0``. The passive joints of each member can follow the twis
 orthogonalised. J has full rank, and the passive screws of every member are independent, exactly where M has full
 column rank.
 
-With free actuators of rates ``u``, ``x - A u`` replaces x for each row and member. ``A`` has the screws of the
-actuators that move the member. Relations between actuator rates that loops impose are additional rows. The dimension
-of the null space of this matrix N is the number of degrees of freedom plus the number of idle actuator rates. The
+With unlocked actuators of rates ``u``, ``x - A u`` replaces x for each row and member. ``A`` has the screws of the
+actuators that move the member. Relations between actuator rates that loops impose are additional rows. The dimension of
+the null space of this matrix N is the number of degrees of freedom plus the number of idle actuator rates. The
 dimension is larger only where the constraint wrenches, or the passive screws, lose rank.
 
 The screws of members with nested loops follow from ``L q = 0`` with the generic rank of L. These screws do not reveal
@@ -103,7 +103,7 @@ class Limbs:
 
 
 def free_matrix(limbs: Limbs) -> SX:
-    """Return the matrix N with free actuators.
+    """Return the matrix N with unlocked actuators.
 
     A robot given by its rows contributes only its couples, which are its constraints.
     """
@@ -221,7 +221,7 @@ class PosedModel:
 
     @property
     def unlocked(self) -> SX:
-        """The matrix N with free actuators."""
+        """The matrix N with unlocked actuators."""
         return ca.sparsify(self.plain(free_matrix(self.limbs)))
 
     @property

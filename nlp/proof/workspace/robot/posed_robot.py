@@ -66,7 +66,7 @@ class Problem:
         independent, dependent: indices of the independent and of the k dependent coordinates of the nominal robot.
         start: (n,) point of the nominal robot with closed loops, at or near the middle of the workspace.
         locked: matrix of rows and members with locked actuators.
-        unactuated: matrix of rows and members with free actuators; None for a robot without constraints.
+        unactuated: matrix of rows and members with unlocked actuators; None for a robot without constraints.
         posed: limbs and loop equations of the nominal robot, or of the robots within the tolerance.
         chosen: independent equations and screws of the model.
         names: names of the m joint centres whose errors are coordinates.
@@ -283,8 +283,8 @@ def _check_left_out(loops: Loops, start: FloatArray, dependent: tuple[int, ...],
     # Constants of a robot that should be 0 may be rounding errors.
     if (np.abs(loops.every_value(moved) - loops.every_value(start[:, None])) > _ROUNDING).any():
         raise NotJudgedError(
-            "its loops do not close everywhere in the workspace: "
-            "the robot does not control all pose coordinates with ranges"
+            "the robot's loops do not close at every pose of the workspace: "
+            "the robot cannot choose all pose coordinates with ranges independently"
         )
 
 
@@ -338,7 +338,9 @@ def _check_freedoms(family: Problem, whole: PosedModel) -> None:
         z[errors] = _OFF * family.length * rng.uniform(-1, 1, len(errors))
         found = loops.all_closed(z[:, None], family.dependent)[:, 0]
         if not np.isfinite(found).all():
-            raise NotJudgedError("the loops do not close with joint-centre errors at the workspace centre")
+            raise NotJudgedError(
+                "with joint-centre errors, the loops of the robot do not close at the workspace centre"
+            )
         every, *screws = (np.array(each) for each in function.call([ca.DM(found)]))
         if float(np.abs(every).max(initial=0.0)) > _CLOSED:
             fault = "with joint-centre errors the robot does not reach the poses of the workspace exactly"
@@ -375,19 +377,19 @@ def _dependent(loops: Loops, start: FloatArray, free: Sequence[int], box: PoseBo
     unknowns, k = list(range(count, len(start))), loops.count
     following = [j for j, index in enumerate(free) if index in box.dependent]
     if k < len(unknowns):
-        raise NotJudgedError("the pose does not determine every joint")
+        raise NotJudgedError("the pose does not determine every joint coordinate")
     if k != len(unknowns) + len(following):
-        raise NotJudgedError("the robot does not control all stated coordinates of the pose independently")
+        raise NotJudgedError("the robot cannot choose all pose coordinates with ranges independently")
     if not k:
         return ()
     slopes = loops.slopes(start[:, None])[0] * loops.size
     if unknowns:
         values = np.linalg.svd(slopes[:, unknowns], compute_uv=False)
         if not values[-1] > _ZERO * values[0]:
-            raise NotJudgedError("the pose does not determine every joint at the workspace centre")
+            raise NotJudgedError("the pose does not determine every joint coordinate at the workspace centre")
     values = np.linalg.svd(slopes[:, [*following, *unknowns]], compute_uv=False)
     if not values[-1] > _ZERO * values[0]:
-        raise NotJudgedError("the loops are singular at the workspace centre")
+        raise NotJudgedError("the loop equations are singular at the workspace centre")
     return (*following, *unknowns)
 
 
@@ -440,7 +442,7 @@ def _length(posed: PosedModel, start: FloatArray, size: float) -> float:
 
 
 def _unactuated(model: Model, posed: PosedModel, start: FloatArray) -> RankMatrix | None:
-    """Return the matrix of rows and members with free actuators; None for a robot without constraints."""
+    """Return the matrix of rows and members with unlocked actuators; None for a robot without constraints."""
     generic, limbs = model.generic, posed.limbs
     if (generic is not None and generic.constraints == 0) or (not limbs.actuators and model.members):
         return None
