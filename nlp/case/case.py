@@ -554,7 +554,8 @@ def _check_choices(case: Case) -> None:
             raise CaseError(key, "must be numbers or { min, max }: a direction cannot have { values }")
         if len(case.tasks) > 1 and case.method is Method.AVERAGE:
             fault = f"must be 'weighted-sum' or 'worst-case': {key} has catalogue values"
-            fault += ", and an average of catalogue values need not be a catalogue value"
+            is_shared = not case.dimensions_per_task.keys() & set(item.components)
+            fault += ", and an average of catalogue values need not be a catalogue value" if is_shared else ""
             raise CaseError("combine.method", fault, case.method.value)
         if case.method is Method.WORST_CASE and len({task.sense for task in case.tasks}) > 1:
             fault = f"must be 'weighted-sum': {key} has catalogue values, and tasks have both senses"

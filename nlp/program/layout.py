@@ -10,6 +10,9 @@ The variables are the free components of the parameters, of the position ``p``, 
 A direction parameter has three components as variables and its unit length as an equation, so that the coordinates have
 no poles. Its components have bounds beyond -1 and 1, so that these are never active together with the equation.
 
+Dimensions and poses that change from task to task are variables of one task: the robot at a pose of the task has these
+values and only the twist of the task.
+
 Several poses share the robot's dimensions. Each stated pose has its own position and rotation; the poses of a
 trajectory or a grid follow from it by fixed displacements.
 """

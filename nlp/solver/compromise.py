@@ -8,6 +8,9 @@ Every task is first solved by itself. Then the tasks are combined:
   only the bounds of the variables are guaranteed there, because a box is convex.
 * ``weighted-sum`` and ``worst-case``: one program each; see :mod:`screwsynth.nlp.program.formulation`.
 
+If dimensions or the pose change from task to task, the program of a task has only its own variables. The combined
+program has those that all tasks share, and those of every task; an average is of the shared ones.
+
 Each method reports its cost: F, rates and verdict of every task at the combined point, the loss against the optimum of
 the task, and every violated limit.
 

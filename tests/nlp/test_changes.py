@@ -1,9 +1,11 @@
 """Dimensions and poses that change from task to task: closed forms, brute force, and the same problem shared."""
 
+import itertools
 import json
 import math
 import re
 import tomllib
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +14,7 @@ import pytest
 from builders import Array, Run, output_of, starter
 from jsonschema import Draft202012Validator
 
-from screwsynth.nlp import Case, Method, PointKind, Solution, Status, Task, case_text, solve
+from screwsynth.nlp import Case, LegLength, Limits, Method, PointKind, Solution, Status, Task, case_text, solve
 from screwsynth.nlp.case.pose import Free, OverPoses, PerTask, Pose, Rotation, over_grid
 from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.errors import CaseError
@@ -222,6 +224,72 @@ def test_the_combined_optimum_is_that_of_brute_force(method: Method, senses: tup
     assert solution.combination.value == pytest.approx(float(expected), rel=2e-4, abs=1e-5)
     gain = solution.changes[0].gain
     assert gain is None or gain >= -1e-9
+
+
+def legs_by_hand(at: Mapping[str, float | Sequence[float]], twist: Array) -> tuple[float, Array]:
+    """F and leg lengths of the aligned 6-6 platform turned about z, from the velocities of its joints."""
+    x1, x2, x3, x4, turn = (float(at[name]) for name in ("x1", "x2", "x3", "x4", "angle"))  # type: ignore[arg-type]
+    centre = np.array([at["p_x"], at["p_y"], at["p_z"]], dtype=np.float64)
+    rates, lengths = [], []
+    for k, sign in itertools.product(range(3), (-1, 1)):
+        b, a = (math.radians(120 * k + sign * half) for half in (x3, x4))
+        a += math.radians(turn)
+        B = x1 * np.array([math.cos(b), math.sin(b), 0])
+        A = centre + x2 * np.array([math.cos(a), math.sin(a), 0])
+        lengths.append(float(np.linalg.norm(A - B)))
+        rates.append((A - B) @ (twist[3:] + np.cross(twist[:3], A)) / lengths[-1])
+    return float(np.sum(np.square(rates))), np.array(lengths)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_random_problems_have_the_F_of_hand_and_beat_random_points(seed: int) -> None:  # noqa: N802 - F is the objective
+    rng = np.random.default_rng(seed)
+    ranges = {"x1": (6, 14), "x2": (4, 9), "x3": (5, 25), "x4": (3, 28)}
+    own = rng.permutation(list(ranges))[: 1 + seed % 3]
+    free = {
+        name: Free(*(math.radians(v) if name in ("x3", "x4") else v for v in ends)) for name, ends in ranges.items()
+    }
+    parameters = {name: PerTask([value]) if name in own else value for name, value in free.items()}
+    tasks = [Task(rng.normal(size=6) * [1, 1, 1, 10, 10, 10], "max", f"task {k}") for k in range(2 + seed % 2)]
+    box = [Free(-4, 4), Free(-4, 4), Free(15, 30)]
+    case = pins(
+        parameters=parameters,
+        position=box,
+        rotation=Rotation((0, 0, 1), Free(-0.4, 0.4)),
+        tasks=tasks,
+        pose_per_task=bool(seed % 2),
+        method=[Method.WORST_CASE, Method.WEIGHTED_SUM][seed // 2],
+        limits=Limits(LegLength(min=16, max=30)),
+    )
+    solution = solve(case)
+    assert solution.status.is_answer
+    for outcome, setting, task in zip(solution.outcomes, solution.settings, tasks, strict=True):
+        F, lengths = legs_by_hand(setting, np.asarray(task.twist))  # type: ignore[arg-type]
+        assert pytest.approx(F, rel=1e-8) == outcome.F
+        assert lengths.min() >= 16 - 1e-6
+        assert lengths.max() <= 30 + 1e-6
+    kept = 0
+    for _ in range(400):
+        shared = {name: rng.uniform(*ends) for name, ends in ranges.items()}
+        pose = random_pose(rng)
+        values = []
+        for task in tasks:
+            at = {**shared, **{name: rng.uniform(*ranges[name]) for name in own}}
+            at |= random_pose(rng) if case.pose_per_task else pose
+            F, lengths = legs_by_hand(at, np.asarray(task.twist))
+            values.append(F if lengths.min() >= 16 and lengths.max() <= 30 else -math.inf)
+        value = min(values) if case.method is Method.WORST_CASE else sum(values)
+        kept += math.isfinite(value)
+        assert solution.combination is not None
+        assert solution.combination.value is not None
+        assert value <= solution.combination.value * (1 + 1e-9)
+    assert kept
+    assert all(each.gain is not None and each.gain >= -1e-7 for each in solution.changes)
+
+
+def random_pose(rng: np.random.Generator) -> dict[str, float]:
+    x, y, z, angle = rng.uniform((-4, -4, 15, math.degrees(-0.4)), (4, 4, 30, math.degrees(0.4)))
+    return {"p_x": x, "p_y": y, "p_z": z, "angle": angle}
 
 
 def test_the_average_is_of_what_the_tasks_share() -> None:
