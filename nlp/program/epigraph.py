@@ -167,14 +167,14 @@ def level_of_tasks(case: Case, values: Sequence[float], weights: Sequence[float]
 
 
 def with_exact_level(nlp: Nlp, x: FloatArray) -> FloatArray:
-    """Return a point with the level of a one-task worst case set to its best value; other points unchanged.
+    """Return a point with the best level of a worst case of one task or of no other variables; other points unchanged.
 
     Args:
         nlp: the program.
         x: (n,) point.
     """
     epigraph = nlp.program.places.epigraph
-    if epigraph is None or len(nlp.program.places.twists) > 1:
+    if epigraph is None or (len(nlp.program.places.twists) > 1 and not nlp.is_fixed):
         return x
     moved = np.array(x)
     moved[epigraph.level] = exact_levels(nlp, moved[:, None])[0]

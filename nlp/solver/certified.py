@@ -268,7 +268,8 @@ def _certify(
         solution = solution_of_one_task(case, own)
         statement = replace(statement, in_home_mode=certificate.nlp.in_home_mode)
         return Certified(solution, (certificate,), None, statement, _complete_tree(writer, certificate))
-    solution = given or _in_half(lambda: solve_programs(case, nlps, search, jobs=jobs))
+    may_be_fixed = bool(case.changes)
+    solution = given or _in_half(lambda: solve_programs(case, nlps, search, jobs=jobs, may_be_fixed=may_be_fixed))
     count = len(solution.outcomes) + 1  # tasks and the combined program
     separate = tuple(
         certify_one(outcome.own, outcome.task.name, None, count - k) for k, outcome in enumerate(solution.outcomes)
@@ -311,7 +312,7 @@ def _certify_choices(
     def solve_fixed(one: Case) -> Solution:
         if case.is_optimised_everywhere:
             return solve(one, starts=starts, seed=seed, jobs=options.jobs)
-        return solve_programs(one, formulate_tasks(one), search, jobs=options.jobs)
+        return solve_programs(one, formulate_tasks(one), search, jobs=options.jobs, may_be_fixed=bool(one.changes))
 
     choice = found.choice if isinstance(found, Solution) else None
     choice = choice or _in_half(lambda: solve_choices(case, solve_fixed).choice)
@@ -324,7 +325,8 @@ def _certify_choices(
         options.gap,
         is_each=options.above is not None,
     )
-    chosen = replace(best.solution, case=case, choice=replace(choice, chosen=values))
+    changes = found.changes if isinstance(found, Solution) else ()
+    chosen = replace(best.solution, case=case, choice=replace(choice, chosen=values), changes=changes)
     closed = (CertificateStatus.PROVED, CertificateStatus.INFEASIBLE)
     if not choice.is_complete and (together is None or together.status not in closed):
         chosen = interrupted(chosen)  # neither the solve nor the proof covers all combinations

@@ -14,7 +14,7 @@ import pytest
 from builders import Array, Run, output_of, starter
 from jsonschema import Draft202012Validator
 
-from screwsynth.nlp import Case, LegLength, Limits, Method, PointKind, Solution, Status, Task, case_text, solve
+from screwsynth.nlp import Case, LegLength, Limits, Method, PointKind, Sense, Solution, Status, Task, case_text, solve
 from screwsynth.nlp.case.pose import Free, OverPoses, PerTask, Pose, Rotation, over_grid
 from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.errors import CaseError
@@ -351,11 +351,37 @@ def test_catalogue_values_per_task_are_those_of_brute_force() -> None:
     assert gain_of(solution, "x1") == pytest.approx(best / shared - 1, rel=1e-4, abs=1e-9)
 
 
-def test_nothing_but_catalogue_values_may_be_free() -> None:
-    values = (5.0, 8.0, 12.0)
-    solution = solve(pins(parameters={**pins().parameters, "x1": PerTask([Free.among(values)])}))
-    best = [max(values, key=F) for F in (pushed, turned)]
-    assert [solution["x1.task1"], solution["x1.task2"]] == best
+@pytest.mark.parametrize("count", [3, 7])
+@pytest.mark.parametrize("senses", [("max", "max"), ("min", "min")])
+@pytest.mark.parametrize("method", ["worst-case", "weighted-sum"])
+def test_nothing_but_catalogue_values_may_be_free(
+    count: int, senses: tuple[str, str], method: str, tmp_path: Path, cli: Run
+) -> None:
+    values = tuple(np.linspace(5, 12, count))
+    tasks = [replace(task, sense=Sense(sense)) for task, sense in zip(pins().tasks, senses, strict=True)]
+    parameters = {**pins().parameters, "x1": PerTask([Free.among(values)])}
+    case = pins(parameters=parameters, tasks=tasks, method=Method(method))
+    solution = solve(case)
+    choose = max if senses[0] == "max" else min
+    best = [choose(values, key=F) for F in (pushed, turned)]
+    assert [solution["x1.task1"], solution["x1.task2"]] == pytest.approx(best)
+    F = [float(pushed(best[0])), float(turned(best[1]))]
+    assert solution.combination is not None
+    weights = solution.combination.weights
+    if method == "weighted-sum":
+        value = sum(w * each for w, each in zip(weights, F, strict=True))
+    elif senses[0] == "max":
+        value = min(each / w for w, each in zip(weights, F, strict=True))
+    else:
+        value = max(each * w for w, each in zip(weights, F, strict=True))
+    assert solution.combination.value == pytest.approx(value, rel=1e-9)
+    if count == 3:
+        file, data = tmp_path / "case.toml", tmp_path / "certified.json"
+        file.write_text(case_text(case))
+        output_of(cli("certify", str(file), "--json", str(data)))
+        bound = json.loads(data.read_text())["certificate"]["bound"]
+        assert (bound >= value * (1 - 1e-12)) if senses[0] == "max" else (bound <= value * (1 + 1e-12))
+        assert bound == pytest.approx(value, rel=2e-4)
 
 
 def test_values_of_each_task_may_be_fixed_or_have_their_own_range() -> None:
