@@ -49,7 +49,7 @@ class UnknownNameError(ExpressionError):
 
 
 class NoValueError(ExpressionError):
-    """Error of an expression with a constant value that is not finite.
+    """Error of an expression that is not finite for the given values of its names.
 
     Attributes:
         values: values of the names in the failing operation, one or three numbers each.

@@ -243,7 +243,7 @@ def _check_shapes(model: Model) -> None:
 
 
 def _check_symbols(model: Model) -> None:
-    """Refuse expressions in place of symbols, symbols with two meanings and undeclared symbols."""
+    """Refuse undeclared symbols, symbols with two meanings, and expressions in place of symbols."""
     declared = [parameter.symbol for parameter in model.parameters] + [unknown.symbol for unknown in model.unknowns]
     declared += [model.pose.rotation, model.pose.position]
     for symbol in declared:

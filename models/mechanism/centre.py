@@ -92,7 +92,10 @@ def _ends(mechanism: Mechanism, member: MemberGraph) -> _Ends:
 
 
 def _last(mechanism: Mechanism, member: MemberGraph) -> tuple[int, ...]:
-    """Return the last joint common to all paths from base to platform; without one, the joints on the platform."""
+    """Return the last joint common to all paths from base to platform.
+
+    Without such a joint, return all joints on the platform.
+    """
     base, platform, edges = _ends(mechanism, member)
     common = bridges_between(base, platform, edges).bridges[-1:]
     return tuple(member.joints[k] for k in common or [k for k, edge in enumerate(edges) if platform in edge])

@@ -73,7 +73,7 @@ def close(
             loops require; without a pose, other actuators stay at rest.
 
     Raises:
-        MechanismError: a name is unknown, or the loops do not close there.
+        MechanismError: a name is unknown, or the loops do not close at the requested pose and coordinates.
     """
     motions = Motions(mechanism)
     wanted = dict(actuators or {})
@@ -113,7 +113,7 @@ def closed_near(
 ) -> ClosedMechanism | None:
     """Return a mechanism with loops closed near joint coordinates and a platform pose; None if they do not close.
 
-    The pose is kept if the loops allow it, and else changed as little as possible.
+    The pose is kept if the loops allow this pose; otherwise it changes as little as possible.
 
     Args:
         mechanism: the mechanism.
@@ -132,7 +132,7 @@ def closed_near(
 
 
 def closed_nearby(motions: Motions, near: Coordinates) -> ClosedMechanism | None:
-    """Return a mechanism with loops closed near coordinates that leave them open; None if they do not close."""
+    """Close the loops near coordinates at which they are open, and return the mechanism; None if they do not close."""
     path = _Path(motions, {}, None)
     at, _ = path.closed(near, 1.0)
     return None if at is None else _closed(path, at, 1.0, 1)

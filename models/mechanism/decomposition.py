@@ -123,7 +123,7 @@ def _joined(
 def without_dangling(
     ends: Sequence[tuple[str, str]], joints: Sequence[int], roots: tuple[str, str], coupled: Collection[int]
 ) -> list[int]:
-    """Return joints without those of links with a single joint; such links are removed repeatedly."""
+    """Remove links with a single joint, repeatedly, and return the remaining joints."""
     kept = list(joints)
     while True:
         count: dict[str, int] = {}

@@ -22,7 +22,7 @@ CLOSED = 1e-11
 
 
 class Reached(NamedTuple):
-    """Iterate: joint coordinates of a mechanism, with the values of the equations there.
+    """Iterate: joint coordinates of a mechanism, with the values of the equations at these coordinates.
 
     Attributes:
         at: joint coordinates.

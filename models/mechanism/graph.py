@@ -72,8 +72,8 @@ class MechanismJoint:
         pitch: translation per radian of an ``H`` joint, length.
         actuated: True if an actuator drives the joint.
         range: smallest and largest coordinate from the stated configuration, radians or length; None for no limit.
-        outer_point: (3,) point of the joint on the outer link, if the description leaves the loop open, length; None
-            for ``point``.
+        outer_point: (3,) point of the joint on the outer link, length; None if it equals ``point``, as in a closed
+            loop.
     """
 
     name: str

@@ -98,7 +98,7 @@ def singularities_of(ranks: RobotRanks, generic: RobotRanks) -> tuple[MechanismS
 
     Args:
         ranks: ranks at the configuration.
-        generic: generic ranks: those at almost all configurations.
+        generic: generic ranks: the ranks at almost all configurations.
     """
     found: list[MechanismSingularity] = []
     for k, passive in enumerate(ranks.passive):

@@ -46,7 +46,7 @@ def incident(edges: Iterable[Edge[Node]]) -> dict[Node, list[tuple[int, Node]]]:
 
 
 def reached(start: Node, edges: Iterable[Edge[Node]]) -> set[Node]:
-    """Return the nodes connected to a start node, including it."""
+    """Return the start node and all nodes connected to it."""
     neighbours = incident(edges)
     found, waiting = {start}, [start]
     while waiting:

@@ -158,7 +158,7 @@ def _core_text(ending: str, prefix: str) -> str:
 
 
 def _stated_texts(names: Mapping[str, str], core: Mapping[str, str]) -> dict[str, str]:
-    """Return the texts of the placeholders for workspaces and the worst case, from the macros of the C.
+    """Return the texts of the placeholders for sizes of work arrays and for the worst case, from the macros of the C.
 
     Args:
         names: all other texts.

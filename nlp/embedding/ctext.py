@@ -99,7 +99,7 @@ def name_cases(names: Iterable[str]) -> str:
 def index_macros(program: Program, prefix: str) -> str:
     """Return a macro for the index of every entry of x and p, such as ``PREFIX_x_p_z``.
 
-    These macros continue the prefix by a small letter, unlike all others, so they never collide with those of another
+    These macros continue the prefix by a small letter, unlike all others, so they never collide with macros of another
     case.
     """
     lines = ["/* Indices of the entries of x and of p. */"]

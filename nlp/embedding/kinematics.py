@@ -48,7 +48,8 @@ class Choice(NamedTuple):
     """Independent equations of Newton's method.
 
     Attributes:
-        rows: indices of equations; actuators, then loop equations. Of the coordinates of the pose, -1 is x and -6 is c.
+        rows: indices of equations: first the actuators, then the loop equations. The indices -1 to -6 stand for the
+            pose coordinates x, y, z, a (roll), b (pitch) and c (yaw).
         columns: indices of the components of a step: rotation, translation, joint coordinates.
     """
 
@@ -384,7 +385,7 @@ class Kinematics:
     def side(self, z: FloatArray) -> float:
         """Return the determinant of the equations of forward kinematics at a point, divided by the determinant at home.
 
-        It is 0 at a singularity, and NaN if the actuators do not determine the pose.
+        The result is 0 at a singularity, and NaN if the actuators do not determine the pose.
         """
         if self.forward is None:
             return math.nan

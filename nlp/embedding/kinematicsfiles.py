@@ -70,7 +70,7 @@ class KinematicsFiles(NamedTuple):
 def kinematics_prefix(name: str) -> str:
     """Return the prefix of the C names of the kinematics of a case.
 
-    No name of the solver of another case begins with it.
+    No name of the solver of another case begins with this prefix.
     """
     return identifier(name).replace("screwsynth_", "kinematics_", 1)
 
@@ -167,7 +167,7 @@ def combined_kinematics(case: Case) -> KinematicsFiles:
 
 
 def _part(file: str, KIN: str, head: str, text: str) -> str:
-    """Return a source of CasADi with a number type of its own; at the end of the source its macros are undefined.
+    """Return a C source from CasADi with a separate number type; at the end of the source, its macros are undefined.
 
     So a module of one source file can include all sources, with the mathematics library of its controller.
     """

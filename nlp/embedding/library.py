@@ -30,13 +30,13 @@ COUNTS = ("status", "runs", "converged", "iterations")
 
 
 class Rows(ctypes.Structure):
-    """Rows of numbers, as in the C."""
+    """Rows of numbers, laid out as the struct in C."""
 
     _fields_: ClassVar = [("values", ctypes.c_void_p), ("length", ctypes.c_int), ("is_shared", ctypes.c_int)]
 
 
 class Options(ctypes.Structure):
-    """Budget of a solve, as in the C; 0 for none."""
+    """Budget of a solve, laid out as the struct in C; with 0 or a null pointer the solve has no budget."""
 
     _fields_: ClassVar = [
         ("max_iterations", ctypes.c_int),
@@ -46,7 +46,7 @@ class Options(ctypes.Structure):
 
 
 class Batch(ctypes.Structure):
-    """Problems and results, as in the C."""
+    """Problems and results, laid out as the struct in C."""
 
     _fields_: ClassVar = [
         *((name, Rows) for name in ("p", "x0", "lower", "upper", "g_lower", "g_upper", "limits")),

@@ -166,7 +166,7 @@ _ROTATION = Reading(Dimension.ANGLE, to_value=_squared_sine, above=0.0, most=MAX
 
 
 def _keys(nlp: Nlp, index: int, ball: FreeRotation | None) -> tuple[str, str]:
-    """Return the keys of a constraint's lower and upper limit; empty for none."""
+    """Return the keys of a constraint's lower and upper limit; a key is empty if there is no limit."""
     constraint: Constraint = nlp.program.constraints[index]
     if ball is None:
         return constraint.keys

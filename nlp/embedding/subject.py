@@ -84,7 +84,7 @@ def _refuse_nested_loops(case: Case) -> None:
 def magnitude_of(nlp: Nlp) -> SX:
     """Return the objective (1, 1) with the magnitudes of its terms: an upper bound on its absolute value.
 
-    For several poses, the value is an estimate from the first one.
+    For several poses, the value is an estimate from the first pose.
     """
     case, places = nlp.case, nlp.program.places
     size = nlp.program.robot.magnitude

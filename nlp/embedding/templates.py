@@ -27,7 +27,7 @@ def prototype(kin: str, name: str) -> str:
 
 
 def casadi_texts(functions: Iterable[ca.Function], name: str) -> dict[str, str]:
-    """Generate C and header, by file ending; CasADi's names in them begin with the given name."""
+    """Generate C and header, by file ending; CasADi's names in these texts begin with ``name``."""
     generator = ca.CodeGenerator(f"{name}.c", {"with_header": True, "casadi_int": "int", "indent": 0})
     for function in functions:
         generator.add(function)

@@ -21,9 +21,9 @@ _DERIVATIVES = 4
 def worst_case_texts(searches: int, phases: int, trials: int, programs: int) -> dict[str, str]:
     """Return the texts of the placeholders for the solver's constants and for its worst case.
 
-    A search counts its first derivatives. It may compute a few for each judged point, in addition to those of a line
-    search: one point in each iteration, one at the end of each part, with one part for each scale of F and each
-    feasible point, and the first point, which scales the constraints.
+    A search computes first derivatives in line searches, and a few times for each judged point. Judged points are one
+    in each iteration, one at the end of each part (one part for each scale of F and each feasible point), and the first
+    point, which scales the constraints.
 
     Args:
         searches: largest number of searches of a solve.

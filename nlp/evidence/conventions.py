@@ -27,8 +27,8 @@ class Dependence:
     """Dependence of F on conventions, relative to F.
 
     Attributes:
-        length: relative derivative ``(l / F) dF/dl`` with respect to the characteristic length; 0 if F does not
-            depend on it.
+        length: relative derivative ``(l / F) dF/dl`` with respect to the characteristic length; 0 if F does not depend
+            on the length.
         centre: largest relative change of F if all arbitrary centres move along their joint axes by the characteristic
             length, to either side; None if all centres are determined.
     """

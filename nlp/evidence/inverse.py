@@ -68,8 +68,8 @@ class InversePoses:
         coordinates: (N, a) actuator coordinates, radians or length.
         unknowns: (N, u) coordinates of the ``joints``, from home, radians or length.
         jacobian: (N, m, 6) ``J``: unit wrenches, force, then moment about the world origin, couples times the
-            characteristic length. For a limb whose wrenches follow from its joints, all rows of the projector onto
-            them; results show a basis of these rows, with the same ``J'J``.
+            characteristic length. A limb whose wrenches follow from its joints has all rows of the projector onto these
+            wrenches; results show a basis of these rows, with the same ``J'J``.
         rates: (N, a, 6) actuator rates for a unit of each component of the platform's motion: angular velocity, then
             velocity of its origin, in the world frame. They are valid for motions that the platform can make.
         closed: (N,) True if all loops close at the pose, in the followed assembly mode. Limits do not count.

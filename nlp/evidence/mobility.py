@@ -52,7 +52,7 @@ class Mobility:
         freedoms: degrees of freedom of the platform with unlocked actuators.
         constraint_rank: rank of the constraint wrenches.
         actuator_rates: rate of each actuator for the program's task: rad or length per unit of time; infinite if the
-            actuator cannot drive the platform, NaN where the motion does not determine it.
+            actuator cannot drive the platform, NaN if the motion does not determine the rate.
         constrained: fraction of F from constraint wrenches, 0 to 1; 0 if the platform can make the motion.
         parts: actuation and constraint part of F for each limb.
         singularities: all singularities at the point.

@@ -167,7 +167,7 @@ def examine(nlp: Nlp, x: FloatArray) -> Evidence:
 
 
 def _is_independent(normals: FloatArray) -> bool:
-    """Return whether finite gradients (k, n) of active sides are linearly independent."""
+    """Return whether the gradients (k, n) of active sides are finite and linearly independent."""
     if not len(normals):
         return True
     return bool(np.isfinite(normals).all() and np.linalg.matrix_rank(normals, tol=1e-9) == len(normals))

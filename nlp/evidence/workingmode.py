@@ -130,7 +130,7 @@ class _Modes:
         return found
 
     def sign(self, limb: str, now: FloatArray, home: FloatArray) -> int:
-        """Return 1 if a limb bends as at home, -1 if it bends the opposite way, 0 if unknown."""
+        """Return 1 if a limb bends as at home, -1 if the limb bends the opposite way, 0 if the sense is unknown."""
         if not (np.isfinite(now).all() and np.isfinite(home).all()):
             return 0
         if self._passive[self.limbs.index(limb)] is None:

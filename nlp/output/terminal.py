@@ -203,7 +203,7 @@ def _broken(line: _Styled, width: int) -> Iterator[_Styled]:
 
 
 def _header(text: str) -> str:
-    """Return a header with its second line, the unit; line breaks within either are escaped."""
+    """Return a column header: the name, and the unit on a second line. All other line breaks are escaped."""
     name, line_break, unit = text.partition("\n")
     return f"{one_line(name)}{line_break}{one_line(unit)}"
 

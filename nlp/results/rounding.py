@@ -80,7 +80,7 @@ def _cross(a: Sequence[float], b: Sequence[float]) -> tuple[float, float, float]
 
 
 def size_of_F(robot: RobotData, F: float = 0.0, task: TaskData | None = None) -> float:  # noqa: N802 - the objective's name
-    """Return the magnitude of the terms of F over all poses; F itself if the task is unknown.
+    """Return the magnitude of the terms of F over all poses; the absolute value of F if the task is unknown.
 
     Args:
         robot: robot at the point.

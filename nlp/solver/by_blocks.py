@@ -48,7 +48,7 @@ def searched_starts(
         blocks: blocks of the program.
         points: (k, n) starting points.
         search: settings of the search.
-        solver: local solver of the whole program; blocks are searched only if it is Ipopt.
+        solver: local solver of the whole program; blocks are searched only if this solver is Ipopt.
         jobs: number of threads; if left out, as many as processors and starts allow.
     """
     if not blocks.blocks:
@@ -132,7 +132,7 @@ class _BlockResults:
 def from_best_blocks(
     nlp: Nlp, blocks: Blocks, ends: Sequence[FloatArray], best: float | None, better: float
 ) -> FloatArray | None:
-    """Return the point (n,) of the best blocks over all results, if it is better than the best optimum; otherwise None.
+    """Combine the best blocks of all results into a point (n,); None if this is no better than the best optimum.
 
     Args:
         nlp: the nonlinear program.

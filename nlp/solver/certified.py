@@ -80,7 +80,7 @@ class Certified(Whole, Shown, Answer):
     Attributes:
         solution: the solution.
         tasks: certificate of the separate optimum of each task.
-        combined: certificate of the combined program of several tasks; None if the method has none.
+        combined: certificate of the combined program of several tasks; None if the method has no combined program.
         statement: nonlinear program of the case that the proof ``tree`` is about.
         tree: bytes of the proof's tree of boxes; None without ``with_proof``, or without a proved bound.
     """
@@ -131,8 +131,8 @@ def certify(
         found: case to solve and certify, or its solution.
         gap: allowed relative difference between bound and incumbent.
         above: value of F to prove as a lower bound on the whole box, for the only task of a case.
-        time_limit: seconds for the whole call. A solve takes at most half of them, and several programs share the rest
-            equally; searches then stop with the bounds that they have reached.
+        time_limit: seconds for the whole call; None for no limit. A solve takes at most half of them, and several
+            programs share the rest equally; searches then stop with the bounds that they have reached.
         jobs: number of threads; the result does not depend on it.
         starts: number of starting points; the case's number if left out.
         seed: seed of the starting points; the case's seed if left out.
@@ -284,14 +284,14 @@ def _certify(
 
 
 def _incumbent(own: ProgramSolution) -> tuple[FloatArray | None, float | None]:
-    """Return the best point (n,) of a solve and its objective; if the solve was interrupted, only an optimum."""
+    """Return the best point (n,) of a solve and its objective; after an interrupted solve, only if it is an optimum."""
     if own.status.is_answer:
         return own.x, own.F
     return (own.optima[0].x if own.status is Status.INTERRUPTED and own.optima else None), None
 
 
 def _after_solve(certificate: Certificate, own: ProgramSolution, starts: int) -> Certificate:
-    """Return a certificate; an unproved certificate gets the reason that its solve was cut short."""
+    """Return a certificate; if it is unproved and its solve was cut short, its reason says so."""
     if own.status is not Status.INTERRUPTED or certificate.status is CertificateStatus.PROVED:
         return certificate
     done = f"the time for the solve was used up after {len(own.starts)} of {starts} starts"

@@ -37,7 +37,7 @@ def solve_choices(case: Case, solve_fixed: Callable[[Case], Solution], most: flo
         most: largest number of solves, after which the search ends with the best known combination.
 
     Returns:
-        The solution of the best combination, with the given case; it has no answer if no combination has one.
+        The solution of the best combination, with the given case; it has no answer if no combination has an answer.
     """
     return _Search(case, solve_fixed, most).run()
 
@@ -52,7 +52,9 @@ def cost_of(solution: Solution) -> float:
 
 
 class _Part:
-    """An open group of combinations: index ranges of values, and the solution with parameters free between them.
+    """An open group of combinations: index ranges of values, and a solution with the parameters free.
+
+    In this solution, each parameter may lie anywhere between the smallest and the largest value of its range.
 
     The solution is None if the robot's loops cannot be closed at any starting point.
     """

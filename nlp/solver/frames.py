@@ -60,7 +60,7 @@ class Frame:
         return self.in_world(SX(pose.position.tolist()), SX(pose.rotation.tolist()))
 
     def carried(self, at: SymbolicPose, nlp: Nlp, x: FloatArray) -> SymbolicPose:
-        """Return a world pose that moves with this frame, as expressions, from its value at a point of a program.
+        """Return a world pose that is fixed in this frame, and equals ``at`` at a point of a program.
 
         Args:
             at: pose in the world, whose expressions are no variables of the frame.
@@ -71,7 +71,7 @@ class Frame:
         return self.in_world(at.position - SX(position.tolist()), at.rotation @ SX(rotation.T.tolist()))
 
     def returned(self, at: SymbolicPose, nlp: Nlp, x: FloatArray) -> SymbolicPose:
-        """Return a pose in the world, for the frame held at its pose at a point (n,) of a program."""
+        """Undo :meth:`carried`: return the world pose for the frame at its pose at a point (n,) of a program."""
         position, rotation = self.at(self.place, nlp, x)
         turned = at.rotation @ self.place.rotation.T @ SX(rotation.tolist())
         return SymbolicPose(at.position - self.place.position + SX(position.tolist()), turned)

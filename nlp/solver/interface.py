@@ -31,7 +31,7 @@ class SolverResult:
     """Report of a local solver about the point at which it stopped.
 
     Multipliers belong to the scaled problem of :mod:`screwsynth.nlp.evidence.kkt`, with variables in half ranges and a
-    scaled objective to be minimised. They are positive at an upper limit and negative at a lower one.
+    scaled objective to be minimised. They are positive at an upper limit and negative at a lower limit.
 
     Attributes:
         x: (n,) last point, in the units of the program.

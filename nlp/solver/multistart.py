@@ -263,7 +263,9 @@ def _searched(
     solver: Solver,
     phase: PhaseProgress,
 ) -> tuple[Nlp, dict[int, Start]]:
-    """Return a program with constraints on its active pairs, and the pending searches from points (k, n).
+    """Search from the points (k, n) that have no known result.
+
+    Return the program with constraints on its active pairs, and the results by index of the point.
 
     If interrupted, the searches end before the last point.
     """

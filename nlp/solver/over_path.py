@@ -19,7 +19,7 @@ from .semi_infinite import ExchangeProof, JudgedDesign, SemiInfinite, design_of,
 
 
 def over_path(case: Case, nlp: Nlp) -> SemiInfinite:
-    """Return a nonlinear program of a case, with limits along the path.
+    """Return the semi-infinite program of a case: its nonlinear program, with limits along the path.
 
     Args:
         case: the case.

@@ -139,7 +139,7 @@ class _ClosedPose:
 
 
 class _PosedClaim(NamedTuple):
-    """Claim at one or two poses: its constraints, those of a minimised epigraph variable, and the robot there."""
+    """Claim at one or two poses: its constraints, those of a minimised epigraph variable, and robots at these poses."""
 
     poses: tuple[_ClosedPose, ...]
     constraints: tuple[BoundedConstraint, ...]
@@ -202,9 +202,9 @@ class PoseConstraints:
     def added(self, design: Case, fresh: Sequence[BindingPose], x: FloatArray, part: float = 1.0) -> list[BindingPose]:
         """Add further claims as constraints, and return the added ones.
 
-        Constraints that repeat another one, such as at mirrored poses of a symmetric robot, are left out: with both, a
-        program has no unique multipliers. Two constraints count as equal if they differ by less than the margin to
-        their limits, at a design and at designs around it.
+        Constraints that repeat another one, such as at mirrored poses of a symmetric robot, are left out: with both
+            constraints, a program has no unique multipliers. Two constraints count as equal if they differ by less than
+            the margin to their limits, at a design and at designs around it.
 
         Args:
             design: design that refutes the claims.
@@ -439,7 +439,7 @@ class PoseConstraints:
 
 
 def with_margin(nlp: Nlp, part: float) -> Nlp:
-    """Return a program with limits at poses that are tighter than in the case by a fraction of the present margin.
+    """Return a program with limits at poses that are tighter than in the case by ``part`` of the present margin.
 
     With ``part`` 0, the limits are those of the case, so that a valid design satisfies the constraints at any pose.
     """

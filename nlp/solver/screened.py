@@ -116,7 +116,7 @@ class _Confirmed:
         return start
 
     def _confirm(self, screened: SolverResult) -> Start | None:
-        """Return the result for an optimum of the search in C; None if it violates the program's conditions.
+        """Return the result for an optimum of the search in C; None if the point violates the program's conditions.
 
         Ipopt's point counts unless Ipopt fails from there, or moves to a worse point.
         """

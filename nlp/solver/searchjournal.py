@@ -73,7 +73,7 @@ class KeptCertificate(NamedTuple):
 
     Attributes:
         key: text that identifies the search.
-        x: incumbent; None without one.
+        x: incumbent; None without an incumbent.
         numbers: fields with real values, by name, as texts.
         words: fields with texts, by name.
         counts: fields with whole numbers and truth values, by name.
@@ -137,7 +137,10 @@ class SearchJournal(JournalFile):
     def search(
         self, nlp: Nlp, search: Search, first: Sequence[FloatArray], solve: Callable[[], Any], make: Callable[..., Any]
     ) -> Any:  # noqa: ANN401 - as in Keeper
-        """Return the kept solution of a search, or solve and keep it; see :class:`.Keeper`."""
+        """Return the solution of a search from the journal; without an entry, search and add the solution.
+
+        See :class:`.Keeper`.
+        """
         key = _key_of(nlp, repr(search), *first)
         known = self[key]
         if isinstance(known, KeptSearch):
@@ -266,13 +269,13 @@ def kept_certificate(
     gap: float = GAP,
     above: float | None = None,
 ) -> Certificate:
-    """Return the certificate of a program from the active journal, or certify and keep it.
+    """Return the certificate of a program from the active journal; without an entry, certify the program and add it.
 
     A certificate that an interrupt or the time limit cuts short is not kept.
 
     Args:
         nlp: the nonlinear program.
-        x: (n,) incumbent; None without one.
+        x: (n,) incumbent; None without an incumbent.
         certified: function that certifies the program, beginning with the incumbent.
         gap: requested gap, as for :func:`.certify_program`.
         above: value of F to prove as a lower bound, as for :func:`.certify_program`.

@@ -122,7 +122,7 @@ class SemiInfinite(NamedTuple):
 
 
 def over_workspace(case: Case, nlp: Nlp) -> SemiInfinite:
-    """Return a nonlinear program of a case, with limits over the workspace.
+    """Return the semi-infinite program of a case: its nonlinear program, with limits over the workspace.
 
     Args:
         case: the case.

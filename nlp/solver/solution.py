@@ -245,10 +245,10 @@ class Solution(Whole, Shown, Answer):
         outcomes: outcome of each task.
         combination: combination of several tasks; None for one task.
         seconds: wall time.
-        workspace: proof that the design satisfies its limits over the workspace; None if no limit holds there, or
-            the program has no answer.
-        path: proof that the design satisfies its limits along the path; None if no limit holds there, or the program
-            has no answer.
+        workspace: proof that the design satisfies its limits over the workspace; None if no limit applies to the
+            workspace, or the program has no answer.
+        path: proof that the design satisfies its limits along the path; None if no limit applies to the path, or the
+            program has no answer.
         choice: search over listed parameter values; None without listed values.
         rounding: rounding of dimensions; None without rounding.
         changes: for each dimension or pose that changes from task to task, the answer with it shared.

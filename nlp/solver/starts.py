@@ -183,7 +183,7 @@ def known_optimum(nlp: Nlp, stopped: FloatArray, known: list[Start]) -> Start | 
 
 
 def judge(nlp: Nlp, found: SolverResult) -> Start:
-    """Correct the last point of a local solver by Newton's method; return it with its status by the conditions."""
+    """Correct the last point of a local solver by Newton's method, and test the KKT conditions there."""
     stopped = np.clip(found.x, nlp.lower, nlp.upper)
     raw = at = linearise(nlp, stopped)
     active = at.active()

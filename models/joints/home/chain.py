@@ -41,7 +41,8 @@ class Joint:
         place: place in the robot file (limb and joint), for messages.
         type: letter of the joint type: ``R, P, H, C, U, S`` or ``Pa``.
         point: (3, 1) centre of the joint or point of its axis, length.
-        axes: axes with one coordinate each, from the base side on; those of a spherical joint are along x, y and z.
+        axes: axes with one coordinate each, from the base side on; the three axes of a spherical joint are along x, y
+            and z.
         actuated: True if an actuator drives the joint.
         name: name of the joint in the robot file; empty for a joint without a name.
         parts: joints of the robot file that this joint replaces; empty for a joint of the robot file itself.
@@ -64,9 +65,9 @@ class Limb:
         name: name of the limb.
         place: place of the limb in the robot file, for messages.
         group: index of the limb in the robot file of which this limb is a copy.
-        stem: joints from the base on that all chains share.
+        stem: joints that all chains share, from the base on.
         branches: joints of each chain after the stem; one empty chain for a limb without branches.
-        centre: (3, 1) centre given by the user, length; None for the centre by rule.
+        centre: (3, 1) centre given by the user, length; None for the centre that a rule determines.
         turn: (3, 3) rotation of this copy relative to the limb in the robot file.
     """
 
@@ -213,7 +214,7 @@ def _with_points(place: str, points: Mapping[str, VectorExpression], names: Mapp
     Args:
         place: beginning of the place in messages.
         points: points by name.
-        names: values of the names that are defined before.
+        names: values of the names that are defined before these points.
     """
     known = dict(names)
     for name, written in points.items():
@@ -294,7 +295,7 @@ def _direction(place: str, written: VectorExpression, names: Mapping[str, SX]) -
 
 
 def _vector(place: str, written: VectorExpression, names: Mapping[str, SX], later: Collection[str] = ()) -> SX:
-    """Return the value of a vector expression, (3, 1); ``later`` are names that are defined below."""
+    """Return the value of a vector expression, (3, 1); ``later`` has names that the robot file defines later."""
     if not isinstance(written, str):
         return ca.vertcat(*[scalar_value(place, each, names, later) for each in written])
     value = _evaluated(place, written, names, later)
@@ -304,7 +305,7 @@ def _vector(place: str, written: VectorExpression, names: Mapping[str, SX], late
 
 
 def scalar_value(place: str, written: str | float, names: Mapping[str, SX], later: Collection[str] = ()) -> SX:
-    """Return the value of a scalar expression, (1, 1); ``later`` are names that are defined below."""
+    """Return the value of a scalar expression, (1, 1); ``later`` has names that the robot file defines later."""
     value = _evaluated(place, written, names, later)
     if not value.is_scalar():
         raise RobotError(place, f"is {written!r}, which is a vector; a number is needed")

@@ -103,7 +103,7 @@ def _rods(robot: HomeRobot, path: Sequence[Joint]) -> list[_Pair]:
 
 
 def _axes(robot: HomeRobot, path: Sequence[Joint]) -> list[_Pair]:
-    """Return the angles between all rotation axes of a chain, and the distances of successive ones."""
+    """Return the angles between all rotation axes of a chain, and the distances of successive rotation axes."""
     axes = [
         (joint, axis) for joint in path for axis in joint.axes if joint.type != "S" and axis.kind is AxisKind.ROTATION
     ]

@@ -112,7 +112,7 @@ class Parts:
 
     Attributes:
         links: names of the links.
-        values: function that returns the values of vectors.
+        values: function that returns the numeric value of a vector expression.
         joints: elementary joints.
     """
 
@@ -121,7 +121,7 @@ class Parts:
     joints: list[MechanismJoint] = field(default_factory=list)
 
     def add(self, name: str, joint: Joint, inner: str, outer: str) -> None:
-        """Add a joint between two links as elementary joints."""
+        """Split a joint between two links into elementary joints, and add these."""
         point = self.values(joint.point)
         axes = [self.values(axis.axis) for axis in joint.axes]
         driven = joint.actuated

@@ -41,7 +41,7 @@ class Motion(NamedTuple):
         return cls(SX.eye(3), SX.zeros(3), SX.zeros(3))
 
     def after(self, first: Motion) -> Motion:
-        """Return the product of displacements: first ``first``, then this one."""
+        """Return the product of two displacements: first ``first``, then this displacement."""
         if first.rotation.is_eye():
             # A translation moves only the origin: the product then rotates one sum of vectors, not two vectors.
             return Motion(self.rotation, self.origin - (first.image - first.origin), self.image)
@@ -109,7 +109,7 @@ class JointAxis:
     def screw(self, value: SX, at: Motion) -> SX:
         """Return the current unit screw (6, 1).
 
-        For a parallelogram, the translation of its platform side, with a velocity of 1.
+        For a parallelogram, this is the translation of its platform side with unit velocity.
 
         Args:
             value: coordinate of the joint.
@@ -124,7 +124,10 @@ class JointAxis:
         return ca.vertcat(direction, ca.cross(at.point(self.point), direction) + self.pitch * direction)
 
     def direction(self, screw: SX) -> SX:
-        """Return the current direction (3, 1) from the current screw (6, 1); for a parallelogram, of the motion."""
+        """Return the current direction (3, 1) of the axis from the current screw (6, 1).
+
+        For a parallelogram, this is the direction of its motion.
+        """
         return screw[:3] if self.kind is AxisKind.ROTATION else screw[3:]
 
     @property

@@ -85,7 +85,10 @@ def _are_centres(frame: PathFrame, ends: tuple[SX, SX], sides: Sequence[Sequence
 
 
 def _met(frame: PathFrame, sides: Sequence[Sequence[Joint]], along: SX) -> tuple[SX, SX] | None:
-    """Return the two points (3, 1) where axes before and after a slide intersect, or a hinge meets the leg's line."""
+    """Return the points (3, 1) where the axes before a slide, and those after it, intersect; None without such points.
+
+    A single hinge on one side counts with the point where its axis meets the leg's line.
+    """
     base, platform = (_centre(frame, side) for side in sides)
     if base is None and platform is None:
         base = sides[0][0].point
@@ -97,7 +100,10 @@ def _met(frame: PathFrame, sides: Sequence[Sequence[Joint]], along: SX) -> tuple
 
 
 def _centre(frame: PathFrame, side: Sequence[Joint]) -> SX | None:
-    """Return the common point (3, 1) of the joint axes; None if they do not intersect or are all parallel."""
+    """Return the common point (3, 1) of the joint axes on one side of a slide.
+
+    The result is None if the axes do not intersect or are all parallel.
+    """
     first, *others = (axis for joint in side for axis in joint.axes)
     across = [each for each in others if not frame.are_parallel(first.axis, each.axis)]
     if not across:
@@ -106,7 +112,7 @@ def _centre(frame: PathFrame, side: Sequence[Joint]) -> SX | None:
 
 
 def _on_hinge(frame: PathFrame, side: Sequence[Joint], centre: SX, along: SX) -> SX | None:
-    """Return the intersection of a hinge axis and the line of a leg from the other centre (3, 1); None without one."""
+    """Return the point where a hinge axis meets a leg's line through ``centre`` (3, 1); None without such a point."""
     axis = side[0].axes[0]
     if frame.are_parallel(axis.axis, along):
         return None

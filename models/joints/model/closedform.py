@@ -79,7 +79,7 @@ class ClosedForm:
 def closed_form(model: Model, *, extended: bool = False, with_angles: bool = True) -> ClosedForm:
     """Return a robot without the unknowns that have a closed form in dimensions and pose.
 
-    Free actuator coordinates stay unknowns; closed forms may depend on them.
+    Free actuator coordinates stay unknowns; closed forms may depend on these coordinates.
 
     Args:
         model: the robot.
@@ -160,7 +160,7 @@ def _solved(model: Model, unknown: Unknown, equation: Closure, extended: bool) -
 
 
 def _root(value: SX, size: SX, extended: bool) -> SX:
-    """Return the square root of a value; if extended, its tangent below a fraction of a size."""
+    """Return the square root of a value; if extended, it continues along its tangent below a fraction of ``size``."""
     if not extended:
         return ca.sqrt(value)
     least = ca.fmax(value, _EXTENDED * size)

@@ -52,7 +52,7 @@ class Root(NamedTuple):
     Attributes:
         equation: name of the equation in the model; empty for an equation that follows from several.
         value: (1, 1) left side of the equation, scaled to values of about 1.
-        slope: (1, 1) derivative with respect to the unknown, with the sign that makes it positive at home.
+        slope: (1, 1) derivative with respect to the unknown, times the sign that makes this product positive at home.
         reach: (1, 1) discriminant: not negative where there are solutions, and 1 at home.
     """
 
@@ -152,12 +152,12 @@ class _Elimination:
 def eliminated(
     model: Model, rotation: tuple[float, ...] | None = None, held: frozenset[int] = frozenset()
 ) -> tuple[Eliminated, ...]:
-    """Return the unknowns of a robot that have a closed form in dimensions and pose, for the solution of home.
+    """Eliminate unknowns of a robot by closed forms in dimensions and pose, in the solution that is valid at home.
 
     Args:
         model: the robot.
         rotation: nine numbers, column by column, of a fixed platform rotation, with which more unknowns may follow;
-            None for a variable one.
+            None for a variable rotation.
         held: indices of unknowns that stay variables if they have two solutions; closed forms of other unknowns may
             depend on these.
     """
@@ -181,7 +181,7 @@ def eliminated(
 
 
 def _eliminate_one(work: _Elimination, gaps: Sequence[Equation], single: Sequence[Equation]) -> bool:
-    """Eliminate one unknown, from a gap or else from one equation; return False if none can be eliminated."""
+    """Eliminate one unknown, from a gap or otherwise from one equation; return False if this fails for all unknowns."""
     attempts = [
         (solve, each) for solve, own in ((_from_gap, gaps), (_from_linear, single), (_from_one, single)) for each in own
     ]
@@ -221,7 +221,7 @@ def _from_gap(work: _Elimination, k: int, gap: Equation) -> bool:
 
 
 def _from_one(work: _Elimination, k: int, equation: Equation) -> bool:
-    """Eliminate an unknown that one equation (1, 1) determines, in the solution of home."""
+    """Eliminate an unknown that one equation (1, 1) determines, in the solution that is valid at home."""
     unknown = work.model.unknowns[k]
     if all(each.limb != equation.limb for each in work.model.signs if each.is_mode):
         # A limb without a sign of its working mode is covered in all modes.
@@ -241,7 +241,10 @@ def _from_one(work: _Elimination, k: int, equation: Equation) -> bool:
 
 
 def _angle_of(work: _Elimination, unknown: Unknown, e: SX, sign: float) -> tuple[Solved | None, SX]:
-    """Return the angle q with ``A cos q + B sin q + C = 0`` and a slope of given sign, or None; and its reach."""
+    """Return the angle q with ``e = 0`` and a slope of given sign, and the edge of its reach.
+
+    The angle is None unless e has the form ``A cos q + B sin q + C``.
+    """
     q = unknown.symbol
     A, B, C = _harmonics(work, e, q)
     if not work.is_zero(A * ca.cos(q) + B * ca.sin(q) + C - e):
@@ -254,7 +257,10 @@ def _angle_of(work: _Elimination, unknown: Unknown, e: SX, sign: float) -> tuple
 
 
 def _slide_of(work: _Elimination, unknown: Unknown, e: SX, sign: float) -> tuple[Solved | None, SX]:
-    """Return the travel with ``c0 + c1 q + c2 q^2 = 0`` and a slope of given sign, and its reach; None without one."""
+    """Return the travel q of a slide with ``e = 0`` and a slope of given sign, and the edge of its reach.
+
+    The travel is None unless e has the form ``c0 + c1 q + c2 q^2`` with a nonzero c2.
+    """
     q = unknown.symbol
     c0, c1, c2 = _coefficients(e, q)
     if not work.is_zero(c0 + c1 * q + c2 * q * q - e):
@@ -266,7 +272,7 @@ def _slide_of(work: _Elimination, unknown: Unknown, e: SX, sign: float) -> tuple
 
 
 def _from_linear(work: _Elimination, k: int, equation: Equation) -> bool:
-    """Eliminate a slide that enters one equation (1, 1) linearly."""
+    """Eliminate the travel of a slide that enters one equation (1, 1) linearly."""
     unknown = work.model.unknowns[k]
     if unknown.dimension is Dimension.ANGLE:
         return False

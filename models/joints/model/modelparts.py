@@ -95,7 +95,7 @@ def _platform_motions(constraints: FloatArray, rank: int, point: ClosedPoint, re
 def _is_determined(
     model: Model, velocities: Velocities, drives: Sequence[LimbDrive], point: ClosedPoint, reach: float
 ) -> bool:
-    """Return True if statics determines the constraints of a limb."""
+    """Return True if, for at least one limb, statics alone determines the constraint wrenches."""
     J, names = velocities.jacobian, np.array([row.limb for row in model.frame_rows])
     for limb, (rows, _, drive) in zip(model.limbs, drives, strict=True):
         constraints = drive.constraints @ J[rows]
@@ -230,7 +230,7 @@ def _column_labels(joint: Joint, labels: Mapping[int, str]) -> list[str]:
 
 
 def with_kept(structures: Iterable[PathStructure], kept: Collection[Closure]) -> tuple[PathStructure, ...]:
-    """Return the structures of chains with the number of loop equations that a program keeps."""
+    """Return the structures of chains with the number of loop equations that the nonlinear program keeps."""
     names = {each.name for each in kept}
     return tuple(
         replace(each, kept=sum(f"loop {each.name} ({k + 1})" in names for k in range(each.equations)))
@@ -256,7 +256,7 @@ def member_remarks(structures: Sequence[PathStructure]) -> list[str]:
 
 
 def rank_remarks(rank: int, structures: Sequence[PathStructure]) -> list[str]:
-    """Return the remark on a robot of several members whose actuators leave its platform one motion everywhere."""
+    """Return a remark if the platform has one motion with all actuators locked, at all poses; empty otherwise."""
     if rank != _ONE_MOTION_LEFT or sum(each.wrenches > 0 for each in structures) == 1:
         return []
     words = f"J has rank {rank} at all poses: with all actuators locked, the platform still moves"

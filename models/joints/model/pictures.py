@@ -241,8 +241,8 @@ def _add_slide(
 def _leg_of(sketch: _Sketch, joints: Sequence[PlacedJoint], k: int) -> Place | None:
     """Return the middle of the telescopic leg of a slide; None for a slide on a rail.
 
-    A slide belongs to a leg if it is at one of its neighbouring joints and slides towards the other. The leg of a last
-    slide ends where the axis is nearest to the platform's origin.
+    A slide belongs to a leg if the slide is at one of its two neighbouring joints and moves towards the other one. If
+    the slide is the last joint, its leg ends where the axis is nearest to the platform's origin.
     """
     joint = joints[k]
     if joint.is_in_rod:

@@ -59,7 +59,10 @@ def with_replaced(symbols: Sequence[SX], outputs: Sequence[SX], argument: int, s
 def _applied(
     op: int, operands: list[SX], held: tuple[int, float] | None, solved: dict[int, Solved]
 ) -> tuple[SX, tuple[int, float] | None]:
-    """Return the result of an operation; if it is an unknown or minus an unknown, also return index and sign."""
+    """Return the result of an operation.
+
+    If the result is an unknown or minus an unknown, also return the index of the unknown and the sign.
+    """
     if held is not None and op in (ca.OP_SIN, ca.OP_COS, ca.OP_NEG):
         index, sign = held
         own = solved[index]

@@ -316,7 +316,7 @@ def model_of_home(
         samples: (s, d) values of the dimensions at which ranks are measured.
         definition: tables of the robot file.
         more: parameters of the model in addition to the dimensions.
-        legs: straight legs of the robot; None to derive them.
+        legs: straight legs of the robot; if None, they are derived from the limbs.
 
     Raises:
         RobotError: the robot cannot be assembled near home.

@@ -58,7 +58,10 @@ def simplified(frame: PathFrame, joints: Sequence[Joint]) -> list[Joint]:
 
 
 def _window(joints: Sequence[Joint], end: int, count: int) -> int | None:
-    """Return the first of the joints before ``end`` with ``count`` passive rotations; None without such joints."""
+    """Return the index from which the joints before ``end`` have exactly ``count`` axes.
+
+    The result is None if these joints are not all passive revolute or universal joints.
+    """
     start, left = end, count
     while start > 0 and left > 0:
         joint = joints[start - 1]
@@ -85,8 +88,8 @@ def _merged(joints: Sequence[Joint], kind: str, point: SX) -> Joint:
 def choose_cut(joints: Sequence[Joint], stem: int, *, with_rods: bool = True) -> Cut:
     """Return the place at which a chain is opened.
 
-    The cut is at the passive spherical joint nearest the platform; without one at a universal joint; without one at the
-    revolute joint with the most equal numbers of coordinates on both sides.
+    The cut is at the passive spherical joint nearest the platform; without a spherical joint at a universal joint;
+    without either at the revolute joint with the most equal numbers of coordinates on both sides.
 
     Args:
         joints: joints from base to platform.
@@ -114,7 +117,7 @@ def _imbalance(joints: Sequence[Joint], first: int, behind: int) -> int:
 
 
 def _rod(joints: Sequence[Joint], stem: int, j: int) -> Cut | None:
-    """Return the cut at a rod that ends at a spherical joint; None without a rod."""
+    """Return the cut at a rod that ends at the spherical joint j; None without a rod."""
     for step in (-1, 1):
         far, slide = j + step, None
         if stem <= far < len(joints) and joints[far].type == "P" and joints[far].actuated:

@@ -73,9 +73,9 @@ def mode_signs(
 
 
 def _normal(path: OpenedPath, frame: PathFrame) -> SX | None:
-    """Return the current axis (3, 1) normal to all motions of a chain's unknowns; None if there is none.
+    """Return the current axis (3, 1) normal to all motions of a chain's unknowns; None without such an axis.
 
-    The chain is planar if all rotations have one direction, and its slides are perpendicular to it.
+    There is such an axis if all rotations have one direction, and all slides are perpendicular to this direction.
     """
     cut = range(path.cut.first, path.cut.last + 1)
     pairs = [

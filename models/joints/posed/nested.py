@@ -100,8 +100,9 @@ def nested_members(robot: HomeRobot, network: OpenNetwork) -> list[NestedMember]
 def motions_of(network: OpenNetwork, frame: PathFrame, member: NestedMember, free: Collection[int]) -> Motions:
     """Return loops and platform twists of a member of a network with some free joints.
 
-    The tree contains the joints that locked actuators fix, then the shortest paths from the base. A loop next to such
-    a joint then does not influence the platform twists: at a dead centre, the joint rates of this loop are undefined.
+    The spanning tree contains first the joints that locked actuators fix, then the shortest paths from the base. So a
+    loop next to a fixed joint does not influence the platform twists: at a dead centre, the joint rates of this loop
+    are undefined.
 
     Args:
         network: the network.

@@ -141,7 +141,7 @@ def _add_to_tree(network: OpenNetwork, k: int, parent: str, child: str, variable
 
 
 def _spanning_axes(network: OpenNetwork, k: int, child: str, frame: PathFrame) -> tuple[JointAxis, ...]:
-    """Return the axes of a spherical joint in the tree: two normal to a rod between spherical joints, else three.
+    """Return the axes of a spherical joint in the tree: two normal to a rod between spherical joints, otherwise three.
 
     Args:
         network: the network.

@@ -53,7 +53,8 @@ class Opened:
 
     Attributes:
         equations: equations of the closed loops.
-        checks: further expressions that are zero in closed loops: signs that the equations leave open.
+        checks: expressions that are 0 if the loop closes, and not 0 for the reversed closures (axis opposite, half
+            turn) that the equations also allow.
     """
 
     equations: list[LoopEquation] = field(default_factory=list)
@@ -68,7 +69,8 @@ class OpenedPath(Opened):
         joints: joints from base to platform.
         cut: place at which the chain is opened.
         screws: current screws (6, 1) of the axes of each joint; empty for a joint of a rod with unknown axes.
-        behind: displacement of the body on the platform side of each joint; None for joints between the two sides.
+        behind: displacement of the body on the platform side of each joint; None for joints between the two sides of
+            the cut.
         points: (3, 1) current position of each joint on the body on its base side, length.
         sides: displacements of the bodies on the base side and on the platform side of the cut.
         rod: (3, 1) vector along the rod, to the joint at the cut; None without a rod.

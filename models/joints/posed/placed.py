@@ -38,12 +38,12 @@ class Place:
 
     @classmethod
     def on(cls, body: Motion, point: SX) -> Place:
-        """Return a point (3, 1) at home that moves with a body."""
+        """Return the point that is ``point`` (3, 1) at home and moves with a body."""
         return cls(body.point(point), point)
 
     @classmethod
     def along(cls, body: Motion, direction: SX) -> Place:
-        """Return a direction (3, 1) at home that rotates with a body."""
+        """Return the direction that is ``direction`` (3, 1) at home and rotates with a body."""
         return cls(body.rotation @ direction, direction)
 
     def __add__(self, other: Place) -> Place:

@@ -76,7 +76,7 @@ def resistance(limb: str, path: OpenedPath, ranks: Ranks, given: SX | None) -> t
         limb: name of the limb.
         path: the chain.
         ranks: ranks of the chain.
-        given: (3, 1) centre given by the user at home, length; None for the centre by rule.
+        given: (3, 1) centre given by the user at home, length; None for the centre that a rule determines.
     """
     if ranks.pinned is not None and given is None:
         return _pinned(limb, path, ranks.pinned)
@@ -130,7 +130,7 @@ def _centre_of(joints: Sequence[Joint], given: SX | None) -> Centre:
 
     Args:
         joints: joints from base to platform, with two intersecting rotations merged into a universal joint.
-        given: (3, 1) centre given by the user at home, length; None for the centre by rule.
+        given: (3, 1) centre given by the user at home, length; None for the centre that a rule determines.
     """
     passive = [j for j, joint in enumerate(joints) if not joint.actuated]
     last = passive[-1] if passive else len(joints) - 1

@@ -145,7 +145,7 @@ class PathJoints:
         return self._between(axes, self._before(j).rotation.T @ self._behind(j).rotation)
 
     def _between(self, axes: Sequence[JointAxis], turn: SX) -> _Coordinates:
-        """Return the angles of one, two or three rotations from the rotation (3, 3) of the body after them."""
+        """Return the angles about one, two or three axes from the rotation (3, 3) of the body behind these axes."""
         a = [axis.axis for axis in axes]
         if len(a) == 1:
             return _Coordinates([_angle(rotation_angle(a[0], turn))])
@@ -186,7 +186,7 @@ class PathJoints:
         return _Coordinates([_angle(second.reversed), _angle(first.reversed)])
 
     def _sign(self, a1: SX, a2: SX, vector: SX) -> float:
-        """Return the sign of ``a1 . (a2 x vector)`` at the typical dimensions; 0 if it is too small."""
+        """Return the sign of ``a1 . (a2 x vector)`` at the typical dimensions; 0 if this product is too small."""
         unit = vector / ca.norm_2(vector)
         value = self._frame.typical_value(ca.dot(a1, ca.cross(a2, unit))).item()
         return 0.0 if abs(value) < _DISTINCT else float(np.sign(value))
@@ -287,7 +287,9 @@ def _is_along(path: OpenedPath, joints: Sequence[int], frame: PathFrame) -> bool
 
 
 def with_shared_places(paths: Sequence[tuple[OpenedPath, list[LimbLink]]], frame: PathFrame) -> tuple[LimbLink, ...]:
-    """Return the links of all chains, with one name for joints of the base, or of the platform, with a common centre.
+    """Return the links of all chains.
+
+    Joints of the base with a common centre get one name, and so do joints of the platform.
 
     Args:
         paths: each chain with its links.

@@ -317,7 +317,7 @@ def _joint_words(place: str, table: Mapping[str, object]) -> JointWords:
 
 
 def _repeat(place: str, value: object) -> RepeatWords:
-    """Return the copies of a limb: evenly spaced by a count, or at angles."""
+    """Return the copies of a limb: evenly spaced if a count is given, otherwise at the stated angles."""
     table = table_of(place, value)
     refuse_other_keys(place, table, ("count", "angles", "axis", "through"))
     if ("count" in table) == ("angles" in table):

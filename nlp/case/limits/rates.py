@@ -86,7 +86,11 @@ def _rates(pose: PosedRobot, limb: str) -> tuple[tuple[str, ...], SX]:
 
 
 def _share(numbers: SX) -> SX:
-    """Return a limb's share of F (1, 1) from F, F without cancellation and the work rates, stacked (2 + n, 1)."""
+    """Return a limb's share of F (1, 1).
+
+    The argument (2 + n, 1) has F, the magnitude that F would have if no terms cancelled, and the limb's n work rates.
+    The magnitude keeps the share finite at F = 0.
+    """
     rates = numbers[2:]
     squares = sum((rates[i] ** 2 for i in range(rates.numel())), SX(0))
     return squares / (numbers[0] + _SHARELESS * numbers[1])

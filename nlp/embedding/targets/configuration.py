@@ -68,7 +68,8 @@ class Configuration(NamedTuple):
         platform: (a, 3) platform joints of legs, or (a, 2) radius and height of the rings of struts.
         ranges: limits of each joint.
         home: (a,) coordinates at home.
-        difference: largest difference between formula and inverse kinematics, in sizes or radians.
+        difference: largest difference between formula and inverse kinematics, as a fraction of the robot's size or in
+            radians.
     """
 
     case: Case
@@ -97,7 +98,7 @@ def printed_home(value: float, size: float) -> str:
 
 
 def rounded(value: float) -> float:
-    """Return a number as it is printed."""
+    """Round a number to the digits with which it is printed."""
     return float(printed(value))
 
 
@@ -298,7 +299,7 @@ def length_unit(case: Case) -> str:
 
 
 def _shared(values: Mapping[str, float], usual: float) -> Mapping[str, float]:
-    """Return values by actuator as a controller states them: one value for equal values, none for usual values."""
+    """Return values by actuator as a controller states them: one value if all are equal, no value if all are usual."""
     every = set(values.values())
     if len(every) > 1:
         return MappingProxyType(dict(values))

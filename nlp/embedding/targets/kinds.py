@@ -250,7 +250,7 @@ def _carriage(robot: Kinematics, samples: Samples, k: int, axis: FloatArray, siz
 
 
 def _outward(limbs: tuple[Limb, ...]) -> tuple[Limb, ...]:
-    """Return carriages with their directions from the centre of the circle through them."""
+    """Return the carriages with their directions outwards from the centre of the circle through all carriages."""
     places = np.array([each.centre[:2] for each in limbs])
     sides = places[1:] - places[0]
     if abs(np.linalg.det(sides)) <= TOLERANCE * np.sum(sides**2):

@@ -51,7 +51,7 @@ def write(case: Case) -> dict[str, str]:
 
 
 def _fault(robot: Kinematics) -> str:
-    """Return why Klipper cannot move a robot, as a sentence; empty if it can."""
+    """Return why Klipper cannot move a robot, as a sentence; empty if Klipper can move the robot."""
     units, count = robot.case.units, len(robot.drives)
     if robot.freedoms != 3 or count != 3:
         own = f"this one has {robot.freedoms} degrees of freedom and {count} motors"

@@ -68,7 +68,7 @@ class Range(NamedTuple):
 def ranges_of(robot: Kinematics, samples: Samples) -> tuple[Range, ...]:
     """Return the limits of the case on each actuator coordinate, in the conventions of the controller.
 
-    A limit is a limit on a coordinate if its margin differs from the coordinate by a constant.
+    A limit of the case counts as a limit on a coordinate if its margin differs from the coordinate by a constant.
     """
     limits = limits_of(robot)
     q = robot.transform.coordinates(samples.coordinates)

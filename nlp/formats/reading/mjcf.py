@@ -250,8 +250,8 @@ class _Reader:
     def _tendon_motor(self, name: str, couplings: list[Coupling]) -> str:
         """Return the name of the joint that the actuator of a fixed tendon drives.
 
-        A tendon of several joints has its motor on the link before the first of them. A coupling makes the length of
-        the tendon the coordinate of the motor.
+        For a tendon of several joints, a motor joint and a link are added to the model, on the link before the first of
+        these joints. A coupling makes the length of the tendon the coordinate of the motor.
 
         Args:
             name: name of the tendon.

@@ -266,8 +266,8 @@ def search_tape(form: StandardForm, rows: Rows | None = None, *, is_short: bool 
 
     The default rows are its R expressions.
 
-    With ``is_short``, common subexpressions are written once. The search for them cannot be interrupted, and doubles
-    the time.
+    With ``is_short``, common subexpressions are written once. The search for common subexpressions cannot be
+    interrupted, and doubles the time.
 
     Raises:
         UncoveredError: an expression has an operation without an interval rule, or a jump.
@@ -316,9 +316,9 @@ def objective_tape(form: StandardForm, length: int) -> Tape | None:
 
 
 def _uncovered_limit(form: StandardForm) -> str | None:
-    """Return the key of the limit with an operation without an interval rule.
+    """Return the key of the limit that contains an operation without an interval rule.
 
-    None if a robot expression has the operation.
+    The result is None if an expression of the robot contains such an operation.
     """
     keys = {each.name: next(filter(None, each.keys), None) for each in form.nlp.program.constraints}
     whose = [*(None for _ in form.functions), *(keys.get(each.name) for each in form.conditions)]

@@ -33,7 +33,7 @@ class IncumbentError(InputError):
 
 
 class _Point(NamedTuple):
-    """A point (n,) and its value; None and -inf without one."""
+    """A point (n,) and its value; None and -inf without a point."""
 
     x: FloatArray | None
     value: float
@@ -53,7 +53,7 @@ class Incumbent:
 
     @property
     def x(self) -> FloatArray | None:
-        """Point (n,) in the form's variables; None without one."""
+        """Point (n,) in the form's variables; None without a point."""
         return self._best.x
 
     @property
@@ -63,18 +63,18 @@ class Incumbent:
 
     @property
     def was_beaten(self) -> bool:
-        """Whether the search found a better point than the given one."""
+        """Whether the search found a better point than the given point."""
         return self.value > self._given + _BETTER * self._form.size
 
     def program_point(self) -> FloatArray | None:
-        """Return the point (n,) in the program's variables; None without one."""
+        """Return the point (n,) in the program's variables; None without a point."""
         return None if self.x is None else self._with_level(self.x, self.value)
 
     def start(self, x: FloatArray | None, claimed: float | None) -> None:
         """Set the first incumbent: a given point, or the best of a few points.
 
         Args:
-            x: (n,) point in the program's variables; None without one.
+            x: (n,) point in the program's variables; None if no point is given.
             claimed: claimed objective at the given point; None without a claim.
 
         Raises:
@@ -102,7 +102,10 @@ class Incumbent:
         self._best, self._given = _Point(point, value), value
 
     def consider(self, point: FloatArray) -> None:
-        """Keep a point (n,) if it is feasible and better. Newton's method from this point gives further candidates."""
+        """Keep a point (n,) if it is feasible and better than the incumbent.
+
+        Newton's method from this point gives further candidates.
+        """
         if self._form.nlp.sides.equal.any():  # without equations, only the corrected point is tested
             self._keep_if_better(point)
         self.improve_near(point)

@@ -196,7 +196,7 @@ class Search(Generic[AnyRule]):
         rule: rule for the examination of boxes.
         root: the whole box, or boxes that cover the domain.
         whole: (n,) widths of the whole box; coordinates with width 0 are ignored.
-        least: relative widths below which a box is not bisected, without and with a finite bound.
+        least: two relative widths below which a box is not bisected: for boxes without a finite bound, and with one.
         order: order in which boxes are taken.
 
     Attributes:
@@ -252,7 +252,7 @@ class Search(Generic[AnyRule]):
         return ""
 
     def step(self, target: float) -> None:
-        """Bisect some boxes, examine the sub-boxes, and close those with bounds of at most a target."""
+        """Bisect some boxes, examine the sub-boxes, and close the sub-boxes with bounds of at most a target."""
         waiting, small = list(self.state.waiting), list(self.state.small)
         parts = self._divided(self._take(waiting))
         self.rule.target = target

@@ -41,7 +41,7 @@ def mirrors(form: StandardForm) -> list[tuple[int, ...]]:
 
 
 def halved(form: StandardForm) -> StandardForm:
-    """Return a form on the part of its box that remains after all mirrors; it has the same maximum."""
+    """Reduce the box of a form by its mirrors, and return the reduced form, which has the same maximum."""
     found = mirrors(form)
     if not found:
         return form

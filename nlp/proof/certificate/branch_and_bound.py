@@ -191,7 +191,7 @@ class _Search:
         return self.incumbent.value + self._allowed_gap()[0] - 2 * _FOLDED * abs(self.incumbent.value)
 
     def _has_counterexample(self) -> bool:
-        """Return whether F is not above the value at a known point; F within rounding errors of 0 counts as 0."""
+        """Return whether a known point refutes the requested lower bound of F; rounding errors count as F = 0."""
         if self._above is None or self.incumbent.x is None:
             return False
         return self.incumbent.value >= self._form.value_of(self._above) - ZERO_F * self._form.size

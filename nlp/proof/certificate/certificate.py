@@ -37,7 +37,7 @@ class Certificate(Whole, Shown):
             ``incomplete``: the bound is proved, but its gap is larger than requested; ``infeasible``: no point of the
             box satisfies the limits; ``refused``: a known point contradicts the claim.
         nlp: the nonlinear program.
-        x: (n,) incumbent; None without one. If ``was_beaten`` is true, it is not the given point.
+        x: (n,) incumbent; None without an incumbent. If ``was_beaten`` is true, the incumbent is not the given point.
         incumbent: objective at ``x``; NaN without a point.
         bound: proved bound of the objective over all feasible points of the box; infinite without a proof.
         allowed: requested gap, in the unit of the objective.

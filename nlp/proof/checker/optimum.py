@@ -41,10 +41,10 @@ class Claims:
     Attributes:
         form: the form.
         kind: ``BOUNDED``, ``INFEASIBLE``, ``MONOTONE`` or the kind of a face.
-        index: index of the condition or variable that the kind names; 0 for a kind without one.
+        index: index of the condition or variable that the kind names; 0 for a kind without condition or variable.
         lower, upper: (n, L) ends of the boxes.
         bounds: (L,) bounds of the value of the form minus its tilt; -inf for boxes without a feasible point.
-        tilts: tilts of the claims about a limb, over the shared variables, which come first; None without any.
+        tilts: tilts of the claims about a limb, over the shared variables, which come first; None without tilts.
     """
 
     form: StandardForm
@@ -114,10 +114,10 @@ class BoundRule(FormRule):
     of both is at most the bound. The claim that a condition holds nowhere in a box uses the same rule with that
     condition only.
 
-    The rest of a limb's box collapses on a face if the limb rises along one of its own variables and no condition
-    stops a motion along this variable. Any feasible point above the bound could then move to that face, and remain
-    feasible and above the bound. Tilts do not change this gradient, as they depend only on the shared variables. A
-    tree over all variables states its faces.
+    The rest of a limb's box collapses on a face if the limb's part of the objective increases along a variable that
+    only this limb has, and no condition stops a motion along this variable. Any feasible point above the bound could
+    then move to that face, and remain feasible and above the bound. Tilts do not change this gradient, as they depend
+    only on the shared variables. A tree over all variables states its faces.
     """
 
     def __init__(self, claims: Claims) -> None:
@@ -159,7 +159,11 @@ class BoundRule(FormRule):
         return shown
 
     def _collapse(self, shown: Shown, which: NDArray[np.intp], forms: Forms) -> None:
-        """Reduce some pieces to faces, with their forms, along own variables in which the limb rises."""
+        """Shrink pieces of boxes, in place, to the face where the limb's part of the objective is largest.
+
+        Pieces shrink along each variable that only this limb has, if that part of the objective provably rises or
+        falls.
+        """
         left = np.flatnonzero((shown.lower[:, which] <= shown.upper[:, which]).all(axis=0))
         which, forms = which[left], forms.select(left)
         low, high = shown.lower[:, which], shown.upper[:, which]
@@ -202,7 +206,7 @@ class _Slopes:
         self.expressions = ca.densify(ca.vertcat(*(form.jacobian[r, i] for r, i in entries)))
 
     def rise(self, i: int, side: int, slopes: Sequence[Polynomial], high: FloatArray) -> NDArray[np.bool_]:
-        """Return where (N,) all functions rise towards a side, and no condition stops a point on its way there.
+        """Return where (N,) all functions increase towards a side, and no condition stops a point on its way.
 
         Args:
             i: index of the variable.

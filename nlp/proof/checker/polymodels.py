@@ -164,7 +164,10 @@ def _largest(b: FloatArray, H: FloatArray, s: FloatArray) -> FloatArray:
 def reaching_part(
     model: SumModel, level: FloatArray | float, lower: FloatArray, upper: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return bounds (n, N) of the parts of boxes in which a model may reach a level; crossed if no point can."""
+    """Return bounds (n, N) of the parts of boxes in which a model may reach a level.
+
+    Lower bounds are above upper bounds if no point can reach the level.
+    """
     with np.errstate(all="ignore"):
         missing = level - model.fixed - _SUMS * (np.abs(level) + np.abs(model.fixed))
         half = 0.5 * model.reach

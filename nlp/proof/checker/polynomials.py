@@ -108,7 +108,7 @@ class Polynomial:
         rad: (N,) sum of the absolute linear coefficients.
         curved: (N,) largest absolute value of the part of second order.
         size: (N,) sum of the absolute values of all coefficients.
-        root: value of which this one is the square; None if no such value is known.
+        root: known square root of this value (of either sign); None if no square root is known.
     """
 
     on: tuple[int, ...]
@@ -179,7 +179,7 @@ def middles(lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArra
 def settled(
     on: tuple[int, ...], P: FloatArray, s: FloatArray | float, V: FloatArray, rounding: float = _ONCE
 ) -> Polynomial:
-    """Return a value with its range intersected with that of its polynomial; undefined unless the latter is finite.
+    """Return a value with its range intersected with its polynomial's range; undefined unless the latter is finite.
 
     Args:
         on: variables of the value.
@@ -376,7 +376,7 @@ def atan(u: Polynomial) -> Polynomial:
 
 
 def ramp(u: Polynomial) -> Polynomial:
-    """Return max(u, 0): for any k from 0 to 1 it exceeds k u by 0 to max(-k lo, (1 - k) hi)."""
+    """Return max(u, 0), for u from lo to hi: for any k from 0 to 1 it exceeds k u by 0 to max(-k lo, (1 - k) hi)."""
     low, high = u.V
     part = np.where(low >= 0, 1.0, np.where(high <= 0, 0.0, high / (high - low)))
     part = np.clip(part, 0.0, 1.0)

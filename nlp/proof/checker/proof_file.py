@@ -61,7 +61,8 @@ class Statement:
     Attributes:
         is_minimum: whether the proof bounds the smallest F of a task that the case maximises.
         in_home_mode: whether the proof covers only the home working mode.
-        best: reference F of each task for its loss, if a case has the worst case of maximised and minimised tasks.
+        best: reference F of each task for its loss, if the case combines maximised and minimised tasks by their worst
+            case.
     """
 
     is_minimum: bool = False
@@ -75,7 +76,7 @@ class ProofClaim:
 
     Attributes:
         name: name of the claim, in the words of the command.
-        sense: ``min`` or ``max`` for a quantity over a workspace, else empty.
+        sense: ``min`` or ``max`` for a quantity over a workspace, otherwise empty.
         reason: kind of the proof, in the words of this module's docstring.
         bound: bound of the quantity in the unit of its search. The quantity is the maximised value of a nonlinear
             program (minus F for a minimum), a distance, a singular value or a condition number. For a pose error it is

@@ -61,8 +61,8 @@ class Claim:
     Attributes:
         name: name of the quantity, in the terms of case files.
         sense: ``MIN`` for the smallest value, ``MAX`` for the largest.
-        expression: (1, 1) expression in the symbols of the layout that grows with the quantity; only for claims of the
-            kind ``EXPRESSION``.
+        expression: (1, 1) expression, in the symbols of the layout, that increases with the quantity; only for claims
+            of the kind ``EXPRESSION``.
         reading: conversion of the expression's value to the quantity in results.
         key: dotted key of the limit below ``limits`` in the case; empty without a limit.
         limit: largest or smallest allowed value of the expression, by ``sense``; None without a limit.
@@ -158,8 +158,8 @@ def length_claims(case: Case) -> Iterator[Claim]:
 def searched_claims(case: Case, quantities: Sequence[str] = ()) -> Iterator[Claim]:
     """Yield the claims about leg clearances, singular values and condition numbers; limits of the case come first.
 
-    The smallest singular value, or the condition number, is also yielded if it is among the quantities; moments about
-    the platform's origin are then divided by the characteristic length.
+    The smallest singular value, or the condition number, is also yielded if its name is among the quantities; moments
+    about the platform's origin are then divided by the characteristic length.
     """
     limited = dict[str, float]()
     for limit in case.limits:

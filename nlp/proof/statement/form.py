@@ -100,7 +100,7 @@ class StandardForm:
         functions: functions ``phi_j``; the smallest function value is maximised.
         conditions: conditions ``h_k``; in a common numbering they follow the functions.
         places: indices of the form's variables in the program; None if the form has the first variables of the program.
-        lift: closed forms of the program variables that this form omits; None if it omits none.
+        lift: closed forms of the program variables that this form omits; None if no variable is omitted.
     """
 
     nlp: Nlp

@@ -100,7 +100,7 @@ def _part(form: StandardForm, terms: Sequence[SX], places: Sequence[int], chosen
 
 
 def _smallest_groups(n: int, links: Sequence[frozenset[int]], terms: int) -> list[frozenset[int]]:
-    """Return the own variables of each limb, for the separation with the smallest largest part.
+    """Return the variables that only one limb has, limb by limb, for the separation whose largest part is smallest.
 
     For each number N, variables that occur in at most N terms are candidates for own variables. Candidates in a common
     term or condition belong to one limb. The list is empty if no separation has parts smaller than the whole.

@@ -103,7 +103,7 @@ def _speeds(case: Case, k: int, joint: DrivenJoint) -> Iterator[Claim]:
 
 
 def _limits(case: Case, kind: type[ActuatorLimit], actuator: str) -> list[ActuatorLimit | None]:
-    """Return the limits of a kind that apply to an actuator; None stands for no limit."""
+    """Return the limits of a kind that apply to an actuator; the list ``[None]`` if there are none."""
     found: list[ActuatorLimit | None] = []
     found += [each for each in case.limits if isinstance(each, kind) and each.actuator in ("", actuator)]
     return found or [None]

@@ -251,7 +251,7 @@ class Directions(NamedTuple):
     """Fixed vectors near a leg's direction over a workspace.
 
     Attributes:
-        claim: name of the claim that uses them.
+        claim: name of the claim that uses these vectors.
         base: (3,) vector in the world frame, for the base joint.
         platform: (3,) vector in the platform frame, for the platform joint.
     """

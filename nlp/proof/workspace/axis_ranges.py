@@ -62,7 +62,7 @@ class AxisRanges:
         case: the case, its dimensions fixed.
         start: (6,) the pose: position, length, and roll, pitch and yaw, radians.
         most: largest displacement of a coordinate: a length, and an angle in radians.
-        stops: claims that are not proved at the pose itself; without such claims empty, otherwise there are no ranges.
+        stops: claims that are not proved at the pose itself. If there are any, no ranges are computed.
         axes: ranges of the independent coordinates.
         pairs: ranges of pairs of independent coordinates.
         others: names of the dependent coordinates.
@@ -80,7 +80,7 @@ class AxisRanges:
 
 
 class _Found(NamedTuple):
-    """Largest proved fraction of a range, smallest fraction that is not proved, and the claim that fails at it."""
+    """Largest proved fraction of a range, smallest fraction that is not proved, and the claim that fails there."""
 
     proved: float
     failed: float | None
@@ -194,7 +194,7 @@ def _of_case(case: Case) -> FloatArray:
     """Return the coordinates (6,) of a case's first pose.
 
     Raises:
-        InputError: a number of the pose is free.
+        InputError: a coordinate of the pose is free.
     """
     axis, values = case.axis, (*case.position, case.rotation.angle)
     fixed = [each for each in values if not isinstance(each, Free)]

@@ -68,7 +68,7 @@ class EdgeSamples:
         return high
 
     def _fails(self, y: FloatArray) -> NDArray[np.bool_]:
-        """Return whether poses (P, 6) violate a limit, or have another sign of the determinant than the start."""
+        """Return whether poses (P, 6) violate a limit, or have a determinant of another sign than the start pose."""
         z = y[:, list(self._problem.free)]
         with np.errstate(all="ignore"):
             fails = ~(self._values.values(self._problem.exact(z)) >= self._least).all(axis=1)
@@ -78,5 +78,5 @@ class EdgeSamples:
 
 
 def coordinates_of(poses: FloatArray) -> FloatArray:
-    """Return poses (P, 6) with angles as coordinates of a search, with tangents of half angles."""
+    """Convert poses (P, 6) to coordinates of a search: angles become tangents of half angles."""
     return np.hstack([poses[:, :3], np.tan(0.5 * poses[:, 3:])])

@@ -108,7 +108,7 @@ class Homes:
         return found is None or generic is None or found.constraint_rank < generic.constraints
 
     def shown(self, each: Verdict) -> Verdict:
-        """Return a verdict with the value in the home assembly mode.
+        """Replace the value of a verdict by the value at its pose in the home assembly mode.
 
         The verdict becomes open if only another assembly mode refutes the claim.
         """
@@ -140,7 +140,7 @@ class Homes:
         return self._nlp.objective_size if claim.name.partition(" ")[0] == "F" else 1.0
 
     def _closed(self, y: FloatArray, errors: JointErrors | None) -> FloatArray | None:
-        """Return the point of the program with closed loops at a pose (6,) of a robot.
+        """Close the loops at a pose (6,) of a robot, and return this point of the nonlinear program.
 
         None if the loops do not close.
         """

@@ -81,7 +81,8 @@ def judge_workspace(
         quantities: names of quantities of the robot whose smallest and largest values are requested.
         gap: largest relative gap between the bound and the best known value.
         time_limit: seconds for all searches together; None for no limit. At the limit, searches stop with their present
-            bounds. A search takes at most half of the time left; searches of actuators take equal shares of it.
+            bounds. A search takes at most half of the remaining time; searches of actuators take equal shares of the
+            remaining time.
         jobs: number of threads.
         with_limits: If false, judge only ranks.
         with_objective: If true, bound F of each task, and quantities of actuators without a limit.
@@ -94,8 +95,8 @@ def judge_workspace(
 
     Raises:
         CaseError: the case has no workspace, or a free dimension.
-        InputError: the robot has no quantity of a given name, the leg error is negative or does not apply to this
-            robot, or there is no C kernel.
+        InputError: the robot has no quantity of a requested name, the leg error is negative or does not apply to this
+            robot, or the C kernel was not built.
     """
     workspace = workspace_of_case(case if workspace is None else replace(case, workspace=workspace))
     kernel()  # fails at once if it is missing
@@ -171,7 +172,7 @@ class _OverBox(Judging):
         return None
 
     def _design_robots(self, design: Problem) -> RobotsWithinTolerance:
-        """Return the design as robots without errors."""
+        """Return the nominal robot as the set of robots within a tolerance of 0."""
         if self._exact is None:
             self._exact = RobotsWithinTolerance(self.case, self._closed, design)
         return self._exact
@@ -196,7 +197,7 @@ class _OverBox(Judging):
         return verdict if verdict.is_rank else self._homes.shown(verdict)
 
     def subject(self, shortest: float) -> Subject:
-        """Return the robot for the searches of the other quantities."""
+        """Return the robot for the searches of clearances, singular values and actuator quantities."""
         return Subject(self.case, self._closed.model, self._problem, self._reason, shortest)
 
     def actuators(self, subject: Subject) -> Iterator[Verdict]:

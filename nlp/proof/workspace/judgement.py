@@ -60,7 +60,7 @@ class Judgement:
 
     @property
     def constraints(self) -> Verdict | None:
-        """Verdict on the claim that the constraint wrenches keep their rank; None for a robot without them."""
+        """Verdict on the claim that the constraint wrenches keep their rank; None without constraint wrenches."""
         return next((each for each in self.verdicts if each.name == CONSTRAINTS), None)
 
     @property

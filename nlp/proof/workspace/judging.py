@@ -110,7 +110,10 @@ class Judging(ABC):
 
     @abstractmethod
     def subject(self, shortest: float) -> Subject:
-        """Return the robot for the searches of the other quantities, with a lower bound of its leg lengths."""
+        """Return the robot for the searches of clearances, singular values and actuator quantities.
+
+        ``shortest`` is a lower bound of its leg lengths.
+        """
 
     @abstractmethod
     def actuators(self, subject: Subject) -> Iterator[Verdict]:
@@ -118,10 +121,10 @@ class Judging(ABC):
 
     @abstractmethod
     def finer(self, claim: Claim, gap: float, about: Directions | None) -> Verdict | None:
-        """Return the verdict on a leg length with a smaller gap; None if there is none.
+        """Judge a leg length again with a smaller gap; return None if the domain has no such search.
 
-        With directions, the length is reduced by the components of the errors along these directions, which are the
-        same at every pose.
+        If directions are given, the claim is about the length minus the components of the joint-centre errors along
+        these directions. These components are the same at every pose.
         """
 
     def shown(self, verdict: Verdict) -> Verdict:

@@ -36,7 +36,7 @@ class LocalCoordinates(NamedTuple):
 
 
 def box_about(start: FloatArray, ends: dict[int, tuple[float, float]]) -> Workspace:
-    """Return the box of poses about a pose in which some coordinates have ranges.
+    """Return a box of poses about a pose: some coordinates have ranges, the other coordinates are fixed.
 
     Args:
         start: (6,) the pose: position, length, and roll, pitch and yaw, radians.

@@ -41,7 +41,7 @@ def check_path(
     Raises:
         CaseError: a dimension of the robot is free, or the case has no path.
         InputError: the file cannot be read or has unsupported words, the rotations of the path are not supported, or
-            there is no C kernel.
+            the C kernel was not built.
     """
     if path is None:
         path = path_of_case(case, options)

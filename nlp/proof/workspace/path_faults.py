@@ -41,7 +41,9 @@ def refuted(verdicts: Sequence[Verdict]) -> dict[int, Verdict]:
 
 
 def first_faults(numbers: Number, wrong: Mapping[int, Verdict], cover: PathCover) -> dict[Claim, Fault]:
-    """Return the first known points where the nominal robot violates limits, if before the points of worst values.
+    """Return, by claim, the first known point where the nominal robot violates the limit.
+
+    Claims are left out if this point is not before the point of the verdict.
 
     Args:
         numbers: quantities of claims.
@@ -96,7 +98,7 @@ class _Sampled:
         return self._numbers.closed(z)
 
     def _values_at(self, z: FloatArray) -> FloatArray:
-        """Return values (B, K) at points with closed loops; NaN for open loops."""
+        """Return the values (B, K) of the quantities at points; NaN at a point where the loops could not be closed."""
         found, known = np.full((len(z), self._numbers.count), np.nan), np.isfinite(z).all(axis=1)
         found[known] = self._numbers.values(z[known])
         return found

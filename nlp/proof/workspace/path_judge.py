@@ -72,13 +72,13 @@ def judge_path(
         gap: largest relative gap of a quantity without a limit.
         time_limit: seconds for all searches together; None for no limit.
         sampling: rule for the knots of the path; None for no knots.
-        limits_only: If true, omit quantities of actuators without a limit.
+        limits_only: If true, omit actuator quantities that have no limit.
         progress: function that is called with the name of the next step.
         record: recorder of the searches for a proof file.
 
     Raises:
         CaseError: a dimension of the robot is free, or limits need a motion that neither the case nor the path states.
-        InputError: rotations of the path are not supported, there is no C kernel, or there are too many knots. Or
+        InputError: rotations of the path are not supported, the C kernel was not built, or there are too many knots. Or
             knots are requested for a robot whose actuator positions are not known.
     """
     cover, box, workspace = covered(path, robot_length(case))
@@ -191,7 +191,7 @@ class _AlongPath(Judging):
             yield from found
 
     def subject(self, shortest: float) -> Subject:
-        """Return the robot for the searches of the other quantities."""
+        """Return the robot for the searches of clearances, singular values and actuator quantities."""
         robots = self._robots
         return Subject(self.case, robots.model, robots.family, "", shortest)
 

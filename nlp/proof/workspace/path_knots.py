@@ -359,7 +359,10 @@ class _Division:
         return self._unproved(np.stack([k, *ends], axis=1), near[which])
 
     def has_joints(self, pieces: _Pieces, knots: Knots) -> bool:
-        """Return whether the coordinates at knots are in the proved assembly mode at the ends of all pieces."""
+        """Return whether the actuator coordinates at all knots belong to the proved assembly mode.
+
+        Knots are the ends of the pieces.
+        """
         # The end of each piece, and the start of the first.
         ends = np.concatenate([pieces.along[:1, [0, 1, 1]], pieces.along[:, [0, 2, 2]]])
         near = np.concatenate([pieces.near[:1], pieces.near])
@@ -384,16 +387,19 @@ class _Division:
 
 
 def _cut(pieces: _Pieces, count: int) -> list[_Pieces]:
-    """Return a given number of first pieces, and the other pieces if there are any."""
+    """Divide pieces into the first ``count`` pieces and the remaining pieces; a group without pieces is left out."""
     every = np.arange(len(pieces.far))
     return [some(pieces, each) for each in (every[:count], every[count:]) if len(each)]
 
 
 def _both(place: NDArray[np.intp], count: NDArray[np.intp]) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-    """Return indices of the starts and of the ends of parts, each with the indices of the parts."""
+    """Return the places of the starts and of the ends of parts, each with ``count``.
+
+    A place is the number of equal steps, of ``count`` in a piece, from its start.
+    """
     return [(place, count), (place + 1, count)]
 
 
 def _distance(moved: FloatArray) -> FloatArray:
-    """Return the displacements (B,) of the platform's origin, the first three of the coordinates (B, n)."""
+    """Return the displacements (B,) of the platform's origin, from displacements (B, n) of all coordinates."""
     return np.asarray(np.sqrt((moved[:, :3] ** 2).sum(axis=1)) * (1 + ROUNDING))

@@ -76,11 +76,9 @@ def speeds_on_path(
 
 
 def _wider(number: PathSpeeds, cover: PathCover) -> FloatArray:
-    """Return the differences (K,) of bounds for all robots within the tolerance and values of the nominal robot.
+    """Return by how much (K,) bounds for all robots within the tolerance exceed values of the nominal robot.
 
-    The differences are those at a single point of the path.
-
-    Smaller boxes do not reduce this difference.
+    The differences are those at single points of the path; smaller boxes do not reduce them.
     """
     problem = number.problem
     if not problem.names or problem.problem.dependent:

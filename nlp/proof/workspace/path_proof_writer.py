@@ -65,7 +65,7 @@ class _Writer:
         self.proved: dict[Key, ProofClaim] = {}
 
     def proof(self, each: Claim) -> ProofClaim:
-        """Return a claim with its proof; a claim must come after the claims on which it depends.
+        """Return a claim with its proof; the claims on which it depends must have been proved before.
 
         Raises:
             ProofError: the claim has no proof; the message is the reason.
@@ -94,7 +94,10 @@ class _Writer:
         return ProofClaim(*each.label, "boxes", bound_on_record(each, found), tree=tree)
 
     def _rank(self, name: str) -> ProofClaim:
-        """Return the claim that J, or the constraint wrenches, keep their rank or lose rank."""
+        """Return the proved claim about the rank of J, or of the constraint wrenches.
+
+        The claim is that the rank is kept everywhere, or that it is lost at some point.
+        """
         found = self.ranks.get((name, ""))
         if found is None:
             raise ProofError(NOT_JUDGED)

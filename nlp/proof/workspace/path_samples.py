@@ -61,7 +61,7 @@ class SampledNumber(NamedTuple):
 
     @property
     def limit(self) -> float | None:
-        """Limit of the claim, radians for an angle; None without one."""
+        """Limit of the claim, radians for an angle; None without a limit."""
         return None if self.claim.limit is None else self.claim.reading.from_value(self.claim.limit)
 
 

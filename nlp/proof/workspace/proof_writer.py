@@ -88,7 +88,7 @@ class ClaimWriter(Protocol):
 
 
 def write_each(writer: ClaimWriter, expected: Sequence[Claim], judged: Iterable[Key], no_rules: str) -> list[Unproved]:
-    """Write the claims with a proof, and return those without one.
+    """Write the claims with a proof, and return the claims without a proof.
 
     Args:
         writer: writer of the claims.
@@ -128,7 +128,7 @@ class _Writer:
         self.proved: dict[Key, ProofClaim] = {}
 
     def proof(self, each: Claim) -> ProofClaim:
-        """Return a claim with its proof; a claim that depends on other claims comes after them.
+        """Return a claim with its proof; the claims on which it depends must have been proved before.
 
         Raises:
             ProofError: the claim has no proof; the message is the reason.
@@ -149,7 +149,10 @@ class _Writer:
         return self._boxes(each, found)
 
     def _rank(self, name: str) -> ProofClaim:
-        """Return the claim that J, or the constraint wrenches, keep their rank or lose rank."""
+        """Return the proved claim about the rank of J, or of the constraint wrenches.
+
+        The claim is that the rank is kept everywhere, or that it is lost at some pose.
+        """
         found = self._judged.regularity if name == REGULAR else self._judged.constraints
         if found is None:
             raise ProofError(NOT_JUDGED)
@@ -187,7 +190,10 @@ class _Writer:
         return program
 
     def _of_lengths(self, found: Verdict) -> ProofClaim:
-        """Return a claim about a telescoping leg, from its lengths over all robots or of one robot at two poses."""
+        """Return a claim about a telescoping leg, from its longest and shortest length.
+
+        The lengths are proved over all robots, or for one robot at two poses.
+        """
         directions = self._record.directions.get(one_robot_name(found.name))
         if directions is None and self._case.model.unknowns:
             raise ProofError(_ONE_ASSEMBLY)

@@ -47,9 +47,9 @@ class RangeEnd(JsonObject):
     """An end of a proved range.
 
     Attributes:
-        value: end of the range; all claims are proved up to this value.
-        failed: smallest known value beyond the end at which a claim is not proved; absent at the end of the largest
-            requested range.
+        value: end of the range; all claims are proved from the start pose to this value.
+        failed: known value beyond the end, and nearest to it, at which a claim is not proved; absent if the end is the
+            end of the requested range.
         stop: claim that is not proved at ``failed``; absent without ``failed``.
         dimension: length or angle; angles are in radians.
     """

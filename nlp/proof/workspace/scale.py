@@ -54,16 +54,17 @@ def largest_scale(
 ) -> Scale:
     """Return the largest scale factor of a case's workspace with full rank of J and all limits proved.
 
-    The factor is known to 1 %, that of a radius to 0.05 %. It is found by bisection, as a box within a proved box is
-    proved. The smallest box is judged first: it takes little time, and if it fails, every box fails. The radius alone
-    is scaled where the positions are a set with one.
+    The factor of a box is computed to 1 %, that of a radius to 0.05 %, by bisection: a box within a proved box is
+    proved. The smallest box is judged first: it takes little time, and if it fails, every box fails. If the positions
+        are a set with a radius, only this radius is scaled.
 
     Args:
         case: case with fixed dimensions.
         time_limit: seconds for all searches together; None for the default time of each judgement. Each box but the
             first takes at most half of the time left, so that an open box leaves time for smaller boxes.
         jobs: number of threads.
-        judged: verdicts on the workspace at factor 1. It is not judged again if all are proved or one is refuted.
+        judged: verdicts on the workspace at factor 1. The workspace is not judged again if all claims are proved or one
+            is refuted.
 
     Raises:
         CaseError: the case has no workspace, or a free dimension; or half spaces exclude the centre of its positions.
@@ -123,7 +124,7 @@ def _accuracy_of(case: Case, workspace: Workspace) -> float:
 
 
 def _next(proved: float, failed: float, most: float, accuracy: float) -> float | None:
-    """Return the next factor to judge, at most the given one; None if the factor is known."""
+    """Return the next factor to judge, at most ``most``; None if the largest proved factor is known to the accuracy."""
     if proved == 0:
         return _LEAST if failed > _LEAST else None
     if failed == math.inf:

@@ -54,15 +54,16 @@ class Verdict:
         bound: proved bound of the quantity over all poses. Radians for angles; infinite if nothing is proved; NaN for a
             rank.
         reached: smallest or largest known value of the quantity; NaN for a rank, and if no value is known.
-        pose: pose with this value. For a rank: a singular pose, or the centre of the widest open box. None without a
-            known pose.
+        pose: pose at which the quantity has the value ``reached``. For a rank: a singular pose, or the centre of the
+            widest open box. None without a known pose.
         reason: reason for an open outcome, or method that computed a singular pose; otherwise empty.
         boxes: number of examined boxes.
         open: number of open boxes at the end.
         share: fraction of the domain's volume that is in open boxes, for a rank.
         seconds: wall time.
         place: place of the pose on a path; None over a box of poses.
-        errors: joint-centre errors of the robot with this value, or of the singular robot; None for the nominal robot.
+        errors: joint-centre errors of the robot with the value ``reached``, or of the singular robot; None for the
+            nominal robot.
         sides: proof of a refuted rank: two poses (2, 6), or two places on a path (2, 1) (segment plus parameter), at
             which the determinant provably has opposite signs. None without such a proof.
         fault: first known point of a path that refutes the limit; None if no such point precedes ``place``.
@@ -141,5 +142,5 @@ def slack_of(limit: float) -> float:
 
 
 def not_judged(name: str, reason: str) -> Verdict:
-    """Return the open verdict on a rank without a search."""
+    """Return an open verdict on a rank that was not searched, with the reason."""
     return Verdict(RANKS[name], Outcome.OPEN, reason=reason, open=1, share=1.0)

@@ -80,7 +80,7 @@ class IndependentSearch:
 
     @property
     def fault(self) -> str:
-        """Reason for stopping at boxes without a finite bound; empty without any."""
+        """Reason for stopping at boxes without a finite bound; empty without such boxes."""
         return next((each.fault for each in self._searches if each.fault), "")
 
     def step(self, target: float) -> None:

@@ -262,8 +262,8 @@ class SharedRule(Rule[SharedColumns]):
         """Drop and contract boxes, and refine the lists of boxes that are not bisected.
 
         Returns:
-            The remaining sub-boxes; a mask (B,) of their boxes; and whether each limb has no open box, (K, B). In a
-            recorded search, only the conditions of a limb can close all of its boxes.
+            The remaining sub-boxes; a mask (B,) of the shared boxes that contain them; and whether each limb has no
+            open box, (K, B). In a recorded search, only the conditions of a limb can close all of its boxes.
         """
         bounded = sums.bound <= self.target
         if self._recorder is not None:

@@ -371,7 +371,10 @@ class _Checker:
         return sum(parts) + (off if each.sense is Sense.MAX else -off)
 
     def _clearance(self, each: Claim, given: ProofClaim) -> float:
-        """Return the bound of a distance between two legs; errors reduce it by at most twice the tolerance."""
+        """Return the bound of a distance between two legs.
+
+        Joint-centre errors reduce a distance by at most twice the tolerance.
+        """
         bound, nearer = _stated(given), 2 * self._tolerance
         least = bound + nearer + _ROUNDING * (abs(bound) + nearer) if nearer else bound
         self._show(ClearanceClaim(self._posed, each.legs, least), given.unpacked())

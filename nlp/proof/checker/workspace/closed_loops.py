@@ -240,9 +240,10 @@ class Assembly:
 
     @np.errstate(all="ignore")
     def enclosed(self, lower: FloatArray, upper: FloatArray, near: FloatArray | None = None) -> Enclosed:
-        """Return the closed points over boxes of independent coordinates (B, f).
+        """Enclose the points with closed loops over boxes of independent coordinates (B, f).
 
-        If ``near`` is left out, closed points (B, n) at the centres are computed from the start.
+        ``near`` has approximate points (B, n) with closed loops at the centres of the boxes. If it is left out, these
+        points are followed from the start point.
         """
         if near is None:
             near = self.near(middles(lower, upper)[0])
@@ -296,7 +297,7 @@ class Assembly:
         return np.asarray(np.maximum(_WIDER * reach * radius, _LEAST * self._size[D]))
 
     def holds(self, boxes: ClosedBoxes, which: NDArray[np.int64], near: FloatArray) -> NDArray[np.bool_]:
-        """Return whether boxes contain a closed point (N, n), by a proof in a small box about it."""
+        """Return whether each box contains a given closed point (N, n), by a proof in a small box about the point."""
         D, at = self.dependent, near[:, self.independent]
         small = self.enclosed(at, at, near)
         # The affine relation gives a narrower range: for a constant coordinate, the boxes are not wider than the small
@@ -337,9 +338,9 @@ class Assembly:
     def _reach(
         self, boxes: ClosedBoxes, is_reached: NDArray[np.bool_], border: NDArray[np.intp], pairs: NDArray[np.intp]
     ) -> None:
-        """Mark boxes that are tied to a touching box of the border.
+        """Mark boxes that are tied to a touching box of ``border``, in place.
 
-        Pairs of indices name the border box and the other box.
+        Each of the pairs has an index in ``border``, and the index of a touching box.
         """
         lower, upper = boxes.lower[:, self.independent], boxes.upper[:, self.independent]
         for begin in range(0, len(pairs), _BLOCK):

@@ -31,7 +31,10 @@ _STEPS, _FLAT = 12, 1e-14
 
 
 class AffineMatrix(NamedTuple):
-    """Matrices over B boxes, enclosed by ``M + sum_k A_k e_k + [-E, E]``: (B, m, c), (B, n, m, c) and (B, m, c)."""
+    """Matrices over B boxes, enclosed by ``M + sum_k A_k e_k + [-E, E]``.
+
+    The shapes of M, A and E are (B, m, c), (B, n, m, c) and (B, m, c).
+    """
 
     M: FloatArray
     A: FloatArray
@@ -83,7 +86,10 @@ class AffineMatrix(NamedTuple):
 
 
 class Forms(NamedTuple):
-    """Expressions over B boxes, in ``c + sum_i a_i e_i + [-r, r]``: (B, R), (B, R, n) and (B, R); NaN if undefined."""
+    """Expressions over B boxes, enclosed by ``c + sum_i a_i e_i + [-r, r]``; NaN if undefined.
+
+    The shapes of c, a and r are (B, R), (B, R, n) and (B, R).
+    """
 
     c: FloatArray
     a: FloatArray
@@ -160,7 +166,7 @@ class FormArithmetic:
     Args:
         z: (n, 1) symbols: coordinates of boxes, followed by further inputs.
         expressions: (R, 1) expressions.
-        given: function that returns polynomials of the further inputs; None without any.
+        given: function that returns polynomials of the further inputs; None without further inputs.
 
     Raises:
         UncoveredError: an expression has an operation without a rule.

@@ -51,7 +51,10 @@ class _Sum(NamedTuple):
 
 
 class _Number(NamedTuple):
-    """Product of a signed force and the speed (None stands for the speed), and the largest allowed value."""
+    """Force, speed or power as a product, and its largest allowed value.
+
+    A factor is the sign of a force, or None for the speed.
+    """
 
     parts: tuple[float | None, ...]
     most: float

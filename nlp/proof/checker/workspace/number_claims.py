@@ -158,7 +158,10 @@ class LegInverse:
     def inverse(
         self, lower: FloatArray, upper: FloatArray
     ) -> tuple[AffineMatrix, NDArray[np.bool_], FloatArray, AffineMatrix]:
-        """Return P over boxes (B, 6), whether P is known, shares (B, n) of coordinates in its remainder, J or A."""
+        """Return P over boxes (B, 6), whether P is known, and shares (B, n) of the coordinates in its remainder.
+
+        The last result is J if ``is_unit`` is true; otherwise it has rows of J times the norms of their forces.
+        """
         values = self._forms(lower[:, self.free], upper[:, self.free])
         sizes, matrix = values.forms(slice(0, 6)), values.forms(slice(6, 42)).matrix(_DENSE, (6, 6))
         inverse, known, shares = solved(matrix, sizes.matrix(_DIAGONAL, (6, 6)))

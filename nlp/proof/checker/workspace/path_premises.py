@@ -83,7 +83,7 @@ def carried_path(case: Case, given: PathPremises) -> ProgrammedPath:
 
 
 def check_path_premises(given: PathPremises, own: PathPremises) -> None:
-    """Refuse a proof about another path, or with other reading options, than given."""
+    """Refuse a proof with a path or reading options (``given``) that differ from the requested ones (``own``)."""
     if given.of_case != own.of_case:
         whose = (
             "the tool path of its case: leave out --along"

@@ -68,8 +68,8 @@ class PoseRoot:
         inner: (6,) pairs of bounds within which every pose belongs to the workspace; for a fixed angle, its bounds in
             the box.
         ball, inner_ball: outer and inner bound of the squared norm of a Cayley vector; infinite without a ball.
-        dependent: indices of the dependent coordinates. Their bounds exclude no pose, and the ball has only the other
-            components.
+        dependent: indices of the dependent coordinates. Their bounds exclude no pose, and the ball contains only
+            independent components.
         at: (6,) pose from which closed loops are followed; None for the centre.
         positions: set of positions; None for all positions of the box.
     """
@@ -148,7 +148,7 @@ class PoseRoot:
         return leaves, pieces
 
     def contracted(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-        """Return boxes (B, 6) contracted to the sets without loss of a pose, and which (B,) may contain poses."""
+        """Contract boxes (B, 6) to the workspace without loss of a pose; also return which (B,) may contain poses."""
         some = np.ones(len(lower), dtype=bool)
         if self.positions is not None:
             *ends, some = self.positions.contracted(lower[:, :POSITION], upper[:, :POSITION])

@@ -60,7 +60,7 @@ class PositionConditions:
 
     Args:
         positions: the set.
-        lower, upper: (3,) ends of the box that encloses it.
+        lower, upper: (3,) ends of the box that encloses the set.
 
     Attributes:
         positions: the set.
@@ -80,7 +80,7 @@ class PositionConditions:
         return is_one and all(each.holds(at) for each in self._every)
 
     def contracted(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-        """Return boxes (B, 3) with their ends moved to the set, never past a position, and which may have positions."""
+        """Contract boxes (B, 3) to the set without loss of a position; also return which boxes may have positions."""
         kept = np.ones(len(lower), dtype=bool)
         for _ in range(_PASSES):
             for each in self._rounded:
@@ -114,7 +114,7 @@ class _Rounded:
         self._room = _ROUNDING * float(size @ np.abs(self._Q) @ size + b @ size + abs(self._c))
 
     def contracted(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-        """Return boxes (B, 3) contracted to the condition, and (B,) True for each box that may have positions."""
+        """Contract boxes (B, 3) to the condition; also return which boxes (B,) may have positions."""
         low, high = lower - self._origin - self._near, upper - self._origin + self._near
         kept = np.maximum(self._least(low, high, -1), self._centred(low, high)) <= self._c + self._room
         lower, upper = lower.copy(), upper.copy()
@@ -140,7 +140,10 @@ class _Rounded:
         return np.asarray(at - (np.maximum(*b) * h).sum(axis=1) + bend)
 
     def _least(self, low: FloatArray, high: FloatArray, without: int) -> FloatArray:
-        """Return lower bounds (B,) of the polynomial over boxes, without the terms of one coordinate; -1 for all."""
+        """Return lower bounds (B,) of the polynomial over boxes, without the terms of coordinate ``without``.
+
+        With -1, no terms are left out.
+        """
         found = np.zeros(len(low))
         for i in range(3):
             if i == without:
@@ -187,7 +190,10 @@ class _Rounded:
 
 
 def conditions_of(given: PositionSet) -> tuple[list[_Condition], list[_Condition]]:
-    """Return conditions that all hold in a set, and conditions of which one holds (none if the list is empty)."""
+    """Return conditions that all hold in a set, and conditions of which at least one holds.
+
+    If the second list is empty, there is no such condition.
+    """
     origin = _vector([Fraction(a) + Fraction(b) for a, b in zip(given.centre, given.shift, strict=True)])
     r, every, any_of = Fraction(given.radius), list[_Condition](), list[_Condition]()
     axis = [Fraction(b) - Fraction(a) for a, b in zip(given.centre, given.end, strict=True)]
@@ -243,12 +249,12 @@ def _line(origin: _Exact, b: _Exact, c: Fraction) -> _Condition:
 
 
 def _between(origin: _Exact, b: _Exact, above: _Exact) -> _Condition:
-    """Return a linear condition with a vector between ends."""
+    """Return a linear condition with a vector between two ends."""
     return _Condition(origin, _diagonal(0, 0, 0), b, above, Fraction(0))
 
 
 def position_conditions(
     positions: PositionSet | None, lower: FloatArray, upper: FloatArray
 ) -> PositionConditions | None:
-    """Return a set of positions in a box with ends (3,) for the checker; None without one."""
+    """Return a set of positions in a box with ends (3,) for the checker; None for all positions of the box."""
     return None if positions is None else PositionConditions(positions, lower, upper)

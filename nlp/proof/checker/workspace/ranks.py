@@ -145,7 +145,7 @@ class RankClaim(LoopClaim):
         return matrices
 
     def _examined(self, matrices: AffineMatrix) -> Attempt:
-        """Return where the rank is proved, from the forms of the matrix."""
+        """Try to prove the rank over boxes, from the forms of the matrix."""
         M, A, E = matrices
         # Powers of two make rows comparable without rounding.
         sizes = np.sqrt((M * M).sum(axis=2, keepdims=True))
@@ -170,8 +170,10 @@ def change_of_rows(
 ) -> FloatArray:
     """Return bounds (B, 6, 6) of the changes of all entries of six leg rows due to errors within a tolerance.
 
+    The leg is ``s (p - b) + u``, with the position p, the base joint b, and the platform joint u turned and times s.
+
     Args:
-        scale: (B,) largest values of s.
+        scale: (B,) largest values of the scale s of the rotation.
         span: (B, 6, 3) largest absolute values of ``p - b``.
         arm: (B, 6, 3) largest absolute values of ``u``.
         tolerance: largest error of each joint centre.

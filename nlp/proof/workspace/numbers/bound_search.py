@@ -56,7 +56,7 @@ class Bounds(NamedTuple):
     """Lower bounds of K quantities over B boxes.
 
     Attributes:
-        lower: (B, K) lower bounds; -inf without one.
+        lower: (B, K) lower bounds; -inf without a bound.
         shares: (B, K, f) share of each coordinate in the overestimation of each quantity.
     """
 
@@ -88,8 +88,8 @@ class Number(ABC):
 
         Args:
             forms: forms of the entries.
-            count: number f of independent coordinates. Their terms come first, followed by products of two coordinates
-                and by joint-centre errors.
+            count: number f of independent coordinates. The terms of each form have this order: these coordinates,
+                products of two of them, joint-centre errors.
         """
 
     @abstractmethod

@@ -112,9 +112,9 @@ def _ends_over(forms: Forms) -> tuple[FloatArray, FloatArray, FloatArray, tuple[
         forms: forms of the entries of a clearance.
 
     Returns:
-        (B, 4, 3) ends m in the middle; (B, 4, 3, t) terms of the ends times the scale minus m times the scale;
-        (B, 4, 3) remainders of the ends times the scale; (B,) smallest values and (B,) remainders of the scale; (B,)
-        rounding errors of computed distances, infinite where no form is known.
+        (B, 4, 3) ends m at the middles of the boxes; for ``s (x - m)``, with the ends x and the scale s, (B, 4, 3, t)
+        terms and (B, 4, 3) remainders; (B,) smallest values and (B,) remainders of the scale; (B,) rounding errors of
+        computed distances, infinite where no form is known.
     """
     known = np.isfinite(forms.c).all(axis=1) & np.isfinite(forms.r).all(axis=1)
     c, a, r = (np.where(known.reshape(-1, *[1] * (each.ndim - 1)), each, 1.0) for each in forms)

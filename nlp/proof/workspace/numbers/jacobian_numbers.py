@@ -307,7 +307,10 @@ def _at_corners(fixed: FloatArray, linear: FloatArray) -> FloatArray:
 
 
 def _schatten(matrices: FloatArray) -> FloatArray:
-    """Return the largest Schatten norm (B,) of matrices (B, S, 6, m): convex, at least the largest singular value."""
+    """Return, for each box, the largest Schatten norm (B,) of its S matrices (B, S, 6, m).
+
+    This norm is convex, and at least the largest singular value.
+    """
     power = matrices @ matrices.transpose(0, 1, 3, 2)
     logarithm: FloatArray = np.zeros(power.shape[:2])
     for k in range(_SQUARINGS + 1):

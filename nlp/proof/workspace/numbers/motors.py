@@ -153,7 +153,7 @@ class Motors(Number):
         return np.asarray(np.stack(columns, axis=1))
 
     def _upper(self, of: Quadratics, turn: Quadratics) -> FloatArray:
-        """Return upper bounds (B,) of a quantity; if rotations are given, they lie in the ball."""
+        """Return upper bounds (B,) of a quantity; if ``turn`` has rotations, only those in the ball count."""
         upper, ball = of.upper()[0, 0], self.problem.box.ball
         which = np.flatnonzero((turn.size**2).sum(axis=(0, 1)) > ball)
         if not (which.size and of.q.shape[2] and turn.c.size):

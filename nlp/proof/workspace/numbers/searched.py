@@ -186,7 +186,7 @@ def _motor_answers(
     Args:
         subject: the robot.
         claims: claims about the quantities of one load, or about the speed.
-        speed: proved bound of the actuator's speed; infinite without one.
+        speed: proved bound of the actuator's speed; infinite without a proof.
         record: recorder of the search for a proof file.
     """
     try:

@@ -105,7 +105,7 @@ class _ChangeRule(Rule[FloatArray]):
         self._times = np.where((rows != columns) & (rows // 3 == columns // 3), 2.0, 1.0)
 
     def examine(self, boxes: Boxes[FloatArray]) -> BoxResults[FloatArray]:
-        """Return bounds of boxes."""
+        """Bound the change over boxes."""
         known = np.ones(len(boxes.split), dtype=bool)
         now, kept = contracted_boxes(self._problem, LoopBoxes(boxes.lower, boxes.upper, boxes.lower, known))
         now = some(now, kept)

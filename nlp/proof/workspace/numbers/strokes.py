@@ -88,7 +88,10 @@ class _Combined:
         return known if len(known) == len(found) else None
 
     def extreme(self, ends: Sequence[Verdict], bound: float | None = None) -> Verdict:
-        """Return the verdict from the two lengths or from a bound, with the pose of one of the lengths."""
+        """Return the verdict on the combination, with the pose of one of the two lengths.
+
+        Its bound is ``bound`` if given; otherwise it follows from the bounds of both lengths.
+        """
         if bound is None:
             bound = float(self._factors @ [each.bound for each in ends])
         reached, errors = self.reached(ends)
@@ -99,7 +102,10 @@ class _Combined:
         return verdict_of(self._claim, found, end.pose, errors=errors)
 
     def reached(self, ends: Sequence[Verdict]) -> tuple[float, JointErrors | None]:
-        """Return the value for one robot at both poses, and its joint-centre errors; None for the nominal robot."""
+        """Return the value of the combination for one robot at the poses of both lengths.
+
+        Also return the joint-centre errors of this robot; None for the nominal robot.
+        """
         poses = [each.pose for each in ends if each.pose is not None]
         if not self._legs.tolerance or len(poses) < len(ends):
             return float(self._factors @ [each.reached for each in ends]), None
@@ -125,7 +131,11 @@ class _Combined:
         return d, np.array([n @ pose.rotation for n, pose in zip(d, poses, strict=True)])
 
     def of_one_robot(self, extreme: Verdict, ends: Sequence[Verdict]) -> Verdict:
-        """Return an open verdict with a bound for robots with the same errors at both poses."""
+        """Improve the bound of an open verdict; return any other verdict unchanged.
+
+        One robot has the same joint-centre errors at the poses of the leg's longest and shortest length, so parts of
+        the errors cancel.
+        """
         poses = [each.pose for each in ends if each.pose is not None]
         if not self._legs.tolerance or extreme.outcome is not Outcome.OPEN or len(poses) < len(ends):
             return extreme
@@ -142,7 +152,10 @@ class _Combined:
         return extreme
 
     def finer_gap(self, extreme: Verdict, ends: Sequence[Verdict]) -> float | None:
-        """Return the gap of squared lengths that decides the limit; None if it is decided or cannot be."""
+        """Return the gap of squared lengths that decides the limit.
+
+        The result is None if the limit is decided already, or if no gap can decide it.
+        """
         if extreme.outcome is not Outcome.OPEN or not math.isfinite(extreme.bound):
             return None
         # Each length is the length of its worst robot here, as in the bound.

@@ -190,7 +190,7 @@ class RobotsWithinTolerance:
         return self.family.errors_of(z[0]), -sign * float(values.values(z)[0, 0])
 
     def _rest(self, claim: Claim, number: SX, values: Expressions) -> float:
-        """Return a bound of the second-order terms of a quantity, the same for both senses; infinite without one.
+        """Return a bound of the second-order terms of a quantity, the same for both senses; infinite without a bound.
 
         Raises:
             UncoveredError: an expression has an operation without an interval rule.

@@ -52,8 +52,8 @@ def _followed(problem: Problem, cover: PathCover) -> FloatArray:
 def _extrapolated(problem: Problem, z: FloatArray, point: FloatArray) -> FloatArray | None:
     """Return the point (n,) with closed loops at another pose (f,), from extrapolated joint positions.
 
-    The result is None if Newton's method corrects them by more than ``_JUMP``: it may have reached another assembly
-    mode.
+    The result is None if Newton's method corrects the positions by more than ``_JUMP``: the point may then be in
+    another assembly mode.
     """
     D, own, size, loops = list(problem.dependent), problem.stated, problem.size, problem.loops
     guess = z.copy()

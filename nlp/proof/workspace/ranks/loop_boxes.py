@@ -136,7 +136,7 @@ class Examiner:
         test: test with entries in the coordinates of the problem.
 
     Attributes:
-        of: indices of the coordinates.
+        of: indices of the independent coordinates, of the dependent coordinates, and of the joint-centre errors.
         loops: the loop equations as functions.
         second: second-order forms of the entries; None if first-order forms are used.
 
@@ -613,13 +613,13 @@ def loop_boxes_of(boxes: Boxes[Followed]) -> LoopBoxes:
 def one_assembly(
     examiner: Examiner, boxes: LoopBoxes, pairs: NDArray[np.intp], is_reached: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Return whether each box (B,) is provably in the assembly mode of the given boxes.
+    """Return whether each box (B,) is provably in the assembly mode of the boxes that ``is_reached`` marks.
 
     Args:
         examiner: examiner of the robot's boxes.
         boxes: (B,) boxes. Boxes that occur in ``pairs`` have known dependent coordinates.
         pairs: (P, 2) indices of neighbouring boxes.
-        is_reached: (B,) whether a box is one of the given boxes.
+        is_reached: (B,) whether a box is known to be in this assembly mode.
     """
     is_reached, tried = is_reached.copy(), np.zeros(len(pairs), dtype=bool)
     while True:

@@ -499,7 +499,7 @@ class SingularSearch:
         return found if self._is_shown(found) else None
 
     def _middle(self, found: Examined, k: int) -> FloatArray:
-        """Return a point (n,) in the middle of a box, with closed loops or near them."""
+        """Return a point (n,) in the middle of a box, at which the loops are closed or nearly closed."""
         z: FloatArray = found.boxes.near[k].copy()
         own = [*self._problem.independent, *self._problem.dependent]
         z[own] = found.boxes.centre[k, own]

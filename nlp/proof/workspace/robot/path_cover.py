@@ -49,6 +49,8 @@ def place_in(piece: FloatArray, part: float) -> Place:
 class _CircleRows(NamedTuple):
     """A world coordinate of A arcs: ``centre + size r cos(a - phase) + rise (height + s change)``.
 
+    Here r is the radius, a the angle, and s the parameter from 0 to 1 along the arc.
+
     Attributes:
         axis: index of the coordinate.
         which: (A,) indices of the arcs.
@@ -105,7 +107,7 @@ class PathCover:
         return found
 
     def blocks(self) -> Iterator[slice]:
-        """Yield the indices of these pieces in blocks, so that a long path needs little memory."""
+        """Yield the indices of :attr:`pieces` in blocks, so that a long path needs little memory."""
         return (slice(begin, begin + _BLOCK) for begin in range(0, len(self.pieces), _BLOCK))
 
     def boxes(self, pieces: FloatArray, within: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
@@ -239,7 +241,7 @@ class PathCover:
         return np.stack([k, s, s], axis=1)
 
     def points(self, pieces: FloatArray, part: float) -> FloatArray:
-        """Return coordinates (B, c) of computed points of pieces."""
+        """Return the coordinates (B, c) of the points at a fraction, from 0 to 1, of pieces, in floating point."""
         s = pieces[:, 1] + part * (pieces[:, 2] - pieces[:, 1])
         low, high = self.boxes(np.stack([pieces[:, 0], s, s], axis=1), pieces)
         return 0.5 * low + 0.5 * high

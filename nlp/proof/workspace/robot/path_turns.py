@@ -123,7 +123,7 @@ class ShortestTurns:
         off: (N + 1,) error bounds of the quaternions.
         halves: (N,) half angles of the turns, radians.
         velocities: (N, 3) axes in the world frame times the angles.
-        vary, turning: (3,) 0 for coordinates, and velocities, that are zero at all points; else 1.
+        vary, turning: (3,) 0 for coordinates, and velocities, that are zero at all points; otherwise 1.
         reference: reference of the Cayley vectors.
     """
 
@@ -194,7 +194,7 @@ class LinearAngles:
 
     @cached_property
     def _rounded(self) -> float:
-        """Error bound of a quaternion without the rounding of its angles; a frame is one more factor."""
+        """Error bound of a quaternion of exact angles; with a frame, the quaternion is a product of one more factor."""
         return ROUNDED if self.frame is None else 2 * ROUNDED
 
     def boxes(
@@ -251,17 +251,17 @@ def in_world(quaternions: FloatArray, frame: PathFrame | None) -> FloatArray:
 
 
 def turning_in_world(turning: FloatArray, frame: PathFrame | None) -> FloatArray:
-    """Return 0 for components (3,) in the world that are exactly zero at all points; else 1.
+    """Return 0 for components (3,) in the world that are exactly zero at all points; otherwise 1.
 
     Args:
-        turning: (3,) 0 for components in the frame that are exactly zero at all points; else 1.
+        turning: (3,) 0 for components in the frame that are exactly zero at all points; otherwise 1.
         frame: the frame; None for the world.
     """
     return turning if frame is None else np.asarray((frame.pattern @ turning > 0).astype(float))
 
 
 def varying(angles: FloatArray, order: Order, reference: Reference, frame: PathFrame | None = None) -> FloatArray:
-    """Return 0 for components (3,) of Cayley vectors that are exactly zero at all points; else 1.
+    """Return 0 for components (3,) of Cayley vectors that are exactly zero at all points; otherwise 1.
 
     The product of the quaternion units i and j is, up to its sign, the unit with index ``i XOR j``.
 
@@ -290,7 +290,7 @@ def _hull(
         quaternions: (2, B, 4) quaternions at both ends.
         least: (B,) smallest absolute scalars between the ends.
         slack: (B,) distances of the vectors from the line between the ends.
-        vary: (3,) 0 for coordinates that are zero at all points; else 1.
+        vary: (3,) 0 for coordinates that are zero at all points; otherwise 1.
     """
     with np.errstate(all="ignore"):
         points = quaternions[:, :, 1:] / quaternions[:, :, :1]

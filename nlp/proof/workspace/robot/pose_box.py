@@ -73,7 +73,7 @@ class PoseBox:
         ball: largest squared norm of a Cayley vector, rounded up; infinite if rotations are not in a ball.
         reference: rotation with Cayley vector zero.
         dependent: indices of the dependent coordinates. Their bounds only start a search, and exclude no pose. A ball
-            has only the other components.
+            contains only independent components.
         positions: set of positions; None for all positions of the box.
     """
 
@@ -139,7 +139,10 @@ class PoseBox:
         return [k for k in self.free if k < 3 and k not in self.dependent]
 
     def holds(self, y: FloatArray) -> NDArray[np.bool_]:
-        """Return whether points (..., c) are provably poses of the workspace, without the outward rounding."""
+        """Return whether points (..., c) are provably poses of the workspace itself.
+
+        Points that only the outward rounding of its bounds includes do not count.
+        """
         lower, upper, ball = self._inner
         inside = ((y >= lower) & (y <= upper)).all(axis=-1)
         if self.positions is not None:
@@ -183,7 +186,7 @@ class PoseBox:
         return min(both, key=lambda r: float(np.maximum(self.lower[3:] - r, r - self.upper[3:]).max()))
 
     def contracted(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-        """Return boxes (B, c) contracted to the sets of positions and rotations, and whether each is empty then."""
+        """Contract boxes (B, c) to the sets of positions and rotations; also return whether each result is empty."""
         lower, upper = np.array(lower), np.array(upper)
         without = np.zeros(len(lower), dtype=bool)
         if self.positions is not None:
@@ -255,7 +258,7 @@ def pose_box(workspace: Workspace) -> PoseBox:
 
 
 def pose_coordinates(box: PoseBox) -> PoseCoordinates:
-    """Return the coordinates of a box for a layout."""
+    """Return the coordinates of a box of poses, for a case as expressions of these coordinates."""
     middle = 0.5 * box.lower + 0.5 * box.upper
     values: list[Value] = [float(each) for each in (*middle[:3], *(2 * np.arctan(middle[3:])))]
     for k in box.free:
@@ -338,12 +341,12 @@ def _reference_matrix(reference: Reference) -> tuple[FloatArray, float]:
 
 
 def cayley_rotation(r: SX) -> tuple[SX, SX]:
-    """Return ``s R`` (3, 3) and ``s`` (1, 1) of the rotation R with a Cayley vector (3, 1)."""
+    """Return ``s R`` (3, 3) and ``s = 1 + r.r`` (1, 1): R is the rotation with the Cayley vector r (3, 1)."""
     return quaternion_rotation(ca.vertcat(1, r))
 
 
 def quaternion_rotation(y: SX) -> tuple[SX, SX]:
-    """Return ``s R`` (3, 3) and ``s`` (1, 1) of the rotation R with a quaternion (4, 1) of any norm but zero."""
+    """Return ``s R`` (3, 3) and ``s`` (1, 1): R is the rotation of a quaternion (4, 1), s its positive squared norm."""
     w, v = y[0], y[1:]
     square = ca.sumsqr(v)
     return (w * w - square) * SX.eye(3) + 2 * (v @ v.T) + 2 * w * ca.skew(v), w * w + square

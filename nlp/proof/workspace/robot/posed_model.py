@@ -137,7 +137,10 @@ def _matrix(limbs: Limbs, driven: Sequence[Actuator]) -> SX:
 
 
 def _rate(limbs: Limbs, seen: SX, screw: SX | None) -> SX:
-    """Return the column (k, 1) of a driven joint; zeros if the joint does not move this row or member."""
+    """Return the column (k, 1) of a driven joint in the equations of one row or member.
+
+    The column is zero if the joint does not move this row or member.
+    """
     return SX(seen.shape[0], 1) if screw is None else -seen @ limbs.twists(screw)
 
 

@@ -65,8 +65,9 @@ class Problem:
         free: indices, in the box, of the varying pose coordinates; they are the first coordinates of the problem.
         independent, dependent: indices of the independent and of the k dependent coordinates of the nominal robot.
         start: (n,) point of the nominal robot with closed loops, at or near the middle of the workspace.
-        locked: matrix of rows and members with locked actuators.
-        unactuated: matrix of rows and members with unlocked actuators; None for a robot without constraints.
+        locked: matrix that has full column rank where J has full rank: rows of J, and screws of the passive joints.
+        unactuated: the same matrix with screws of the actuated joints, too: its rank shows whether the constraint
+            wrenches keep their rank. None for a robot without constraints.
         posed: limbs and loop equations of the nominal robot, or of the robots within the tolerance.
         chosen: independent equations and screws of the model.
         names: names of the m joint centres whose errors are coordinates.

@@ -71,7 +71,7 @@ class _Part:
         return np.asarray(inside.any(axis=1) if self.is_any else inside.all(axis=1))
 
     def contracted(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-        """Return boxes (B, 3) with their ends moved to the part, and which (B,) are outside."""
+        """Contract boxes (B, 3) to the part; also return which boxes (B,) are outside of the part."""
         low, high = self.forms(lower, upper)
         if not self.signs.size:
             outside = low > self.most + self.room
@@ -133,7 +133,7 @@ class PositionBounds:
 
     Args:
         positions: the set.
-        lower, upper: (3,) ends of the box that encloses it.
+        lower, upper: (3,) ends of the box that encloses the set.
 
     Attributes:
         positions: the set.
@@ -156,7 +156,7 @@ class PositionBounds:
         return _Part(part.origin, part.rows, part.signs, part.most, room, part.is_any)
 
     def contracted(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-        """Return boxes (B, 3) contracted to the set, and which (B,) have no position of it."""
+        """Contract boxes (B, 3) to the set; also return which boxes (B,) have no position of the set."""
         outside = np.zeros(len(lower), dtype=bool)
         for _ in range(_PASSES):
             for part in self._parts:
@@ -174,7 +174,7 @@ class PositionBounds:
         return np.asarray(inside.reshape(points.shape[:-1]))
 
     def excess(self, points: FloatArray) -> FloatArray:
-        """Return numbers (N,) that are negative for points (N, 3) inside of the set, and positive outside."""
+        """Return one number for each point (N, 3): negative inside of the set, positive outside."""
         parts = []
         for part in self._parts:
             values = part.values(points)
@@ -240,7 +240,7 @@ def _parts_of(given: PositionSet) -> list[_Part]:
 
 
 def _frame(axis: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return a unit vector (3,) along an axis, and two orthogonal ones (2, 3) across it."""
+    """Return a unit vector (3,) along an axis, and two orthogonal unit vectors (2, 3) normal to this axis."""
     along = axis / np.linalg.norm(axis)
     if np.count_nonzero(axis) == 1:
         others = [k for k in range(3) if axis[k] == 0]
@@ -251,7 +251,7 @@ def _frame(axis: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def position_bounds(positions: PositionSet | None, lower: FloatArray, upper: FloatArray) -> PositionBounds | None:
-    """Return a set of positions in a box with ends (3,) for searches; None without one."""
+    """Return a set of positions in a box with ends (3,) for searches; None for all positions of the box."""
     return (
         None if positions is None else PositionBounds(positions, frozen_array(lower, (3,)), frozen_array(upper, (3,)))
     )

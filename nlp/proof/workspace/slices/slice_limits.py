@@ -140,7 +140,7 @@ class SliceLimits:
 
         Args:
             boxes: (B,) boxes; states of boxes with unknown dependent coordinates stay as they are.
-            relation: relation of the dependent coordinates; it is updated in place.
+            relation: relation of the dependent coordinates; the examination updates this relation in place.
             known: (B, K) states over larger boxes.
         """
         states, enclosed, k = known.copy(), len(self._leasts), len(self._of.dependent)
@@ -193,7 +193,7 @@ def _least(claim: Claim) -> float:
 
 
 def _states_of(kept: NDArray[np.bool_], violated: NDArray[np.bool_]) -> NDArray[np.int8]:
-    """Return states from arrays of proved and violated claims."""
+    """Return the states of claims from two arrays: whether each claim is proved, and whether it is violated."""
     return np.where(kept, LimitState.KEPT, np.where(violated, LimitState.VIOLATED, LimitState.OPEN)).astype(np.int8)
 
 

@@ -138,8 +138,8 @@ class _Robot:
         examiners: examiners of the ranks.
         is_singular: whether J is singular at every pose.
         sign: sign of the determinant in the middle; 0 for a matrix that is not square.
-        other: region of regular boxes with the other sign; for polynomial entries, a singular pose lies between this
-            region and the middle.
+        other: region of regular boxes whose determinant has the opposite sign; for polynomial entries, a singular pose
+            lies between this region and the middle.
         free: indices, among the six coordinates of a box, of the independent coordinates with a range.
 
     Raises:
