@@ -201,8 +201,8 @@ def _check_shapes(model: Model) -> None:
             raise _model_error(model, f"parameter {parameter.name!r} should have 1 or 3 components")
         starter, typical = len(parameter.starter or parameter.typical), len(parameter.typical)
         if starter != typical:
-            fault = f"parameter {parameter.name!r} needs {typical} components in its starter value, as in its typical"
-            raise _model_error(model, f"{fault} value; got {starter}")
+            fault = f"the starter value of parameter {parameter.name!r} has a wrong number of components"
+            raise _model_error(model, f"{fault}: {starter}; the typical value has {typical}")
     expected: list[tuple[str, SX, tuple[int, int]]] = [
         ("pose rotation", model.pose.rotation, (3, 3)),
         ("pose position", model.pose.position, (3, 1)),

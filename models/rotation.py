@@ -103,3 +103,11 @@ def axis_angle_from_matrix(matrix: ArrayLike) -> AxisAngle:
     axis = axis / np.linalg.norm(axis)
     lead = float(axis @ sine) if size > 1e-12 else float(axis[np.flatnonzero(np.abs(axis) > 1e-12)[0]])
     return AxisAngle(frozen_array(axis if lead > 0 else -axis, (3,)), angle)
+
+
+def perpendiculars(axis: FloatArray) -> FloatArray:
+    """Return two unit vectors (2, 3) perpendicular to a unit axis (3,) and to each other."""
+    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    first = np.cross(axis, helper)
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(axis, first)])

@@ -59,6 +59,7 @@ def in_world(workspace: Workspace, pose: Pose) -> Workspace:
     positions = workspace.position_set
     if positions is not None:
         positions = positions.moved(np.array([ends_of(each)[0] for each in pose.position]))
+        position = positions.box
     return replace(workspace, position=position, turns=turns, about_pose=False, position_set=positions)
 
 

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from ...models import Dimension, FloatArray, frozen_array
+from ...models import Dimension, FloatArray, frozen_array, unit_vector
+from ...models.rotation import perpendiculars
 from ...models.values import dataclass
 from ..errors import CaseError
 from ..units import Units
@@ -95,10 +96,14 @@ class PositionSet:
     is_diameter: bool = False
 
     @property
+    def shaped(self) -> tuple[int, ...]:
+        """Indices of the coordinates whose ranges follow from the shape."""
+        return (0, 1) if self.kind in UPRIGHT else () if self.kind is SetKind.BOX else (0, 1, 2)
+
+    @property
     def coordinates(self) -> tuple[int, ...]:
         """Indices of the coordinates that the set couples; the other coordinates have the ranges of the box."""
-        used = [0, 1] if self.kind in UPRIGHT else [] if self.kind is SetKind.BOX else [0, 1, 2]
-        return tuple(sorted({*used, *(k for each in self.half_spaces for k in range(3) if each.normal[k])}))
+        return tuple(sorted({*self.shaped, *(k for each in self.half_spaces for k in range(3) if each.normal[k])}))
 
     @property
     def is_convex(self) -> bool:
@@ -175,7 +180,7 @@ class PositionSet:
         shape = shape + np.array(self.shift)
         if not self.half_spaces or float(self.depths(shape[None])[0]) > 0:
             return frozen_array(shape, (3,))
-        points, rng = np.zeros((0, 3)), np.random.default_rng(_SEED)
+        rng = np.random.default_rng(_SEED)
         for _ in range(_TRIALS):
             points = self.shape_points(_POINTS, rng)
             depths = self.depths(points)
@@ -216,7 +221,7 @@ class PositionSet:
             if self.kind is SetKind.CONE:
                 along = np.minimum(np.cbrt(along), 1 - _INWARDS)
                 r = r * along
-            e = _across(self.axis)
+            e = perpendiculars(unit_vector(self.axis))
             points = origin + along[:, None] * self.axis + (r * np.sqrt(share))[:, None] * (about @ e)
         return points
 
@@ -382,16 +387,8 @@ def scaled_range(value: Value, factor: float) -> Value:
     return Free(centre + factor * (value.lower - centre), centre + factor * (value.upper - centre))
 
 
-def _across(axis: FloatArray) -> FloatArray:
-    """Return two orthogonal unit vectors (2, 3) across an axis (3,)."""
-    first = np.eye(3)[int(np.abs(axis).argmin())]
-    one = np.cross(axis, first)
-    other = np.cross(axis, one)
-    return np.stack([one / np.linalg.norm(one), other / np.linalg.norm(other)])
-
-
 def _shortened(vectors: FloatArray, most: float | FloatArray) -> FloatArray:
     """Return vectors (N, k) with norms of at most the given ones, (N,) or a number."""
     sizes = np.linalg.norm(vectors, axis=1)
-    factors = np.minimum(1.0, most / np.maximum(np.maximum(sizes, most), np.finfo(float).tiny))
+    factors = most / np.maximum(np.maximum(sizes, most), np.finfo(float).tiny)
     return np.asarray(vectors * factors[:, None])

@@ -14,7 +14,7 @@ from ..errors import CaseError
 from ..units import Units
 from .checks import check_value
 from .pose import Free, Value, ends_of, written_value
-from .positionsets import PositionSet, SetKind
+from .positionsets import PositionSet
 
 if TYPE_CHECKING:
     from .toml import TomlValue
@@ -182,7 +182,7 @@ class Workspace:
         """
         dependent, groups = [each.index for each in self.dependent], dict[str, list[str]]()
         is_any, chosen_set = self.turns.kind is TurnKind.ANY_AXIS, self.position_set
-        shaped = () if chosen_set is None else shaped_coordinates(chosen_set)
+        shaped = () if chosen_set is None else chosen_set.shaped
         for k, value in self.ranged:
             if k in dependent or (is_any and k >= 3) or k in shaped:
                 continue
@@ -194,7 +194,7 @@ class Workspace:
             dimension = Dimension.LENGTH if k < 3 else Dimension.ANGLE
             at = f"= {digits(units.shown(ends_of(values[k])[0], dimension))} {units.label(dimension)}"
             groups.setdefault(at, []).append(self.names[k])
-        texts = [] if chosen_set is None else [chosen_set.words(units, digits)]
+        texts = [] if chosen_set is None else [f"position in the {chosen_set.words(units, digits)}"]
         texts += [f"{', '.join(names)} {ends}".rstrip() for ends, names in groups.items()]
         if is_any:
             most = max(map(abs, ends_of(self.turns.angles[0])))
@@ -246,11 +246,6 @@ class Workspace:
             else self.position_set.to_table(units),
             "rotation": None if turns == Turns() else rotation,
         }
-
-
-def shaped_coordinates(positions: PositionSet) -> tuple[int, ...]:
-    """Return the indices of the coordinates with ranges that follow from the shape of a set of positions."""
-    return {SetKind.BOX: (), SetKind.DISC: (0, 1), SetKind.RING: (0, 1)}.get(positions.kind, (0, 1, 2))
 
 
 def _negative(value: Value) -> Value:

@@ -45,6 +45,8 @@ def codegen(
     """Write F and its derivatives, or the kinematics alone, as C code for controllers."""
     from ..errors import InputError
 
+    if kinematics and no_measure:
+        raise InputError("--no-measure: kinematics are never measured; leave it out, or leave --kinematics out")
     if kinematics:
         _write_kinematics(case, out, settings, of, target, single=single, coordinates=coordinates, force=force)
         return

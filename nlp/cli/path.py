@@ -11,8 +11,8 @@ from .progress import spinner
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from ..evidence.state import WorkspacePose
     from ..proof.workspace.path_knots import Sampling
+    from ..results.path import PathVerdictData
 
 
 def path(
@@ -32,7 +32,7 @@ def path(
     unit: pathoptions.Unit = None,
     start: Annotated[
         str | None,
-        options.text("--start", "X,Y,Z,A,B,C", "Pose before the G-code begins, or the pose of --range"),
+        options.text("--start", "X,Y,Z,A,B,C", "Pose before the G-code, or of --range; X,Y,Z if the angles are 0"),
     ] = None,
     offset: pathoptions.Offsets = None,
     angles: pathoptions.Angles = None,
@@ -73,7 +73,7 @@ def path(
     from ..path.options import PathOptions
     from ..path.reader import options_of, path_of_case, read_path
     from ..proof.workspace.path_judge import TIME_LIMIT, judge_path
-    from ..results.path import path_result
+    from ..results.path import path_result, violating_poses
     from ..words.poses import evaluate_command
     from .proofs import path_premises, path_proof_text, proof_record
 
@@ -113,9 +113,10 @@ def path(
         )
     result = path_result(judged, chosen)
 
-    def command(pose: WorkspacePose) -> str:
-        """Return the command that shows a pose."""
-        return evaluate_command(case, loaded, chosen, pose, RotationForm.RPY)
+    def command(claim: PathVerdictData) -> str:
+        """Return the command that shows a violated claim."""
+        pose, *further = violating_poses(judged, claim)
+        return evaluate_command(case, loaded, chosen, pose, RotationForm.RPY, claim=claim.name, further=further)
 
     @cache
     def picture() -> contents.PathPicture:

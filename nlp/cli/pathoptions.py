@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from . import options
@@ -18,7 +19,7 @@ AlongFile = Annotated[
 Unit = Annotated[str | None, options.text("--unit", "mm|in", "Length unit of G-code before G20 or G21")]
 Stands = Annotated[
     str | None,
-    options.text("--start", "X,Y,Z,A,B,C", "Pose before the G-code begins"),
+    options.text("--start", "X,Y,Z,A,B,C", "Pose before the G-code begins; X,Y,Z if the angles are 0"),
 ]
 Offsets = Annotated[
     list[str] | None,
@@ -75,18 +76,28 @@ class PathChoices(NamedTuple):
         from ..errors import InputError
         from ..path.options import Between
 
-        def numbers(option: str, text: str) -> list[float]:
+        def numbers(text: str) -> list[float]:
             try:
-                return [float(part) for part in text.split(",")]
+                found = [float(part) for part in text.split(",")]
             except ValueError:
-                raise InputError(f"{option} {text}: must be six numbers, separated by commas: X,Y,Z,A,B,C") from None
+                return []
+            return found if all(map(math.isfinite, found)) else []
+
+        def start_of(text: str) -> list[float]:
+            found = numbers(text)
+            if len(found) not in (3, 6):
+                fault = "must be six finite numbers: X,Y,Z,A,B,C; or three, X,Y,Z, if the angles are 0"
+                raise InputError(f"--start {text}: {fault}")
+            return [*found, 0.0, 0.0, 0.0][:6]
 
         found = dict(own.offsets)
         for each in self.offsets:
             name, equals, text = each.partition("=")
             if not equals:
                 raise InputError(f"--offset {each}: must be a coordinate system and its origin: G54=X,Y,Z,A,B,C")
-            found[name] = numbers("--offset", text)
+            found[name] = numbers(text)
+            if len(found[name]) != 6:
+                raise InputError(f"--offset {each}: must be six finite numbers after {name}=: X,Y,Z,A,B,C")
         if self.between not in (None, *(each.value for each in Between)):
             raise InputError(f"--between {self.between}: must be angles or slerp")
         return replace(
@@ -94,7 +105,7 @@ class PathChoices(NamedTuple):
             between=own.between if self.between is None else Between(self.between),
             angles=own.angles if self.angles is None else self.angles,
             unit=own.unit if self.unit is None else self.unit,
-            start=own.start if self.start is None else numbers("--start", self.start),
+            start=own.start if self.start is None else start_of(self.start),
             offsets=found,
             flavour=self.flavour or own.flavour,
             end_of_file=self.end_of_file or own.end_of_file,

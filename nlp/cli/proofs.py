@@ -174,7 +174,7 @@ def _checked_lines(
     premises: Sequence[str],
     notes: Sequence[str] = (),
 ) -> Iterator[Line]:
-    """Yield the result of a check: counts, claims without a proof, notes, then every premise and claim."""
+    """Yield the result of a check: counts, notes, claims without a proof, then every premise and claim."""
     from ..proof.checker.premises import exact
     from ..proof.statement.claims import ERRORS
     from ..words.text import Line
@@ -184,13 +184,19 @@ def _checked_lines(
     if case.joint_centre_tolerance:
         off = f"{exact(case.joint_centre_tolerance)} {case.units.length}"
         whose += f", for every robot whose joint centres are off by at most {off}"
-    yield Line(f"PROOF VALID: {len(checked.claims)} of {count} claims about {whose}")
-    for k, words in enumerate(_unproved_words(proof.unproved)):
-        yield Line(words, part="claims without a proof" if k >= SHOWN else "")
+    counts = f"{len(checked.claims)} of {count} claims"
     if proof.unproved:
-        yield Line("the reasons in the file for claims without a proof are not checked")
+        yield Line(f"PROOF VALID for {counts}; {_outcome_counts(proof.unproved)}")
+        yield Line(f"the claims are about {whose}")
+    else:
+        yield Line(f"PROOF VALID: {counts} about {whose}")
     yield from map(Line, notes)
     yield Line(f"{checked.leaves:,} leaves of the proof trees, checked on {checked.pieces:,} boxes")
+    # A short view shows the lines of parts last, so that nothing stands between the claims without a proof.
+    if proof.unproved:
+        yield Line("the reasons in the file for claims without a proof are not checked")
+    for k, words in enumerate(_unproved_words(proof.unproved)):
+        yield Line(words, part="claims without a proof" if k >= SHOWN else "")
     for line in premises:
         yield Line(f"  {line}", part="premises")
     legs = f"off by at most {exact(leg_error)} {case.units.length}" if leg_error else "exact"
@@ -287,6 +293,17 @@ def _words(claim: CheckedClaim, case: Case) -> str:
     if claim.limit is None:
         return text
     return f"{text}, within the limit {case.units.shown(claim.limit, claim.dimension):.10g}"
+
+
+def _outcome_counts(unproved: Sequence[Unproved]) -> str:
+    """Return the numbers of claims without a proof, by the outcome that the file states."""
+    from collections import Counter
+
+    from ..proof.workspace.verdict import Outcome
+
+    words = {Outcome.REFUTED.value: "refuted", Outcome.OPEN.value: "undecided"}
+    counts = Counter(words.get(each.reason.partition(":")[0], "without a proof") for each in unproved)
+    return ", ".join(f"{counts[each]} {each}" for each in (*words.values(), "without a proof") if counts[each])
 
 
 def _unproved_words(unproved: Sequence[Unproved]) -> Iterator[str]:

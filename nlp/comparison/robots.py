@@ -208,7 +208,8 @@ def placed(case: Case, contender: Contender, factor: float, part: float, length:
     if workspace is not None and not workspace.about_pose:
         positions = workspace.position_set
         positions = None if positions is None else positions.moved(-offset)
-        workspace = replace(workspace, position=_moved(workspace.position, offset), position_set=positions)
+        position = _moved(workspace.position, offset) if positions is None else positions.box
+        workspace = replace(workspace, position=position, position_set=positions)
     bare = replace(
         case,
         model=model,

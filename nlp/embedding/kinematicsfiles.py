@@ -18,6 +18,7 @@ from ..errors import InputError
 from ..evidence.inverse import inverse
 from ..system.markdown import markdown_text
 from .ctext import comment_text, identifier, matrix_table, name_cases
+from .driveaxes import direction_texts
 from .kinematics import Kinematics, matrix_of_rpy
 from .kinematicsjoints import LimbCoordinates, coordinate_texts, limb_coordinates
 from .kinematicslimits import KinematicLimit, limit_texts, limits_of
@@ -34,6 +35,12 @@ _NUMBER = re.compile(r"(?<![\w.])(\d+\.\d*(?:[eE][+-]?\d+)?)(?![\w.])")
 _MACRO = re.compile(r"^ *#define (\w+)", re.MULTILINE)
 #: Kind of an actuator coordinate, by whether the actuator turns.
 _KINDS = {True: "angle", False: "length"}
+#: Largest coordinate at home that counts as rounding, in parts of the robot's size or radians.
+_ROUNDING = 1e-10
+#: Meaning of the column ``axis`` of the table of actuators.
+_AXES = """\
+  An angle grows if the actuator turns about its axis by the right-hand rule, and a length grows if it slides along its
+  axis. Axes are given at home, in the world frame above."""
 _COORDINATES = ("x", "y", "z", "a", "b", "c")
 #: Functions of the mathematics library that generated C may call.
 _LIBM = (
@@ -94,7 +101,7 @@ def generate_kinematics(case: Case, source: str, *, single: bool = False, coordi
     files, names = kinematics_files(case, single=single, coordinates=coordinates)
     title = markdown_text(" ".join((case.title or case.name).split()))
     whole = {**names, "title": title, "id": identifier(case.name)}
-    whole["conventions"] = fill_template("kinematics/conventions.md.in", whole)
+    whole["conventions"] = fill_template("kinematics/conventions.md.in", whole).rstrip()
     objects = " ".join(f"{name[:-2]}.o" for name in files if name.endswith(".c"))
     others = ("selftest.c", "bench.c", "example.c", "Makefile", "README.md")
     texts = {name: fill_template(f"kinematics/{name}.in", whole | {"objects": objects}) for name in others}
@@ -149,7 +156,9 @@ def combined_kinematics(case: Case) -> KinematicsFiles:
     kin, file, prefix = names["kin"], names["file"], identifier(case.name)
     program = "selftest-kinematics"
     test = fill_template("kinematics/selftest.c.in", names)
-    conventions = fill_template("kinematics/conventions.md.in", names).replace("## Conventions", "## Kinematics", 1)
+    conventions = (
+        fill_template("kinematics/conventions.md.in", names).rstrip().replace("## Conventions", "## Kinematics", 1)
+    )
     texts = {
         "programs": f" {program}",
         "test": f"\n\t./{program}",
@@ -256,19 +265,25 @@ def _substitutions(robot: Kinematics, functions: _Functions) -> dict[str, str]:
     if f:
         tables.append(f"static const int moving[] = {{{_integers(robot.loops.columns)}}};")
     frame = _frame_words(controller, case)
-    at_home = robot.home_coordinates
+    # Rounding of Newton's method and of trigonometric functions is printed as 0.
+    at_home = np.where(np.abs(robot.home_coordinates) < _ROUNDING * robot.motor_sizes, 0.0, robot.home_coordinates)
+    directions = direction_texts(robot)
     lines = [
         f" *           {i}: {comment_text(each.name)}, {_KINDS[turns]} in {label}, {value:.10g} at home"
         for i, (each, turns, label, value) in enumerate(zip(drives, turning, labels, at_home, strict=True))
     ]
     rows = ["| actuator | coordinate | unit | sense | at home |", "|---|---|---|---|---|"]
+    if all(directions):
+        rows = ["| actuator | coordinate | unit | sense | at home | axis |", "|---|---|---|---|---|---|"]
     rows += [
         f"| {i}: {markdown_text(each.name)} | {measure.replace('_', ' ')} | {label} "
-        f"| {'+' if controller.sign_of(each.name) > 0 else '-'} | {value:.10g} |"
-        for i, (each, measure, label, value) in enumerate(
-            zip(drives, robot.robot.measures, labels, at_home, strict=True)
+        f"| {'+' if controller.sign_of(each.name) > 0 else '-'} | {value:.10g} |{direction and f' {direction} |'}"
+        for i, (each, measure, label, value, direction) in enumerate(
+            zip(drives, robot.robot.measures, labels, at_home, directions, strict=True)
         )
     ]
+    if all(directions):
+        rows += ["", *_AXES.split("\n")]
     given = " ".join(_COORDINATES[k] for k in robot.coordinates)
     freedom = (
         f"the platform has {robot.freedoms} degree{'s' * (robot.freedoms != 1)} of freedom; all coordinates are given."

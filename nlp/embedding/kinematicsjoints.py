@@ -38,6 +38,7 @@ class LimbCoordinates(NamedTuple):
         pose: (12, 1) rotation row by row, then position, as expressions of these symbols.
         twists: (6, k) twist of the platform for a unit rate of each coordinate, as expressions of these symbols.
         measured: (k, 1) coordinates as expressions of a point of the kinematics.
+        directions: (k, 3) axes of turns and directions of slides at home, in the controller's world frame.
     """
 
     names: tuple[str, ...]
@@ -46,6 +47,7 @@ class LimbCoordinates(NamedTuple):
     pose: SX
     twists: SX
     measured: SX
+    directions: FloatArray
 
 
 def limb_coordinates(robot: Kinematics, limb: str) -> LimbCoordinates:
@@ -82,7 +84,11 @@ def limb_coordinates(robot: Kinematics, limb: str) -> LimbCoordinates:
     at_home = np.array(ca.Function("home", [robot.z], [measured])(robot.home), dtype=np.float64).ravel()
     values = SX.sym("c", len(stated))
     pose, twists = _chain(robot, at_start, values, at_home, units)
-    found = LimbCoordinates(tuple(_name(*each) for each in stated), dimensions, values, pose, twists, measured)
+    turns = [each is Dimension.ANGLE for each in dimensions]
+    lines = np.where(turns, at_start[:3], at_start[3:])
+    names = tuple(_name(*each) for each in stated)
+    directions = (robot.transform.turn.T @ lines / np.linalg.norm(lines, axis=0)).T
+    found = LimbCoordinates(names, dimensions, values, pose, twists, measured, directions)
     _check(robot, found, at_home, limb)
     return found
 

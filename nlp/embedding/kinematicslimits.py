@@ -12,14 +12,14 @@ from casadi import SX
 from ...models import Dimension
 from ..case.limits.constraint import BoundedConstraint, Reading
 from ..case.limits.limit import PosedRobot
+from ..errors import InputError
 from .ctext import comment_text, name_cases
 from .kinematics import Kinematics
 from .templates import fill_template, prototype
 
-#: Limits that depend on loads, motions or the whole Jacobian.
+#: Limits that depend on the task or on the whole Jacobian.
 _NOT_OF_JOINTS = frozenset(
-    {"condition_number", "smallest_singular_value", "actuator_rate", "actuator_force", "actuator_speed"}
-    | {"actuator_power", "deflection", "rate_share", "custom", "F"}
+    ("condition_number", "smallest_singular_value", "actuator_rate", "rate_share", "custom", "F")
 )
 #: Values at which two forms of a reading are compared, and their largest relative difference.
 _VALUES, _SAME = (0.15, 0.4, 0.85), 1e-9
@@ -45,7 +45,7 @@ def limits_of(robot: Kinematics) -> tuple[KinematicLimit, ...]:
     posed = PosedRobot(functions.model, functions.robot, ())
     found: list[KinematicLimit] = []
     for limit in case.limits:
-        if limit.needs_motion or limit.name.partition(".")[0] in _NOT_OF_JOINTS:
+        if limit.needs_motion or limit.needs_loads or limit.name.partition(".")[0] in _NOT_OF_JOINTS:
             continue
         for each in limit.at_pose(posed):
             found += _sides(robot, each)
@@ -74,7 +74,7 @@ def _measured(reading: Reading) -> Callable[[SX], SX]:
     """Return the function from the value of a constraint to the measured value.
 
     Raises:
-        ValueError: the conversion has an unsupported form.
+        InputError: the conversion has an unsupported form.
     """
     part = reading.from_value(_VALUES[0]) / _VALUES[0]
     forms: tuple[Callable[[SX], SX], ...] = (
@@ -88,7 +88,7 @@ def _measured(reading: Reading) -> Callable[[SX], SX]:
         values = ((float(form(SX(each))), reading.from_value(each)) for each in _VALUES)
         if all(abs(one - other) <= _SAME * max(1.0, abs(other)) for one, other in values):
             return form
-    raise ValueError(f"no expression is known for the reading {reading}")
+    raise InputError(f"kinematics in C: a limit in {reading.dimension.value} has no expression in C")
 
 
 def limit_texts(limits: tuple[KinematicLimit, ...], names: Mapping[str, str]) -> dict[str, str]:

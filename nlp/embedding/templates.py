@@ -22,7 +22,7 @@ def fill_template(template: str, names: Mapping[str, str]) -> str:
 
 
 def prototype(kin: str, name: str) -> str:
-    """Return the C declaration of a CasADi function of the kinematics; ``prefix`` begins its name."""
+    """Return the C declaration of a CasADi function of the kinematics; ``kin`` begins its name."""
     return f"int {kin}_CASADI_{name}(const real **arg, real **res, int *iw, real *w, int mem);"
 
 

@@ -96,14 +96,15 @@ def measured_slack(nlp: Nlp, x: FloatArray, at: Linearisation, numbers: Sequence
             numbers = measured_values(nlp, x) if numbers is None else numbers
             value = float(constraints[k].reading.to_value(SX(numbers[k])))
             slack[j] = -float(nlp.sides.sign[j] * (value - nlp.sides.limit[j]) * at.per_unit[j])
-    if loses_forces(nlp, x):
-        loaded = _loaded(nlp, constraints)
-        slack[[j for j, k in sides if k in loaded]] = np.nan
+    undetermined = _undetermined(nlp, x, constraints)
+    slack[[j for j, k in sides if k in undetermined]] = np.nan
     return slack
 
 
-def _loaded(nlp: Nlp, constraints: Sequence[Constraint]) -> list[int]:
-    """Return the indices of the constraints that are limits on quantities under loads."""
+def _undetermined(nlp: Nlp, x: FloatArray, constraints: Sequence[Constraint]) -> list[int]:
+    """Return the indices of limits on quantities under loads at a singular point (n,); empty at another point."""
+    if not loses_forces(nlp, x):
+        return []
     prefixes = tuple(f"{limit.name}." for limit in nlp.case.limits if limit.needs_loads)
     return [k for k, each in enumerate(constraints) if any(key.startswith(prefixes) for key in each.keys)]
 
@@ -241,7 +242,6 @@ def _measured(nlp: Nlp, x: FloatArray, constraints: Sequence[Constraint], values
     for k, each in enumerate(constraints):
         if each.measure is not None and each.spectral is not None:
             measured[k] = each.measured_at((nlp.program.x, nlp.program.p), (x, nlp.arguments))
-    if loses_forces(nlp, x):
-        for k in _loaded(nlp, constraints):
-            measured[k] = float("nan")
+    for k in _undetermined(nlp, x, constraints):
+        measured[k] = float("nan")
     return measured

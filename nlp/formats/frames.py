@@ -70,14 +70,6 @@ def cross_matrix(v: FloatArray) -> FloatArray:
     return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
 
 
-def perpendiculars(axis: FloatArray) -> FloatArray:
-    """Return two unit vectors (2, 3) perpendicular to a unit axis (3,) and to each other."""
-    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    first = np.cross(axis, helper)
-    first /= np.linalg.norm(first)
-    return np.array([first, np.cross(axis, first)])
-
-
 def axis_frame(point: FloatArray, axis: FloatArray) -> Frame:
     """Return a frame at a point (3,) with z along an axis (3,) of any length but zero."""
     z = axis / np.linalg.norm(axis)

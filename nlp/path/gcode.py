@@ -17,7 +17,7 @@ from ..case.pose import LARGEST
 from ..errors import InputError
 from ..units import Units
 from .arcs import PLANES, TOLERANCES, Arc, ArcError, Tolerances, arc_about, arc_length, centre_of_radius
-from .idle import idle_words
+from .idle import BEFORE_PATH, idle_words
 from .options import SYSTEMS, Between, PathOptions, code_of_unit, program_unit
 from .orientation import order_named
 from .path import Kind, ProgrammedPath
@@ -78,7 +78,7 @@ class Interpreter:
         self.lines, self.kinds, self.seconds = array("i"), array("B"), array("d")
         self.arcs, self.planes = array("d"), array("B")
         self.idle: dict[str, list[int]] = {}
-        self.before_path = "motion before the path"
+        self.before_path = BEFORE_PATH
 
     def run(self, lines: Iterable[str]) -> ProgrammedPath:
         """Return the tool path of a program; the errors are those of :func:`read_program`."""
@@ -92,8 +92,8 @@ class Interpreter:
             raise InputError(f"{self.source}: {where}: {fault}") from None
         if not (has_end or self.options.end_of_file):
             raise InputError(
-                f"{self.source}: line {self.line}: the program has no end, M2, M30 or %; it may be cut off;"
-                " if it is complete, give --end-of-file"
+                f"{self.source}: line {self.line}: the program does not end with M2, M30 or %, so it may be"
+                " cut off; if it is complete, give --end-of-file"
             )
         if not self.lines:
             unknown = [letter for letter, axis in AXES.items() if math.isnan(self.now[axis])]

@@ -4,6 +4,9 @@ from collections.abc import Mapping, Sequence
 
 from ..system.jsonvalues import JsonObject
 
+#: Entries for motions whose start is unknown: before the path, and after homing, macros or motors off within a program.
+BEFORE_PATH, UNKNOWN_START = "motion before the path", "motion from an unknown position"
+
 
 class Idle(JsonObject):
     """Word of a G-code program without motion, or line that does not belong to the path.
@@ -17,6 +20,11 @@ class Idle(JsonObject):
     word: str
     line: int
     lines: int
+
+    @property
+    def is_motion(self) -> bool:
+        """True for motions that are not part of the path, because their start is unknown."""
+        return self.word in (BEFORE_PATH, UNKNOWN_START)
 
 
 def idle_words(counts: Mapping[str, Sequence[int]]) -> tuple[Idle, ...]:

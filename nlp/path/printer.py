@@ -18,6 +18,7 @@ from ..errors import InputError
 from ..units import Units
 from .arcs import Arc
 from .gcode import Interpreter
+from .idle import UNKNOWN_START
 from .merging import joined_to_previous
 from .options import PathOptions
 from .path import Kind, ProgrammedPath
@@ -93,11 +94,13 @@ class _Printer(Interpreter):
         if self.factors:
             shown = ", ".join(f"{name} (line {line})" for name, line in list(self.factors.items())[:_SHOWN])
             more = f", and {len(self.factors) - _SHOWN} more" if len(self.factors) > _SHOWN else ""
-            found.append(f"{shown}{more}: later feeds are multiplied by this percentage")
+            found.append(f"{shown}{more}: each scales the feeds after it by this percentage")
         if len(self.parts) > 1:
             found.append(f"part {self.part} of {len(self.parts)} of the program; the other parts are not checked")
         if not all(map(math.isnan, self.seconds)):
-            found.append("times are those of the programmed feeds; accelerations of the firmware make a print longer")
+            found.append(
+                "times follow from the programmed feeds; a print takes longer, because firmware limits acceleration"
+            )
         if not self.is_ended:
             found.append("no M84 after the last motion: the file may be cut off")
         return tuple(found)
@@ -233,7 +236,7 @@ class _Printer(Interpreter):
         self._close_part()
         self.now, self.is_known = [math.nan] * 3 + [0.0] * 3, False
         if self.parts:
-            self.before_path = "motion from an unknown position"
+            self.before_path = UNKNOWN_START
 
     def _close_part(self) -> None:
         """End a part; a part without a motion is dropped."""
@@ -258,9 +261,9 @@ class _Printer(Interpreter):
                 for k, (first, last) in enumerate(self.parts[:_SHOWN], 1)
             )
             more = f", and {count - _SHOWN} more" if count > _SHOWN else ""
-            cause = f"the path has {count} part{'s' * (count > 1)} between homing, macros and motors off"
+            cause = f"homing, macros and motors off divide the program into {count} part{'s' * (count > 1)}"
             fault = f"there is no part {chosen}; {cause}" if chosen > count else cause
-            raise InputError(f"{self.source}: {fault}: {shown}{more}; choose one of them with --part")
+            raise InputError(f"{self.source}: {fault}: {shown}{more}; choose one with --part")
         self.part = chosen
         first, last = self.parts[chosen - 1]
         self.knots = self.knots[6 * first.knots : 6 * last.knots]

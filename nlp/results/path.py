@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...models import Dimension
+from ...models.rotation import axis_angle_from_matrix
 from ...models.statics import driven_joints
 from ..case.pathfile import PLACE
 from ..case.task import Sense
 from ..evidence.state import WorkspacePose
 from ..path.idle import Idle
 from ..proof.statement.claims import ACTUATED
+from ..proof.workspace.robot.pose_box import PoseNumbers
 from ..system.jsonvalues import Absent, Inline, JsonObject
 from .exchange import ExchangeData, exchange_fields
 from .parts import HeadData, SettingsData, VersionsData, settings_data
@@ -27,6 +29,9 @@ if TYPE_CHECKING:
     from ..proof.workspace.verdict import Fault, Verdict
     from ..solver.semi_infinite import ExchangeProof
     from ..units import Units
+
+#: Distances along a segment, as parts of it, at which a violation is shown that is rounding error at its first point.
+_FURTHER = (1e-3, 1e-2, 0.1, 1.0)
 
 
 class PathFaultData(JsonObject):
@@ -254,6 +259,28 @@ def _fault(each: "Verdict", fault: "Fault", judged: "Judgement") -> PathFaultDat
         parameter=fault.place.parameter,
         pose=pose_data(fault.pose, units),
     )
+
+
+def violating_poses(judged: "Judgement", claim: PathVerdictData) -> Iterator[WorkspacePose]:
+    """Yield poses that refute a claim: the first known one, some further along its segment, and the worst known one.
+
+    The first pose is at the limit, where the violation may count as rounding error. With dependent coordinates, poses
+    along the segment are left out, because the path does not state them.
+
+    Args:
+        judged: the verdicts.
+        claim: one of them.
+    """
+    fault = claim.fault
+    if fault is not None:
+        yield fault.pose
+    if fault is not None and not judged.dependent:
+        parts = sorted({min(fault.parameter + each, 1.0) for each in _FURTHER} - {fault.parameter})
+        for position, rotation in zip(*judged.path.poses_at([fault.segment] * len(parts), parts), strict=True):
+            axis, angle = axis_angle_from_matrix(rotation)
+            yield pose_data(PoseNumbers(position, rotation, axis, angle), judged.case.units)
+    if claim.pose is not None:
+        yield claim.pose
 
 
 def _knots_data(units: "Units", knots: "Knots") -> PathKnotsData:

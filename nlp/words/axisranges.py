@@ -86,7 +86,7 @@ def _factor_words(factor: float | None) -> str:
 
 def _pair_words(pair: PairRange) -> str:
     """Return, in words, the claim that limits two coordinates."""
-    return "single-axis ranges only" if pair.stop is None else _stop_words(pair.stop)
+    return "the ranges of the single axes" if pair.stop is None else _stop_words(pair.stop)
 
 
 def _end_words(end: RangeEnd) -> str:

@@ -34,7 +34,7 @@ _UNCHANGED = 1e-9
 #: Relative gain of an objective by a change from task to task, below which there is no gain.
 _NO_GAIN = 1e-6
 #: Rank of J of a robot that is not singular.
-FULL_RANK = 6
+_FULL_RANK = 6
 #: Share of searches that converged, of which there are many, up to which the result has a caution.
 _FEW, _MANY = 0.125, 8
 #: Smallest over largest singular value of J, below which a regular robot has a caution.
@@ -199,7 +199,7 @@ def check_lines(result: SolveResult) -> Iterator[Line]:
         for direction in evidence.flat:
             steps = [f"{name} by {rate:+.4g}" for name, rate in direction.items()]
             moved = " and ".join(each for each in (", ".join(steps[:-1]), steps[-1]) if each)
-            yield Line(f"moving {moved} keeps F: other designs are equally good", label="flat direction")
+            yield Line(f"changing {moved} keeps F: other designs are equally good", label="flat direction")
         if math.isfinite(evidence.stationarity):
             checks = f"stationarity {residual(evidence.stationarity)}, feasibility {residual(evidence.feasibility)}"
             curvature = evidence.eigenvalues
@@ -335,11 +335,12 @@ def singularity_lines(robot: RobotData, units: Units) -> Iterator[Line]:
         yield from joint_lines(robot, robot.joints, units)
     yield from convention_lines(robot)
     if not robot.singular:
-        values = robot.singular_values
-        words = f"{robot.rank}, nearly singular: the smallest singular value is {{:.2g}} of the largest"
-        is_near = values[-1] < _NEAR * values[0]
-        shown = Line(words.format(values[-1] / values[0]), label="rank of J", tone=Tone.CAUTION)
-        yield shown if is_near else Line(f"{robot.rank}", label="rank of J")
+        share = robot.singular_values[-1] / robot.singular_values[0]
+        if share < _NEAR:
+            words = f"nearly singular: the smallest singular value is {share:.2g} of the largest"
+            yield Line(f"{robot.rank}, {words}", label="rank of J", tone=Tone.CAUTION)
+        else:
+            yield Line(f"{robot.rank}", label="rank of J")
         return
     several = " combinations of" if len(robot.free_motions) > 1 else ""
     yield Line(f"{robot.rank}: singular; with all actuators locked nothing resists{several}", label="rank of J")
@@ -347,19 +348,19 @@ def singularity_lines(robot: RobotData, units: Units) -> Iterator[Line]:
         yield Line(f"  {motion_words(motion, units, robot_size(robot))}")
 
 
-def exclusion_line(case: Case, robot: RobotData | None) -> Line | None:
-    """Return the limit that excludes singular designs, for an answer that is singular although its case expects none.
+def exclusion_lines(case: Case, robot: RobotData | None) -> Iterator[Line]:
+    """Yield the limit that excludes singular designs, for an answer that is singular although its case expects none.
 
-    None if the case has this limit or minimises a quantity of the actuators, and for a robot that is singular at all
-    poses.
+    Nothing is yielded if the case has this limit or minimises a quantity of the actuators, or if the robot is singular
+    at all poses.
     """
     limits = {each.name for each in case.limits}
-    if not is_unasked_singularity(robot, case) or case.model.rank < FULL_RANK or "smallest_singular_value" in limits:
-        return None
+    if not is_unasked_singularity(robot, case) or case.model.rank < _FULL_RANK or "smallest_singular_value" in limits:
+        return
     if any(task.measure for task in case.tasks):
-        return None
+        return
     words = "add smallest_singular_value = { min = ..., length = ... } to [limits] to exclude singular designs"
-    return Line(words, label="advice")
+    yield Line(words, label="advice")
 
 
 def tolerance_line(lost: ToleranceLoss, F: float | None, units: Units) -> Line:

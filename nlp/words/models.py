@@ -64,7 +64,7 @@ def model_words(name: str, model: Model | None, options: Sequence[ModelOption]) 
             words = f"{', '.join(leg.name for leg in model.legs)} (a case can limit their lengths: leg_length)"
             yield Line(words, label="straight legs")
     words = (
-        "in the motion of a task, limb wrenches of magnitudes f_i have a total power of at most sqrt(sum f_i^2) sqrt(F)"
+        "limb wrenches of magnitudes f_i do work in the motion of a task at a rate of at most sqrt(sum f_i^2) sqrt(F)"
     )
     yield Line(words if not model.actuators else f"{words}; for actuator forces state [[load]]", label="power")
     if model.quantities:

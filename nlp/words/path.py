@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from ..case.pathfile import PLACE
 from ..case.pose import Free
 from ..case.task import Sense
+from ..path.idle import BEFORE_PATH
 from ..proof.workspace.verdict import Outcome
 from .claims import CLAIM_WORDS, SINGULAR, rank_line, unproved_ranks
 from .motors import OUTCOME_WORDS, TONES
@@ -28,7 +29,7 @@ from .verdicts import (
 
 if TYPE_CHECKING:
     from ..case.case import Case
-    from ..evidence.state import WorkspacePose
+    from ..path.idle import Idle
     from ..results.path import PathData, PathFaultData, PathProofData, PathResult, PathVerdictData
 
 #: Title of the table of limits with the smallest margin.
@@ -38,14 +39,15 @@ _SHOWN = 6
 
 
 def path_summary(
-    case: Case, result: PathResult, command: Callable[[WorkspacePose], str] | None = None
+    case: Case, result: PathResult, command: Callable[[PathVerdictData], str] | None = None
 ) -> Iterator[Line | TextTable]:
     """Yield the verdicts on a robot along a tool path.
 
     Args:
         case: the case.
         result: the verdicts.
-        command: function that returns the command for a pose; None for a page, which lists claims only in tables.
+        command: function that returns the command that shows a violated claim; None for a page, which lists claims only
+            in tables.
     """
     path, answer = result.path, verdict_words(result)
     limited = [each for each in path.claims if each.limit is not None]
@@ -55,7 +57,7 @@ def path_summary(
     if wrong is not None and wrong.fault is not None:
         yield Line(fault_words(wrong, wrong.fault), label="first violation", tone=Tone.FAULT)
         if command is not None:
-            yield Line(command(wrong.fault.pose), label="see it with", is_command=True)
+            yield Line(command(wrong), label="see it with", is_command=True)
     for each in path.claims:
         if each.sense is None:
             after = f": {each.reason}" if each.reason else ""
@@ -76,12 +78,22 @@ def _subject_lines(path: PathData) -> Iterator[Line]:
     yield Line(f"{path.file}: {path.segments:,} segment{'s' * (path.segments != 1)}", label="path")
     if path.time is not None:
         yield Line(f"{number(path.time)} s", label="time", after=_untimed_words(path))
-    if path.idle:
-        words = ", ".join(f"{each.word} (line {each.line})" for each in path.idle[:_SHOWN])
-        rest = len(path.idle) - _SHOWN
+    idle = [each for each in path.idle if not each.is_motion]
+    if idle:
+        words = ", ".join(f"{each.word} (line {each.line})" for each in idle[:_SHOWN])
+        rest = len(idle) - _SHOWN
         yield Line(words + (f", and {rest} more" if rest > 0 else ""), label="ignored (no motion)")
-    for sentence in path.warnings or ():
+    for sentence in (*(_unchecked_words(each) for each in path.idle if each.is_motion), *(path.warnings or ())):
         yield Line(sentence, label="note", tone=Tone.CAUTION)
+
+
+def _unchecked_words(motion: Idle) -> str:
+    """Return a sentence about motions whose start is unknown, which are not part of the path."""
+    one = f"line {motion.line}: its start is unknown, so this motion is not checked"
+    lines = f"line {motion.line} and {motion.lines - 1} more"
+    several = f"{lines}: the start of these motions is unknown, so they are not checked"
+    hint = "; state it with --start X,Y,Z,A,B,C" if motion.word == BEFORE_PATH else ""
+    return (one if motion.lines == 1 else several) + hint
 
 
 def _other_faults(path: PathData, first: PathVerdictData | None) -> Iterator[Line]:

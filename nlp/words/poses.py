@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from ...models import Dimension, component_names
@@ -73,7 +73,14 @@ def pose_words(case: Case, pose: WorkspacePose, form: RotationForm | None = None
 
 
 def evaluate_command(
-    name: str, case: Case, settings: Settings, pose: WorkspacePose, form: RotationForm | None = None
+    name: str,
+    case: Case,
+    settings: Settings,
+    pose: WorkspacePose,
+    form: RotationForm | None = None,
+    *,
+    claim: str = "",
+    further: Iterable[WorkspacePose] = (),
 ) -> str:
     """Return the shell command that shows a robot at a pose.
 
@@ -85,14 +92,24 @@ def evaluate_command(
         settings: values that replace those of the case's file.
         pose: the pose.
         form: form of its rotation; None for the form of the case.
+        claim: name of the limit that the pose violates; empty if unknown.
+        further: other poses with a violation of this limit. The first one at which it is shown replaces a pose at
+            which it counts as rounding error.
     """
-    turn = rotation_numbers(case, pose.axis, pose.angle, rotation_form(case) if form is None else form)
-    position = list(pose.position)
+    form = rotation_form(case) if form is None else form
+    position, turn = list(pose.position), rotation_numbers(case, pose.axis, pose.angle, form)
     wanted = _shown(case, position, turn)
-    for digits in range(_FEWEST if wanted else _ENOUGH, _ALL):
+    is_hidden = wanted is not None and wanted.isdisjoint((claim, "rank", _IMPOSSIBLE, _OPEN))
+    for other in further if is_hidden else ():
+        point = list(other.position), rotation_numbers(case, other.axis, other.angle, form)
+        found = _shown(case, *point)
+        if found is not None and claim in found:
+            (position, turn), wanted = point, found
+            break
+    least = _FEWEST if wanted else _ENOUGH
+    for digits in range(_ALL if wanted is None else least, _ALL):
         shorter = _rounded(position, digits), {key: _rounded(each, digits) for key, each in turn.items()}
-        found = _shown(case, *shorter)
-        if found >= wanted and {*found} & {_IMPOSSIBLE, _OPEN} == {*wanted} & {_IMPOSSIBLE, _OPEN}:
+        if _is_shown(wanted or frozenset(), _shown(case, *shorter)):
             position, turn = shorter
             break
     prefix = case.pose_prefixes[0]
@@ -103,21 +120,34 @@ def evaluate_command(
     return " ".join(["screwsynth evaluate", shlex.quote(name), *texts])
 
 
-def _shown(case: Case, position: Sequence[float], turn: Mapping[str, list[float]]) -> frozenset[str]:
-    """Return the faults that an evaluation at a pose shows: violated limits, a lost rank, or an impossible pose."""
-    from ..errors import ScrewsynthError  # noqa: PLC0415 - few results have a pose to be shown
+def _is_shown(wanted: frozenset[str], found: frozenset[str] | None) -> bool:
+    """Return whether a pose shows all faults of another pose, and is impossible only if the other pose is."""
+    fatal = {_IMPOSSIBLE, _OPEN}
+    return found is not None and found >= wanted and found & fatal == wanted & fatal
+
+
+def _shown(case: Case, position: Sequence[float], turn: Mapping[str, list[float]]) -> frozenset[str] | None:
+    """Return the faults that an evaluation at a pose shows: violated limits, a lost rank, or an impossible pose.
+
+    As in the command ``evaluate``, limits on speeds and powers of a case without a motion are left out. The result is
+    None if the case is refused, because its error says nothing about the pose.
+    """
+    from ..errors import CaseError, ScrewsynthError  # noqa: PLC0415 - few results have a pose to be shown
     from ..evidence.closing import closed_start  # noqa: PLC0415
+    from ..evidence.evaluation import without_speeds  # noqa: PLC0415
     from ..evidence.margins import margins_of  # noqa: PLC0415
     from ..evidence.state import evaluate, loops_are_closed  # noqa: PLC0415
     from ..program.formulation import formulate_each  # noqa: PLC0415
     from ..proof.statement.posed_layout import at_one_pose  # noqa: PLC0415
 
     try:
-        nlp = formulate_each(at_one_pose(case, position, _rotation(case, turn)))[0]
+        nlp = formulate_each(at_one_pose(without_speeds(case), position, _rotation(case, turn)))[0]
         x = closed_start(nlp)
         lost = ["rank"] if evaluate(nlp, x).is_singular else []
         lost += [] if loops_are_closed(nlp, x) else [_OPEN]
         return frozenset([*lost, *(row.name for row in margins_of(nlp, x, optimal=False) if row.violated)])
+    except CaseError:
+        return None
     except ScrewsynthError:
         return frozenset([_IMPOSSIBLE])
 

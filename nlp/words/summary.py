@@ -24,7 +24,7 @@ from .lines import (
     choice_lines,
     combined_lines,
     combined_value_lines,
-    exclusion_line,
+    exclusion_lines,
     fault_lines,
     heading_lines,
     is_unasked_singularity,
@@ -89,7 +89,7 @@ def _task_summary(case: Case, result: SolveResult) -> Summary:
     yield from certificate_lines(result.certificate)
     if robot is not None and result.reached is None:
         yield from singularity_lines(robot, case.units)
-        yield from _advice_lines(case, robot)
+        yield from exclusion_lines(case, robot)
     yield from _remark_lines(case)
     if robot is not None:
         yield solved_design_table(case, result, robot)
@@ -177,7 +177,7 @@ def _combined_summary(case: Case, result: CombinedResult) -> Summary:
         part = "" if is_unasked_singularity(each, case) else "rank"
         name = each.task.name if each.task is not None and combined.settings else None
         yield from in_part(part, _named(singularity_lines(each, case.units), name))
-        advice |= {line.text: line for line in _advice_lines(case, each)}
+        advice |= {line.text: line for line in exclusion_lines(case, each)}
     yield from advice.values()
     if point is not None and point.limits:
         title = limits_title(case, result.workspace or result.path)
@@ -246,13 +246,6 @@ def _limb_parts(case: Case, robot: RobotData) -> Summary:
     table = limb_part_table(case, robot)
     if table is not None and robot.joints is not None and robot.joints.constrained:
         yield table
-
-
-def _advice_lines(case: Case, robot: RobotData) -> Iterator[Line]:
-    """Yield the limit that excludes singular designs, if the answer is singular."""
-    advice = exclusion_line(case, robot)
-    if advice is not None:
-        yield advice
 
 
 def _remark_lines(case: Case) -> Summary:

@@ -10,6 +10,7 @@ from ...models import Dimension
 from ..case.case import Case
 from ..case.motors import ActuatorQuantity
 from ..case.pose import ends_of
+from ..case.positionsets import SetKind
 from ..case.task import Sense
 from ..interruption import STOPPED
 from ..proof.statement.claims import CONSTRAINTS, REGULAR
@@ -189,7 +190,8 @@ def _scale_lines(case: Case, scale: ScaleData) -> Iterator[Line]:
     positions = None if case.workspace is None else case.workspace.position_set
     size = "box" if positions is None or not positions.has_radius else "diameter"
     if scale.factor is not None and scale.diameter is not None:
-        words = f"{scale.diameter:.6g} {case.units.length}, {scale.factor:.4g} times the stated one"
+        stated = "width" if positions is not None and positions.kind is SetKind.RING else "one"
+        words = f"{scale.diameter:.6g} {case.units.length}, {scale.factor:.4g} times the stated {stated}"
         yield Line(words, label=f"largest proved {size}", tone=Tone.ANSWER, after=ended)
     elif scale.factor is not None:
         words = f"{scale.factor:.4g} times the workspace"

@@ -240,7 +240,7 @@ def alterations(content: dict[str, Any], rng: np.random.Generator, per_field: in
 
 BOUND = re.compile(r"at (most|least) ([^\s,]+)")
 BOXES = re.compile(r"[\d,]+ leaves of the proof trees?, checked on .*\n")
-REASONS = re.compile(r"(?<=^no proof: ).*?: .*", re.MULTILINE)
+REASONS = re.compile(r"(?<=^no proof: ).*?: .*|(?<= claims); .*", re.MULTILINE)
 LOSSES = re.compile(r"F being the largest of (\S+) \((\S+) - F\('one'\)\) and (\S+) \(F\('other'\) - (\S+)\)")
 
 

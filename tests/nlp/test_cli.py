@@ -439,7 +439,7 @@ def test_a_new_case_solves(model: str, tmp_path: Path, cli: Run) -> None:
 def test_models_lists_the_shipped_robots_and_shows_one(cli: Run) -> None:
     shown = unbroken(output_of(cli("models")))
     assert all(re.search(rf"(?<!\S){name}\b", shown) for name in model_names())
-    assert "six degrees of freedom  6-pus, 6-rss, 6-rus, 6-sps, 6-ups\n" in shown
+    assert "six degrees of freedom  6-pus, 6-rss, 6-rus, 6-sps, 6-ups, servo-hexapod\n" in shown
     rows = [line.split()[0] for line in output_of(cli("models", "--all")).splitlines() if line[0] != " "]
     assert rows[rows.index("robot") :][1:3] == ["stewart-gough", "hexapod"]
     words = ("x1", "x4", "layout", '"octahedral"', "length", "angle", "leg_length", ">= 0 deg, <= 30 deg", "1-", "3+")

@@ -82,7 +82,7 @@ def test_a_robot_that_is_singular_everywhere_gets_no_advice() -> None:
 
 def test_a_flat_direction_is_a_sentence(tmp_path: Path, cli: Run) -> None:
     out = solved(tmp_path, cli, edited(PRESS, (LEG_LIMIT, f"{LEG_LIMIT}\n{SMALLEST}")), "--all")
-    assert "flat direction  moving x3 by +1 and x4 by -1 keeps F: other designs are equally good" in out
+    assert "flat direction  changing x3 by +1 and x4 by -1 keeps F: other designs are equally good" in out
 
 
 def test_an_unproved_claim_is_named_and_its_design_can_be_set(tmp_path: Path, cli: Run, monkeypatch: Patch) -> None:

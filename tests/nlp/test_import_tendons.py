@@ -100,7 +100,7 @@ def test_motors_of_fixed_tendons_have_their_lengths(tmp_path: Path, ref: float) 
     mujoco.mj_forward(model, zero)
     for k, found in enumerate(motors.values()):
         np.testing.assert_allclose(found, lengths[:, k] - zero.ten_length[k], rtol=0, atol=1e-11)
-    assert "actuator of tendon left: joint left, whose coordinate is the length of the tendon" in notes
+    assert "the actuator of tendon left became joint left; its coordinate is the length of the tendon" in notes
     assert any("'m3' was omitted: it acts on the tendon 'cable'" in note for note in notes)
 
 
@@ -128,8 +128,19 @@ def test_a_tendon_of_one_joint_drives_it_and_one_of_a_missing_joint_is_left_out(
     """
     tables, notes = imported(tmp_path / "waist.xml", model_text(ROTORS, parts))
     assert [each["name"] for each in tables["joint"] if each.get("actuated")] == ["motor1", "right"]
-    assert "motor1 is driven through the tendon only; its rate is that of the joint itself" in notes
+    assert "the actuator of tendon only drives only joint motor1; its rate is the rate of motor1" in notes
     assert any("acts on the tendon 'nothing'" in note for note in notes)
+
+
+def test_an_actuator_of_a_tendon_that_moves_nothing_is_refused(tmp_path: Path, cli: Run) -> None:
+    parts = """
+    <tendon><fixed name="slack"><joint joint="motor1" coef="0"/></fixed></tendon>
+    <actuator><motor tendon="slack"/></actuator>
+    """
+    path = saved(tmp_path / "waist.xml", model_text(ROTORS, parts))
+    status, _, err = cli("import", str(path), "--platform", "torso", "--base", "pelvis", "--out", "-")
+    assert status == 2
+    assert "an actuator drives the tendon 'slack', which moves no joint: all its coef are 0" in " ".join(err.split())
 
 
 def test_a_polynomial_of_tendons_is_refused(tmp_path: Path, cli: Run) -> None:

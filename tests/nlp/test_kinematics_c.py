@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import Array, Run, output_of, refusal_of, saved, turn_about
+from builders import DOCS, Array, Run, output_of, refusal_of, saved, turn_about
 from generated import COMPILERS, STRICT, made, needs_compiler, run
 from kinematics_library import BAD_INPUT, LOOPS_OPEN, OK, OUT_OF_REACH, SINGULAR, Library, typical_case
 from position_cases import DELTA
@@ -25,6 +25,7 @@ from screwsynth.nlp.embedding.kinematicsfiles import generate_kinematics, kinema
 
 pytestmark = needs_compiler
 
+PAGE = (DOCS / "servo-angles.md").read_text(encoding="utf-8")
 #: A robot with legs, one with cranks in closed form, and one whose coordinates depend on each other.
 SOME = ("stewart-gough", "6-rss", "3-rrs")
 OTHERS = [name for name in ("hexapod", "three-upu", *gallery_names()) if name not in SOME]
@@ -465,6 +466,76 @@ def test_limits_have_the_margins_that_people_state() -> None:
         expected = np.concatenate([[each - limit.min, limit.max - each] for each in q])
         np.testing.assert_allclose(np.sort(margins), np.sort(expected), atol=1e-11)
         assert violated[0] == (expected < 0).sum()
+
+
+def axes_of(text: str) -> Array:
+    """Return the column ``axis`` of the table of actuators in a generated README."""
+    rows = re.findall(r"^\| \d+: .*\| \((.*)\) \|$", text, flags=re.MULTILINE)
+    return np.array([[float(each) for each in row.split(",")] for row in rows])
+
+
+def test_axes_of_actuators_are_those_of_the_robot_file() -> None:
+    # 6-rss: the axis of a servo points outwards, along B.
+    outward = [[math.cos(a), math.sin(a), 0.0] for a in np.radians([-30, 90, 210, 30, 150, 270])]
+    files = generate_kinematics(typical_case("6-rss"), "")
+    np.testing.assert_allclose(axes_of(files["README.md"]), outward, atol=5e-5)
+    # Horns of servos 1 to 3 turn down, and those of 4 to 6 turn up: the motion of their ends for a small angle.
+    ends = [turn_about(np.array([0, 0, 1.0]), a) @ [0.0, s, 0.0] for s in (-1, 1) for a in np.radians([0, 120, 240])]
+    horns = [end - np.array(axis) * (end @ axis) for end, axis in zip(ends, outward, strict=True)]
+    assert (
+        np.sign([np.cross(a, horn)[2] for a, horn in zip(outward, horns, strict=True)]).tolist() == [-1] * 3 + [1] * 3
+    )
+    # The remedy of servo-angles.md, in a frame that is turned, and with joints that slide.
+    senses = Controller(sign={"1": -1.0, "2": -1.0, "3": -1.0}, rpy=(0.0, 0.0, math.pi / 2))
+    text = generate_kinematics(replace(typical_case("6-rss"), controller=senses), "")["README.md"]
+    turned = [[y * s, -x * s, 0.0] for (x, y, _), s in zip(outward, [-1, -1, -1, 1, 1, 1], strict=True)]
+    np.testing.assert_allclose(axes_of(text), turned, atol=5e-5)
+    assert (axes_of(generate_kinematics(typical_case("orthoglide"), "")["README.md"]) == np.eye(3)).all()
+    # Motors with couplings alone, and legs, which have no axes.
+    expected = [[0, 1, 0], [0, 1, 0], [0, 0, 1]]
+    assert axes_of(generate_kinematics(typical_case("differential-waist"), "")["README.md"]).tolist() == expected
+    assert "axis" not in generate_kinematics(typical_case("hexapod"), "")["README.md"].partition("Twist")[0]
+
+
+def test_rounding_at_home_is_printed_as_zero() -> None:
+    files = generate_kinematics(typical_case("6-rss"), "")
+    header = next(text for name, text in files.items() if name.endswith(".h"))
+    assert re.findall(r"angle in rad, (.*) at home", header) == ["0"] * 6
+    assert "e-" not in files["README.md"].partition("Actuators")[2].partition("Twist")[0]
+    assert files["README.md"].endswith("index |\n")
+
+
+def test_servos_of_6_rss_turn_up_with_the_remedy_of_the_page() -> None:
+    signs = tomllib.loads(re.search(r"sign = \{.*\}", PAGE)[0])["sign"]  # type: ignore[index]
+    case = typical_case("6-rss")
+    for controller, up in ((Controller(), [-1, -1, -1, 1, 1, 1]), (Controller(sign=signs), [1] * 6)):
+        robot = Library(replace(case, controller=controller))
+        p, R = robot.home
+        status, q = robot.motors(p + np.array([0, 0, 0.1 * robot.robot.size]), R)
+        assert status == OK
+        assert np.sign(q).tolist() == up
+
+
+def test_the_fragment_of_servo_angles_compiles_and_refuses_what_is_out_of_range(tmp_path: Path) -> None:
+    (case,) = re.findall(r"<!-- file: rig.toml -->\n```toml\n(.*?)^```", PAGE, flags=re.DOTALL | re.MULTILINE)
+    (fragment,) = re.findall(r"^```c\n(.*?)^```", PAGE, flags=re.DOTALL | re.MULTILINE)
+    files = generate_kinematics(case_of(case, "rig"), case)
+    for name, text in files.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    # Within reach and range, within reach but out of the servos' range, and out of reach.
+    for height, expected in ((648, "0 0 ok"), (884, "0 0 ok"), (886, "0 1 refused"), (9000, "1 0 refused")):
+        body = fragment.replace("{30, 0, 648}", f"{{0, 0, {height}}}").replace("{0, 5, 0}", "{0, 0, 0}")
+        assert body.count(f"{{0, 0, {height}}}") == 1
+        body = re.sub(r"if \((.*)\) \{\n", r"if (\1) {\n    refused = 1;\n", body, count=1)
+        program = (
+            '#include <stdio.h>\n#include "screwsynth_rig-kinematics.h"\nint main(void) {\nint refused = 0;\n' + body
+            + 'printf("%d %d %s\\n", status != 0, violated > 0, refused ? "refused" : "ok");\n'
+            "(void)angles;\nreturn 0; }\n"
+        )  # fmt: skip
+        (tmp_path / "main.c").write_text(program, encoding="utf-8")
+        sources = [name for name in files if name.endswith(".c") and "kinematics" in name]
+        run(COMPILERS[0], *STRICT.split(), "main.c", *sources, "-lm", "-o", "main", where=tmp_path)
+        assert run("./main", where=tmp_path).strip() == expected
 
 
 @pytest.mark.parametrize("scale", [1e-6, 1e5])

@@ -244,6 +244,15 @@ def test_rotary_delta_for_reprapfirmware() -> None:
     assert joints_at(robot, p[None])[0] == pytest.approx(expected, abs=1e-9)
 
 
+def test_the_description_for_klipper_names_settings_of_a_printer_in_use(linear: Case) -> None:
+    text = export_kinematics(linear, "", "klipper")["README.md"]
+    assert "Klipper's defaults are 210, 330, 90." in text
+    assert "State `print_radius`\n  yourself" in text
+    text = export_kinematics(rotary("[controller]\norigin = [0, 0, -0.02]\n"), "", "klipper")["README.md"]
+    assert "print_radius" not in text
+    assert "Klipper's defaults are 30, 150, 270." in text
+
+
 def test_limits_become_those_of_joints() -> None:
     text = ROTARY + "[limits.actuator_angle]\nmin = -30\nmax = 50\n"
     files = export_kinematics(case_of(text, "limited"), "", "linuxcnc")
@@ -468,6 +477,12 @@ def test_transmission_of_ros2_control(name: str, tmp_path: Path) -> None:
     else:
         case = read_robot_case(name).case
         files = export_kinematics(case, "", "ros2")
+    order = {
+        "ankle": "ankle first turns about y (pitch); ankle second turns about x (roll).\n  Without `--coordinates`",
+        "delta": "in this order: x, y, z;",
+        "3-rrs": "in this order: z, roll, pitch;",
+    }
+    assert order[name] in files["README.md"]
     robot = Kinematics(case)
     for file, text in files.items():
         (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)

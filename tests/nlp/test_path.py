@@ -364,8 +364,8 @@ def test_what_is_not_read_is_refused_with_its_line_and_word(lines: str, word: st
 @pytest.mark.parametrize(
     ("text", "words", "options", "unit"),
     [
-        ("G0 X1", "line 1: the program has no end", AT_ZERO, "mm"),
-        ("%\nG0 X1\n", "line 3: the program has no end", AT_ZERO, "mm"),
+        ("G0 X1", "line 1: the program does not end with M2, M30 or %", AT_ZERO, "mm"),
+        ("%\nG0 X1\n", "line 3: the program does not end with M2, M30 or %", AT_ZERO, "mm"),
         ("M2", "there is no path: the program makes no motion", AT_ZERO, "mm"),
         ("G0 X0\nX0 Y0\nM2", "there is no path: the start of Z is not known", PathOptions(), "mm"),
         ("G91 G0 X1\nM2", "line 1, G91: needs the present X", PathOptions(), "mm"),

@@ -537,7 +537,7 @@ def drawn_lengths(view: dict[str, Any], frame: dict[str, Any]) -> dict[str, list
 
 
 def test_the_page_has_the_postures_of_the_path(spindle: PathPicture) -> None:
-    page = path_page(spindle, "the text of the case", lambda pose: f"command at {pose.position[0]}")
+    page = path_page(spindle, "the text of the case", lambda claim: f"command at {claim.line}")
     assert len(page) < 3_000_000
     view = data_of(page)["view"]
     frames = view["frames"]

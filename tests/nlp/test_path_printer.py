@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from builders import Run, case_from, case_of, output_of, refusal_of, saved
+from builders import Run, case_file, case_from, case_of, case_tables, commands_in, output_of, refusal_of, saved
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -364,7 +364,9 @@ TWO = "G28\nG1 X0 Y0 Z0 F600\nG1 X5\nG2 I2\nG28 Z0\nG1 X7 Y7\nG1 X9 Z1\nG1 Y2\nG
 
 
 def test_homing_divides_a_program_into_parts_and_one_is_chosen() -> None:
-    with pytest.raises(InputError, match=r"2 parts between .*: 1 \(lines 3 to 4\), 2 \(lines 8 to 9\); .* --part"):
+    with pytest.raises(
+        InputError, match=r"divide the program into 2 parts: 1 \(lines 3 to 4\), 2 \(lines 8 to 9\); .* --part"
+    ):
         program(TWO)
     with pytest.raises(InputError, match="there is no part 3"):
         program(TWO, part=3)
@@ -380,7 +382,7 @@ def test_motors_without_current_lose_the_position() -> None:
     for off, parts in (("M84", 2), ("M18 X Y", 2), ("M84 E", 1), ("M84 S30", 1)):
         text = f"{BEGIN}G1 X1\n{off}\nG1 X2 Y0 Z0\nG1 X3\nM84"
         if parts == 2:
-            with pytest.raises(InputError, match="the path has 2 parts"):
+            with pytest.raises(InputError, match="divide the program into 2 parts"):
                 program(text)
         assert len(program(text, part=1)) == 1  # one merged line, or the first part
 
@@ -442,7 +444,7 @@ def test_a_refused_file_of_a_printer_is_named_as_such(text: str, sign: str) -> N
 
 def test_a_program_of_linuxcnc_ends_with_its_file_only_by_option() -> None:
     text = "G94 F600\nG0 X0 Y0 Z0\nG1 X10"
-    with pytest.raises(InputError, match=r"has no end, M2, M30 or %; .* --end-of-file") as error:
+    with pytest.raises(InputError, match=r"does not end with M2, M30 or %, .* --end-of-file") as error:
         path_of_text(text, "part.ngc", MM)
     assert "printer" not in str(error.value)
     path = path_of_text(text, "part.ngc", MM, PathOptions(end_of_file=True))
@@ -521,3 +523,86 @@ def test_the_page_about_a_delta_proves_a_file_and_names_what_is_out_of_reach(cli
     assert status == 1
     assert "no solution of the loop equations in the home assembly mode at the first pose of the path" in words
     assert "actuator unit" not in words
+
+
+@pytest.mark.parametrize("speed", ["", "actuator_speed = { max = 300 }"])
+def test_the_command_of_the_first_violation_shows_it(cli: Run, tmp_path: Path, speed: str) -> None:
+    """At the crossing the violation is rounding error, so the pose of the command is a little further along."""
+    page = (Path(__file__).parents[2] / "docs" / "printing.md").read_text(encoding="utf-8")
+    text = re.findall("```toml\n(.*?)```", page, re.DOTALL)[1]
+    text = re.sub(r"actuator_length = .*\nactuator_speed = .*\n", f"actuator_length.min = -100\n{speed}\n", text)
+    case, out = str(saved(tmp_path / "printer.toml", text)), tmp_path / "path.json"
+    saved(tmp_path / "part.gcode", "G28\nG1 X0 Y0 Z0 F3000\nG1 X-105\nM84")
+    status, shown, _ = cli("path", case)
+    assert status == 1
+    cli("path", case, "--json", str(out))
+    (refuted,) = (each for each in json.loads(out.read_text())["path"]["claims"] if each["outcome"] == "refuted")
+    height = math.sqrt(333**2 - 174.75**2)
+    crossing = (math.sqrt(333**2 - (height - 100) ** 2) - 174.75) / 105
+    assert refuted["fault"]["parameter"] == pytest.approx(crossing, rel=1e-6)
+    (command,) = commands_in(shown, "see it with")
+    status, evaluated, _ = cli(*command, "--json", "-")
+    assert status == 1
+    (margin,) = json.loads(evaluated)["violated"]
+    assert (margin["name"], margin["bound"]) == (refuted["name"], "min")
+    (x,) = (float(each.removeprefix("p_x=")) for each in command if each.startswith("p_x="))
+    assert -x == pytest.approx(105 * crossing, rel=1e-2)
+
+
+def test_a_start_may_leave_out_the_angles(cli: Run, tmp_path: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "printing.md").read_text(encoding="utf-8")
+    case = str(saved(tmp_path / "printer.toml", re.findall("```toml\n(.*?)```", page, re.DOTALL)[1]))
+    saved(tmp_path / "part.gcode", "G1 X0 Y0 Z0 F3000\nG1 X30\nM84")
+    three, six = (output_of(cli("path", case, "--start", f"0,0,45{rest}")) for rest in ("", ",0,0,0"))
+    assert "part.gcode: 2 segments" in three
+    assert three == six
+    for wrong in ("0,0", "0,0,nan", "0,0,45,0", "0,0,z", "0,0,0,0,0,0,0"):
+        refusal_of(cli("path", case, "--start", wrong), f"--start {wrong}: must be six finite numbers", "or three")
+    refusal_of(cli("path", case, "--flavour", "linuxcnc", "--offset", "G54=1,2,3"), "--offset G54=1,2,3: must be six")
+
+
+@pytest.mark.parametrize("flavour", ["linuxcnc", "printer"])
+def test_a_motion_from_an_unknown_start_is_a_note_and_not_ignored(cli: Run, tmp_path: Path, flavour: str) -> None:
+    out, words = tmp_path / "path.json", ["--along", str(tmp_path / "part.ngc"), "--flavour", flavour]
+    ways = (
+        ("G1 X0 Y0 Z500 F600", "line 1: its start is unknown, so this motion is not checked"),
+        ("G1 X0 Y0 F600\nG1 Z500", "line 1 and 1 more: the start of these motions is unknown, so they are not checked"),
+    )
+    for before, note in ways:
+        saved(tmp_path / "part.ngc", f"{before}\nG1 X9\nM0\nM2")
+        cli("path", "hexapod-linuxcnc", *words, "--json", str(out))
+        shown = " ".join(cli("path", "hexapod-linuxcnc", *words)[1].split())
+        assert f"note {note}; state it with --start X,Y,Z,A,B,C" in shown
+        assert "ignored (no motion) M0" in shown
+        assert "motion before the path" not in shown
+        lines = before.count("\n") + 1
+        assert {"word": "motion before the path", "line": 1, "lines": lines} in json.loads(out.read_text())["path"][
+            "idle"
+        ]
+        shown = " ".join(cli("path", "hexapod-linuxcnc", *words, "--start", "1,0,500")[1].split())
+        assert "its start is unknown" not in shown
+
+
+def test_a_later_part_has_a_note_without_the_option_start(cli: Run, tmp_path: Path) -> None:
+    file = str(saved(tmp_path / "part.gcode", "G1 X0 Y0 Z500 F600\nG1 X9\nG28\nG1 X0 Y0 Z500\nG1 X5\nM84"))
+    _, shown, _ = cli("path", "hexapod-linuxcnc", "--along", file, "--flavour", "printer", "--part", "2")
+    assert "note line 4: its start is unknown, so this motion is not checked note" in " ".join(shown.split())
+
+
+def test_the_proof_of_a_path_with_violations_counts_them(cli: Run, tmp_path: Path) -> None:
+    """Lines of claims without a proof follow each other, also where a short view shows only some of them."""
+    tables = case_tables("hexapod-linuxcnc", limits={"leg_length": {"min": 20, "max": 24}})
+    case, out = str(case_file(tmp_path, tables)), str(tmp_path / "proof.json")
+    file = str(saved(tmp_path / "part.gcode", "G1 X0 Y0 Z500 F600\nG1 X90\nM84"))
+    run = cli("path", case, "--along", file, "--flavour", "printer", "--proof", out, "--json", str(tmp_path / "r.json"))
+    assert run[0] == 1
+    claims = json.loads((tmp_path / "r.json").read_text())["path"]["claims"]
+    refuted = [each for each in claims if each["outcome"] == "refuted"]
+    assert len(refuted) > 2
+    for words in ([], ["--all"]):
+        lines = output_of(cli("verify-proof", out, *words)).splitlines()
+        assert (
+            lines[0] == f"PROOF VALID for {len(claims) - len(refuted)} of {len(claims)} claims; {len(refuted)} refuted"
+        )
+        rows = [k for k, line in enumerate(lines) if line.startswith("no proof: ")]
+        assert rows == list(range(rows[0], rows[0] + len(refuted)))

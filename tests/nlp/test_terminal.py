@@ -26,6 +26,7 @@ from builders import (
     refusal_of,
     rows_of,
     saved,
+    shipped_tables,
     soaked,
     turn_about,
     unbroken,
@@ -278,6 +279,12 @@ def test_a_command_has_no_more_digits_than_show_the_claim(cli: Run) -> None:
     assert is_violated(value)
     assert not any(is_violated(round(high, fewer)) for fewer in range(1, digits))
     assert cli(*command_at(high))[0] == 1
+    # A limit on speeds, which needs a motion, takes no digits away: evaluate leaves it out.
+    tables = shipped_tables("hexapod-linuxcnc")
+    tables["limits"] |= {"actuator_speed": {"max": 5}}
+    fast = case_from(tables)
+    pose = WorkspacePose(position=(high, 0.0, 20.0), axis=(0.0, 0.0, 1.0), angle=0.0)
+    assert evaluate_command("hexapod-linuxcnc", fast, {}, pose).split()[1:] == command_at(high)
 
 
 def test_the_command_at_a_singular_pose_and_beyond_reach_shows_both(cli: Run, refuted: tuple[str, Path]) -> None:

@@ -461,7 +461,7 @@ def test_a_page_says_where_the_worst_pose_is_that_of_another_machine(cli: Run, t
     case, page, drawn = case_file(tmp_path, tables_of("3-rps")), tmp_path / "page.html", tmp_path / "robot.png"
     output_of(cli("workspace", str(case), "--gap", "0.1", "--html", str(page)))
     words = "the worst pose was found for joint centres displaced within the tolerance, and the nominal robot does not"
-    words += " reach it"
+    words += " reach this pose"
     assert f"No picture: {words}." in page.read_text(encoding="utf-8")
     refusal_of(cli("workspace", str(case), "--gap", "0.1", "--plot-pose", str(drawn)), words)
     assert not drawn.exists()

@@ -78,8 +78,8 @@ def _readme(library: Library, name: str, *, single: bool) -> str:
         "frame": frame_words(robot),
         "zero": zero_words(robot, range(len(robot.drives))),
         "units": f"lengths in {length}, angles in {robot.controller.angle}; angular velocities in rad/s.",
-        "unchecked": "the library computes poses one by one. Points between them, joint limits and speeds are the\n"
-        f"  sketch's; `{library.names['kin']}_limits` exists if the case has limits on joints.",
+        "unchecked": "the library computes single poses. The sketch must check points between them, joint limits\n"
+        f"  and speeds; `{library.names['kin']}_limits` exists if the case limits joints.",
     }
     what = (
         f"A library for Arduino and PlatformIO: put this folder into `libraries/` or `lib/`, and include `{name}.h`. "

@@ -6,7 +6,7 @@ The controller's formula is computed here with the numbers as they are printed, 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Literal, NamedTuple
@@ -289,7 +289,9 @@ def _checked(found: Configuration, samples: Samples, computed: FloatArray) -> Co
         units, size = robot.case.units, robot.size / robot.transform.scale
         angle = drive.dimension is Dimension.ANGLE
         shown = units.text(float(off[k]) * (1.0 if angle else size), drive.dimension)
-        raise OtherKindError(f"the coordinate of {drive.name} differs by {shown} (another working mode)")
+        raise OtherKindError(
+            f"the coordinate of {drive.name} differs by {shown}: the robot may be in another working mode"
+        )
     return found._replace(difference=float(off.max()))
 
 
@@ -319,8 +321,3 @@ def _plain(value: float, size: float) -> float:
 
 def _shown(found: Configuration, value: float) -> str:
     return f"{value:.6g} {found.case.controller.length}"
-
-
-def joint_names(found: Configuration) -> Sequence[str]:
-    """Return the names of the actuators in the order of the controller's joints."""
-    return [found.robot.drives[k].name for k in found.order]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from ....models import Dimension
+from ....models.statics import driven_joints
 from ...case.case import Case
-from ..kinematics import Kinematics
 from .configuration import Configuration, Rules, delta_configuration, printed
 from .texts import conventions_table, frame_words, readme, zero_words
 
@@ -15,8 +15,8 @@ MARLIN, REPRAP = "marlin", "reprapfirmware"
 _FIRST = 210.0
 _HINT = "arduino writes C for this robot"
 UNCHECKED = (
-    "The firmware limits end points to a radius and a height. Reach between them and limits of joints are\n"
-    "  not checked."
+    "The firmware checks only that end points are within a radius and a height. It checks neither points\n"
+    "  between them nor joint limits."
 )
 
 
@@ -45,7 +45,7 @@ def write_reprapfirmware(case: Case) -> dict[str, str]:
     Raises:
         CaseError: the robot is not such a Delta.
     """
-    turns = Kinematics(case).drives[0].dimension is Dimension.ANGLE
+    turns = any(each.dimension is Dimension.ANGLE for each in driven_joints(case.model)[:1])
     kind = "the rotary Delta of RepRapFirmware" if turns else "the linear Delta of RepRapFirmware"
     found = delta_configuration(case, _rules(REPRAP, kind, turns=turns))
     height = None if turns else _height(found)

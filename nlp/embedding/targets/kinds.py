@@ -13,7 +13,8 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from ....models import Dimension, FloatArray, Substitution
+from ....models import Dimension, FloatArray
+from ..driveaxes import DriveAxis, drive_axes
 from ..kinematics import Kinematics
 from .samples import Samples
 
@@ -120,7 +121,7 @@ def delta_of(robot: Kinematics, samples: Samples) -> Delta:
         raise OtherKindError(f"the platform rotates by {turned} near home, but the platform of a Delta does not rotate")
     turns = drives[0].dimension is Dimension.ANGLE
     fit = _arm if turns else _carriage
-    limbs = tuple(fit(robot, samples, k, each.axis, size) for k, each in enumerate(_drives(robot)))
+    limbs = tuple(fit(robot, samples, k, each.direction, size) for k, each in enumerate(_drives(robot)))
     if not turns:
         limbs = _outward(limbs)
     radial = np.array([[math.cos(each.outward), math.sin(each.outward)] for each in limbs])
@@ -167,34 +168,17 @@ def equal_rods(found: Delta, robot: Kinematics) -> None:
             )
 
 
-class _Drive(NamedTuple):
-    """Actuator at home: its direction, and the screws (6, k) of the joints between base and actuator."""
-
-    axis: FloatArray
-    before: FloatArray
-
-
-def _drives(robot: Kinematics) -> list[_Drive]:
+def _drives(robot: Kinematics) -> list[DriveAxis]:
     """Return the actuators at home: axis of an arm, or line of a carriage or strut.
 
     Raises:
         OtherKindError: an actuator is not a joint of the robot.
     """
-    model, start = robot.robot.model, robot.start
-    joints = {each.joint: each.name for each in model.actuators}
-    parameters = robot.case.fixed_parameters("the kind of a robot is recognised with fixed dimensions")
-    found: dict[str, _Drive] = {}
-    for path in model.joint_screws:
-        screws = ca.Function("screws", Substitution.identity(model).all, [ca.densify(path.all)])
-        at_start = np.array(screws(parameters, start[12:], start[:9].reshape(3, 3).T, start[9:12]), dtype=np.float64)
-        for column in path.driven:
-            name, screw = joints.get(path.joints[column], ""), at_start[:, column]
-            line = screw[:3] if np.linalg.norm(screw[:3]) else screw[3:]
-            found.setdefault(name, _Drive(line / np.linalg.norm(line), at_start[:, :column]))
-    missing = [each.name for each in robot.drives if each.name not in found]
+    axes = drive_axes(robot)
+    missing = [each.name for each in robot.drives if each.name not in axes]
     if missing:
         raise OtherKindError(f"the actuator {missing[0]} is not a joint with an axis")
-    return [found[each.name] for each in robot.drives]
+    return [axes[each.name] for each in robot.drives]
 
 
 def _arm(robot: Kinematics, samples: Samples, k: int, axis: FloatArray, size: float) -> Limb:
@@ -323,7 +307,7 @@ def struts_of(robot: Kinematics, samples: Samples) -> Struts:
 
 
 def _strut(
-    robot: Kinematics, samples: Samples, k: int, drive: _Drive, size: float
+    robot: Kinematics, samples: Samples, k: int, drive: DriveAxis, size: float
 ) -> tuple[FloatArray, FloatArray, float, float]:
     """Return base joint, ring, zero and sign of a strut."""
     units, name = robot.case.units, robot.drives[k].name

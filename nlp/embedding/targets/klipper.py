@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from ....models import Dimension
+from ....models.statics import driven_joints
 from ...case.case import Case
-from ..kinematics import Kinematics
 from .configuration import Configuration, Rules, delta_configuration, printed, refused
 from .texts import conventions_table, frame_words, readme, zero_words
 
@@ -14,9 +14,12 @@ TARGET = "klipper"
 _HINT = "klipper-patch writes kinematics for robots of three translations"
 _ROTARY = Rules(TARGET, "rotary_delta", True, "rad", False, None, True, False, _HINT)
 _LINEAR = Rules(TARGET, "delta", False, "rad", False, None, True, False, _HINT)
+#: Klipper's angles of towers or arms, degrees, and the largest difference from them.
+_USUAL = {"delta": (210.0, 330.0, 90.0), "rotary_delta": (30.0, 150.0, 270.0)}
+_SAME_ANGLE = 1e-6
 UNCHECKED = (
-    "Klipper checks only the end point of a move, by radius and height. Out of reach its step generator\n"
-    "  goes on without an error."
+    "Klipper checks only the end point of a move, by radius and height. If a move leaves the reach,\n"
+    "  its step generator reports no error."
 )
 
 
@@ -26,7 +29,7 @@ def write(case: Case) -> dict[str, str]:
     Raises:
         CaseError: the robot is not such a Delta, or its motor axes are not above the bed.
     """
-    turns = Kinematics(case).drives[0].dimension is Dimension.ANGLE
+    turns = any(each.dimension is Dimension.ANGLE for each in driven_joints(case.model)[:1])
     found = delta_configuration(case, _ROTARY if turns else _LINEAR)
     if turns and found.height <= 0:
         height = f"{printed(found.height)} {found.case.controller.length}"
@@ -90,5 +93,28 @@ def _readme(found: Configuration, kind: str) -> str:
     )
     table = conventions_table(found.robot)
     return readme(
-        found.case, what, words, f"Generated C has the same conventions with this table:\n\n```toml\n{table}```"
+        found.case,
+        what,
+        words,
+        f"{_printer_words(found, kind)}Generated C has the same conventions with this table:\n\n```toml\n{table}```",
     )
+
+
+def _printer_words(found: Configuration, kind: str) -> str:
+    """Return items about settings that a printer.cfg in use has already."""
+    turns = kind == "rotary_delta"
+    usual, own = _USUAL[kind], list(found.angles)
+    items = []
+    if max(abs(a - b) for a, b in zip(own, usual, strict=True)) > _SAME_ANGLE:
+        shown, theirs = (", ".join(printed(each) for each in angles) for angles in (own, usual))
+        items.append(
+            f"- **Angles**: {'arms' if turns else 'towers'} are at {shown} degrees; Klipper's defaults are {theirs}.\n"
+            "  With other angles than before, x and y turn on the bed. Keep the angles of your `printer.cfg` if all\n"
+            "  three differ from these by the same angle."
+        )
+    if not turns:
+        items.append(
+            "- **Radius**: `print_radius` is not written, and its default is `delta_radius`. State `print_radius`\n"
+            "  yourself; `screwsynth workspace` with a disc proves it."
+        )
+    return "".join(f"{each}\n" for each in items) + "\n" * bool(items)

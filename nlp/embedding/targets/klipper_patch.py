@@ -102,7 +102,7 @@ def _readme(case: Case, robot: Kinematics, name: str) -> str:
         "add the lines of `chelper.patch.md`. Klipper compiles the file at its next start."
     )
     slow = (
-        "Joint coordinates without a closed form are followed from call to call, each motor for itself. A call takes "
+        "Each motor computes passive joints by Newton's method, starting from its previous call. A call takes "
         "about 2 us on a desktop computer: keep the rate below 20,000 steps a second.\n\n"
     )
     more = (slow if robot.unknowns else "") + (

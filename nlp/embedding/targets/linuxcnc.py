@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 from ....models import Dimension, FloatArray
+from ....models.statics import driven_joints
 from ...case.case import Case
 from ..kinematics import Kinematics
 from .configuration import (
@@ -48,7 +49,7 @@ def write(case: Case) -> dict[str, str]:
 
 def _found(case: Case) -> tuple[Configuration, str, str]:
     """Return the configuration, the module, and the words of the coordinates."""
-    drives = Kinematics(case).drives
+    drives = driven_joints(case.model)
     if len(drives) == 3:
         rules = _ROTARY if drives[0].dimension is Dimension.ANGLE else _LINEAR
         return delta_configuration(case, rules), rules.kind, "XYZ"
@@ -149,9 +150,9 @@ def _readme(found: Configuration, module: str) -> str:
     table = conventions_table(found.robot)
     more = [f"This table in the case gives generated C the same conventions:\n\n```toml\n{table}```"]
     if module == "genhexkins":
-        more.insert(0, "Pins of tool offset, spindle offset and screw lead keep their value 0.")
+        more.insert(0, "Leave the pins of tool offset, spindle offset and screw lead at 0.")
     if module == "pentakins":
-        more.insert(0, "The pin of tool offset keeps its value 0. Turns about the spindle do not change the struts.")
+        more.insert(0, "Leave the pin of tool offset at 0. Turns about the spindle do not change the struts.")
     if module == "rotarydeltakins":
         more.insert(0, "`platformradius` is the radius of the motor axes less that of the platform's joints.")
     return readme(found.case, what, words, "\n\n".join(more))

@@ -61,7 +61,7 @@ def write(case: Case) -> dict[str, str]:
     )
     more = (
         "Angles of joints are within half a turn of home. Out of reach, and where the robot is singular, the functions "
-        "return -1 and leave their results unchanged. `kinematicsJacobian` is read only by releases that have it."
+        "return -1 and leave their results unchanged. Releases of LinuxCNC without `kinematicsJacobian` ignore it."
     )
     if robot.unknowns >= _LARGE:
         more += (

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from xml.sax.saxutils import escape, quoteattr
 
+from ....models import Dimension
 from ...case.case import Case
 from ...errors import CaseError
 from ..ctext import comment_text, identifier, string_literal
-from ..kinematicsjoints import limb_coordinates
+from ..driveaxes import axis_words
+from ..kinematicsjoints import LimbCoordinates, limb_coordinates
 from ..templates import fill_template
 from .library import Library, library_of
 from .texts import frame_words, readme, zero_words
@@ -15,6 +17,8 @@ from .texts import frame_words, readme, zero_words
 TARGET = "ros2"
 _WORDS = ("x", "y", "z", "roll", "pitch", "yaw")
 _VERSION = "0.1.0"
+#: Names of turns about the axes of the world frame.
+_ROTATIONS = {"x": " (roll)", "y": " (pitch)", "z": " (yaw)"}
 
 
 def write(case: Case, coordinates: str) -> dict[str, str]:
@@ -33,10 +37,8 @@ def write(case: Case, coordinates: str) -> dict[str, str]:
     package = f"{identifier(case.name)}_transmission"
     cls = "".join(part.capitalize() for part in package.split("_"))
     actuators = [each.name for each in robot.drives]
-    if coordinates == "pose":
-        joints = [_WORDS[k] for k in robot.coordinates]
-    else:
-        joints = list(limb_coordinates(robot, coordinates).names)
+    limb = None if coordinates == "pose" else limb_coordinates(robot, coordinates)
+    joints = [_WORDS[k] for k in robot.coordinates] if limb is None else list(limb.names)
     if len(joints) != len(actuators) or robot.forward is None:
         fault = f"a transmission needs as many actuators as joints: the robot has {len(actuators)} and {len(joints)}"
         if robot.forward is None:
@@ -69,7 +71,7 @@ def write(case: Case, coordinates: str) -> dict[str, str]:
         "CMakeLists.txt": _cmake(package, [name for name in sources if name.endswith(".c")]),
         "package.xml": _package(package, case),
         "transmission.urdf": _urdf(package, cls, joints, actuators),
-        "README.md": _readme(library, package, joints),
+        "README.md": _readme(library, package, limb),
     }
 
 
@@ -162,14 +164,34 @@ def _urdf(package: str, cls: str, joints: list[str], actuators: list[str]) -> st
     return "\n".join(lines) + "\n"
 
 
-def _readme(library: Library, package: str, joints: list[str]) -> str:
+def _joint_words(library: Library, limb: LimbCoordinates | None) -> str:
+    """Return sentences about the joints of the transmission and their order."""
+    if limb is None:
+        joints = ", ".join(_WORDS[k] for k in library.robot.coordinates)
+        return (
+            f"Joints are coordinates of the pose, in this order: {joints}; R = Rz(yaw) Ry(pitch) Rx(roll).\n"
+            "  `--coordinates LIMB` takes the joints of a limb instead, whose order may differ."
+        )
+    turns = []
+    for name, dimension, direction in zip(limb.names, limb.dimensions, limb.directions, strict=True):
+        axis, kind = axis_words(direction), "slides along"
+        if dimension is Dimension.ANGLE:
+            kind, axis = "turns about", axis + _ROTATIONS.get(axis, "")
+        turns.append(f"{name} {kind} {axis}")
+    return (
+        f"Joints, in this order, with their axes at home: {'; '.join(turns)}.\n"
+        "  Without `--coordinates`, joints are coordinates of the pose in another order: x, y, z, roll, pitch, yaw."
+    )
+
+
+def _readme(library: Library, package: str, limb: LimbCoordinates | None) -> str:
     robot = library.robot
     words = {
-        "frame": frame_words(robot) + f"\n  Joints are {', '.join(joints)}.",
+        "frame": f"{frame_words(robot)}\n  {_joint_words(library, limb)}",
         "zero": zero_words(robot, range(len(robot.drives))) + " `mechanical_reduction` and `offset` are not read.",
         "units": "lengths in m, angles in rad, efforts in N and N m; velocities and efforts keep the power equal.",
-        "unchecked": "ros2_control does not load transmissions by itself: the hardware component does. Joint limits\n"
-        "  are those of its controllers, not those of the loops.",
+        "unchecked": "ros2_control does not load transmissions by itself: the hardware component does. Its\n"
+        "  controllers check limits of these joints; nothing checks limits of passive joints.",
     }
     what = (
         f"`{package}` is a package for ros2_control: build it with colcon, and copy `transmission.urdf` into the "

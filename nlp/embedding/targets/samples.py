@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import casadi as ca
@@ -30,7 +31,7 @@ class Samples(NamedTuple):
         rotations: (N, 3, 3) platform to world coordinates.
         coordinates: (N, a) actuator coordinates, radians or length.
         unknowns: (N, u) coordinates of the passive joints.
-        turned: largest difference of an entry of a rotation matrix from the rotation at home.
+        turned: largest angle of a rotation from the rotation at home, radians.
     """
 
     positions: FloatArray
@@ -52,7 +53,9 @@ def samples_of(robot: Kinematics) -> Samples:
         closed = found.closed
         if closed.mean() >= _ENOUGH:
             break
-    turned = float(np.abs(found.rotations[closed] - home).max(initial=0.0))
+    # The Frobenius norm of the difference is 2 sqrt(2) sin(angle / 2).
+    chords = np.linalg.norm(found.rotations[closed] - home, axis=(1, 2)) / math.sqrt(8)
+    turned = 2 * math.asin(min(1.0, float(chords.max(initial=0.0))))
     arrays = (found.positions, found.rotations, found.coordinates, found.unknowns)
     p, R, q, unknowns = (each[closed] for each in arrays)
     return Samples(p, R, q, unknowns, turned)

@@ -63,7 +63,7 @@ def zero_words(robot: Kinematics, order: Sequence[int]) -> str:
     measured = (
         "the length of the leg" if "leg_length" in robot.robot.measures else "the actuator's coordinate from home"
     )
-    return f"the coordinates of the joints are {shown}. In the case, q is {measured}."
+    return f"the joint coordinate is {shown}. In the case, q is {measured}."
 
 
 def conventions_table(robot: Kinematics) -> str:

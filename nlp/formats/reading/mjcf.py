@@ -258,9 +258,12 @@ class _Reader:
             couplings: couplings of the robot; the coupling of the motor is added.
         """
         pulls = [(joint, factor) for joint, factor in self._pulls(self.model.tendon(name).id) if factor]
+        if not pulls:
+            fault = f"an actuator drives the tendon {name!r}, which moves no joint: all its coef are 0"
+            raise InputError(f"{self.source}: {fault}")
         if len(pulls) == 1:
             only = self.joint_names[pulls[0][0]]
-            self.notes.append(f"{only} is driven through the tendon {name}; its rate is that of the joint itself")
+            self.notes.append(f"the actuator of tendon {name} drives only joint {only}; its rate is the rate of {only}")
             return only
         names = {each.name: each for each in self.joints}
         first = names[self.joint_names[pulls[0][0]]]
@@ -272,5 +275,6 @@ class _Reader:
         self.joints.append(MechanismJoint(motor, first.kind, inner.name, rotor, first.point, first.axis))
         factors = ((motor, 1.0), *((self.joint_names[joint], -factor) for joint, factor in pulls))
         couplings.append(Coupling(unique_name(f"{motor} tendon", taken), factors))
-        self.notes.append(f"actuator of tendon {name}: joint {motor}, whose coordinate is the length of the tendon")
+        became = f"the actuator of tendon {name} became joint {motor}"
+        self.notes.append(f"{became}; its coordinate is the length of the tendon")
         return motor

@@ -11,8 +11,9 @@ import numpy as np
 
 from ....models.arrays import FloatArray
 from ....models.mechanism import Coupling, MechanismJoint
+from ....models.rotation import perpendiculars
 from ...errors import InputError, listing
-from ..frames import Frame, perpendiculars
+from ..frames import Frame
 from .description import Body, Description, LoopClosure, unique_name
 from .urdfelements import axis_of, link_of, name_of, number_of, origin_of
 from .urdfloops import (

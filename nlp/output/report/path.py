@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ...case.pose import RotationForm
-from ...evidence.state import WorkspacePose
+from ...results.path import PathVerdictData
 from ...system.jsonvalues import json_data
 from ...words.path import checked_claims, fault_words, first_refuted, path_summary, verdict_words
 from ...words.poses import pose_words
@@ -44,13 +44,13 @@ _POINTS = 600
 _RED = "#a3250f"
 
 
-def path_page(picture: PathPicture, text: str, command: Callable[[WorkspacePose], str]) -> str:
+def path_page(picture: PathPicture, text: str, command: Callable[[PathVerdictData], str]) -> str:
     """Return the page, which opens without a network; verdicts and curves need no script.
 
     Args:
         picture: path with its verdicts and curves.
         text: text of the case file.
-        command: function that returns the command for a pose.
+        command: function that returns the command that shows a violated claim.
     """
     case, result = picture.judged.case, picture.result
     title = case.title or case.name
@@ -218,12 +218,12 @@ def _swatch(colour: str) -> Markup:
     return tag("span", class_="swatch", style=f"--fill: {colour}")
 
 
-def _refuted(picture: PathPicture, command: Callable[[WorkspacePose], str]) -> Markup:
+def _refuted(picture: PathPicture, command: Callable[[PathVerdictData], str]) -> Markup:
     """Return each violated claim with its first known violation and a command for the pose."""
     case = picture.judged.case
     refuted = [(each, each.fault) for each in checked_claims(picture.result)]
     return join_markup(
-        refuting_place(fault_words(each, fault), pose_words(case, fault.pose, RotationForm.RPY), command(fault.pose))
+        refuting_place(fault_words(each, fault), pose_words(case, fault.pose, RotationForm.RPY), command(each))
         for each, fault in refuted
         if fault is not None
     )

@@ -32,7 +32,7 @@ class Scale:
     Attributes:
         factor: scale factor of the largest proved box; None if no box was proved.
         failed: smallest known scale factor of a box that is not proved; infinite without such a box.
-        refuted: whether a claim about the failed box is refuted, and not only open.
+        refuted: If true, a claim about the failed box is refuted; otherwise it is undecided.
         claim: claim that fails in the failed box; empty without a failed box.
         pose: pose at which the claim fails; None without a pose.
         reason: reason why the search ended before the factor was known to its accuracy; otherwise empty.
@@ -56,7 +56,7 @@ def largest_scale(
 
     The factor of a box is computed to 1 %, that of a radius to 0.05 %, by bisection: a box within a proved box is
     proved. The smallest box is judged first: it takes little time, and if it fails, every box fails. If the positions
-        are a set with a radius, only this radius is scaled.
+    are a set with a radius, only this radius is scaled; for a ring, the width between both radii.
 
     Args:
         case: case with fixed dimensions.
@@ -67,7 +67,7 @@ def largest_scale(
             is refuted.
 
     Raises:
-        CaseError: the case has no workspace, or a free dimension; or half spaces exclude the centre of its positions.
+        CaseError: the case has no workspace, or a free dimension; or half spaces exclude the smallest set of positions.
     """
     workspace = workspace_of_case(case)
     accuracy = _accuracy_of(case, workspace)
@@ -110,7 +110,7 @@ def _accuracy_of(case: Case, workspace: Workspace) -> float:
     """Return the accuracy of the factor of a workspace.
 
     Raises:
-        CaseError: half spaces exclude the centre about which the positions are scaled.
+        CaseError: half spaces exclude the smallest set of positions that is examined.
     """
     positions = workspace.position_set
     if positions is None:
@@ -118,7 +118,10 @@ def _accuracy_of(case: Case, workspace: Workspace) -> float:
     try:
         _ = positions.scaled(_LEAST).middle
     except CaseError:
-        fault = "exclude the centre of the shape; with --scale, every half-space must contain this centre"
+        fault = (
+            "exclude the smallest set that --scale examines (a disc, ball or box shrinks to its centre, a cylinder to "
+            "its axis, a cone to its apex, a ring to its inner circle); move the planes so that a part of it remains"
+        )
         raise CaseError(f"{KEY}.half_spaces", fault, source=case.source) from None
     return ACCURACY_OF_RADIUS if positions.has_radius else ACCURACY
 

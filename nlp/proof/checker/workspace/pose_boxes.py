@@ -25,7 +25,7 @@ from ..fractions import tangent_ends
 from ..polynomials import Polynomial
 from ..proof_file import ProofError
 from ..tree import Node, TreeReader, ahead, blocks_of, wrong_node
-from .position_conditions import PositionConditions, position_conditions
+from .position_conditions import PositionConditions
 
 #: Number of coordinates of a pose.
 COORDINATES = 6
@@ -219,8 +219,9 @@ def pose_root(workspace: Workspace) -> PoseRoot:
     values = (Free(*each) if low < high else low for (low, high), each in zip(spans, ends, strict=True))
     axis = np.array(turns.axis, dtype=float)
     dependent = tuple(each.index for each in workspace.dependent)
-    positions, at = position_conditions(workspace.position_set, lower[:POSITION], upper[:POSITION]), None
-    if workspace.position_set is not None:
+    chosen, positions, at = workspace.position_set, None, None
+    if chosen is not None:
+        positions = PositionConditions(chosen, lower[:POSITION], upper[:POSITION])
         at = 0.5 * lower + 0.5 * upper
         moving = [k for k in range(POSITION) if lower[k] < upper[k] and k not in dependent]
         at[moving] = np.array(workspace.middle)[moving]

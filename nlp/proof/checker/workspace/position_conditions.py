@@ -68,10 +68,9 @@ class PositionConditions:
 
     def __init__(self, positions: PositionSet, lower: FloatArray, upper: FloatArray) -> None:
         self.positions = positions
-        every, any_of = conditions_of(positions)
-        self._every, self._any = every, any_of
-        self._rounded = [_Rounded(each, lower, upper) for each in every]
-        self._rounded_any = [_Rounded(each, lower, upper) for each in any_of]
+        self._every, self._any = _conditions_of(positions)
+        self._rounded = [_Rounded(each, lower, upper) for each in self._every]
+        self._rounded_any = [_Rounded(each, lower, upper) for each in self._any]
 
     def holds(self, point: FloatArray) -> bool:
         """Return whether a point (3,) is provably a position of the set; ends of the box are not tested."""
@@ -189,7 +188,7 @@ class _Rounded:
         return begin, end
 
 
-def conditions_of(given: PositionSet) -> tuple[list[_Condition], list[_Condition]]:
+def _conditions_of(given: PositionSet) -> tuple[list[_Condition], list[_Condition]]:
     """Return conditions that all hold in a set, and conditions of which at least one holds.
 
     If the second list is empty, there is no such condition.
@@ -251,10 +250,3 @@ def _line(origin: _Exact, b: _Exact, c: Fraction) -> _Condition:
 def _between(origin: _Exact, b: _Exact, above: _Exact) -> _Condition:
     """Return a linear condition with a vector between two ends."""
     return _Condition(origin, _diagonal(0, 0, 0), b, above, Fraction(0))
-
-
-def position_conditions(
-    positions: PositionSet | None, lower: FloatArray, upper: FloatArray
-) -> PositionConditions | None:
-    """Return a set of positions in a box with ends (3,) for the checker; None for all positions of the box."""
-    return None if positions is None else PositionConditions(positions, lower, upper)

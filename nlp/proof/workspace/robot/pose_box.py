@@ -30,7 +30,7 @@ from ....case.pose import Free, Value, ends_of
 from ....case.workspace import TurnKind, Workspace
 from ....path.orientation import matrices_from_quaternions
 from ...statement.tolerance import PoseCoordinates
-from .position_bounds import PositionBounds, position_bounds
+from .position_bounds import PositionBounds
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -252,7 +252,8 @@ def pose_box(workspace: Workspace) -> PoseBox:
         ends[each.index] = (math.tan(each.lower / 2), math.tan(each.upper / 2)) if is_turn else (each.lower, each.upper)
     lower, upper = frozen_array(np.array(ends).T, (2, 6))
     dependent = tuple(each.index for each in workspace.dependent)
-    positions = position_bounds(workspace.position_set, lower[:3], upper[:3])
+    chosen = workspace.position_set
+    positions = None if chosen is None else PositionBounds(chosen, lower[:3], upper[:3])
     axis = frozen_array(turns.axis, (3,))
     return PoseBox(turns.kind, axis, lower, upper, ball, dependent=dependent, positions=positions)
 

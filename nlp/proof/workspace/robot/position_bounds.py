@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from .....models import FloatArray, frozen_array
+from .....models import FloatArray
+from .....models.rotation import perpendiculars
 from ....case.positionsets import UPRIGHT, PositionSet, SetKind
 
 if TYPE_CHECKING:
@@ -110,6 +111,7 @@ class _Part:
         least, most = lower.copy(), upper.copy()
         scale = np.maximum(np.abs(before[0]), np.abs(before[1]))
         for i, row in enumerate(self.rows):
+            is_less = (after[0][:, i] > before[0][:, i]) | (after[1][:, i] < before[1][:, i])
             # Coordinates with tiny factors would move only by rounding.
             for k in np.flatnonzero(np.abs(row) > _ROUNDING * np.abs(row).max()):
                 low, high = (row[k] * (end[:, k] - self.origin[k]) for end in (lower, upper))
@@ -121,8 +123,6 @@ class _Part:
                 a = (after[0][:, i] - (before[1][:, i] - own[1]) - slack) / row[k] + self.origin[k]
                 b = (after[1][:, i] - (before[0][:, i] - own[0]) + slack) / row[k] + self.origin[k]
                 a, b = (a, b) if row[k] > 0 else (b, a)
-                is_less = after[0][:, i] > before[0][:, i]
-                is_less |= after[1][:, i] < before[1][:, i]
                 least[:, k] = np.where(is_less, np.maximum(least[:, k], a), least[:, k])
                 most[:, k] = np.where(is_less, np.minimum(most[:, k], b), most[:, k])
         return least, most
@@ -219,8 +219,9 @@ def _parts_of(given: PositionSet) -> list[_Part]:
     elif given.kind is SetKind.BALL:
         parts.append(_Part(origin, np.eye(3), np.ones(3), square, none))
     elif given.kind is not SetKind.BOX:
-        along, e = _frame(given.axis)
         size = float(np.linalg.norm(given.axis))
+        along = given.axis / size
+        e = perpendiculars(along)
         if given.kind is SetKind.CYLINDER:
             parts.append(_Part(origin, e, np.ones(2), square, none))
         else:
@@ -237,21 +238,3 @@ def _parts_of(given: PositionSet) -> list[_Part]:
         n = np.array(each.normal) / np.linalg.norm(each.normal)
         parts.append(_Part(np.array(each.point) + np.array(given.shift), n[None], none, np.zeros(1), none))
     return parts
-
-
-def _frame(axis: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return a unit vector (3,) along an axis, and two orthogonal unit vectors (2, 3) normal to this axis."""
-    along = axis / np.linalg.norm(axis)
-    if np.count_nonzero(axis) == 1:
-        others = [k for k in range(3) if axis[k] == 0]
-        return np.asarray(along), np.eye(3)[others]
-    one = np.cross(along, np.eye(3)[int(np.abs(along).argmin())])
-    one /= np.linalg.norm(one)
-    return np.asarray(along), np.stack([one, np.cross(along, one)])
-
-
-def position_bounds(positions: PositionSet | None, lower: FloatArray, upper: FloatArray) -> PositionBounds | None:
-    """Return a set of positions in a box with ends (3,) for searches; None for all positions of the box."""
-    return (
-        None if positions is None else PositionBounds(positions, frozen_array(lower, (3,)), frozen_array(upper, (3,)))
-    )
