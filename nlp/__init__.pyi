@@ -32,6 +32,7 @@ from .case.loads import Motion as Motion
 from .case.pathfile import PathFile as PathFile
 from .case.pose import Free as Free
 from .case.pose import OverPoses as OverPoses
+from .case.pose import PerTask as PerTask
 from .case.pose import Pose as Pose
 from .case.pose import Rotation as Rotation
 from .case.pose import along_screw as along_screw

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -36,9 +36,10 @@ from .existence import assembly_fault
 from .limits.limit import Limit, LimitedCase
 from .limits.limits import Limits
 from .loads import NO_LOADING, Loading
-from .names import parameter_name, pose_prefixes
+from .names import name_of_task, parameter_name, pose_prefixes
 from .pathfile import PathFile
-from .pose import LARGEST, MAX_FREE_ROTATION, NO_DISPLACEMENT, Free, OverPoses, Pose, Rotation, Value
+from .pertask import check_poses, common_poses, common_value, task_value
+from .pose import LARGEST, MAX_FREE_ROTATION, NO_DISPLACEMENT, Free, OverPoses, PerTask, Pose, Rotation, Value
 from .radians import angles_of, check_radians, with_radians
 from .settings import Expectation, Published, Search
 from .task import MEASURES, Method, Sense, Task
@@ -48,14 +49,28 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
+class Station(NamedTuple):
+    """Pose of the robot in a case.
+
+    Attributes:
+        task: index of the only task at this pose; None if every task takes it.
+        pose: index of the stated pose.
+        step: displacement from the stated pose.
+    """
+
+    task: int | None
+    pose: int
+    step: Displacement
+
+
 @dataclass(frozen=True, eq=False)
 class Case(Whole, Shown):
     """Synthesis problem: a robot, its dimensions and pose, tasks, limits, and settings of the search.
 
     Attributes:
         model: robot of the case.
-        parameters: value of each parameter of the robot by name: a number or :class:`Free`, or a sequence of three for
-            a point or direction; stored as tuples of components.
+        parameters: value of each parameter of the robot by name: a number, :class:`Free` or :class:`PerTask`, or a
+            sequence of three for a point or direction; stored as tuples of components.
         position: (3,) origin of the platform frame in the world frame, length; each coordinate fixed or free.
         rotation: orientation of the platform.
         tasks: tasks of the platform, one or more.
@@ -65,6 +80,8 @@ class Case(Whole, Shown):
         limits: limits that a design must satisfy to be buildable.
         displacements: displacements of the first stated pose; each gives one pose of the robot.
         further: stated poses after the first one, with their displacements; the dimensions are the same at all poses.
+        pose_per_task: If true, every task has its own pose: the stated poses belong to the tasks in turn, as many to
+            each task. A single stated pose gives the ranges of all tasks.
         over_poses: combination of F over several poses.
         worst_everywhere: If true, the worst F over the workspace or path is optimised, not F at the stated poses only.
         joint_centre_tolerance: largest manufacturing error of each joint centre, length; None for no tolerance.
@@ -86,7 +103,7 @@ class Case(Whole, Shown):
     """
 
     model: Model
-    parameters: Mapping[str, Value | Sequence[Value]]
+    parameters: Mapping[str, Value | PerTask | Sequence[Value | PerTask]]
     position: Sequence[Value]
     tasks: Sequence[Task]
     rotation: Rotation = field(default_factory=Rotation)
@@ -95,6 +112,7 @@ class Case(Whole, Shown):
     limits: Limits = field(default_factory=Limits)
     displacements: tuple[Displacement, ...] = (NO_DISPLACEMENT,)
     further: Sequence[Pose] = ()
+    pose_per_task: bool = False
     over_poses: OverPoses = OverPoses.SUM
     worst_everywhere: bool = False
     joint_centre_tolerance: float | None = None
@@ -132,12 +150,16 @@ class Case(Whole, Shown):
         """
         store = object.__setattr__
         store(self, "parameters", MappingProxyType(_check_parameters(self)))
-        if fault := assembly_fault(self.model, self.parameters, self.units):
+        known = {} if self.dimensions_per_task else self.parameters
+        if fault := assembly_fault(self.model, known, self.units):  # type: ignore[arg-type]
             raise NoRobotError("robot.parameters", fault, source=self.source)
         store(self, "position", _check_position(self, self.position, "pose"))
         store(self, "rotation", _check_rotation(self, self.rotation, "pose"))
+        if self.pose_per_task and not self.further:
+            store(self, "further", [Pose(self.position, self.rotation, self.displacements)] * (len(self.tasks) - 1))
         store(self, "further", _check_further_poses(self))
         store(self, "tasks", _check_tasks(self))
+        _check_changes(self)
         _check_choices(self)
         _check_worst_everywhere(self)
         _check_loading(self)
@@ -155,7 +177,8 @@ class Case(Whole, Shown):
             raise CaseError("robot.characteristic_length", "must be positive and finite", self.characteristic_length)
 
     def __repr__(self) -> str:
-        values = [value for name in self.parameters for value in self.components(name)]
+        stated = [value for name in self.parameters for value in self._stated(name)]
+        values = [each for value in stated for each in (value.values if isinstance(value, PerTask) else [value])]
         values += [value for pose in self.poses for value in (*pose.position, pose.rotation.angle)]
         free = sum(isinstance(value, Free) for value in values)
         parts = [_counted(free, "variable"), _counted(len(self.tasks), "task"), _counted(self.pose_count, "pose")]
@@ -196,8 +219,85 @@ class Case(Whole, Shown):
         Args:
             name: name of the parameter in the robot.
         """
+        return tuple(value.whole if isinstance(value, PerTask) else value for value in self._stated(name))
+
+    def _stated(self, name: str) -> tuple[Value | PerTask, ...]:
+        """Return the components of a parameter as the case states them."""
         values = self.parameters[name]
         return tuple(values) if isinstance(values, Sequence) else (values,)
+
+    @property
+    def dimensions_per_task(self) -> Mapping[str, PerTask]:
+        """Components of the robot's parameters that are set anew for every task, by their name in the robot."""
+        return {
+            name: value
+            for item in self.model.parameters
+            for name, value in zip(item.components, self._stated(item.name), strict=True)
+            if isinstance(value, PerTask)
+        }
+
+    @property
+    def changes(self) -> tuple[str, ...]:
+        """Names of what changes from task to task: components of parameters, then ``pose``; empty if nothing does."""
+        return (*map(self.parameter_name, self.dimensions_per_task), *(["pose"] if self.pose_per_task else []))
+
+    @property
+    def changing_key(self) -> str:
+        """Dotted key of the first dimension that changes from task to task, or else of the pose."""
+        name = next(iter(self.dimensions_per_task), None)
+        return "pose" if name is None else f"robot.parameters.{name}"
+
+    def of_task(self, index: int) -> Case:
+        """Return the case of one task: its dimensions, its poses, and no other task.
+
+        Args:
+            index: index of the task.
+        """
+        poses = self.poses
+        if self.pose_per_task:
+            count = len(poses) // len(self.tasks)
+            poses = poses[count * index : count * (index + 1)]
+        first, *further = poses
+        return replace(
+            self,
+            parameters={name: [task_value(each, index) for each in self._stated(name)] for name in self.parameters},
+            position=first.position,
+            rotation=first.rotation,
+            displacements=first.displacements,
+            further=further,
+            pose_per_task=False,
+            tasks=(self.tasks[index],),
+            expect=Expectation(),
+            published=(),
+        )
+
+    def sharing(self, *names: str) -> Case:
+        """Return the case with something that is the same for every task instead of changing from task to task.
+
+        The shared value may take the values that every task allows.
+
+        Args:
+            names: names of ``changes``.
+
+        Raises:
+            CaseError: no value is allowed for every task.
+        """
+        own = self.dimensions_per_task
+        parameters = {item.name: list(self._stated(item.name)) for item in self.model.parameters}
+        for item in self.model.parameters:
+            for k, key in enumerate(item.components):
+                if key in own and self.parameter_name(key) in names:
+                    parameters[item.name][k] = common_value(own[key].values, f"robot.parameters.{key}")
+        first, *further = common_poses(self.poses, len(self.tasks)) if "pose" in names else self.poses
+        return replace(
+            self,
+            parameters=parameters,
+            position=first.position,
+            rotation=first.rotation,
+            displacements=first.displacements,
+            further=further,
+            pose_per_task=self.pose_per_task and "pose" not in names,
+        )
 
     def fixed_parameters(self, reason: str) -> FloatArray:
         """Return the values (d,) of all components of the robot's parameters, in the robot's order.
@@ -262,8 +362,30 @@ class Case(Whole, Shown):
 
     @property
     def pose_count(self) -> int:
-        """Number of poses of the robot: one for each displacement of each stated pose."""
-        return sum(len(pose.displacements) for pose in self.poses)
+        """Number of poses of the robot: one for each displacement of each stated pose.
+
+        If only dimensions change from task to task, the robot takes every pose once for each task.
+        """
+        return len(self.stations)
+
+    @property
+    def poses_per_task(self) -> int:
+        """Number of poses at which F of one task is taken."""
+        return self.pose_count // (len(self.tasks) if self.changes else 1)
+
+    @property
+    def stations(self) -> tuple[Station, ...]:
+        """Poses of the robot in order: the poses of the first task, then those of the second, and so on."""
+        poses = [(k, step) for k, pose in enumerate(self.poses) for step in pose.displacements]
+        if not self.changes:
+            return tuple(Station(None, k, step) for k, step in poses)
+        count = len(self.poses) // len(self.tasks)
+        return tuple(
+            Station(task, k, step)
+            for task in range(len(self.tasks))
+            for k, step in poses
+            if not self.pose_per_task or k // count == task
+        )
 
     @property
     def pose_prefixes(self) -> tuple[str, ...]:
@@ -276,7 +398,13 @@ class Case(Whole, Shown):
 
         The order is: components of the parameters; then, for each pose, position and, if its axis is fixed, angle.
         """
-        names = {part: item.dimension for item in self.model.parameters for part in self.component_names(item)}
+        own, several = self.dimensions_per_task, range(len(self.tasks))
+        names = {
+            name: item.dimension
+            for item in self.model.parameters
+            for key, part in zip(item.components, self.component_names(item), strict=True)
+            for name in ([name_of_task(part, k) for k in several] if key in own else [part])
+        }
         for prefix, pose in zip(self.pose_prefixes, self.poses, strict=True):
             names |= dict.fromkeys((f"{prefix}{part}" for part in component_names("p", 3)), Dimension.LENGTH)
             if pose.rotation.axis is not None:
@@ -346,7 +474,33 @@ class Case(Whole, Shown):
     @property
     def as_limited(self) -> LimitedCase:
         """Part of the case on which its limits depend."""
-        return LimitedCase(self.model, self.units, self.scalars, self.loading)
+        scalars = self.of_task(0).scalars if self.changes else self.scalars
+        return LimitedCase(self.model, self.units, scalars, self.loading)
+
+
+def _check_changes(case: Case) -> None:
+    """Refuse dimensions and poses that change from task to task where this has no meaning, or is not supported.
+
+    Raises:
+        CaseError: there is only one task, poses do not fit to tasks, or another table of the case conflicts.
+    """
+    if not case.changes:
+        return
+    key, tasks = case.changing_key, len(case.tasks)
+    if tasks == 1:
+        raise CaseError(f"{key}.per", "needs several tasks, but the case has one [[task]]; leave per out", "task")
+    for table, stated in (("workspace", case.workspace), ("path", case.path)):
+        if stated is not None:
+            fault = (
+                f"conflicts with {key}, which changes from task to task: the proof needs one robot; remove [{table}]"
+            )
+            raise CaseError(table, fault)
+    if case.pose_per_task:
+        check_poses(case.poses, tasks)
+    if case.over_poses is OverPoses.WORST and case.poses_per_task > 1:
+        raise CaseError("combine.over_poses", "must be 'sum' or 'mean' with several tasks", case.over_poses.value)
+    for task in range(tasks):
+        case.of_task(task)  # checks the dimensions and poses of this task
 
 
 def _check_worst_everywhere(case: Case) -> None:
@@ -400,7 +554,8 @@ def _check_choices(case: Case) -> None:
             raise CaseError(key, "must be numbers or { min, max }: a direction cannot have { values }")
         if len(case.tasks) > 1 and case.method is Method.AVERAGE:
             fault = f"must be 'weighted-sum' or 'worst-case': {key} has catalogue values"
-            fault += ", and an average of catalogue values need not be a catalogue value"
+            is_shared = not case.dimensions_per_task.keys() & set(item.components)
+            fault += ", and an average of catalogue values need not be a catalogue value" if is_shared else ""
             raise CaseError("combine.method", fault, case.method.value)
         if case.method is Method.WORST_CASE and len({task.sense for task in case.tasks}) > 1:
             fault = f"must be 'weighted-sum': {key} has catalogue values, and tasks have both senses"
@@ -440,7 +595,7 @@ def _counted(count: int, word: str) -> str:
     return f"{count} {word}{'' if count == 1 else 's'}"
 
 
-def _check_parameters(case: Case) -> dict[str, tuple[Value, ...]]:
+def _check_parameters(case: Case) -> dict[str, tuple[Value | PerTask, ...]]:
     """Return the components of every parameter in the model's order, a fixed direction as a unit vector.
 
     Raises:
@@ -450,7 +605,7 @@ def _check_parameters(case: Case) -> dict[str, tuple[Value, ...]]:
     for name in case.parameters:
         if name not in known:
             raise CaseError(f"robot.parameters.{name}", f"no such parameter; {nearest(name, known)}")
-    components: dict[str, tuple[Value, ...]] = {}
+    components: dict[str, tuple[Value | PerTask, ...]] = {}
     for name, parameter in known.items():
         key = f"robot.parameters.{name}"
         if name not in case.parameters:
@@ -458,19 +613,39 @@ def _check_parameters(case: Case) -> dict[str, tuple[Value, ...]]:
         given = case.parameters[name]
         if isinstance(given, str | bytes):  # a sequence too, but of no numbers
             check_real(given, key)
-        values = tuple(given) if isinstance(given, Sequence) else (given,)
+        values: tuple[Value | PerTask, ...] = tuple(given) if isinstance(given, Sequence) else (given,)
         if len(values) != len(parameter.typical):
             raise CaseError(key, f"must be {_allowed_form(parameter)}")
+        if parameter.is_direction and any(isinstance(value, PerTask) for value in values):
+            raise CaseError(key, "must be the same for every task: a direction cannot change from task to task")
         if parameter.is_direction and not any(isinstance(value, Free) for value in values):
-            components[name] = tuple(float(part) for part in unit_vector(check_direction(values, key)))
+            components[name] = tuple(float(part) for part in unit_vector(check_direction(values, key)))  # type: ignore[arg-type]
             continue
         keys = [key] if len(values) == 1 else [f"{key}[{index}]" for index in range(len(values))]
         domain = (parameter.lower, parameter.upper)
         components[name] = tuple(
-            check_value(value, place, parameter.dimension, case.units, domain)
+            _check_each(value, place, parameter.dimension, case, domain)
             for value, place in zip(values, keys, strict=True)
         )
     return components
+
+
+def _check_each(
+    value: Value | PerTask, key: str, dimension: Dimension, case: Case, domain: tuple[float, float]
+) -> Value | PerTask:
+    """Return a checked value, or the checked value for each task; arguments and errors are those of ``check_value``."""
+    if not isinstance(value, PerTask):
+        return check_value(value, key, dimension, case.units, domain)
+    given = tuple(value.values)
+    given = given * len(case.tasks) if len(given) == 1 else given
+    if len(given) != len(case.tasks):
+        raise CaseError(
+            f"{key}.tasks", f"must have one value for each of the {len(case.tasks)} tasks, got {len(given)}"
+        )
+    keys = [key if len(value.values) == 1 else f"{key}.tasks[{k}]" for k in range(len(given))]
+    return PerTask(
+        tuple(check_value(each, place, dimension, case.units, domain) for each, place in zip(given, keys, strict=True))
+    )
 
 
 def _allowed_form(parameter: Parameter) -> str:

@@ -4,11 +4,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Annotated, NamedTuple, TypeAlias
 
-from ...models import Dimension
+from ...models import Dimension, Parameter
 from ..errors import CaseError
 from ..system.jsonvalues import Absent, Hidden, JsonObject, Known, Measure, Vector
 from .case import Case
-from .pose import Free, Value
+from .names import name_of_task
+from .pose import Free, PerTask, Value
 
 #: For each such dimension, a slice of its values: index of the first value, and index behind the last value.
 Ranges: TypeAlias = tuple[tuple[int, int], ...]
@@ -23,6 +24,7 @@ class CatalogueDimension(NamedTuple):
         name: name of the component in the case.
         dimension: length, angle or plain number.
         values: allowed values, ascending, radians for angles.
+        task: index of the task with this value; None for a value of all tasks.
     """
 
     parameter: str
@@ -30,6 +32,7 @@ class CatalogueDimension(NamedTuple):
     name: str
     dimension: Dimension
     values: tuple[float, ...]
+    task: int | None = None
 
 
 class ChosenDimension(JsonObject):
@@ -55,11 +58,29 @@ class ChosenDimension(JsonObject):
 def catalogue_dimensions(case: Case) -> tuple[CatalogueDimension, ...]:
     """Return the dimensions of a case with catalogue values, in the robot's order."""
     return tuple(
-        CatalogueDimension(item.name, k, name, item.dimension, value.values)
+        CatalogueDimension(item.name, k, name, item.dimension, value.values, task)
         for item in case.model.parameters
-        for k, (name, value) in enumerate(zip(case.component_names(item), case.components(item.name), strict=True))
+        for k in range(len(item.components))
+        for task, name, value in values_of_component(case, item, k)
         if isinstance(value, Free) and value.values
     )
+
+
+class ComponentValue(NamedTuple):
+    """Name and value of a component of a parameter; with the index of the task, if it changes from task to task."""
+
+    task: int | None
+    name: str
+    value: Value
+
+
+def values_of_component(case: Case, item: Parameter, component: int) -> list[ComponentValue]:
+    """Return the value of a component of a parameter by its index; for each task, if it changes from task to task."""
+    name = case.component_names(item)[component]
+    own = case.dimensions_per_task.get(item.components[component])
+    if own is None:
+        return [ComponentValue(None, name, case.components(item.name)[component])]
+    return [ComponentValue(task, name_of_task(name, task), value) for task, value in enumerate(own.values)]
 
 
 def all_values(numbers: Sequence[CatalogueDimension]) -> Ranges:
@@ -75,14 +96,18 @@ def within_ranges(case: Case, numbers: Sequence[CatalogueDimension], ranges: Ran
         numbers: its dimensions with catalogue values.
         ranges: slice of the values of each dimension.
     """
-    given: dict[tuple[str, int], Value] = {}
+    given: dict[tuple[str, int, int | None], Value] = {}
     for number, (first, behind) in zip(numbers, ranges, strict=True):
         low, high = number.values[first], number.values[behind - 1]
-        given[number.parameter, number.component] = low if behind - first == 1 else Free(low, high)
-    parameters = {
-        item.name: [given.get((item.name, k), value) for k, value in enumerate(case.components(item.name))]
-        for item in case.model.parameters
-    }
+        given[number.parameter, number.component, number.task] = low if behind - first == 1 else Free(low, high)
+
+    def within(item: Parameter, k: int) -> Value | PerTask:
+        values = [
+            (task, given.get((item.name, k, task), value)) for task, _, value in values_of_component(case, item, k)
+        ]
+        return values[0][1] if values[0][0] is None else PerTask(tuple(value for _, value in values))
+
+    parameters = {item.name: [within(item, k) for k in range(len(item.components))] for item in case.model.parameters}
     return replace(case, parameters=parameters)
 
 
@@ -93,10 +118,12 @@ def chosen_settings(case: Case, fixed: Case) -> Mapping[str, float]:
         case: the case with catalogue values.
         fixed: the same case with values chosen.
     """
+    items = {item.name: item for item in case.model.parameters}
     return {
         each.name: case.units.shown(value, each.dimension)
         for each in catalogue_dimensions(case)
-        if not isinstance(value := fixed.components(each.parameter)[each.component], Free)
+        for task, _, value in values_of_component(fixed, items[each.parameter], each.component)
+        if task == each.task and not isinstance(value, Free)
     }
 
 

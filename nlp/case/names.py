@@ -34,6 +34,16 @@ def pose_names(count: int) -> frozenset[str]:
     return frozenset(f"{prefix}{part}" for prefix in pose_prefixes(count) for part in parts)
 
 
+def name_of_task(name: str, task: int) -> str:
+    """Return the name of a dimension of one task, such as ``x1.task2``.
+
+    Args:
+        name: name of the dimension in the case.
+        task: index of the task.
+    """
+    return f"{name}.task{task + 1}"
+
+
 def parameter_name(name: str, count: int) -> str:
     """Return the name of a parameter or component in a case, which differs from all names of pose coordinates.
 

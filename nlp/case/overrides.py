@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from copy import deepcopy
 from typing import Any, TypeAlias
 
 from ...models import component_names
 from ..errors import CaseError, nearest
-from .names import parameter_name, pose_prefixes
+from .names import name_of_task, parameter_name, pose_prefixes
 
 #: New values by name, in the units of the case file: a number, or three for a point, axis or direction.
 Settings: TypeAlias = Mapping[str, float | list[float]]
@@ -23,6 +24,8 @@ _PLACE = "path.place."
 ENDS = ("min", "max", "start")
 #: Names of values of a task, such as ``task.pitch`` or ``task[1].point_x``.
 _TASK = re.compile(r"task(\[\d+\])?\..+")
+#: Names of coordinates of one of several poses, and names of dimensions of one task, such as ``x1.task2``.
+_OF_POSE, _OF_TASK = re.compile(r"pose\d+_"), re.compile(r"\.task\d+(\.|$)")
 #: Names of the six components of a task's twist.
 _TWIST = tuple(f"twist_{k}" for k in range(6))
 #: Forms of a rotation that are a single list of numbers.
@@ -54,12 +57,15 @@ def override_number(tables: dict[str, Any], name: str, value: float | list[float
     if _TASK.fullmatch(name):
         _override_task(tables, name, value)
         return
+    _separate_tasks(tables, name)
     places, rotations = _places(tables, name)
     whole, _, end = name.rpartition(".")
     if end in ENDS and whole in places:
         table, place = places[whole]
         if not isinstance(table[place], dict):
             raise CaseError(name, f"cannot be set: {whole} is fixed; set {whole} itself")
+        if "tasks" in table[place]:
+            raise CaseError(name, f"cannot be set: {whole} differs from task to task; set {whole}.task1.{end}")
         if "values" in table[place]:
             raise CaseError(name, f"cannot be set: {whole} has catalogue values and no bounds; set {whole} itself")
         table[place][end] = value
@@ -158,6 +164,10 @@ def _places(tables: dict[str, Any], name: str) -> tuple[dict[str, _Place], list[
         if isinstance(written, list):
             for index, part in enumerate(component_names(key, len(written))):
                 places[parameter_name(part, len(poses))] = (written, index)
+    for key, (table, place) in list(places.items()):
+        if isinstance(table[place], dict) and "tasks" in table[place]:
+            own = table[place]["tasks"]
+            places |= {name_of_task(key, task): (own, task) for task in range(len(own))}
     rotations = []
     for prefix, pose in zip(pose_prefixes(len(poses)), poses, strict=True):
         if isinstance(pose.get("position"), list):
@@ -166,6 +176,31 @@ def _places(tables: dict[str, Any], name: str) -> tuple[dict[str, _Place], list[
         rotations += [f"{prefix}{part}" for part in ("angle", "axis", *_FORMS)]
         places |= {key: place for key, place in _rotation_places(pose, prefix, name).items() if key not in places}
     return places, rotations
+
+
+def _separate_tasks(tables: dict[str, Any], name: str) -> None:
+    """Write a common range of all tasks once for each task, if the value of one task is to be set.
+
+    Args:
+        tables: the document; changed in place.
+        name: name of the value to be set.
+    """
+    tasks, pose = tables.get("task"), tables.get("pose")
+    if not isinstance(tasks, list):
+        return
+    if isinstance(pose, dict) and pose.get("per") == "task" and _OF_POSE.match(name):
+        shared = {key: value for key, value in pose.items() if key != "per"}
+        names = [task.get("name") or f"task {k + 1}" for k, task in enumerate(tasks)]
+        tables["pose"] = [{**deepcopy(shared), "task": each} for each in names]
+    if _OF_TASK.search(name):
+        parameters = tables.get("robot", {}).get("parameters", {})
+        lists = [value for value in parameters.values() if isinstance(value, list)]
+        for table, keys in [(parameters, list(parameters)), *((each, range(len(each))) for each in lists)]:
+            for key in keys:
+                value = table[key]
+                if isinstance(value, dict) and value.get("per") == "task":
+                    one = {part: given for part, given in value.items() if part != "per"}
+                    table[key] = {"tasks": [dict(one) for _ in tasks]}
 
 
 def _rotation_places(pose: dict[str, Any], prefix: str, name: str) -> dict[str, _Place]:

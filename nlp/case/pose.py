@@ -12,7 +12,7 @@ import itertools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import field
-from typing import TYPE_CHECKING, Protocol, TypeAlias, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
@@ -76,6 +76,46 @@ class Free:
 Value: TypeAlias = float | Free
 
 
+@dataclass(frozen=True)
+class PerTask:
+    """Dimension that is set anew for every task, such as a pin in one of several holes.
+
+    Attributes:
+        values: value for each task, in the order of the tasks; a single value stands for all tasks.
+    """
+
+    values: Sequence[Value]
+
+    @property
+    def whole(self) -> Value:
+        """Smallest range that contains the values of all tasks; a number if all tasks have this number."""
+        ends = [ends_of(value) for value in self.values]
+        lower, upper = min(low for low, _ in ends), max(high for _, high in ends)
+        first = self.values[0]
+        if all(value == first for value in self.values):
+            return first
+        return Free(lower, upper) if lower < upper else lower
+
+    @property
+    def shared(self) -> Value | None:
+        """Values that every task allows; None if there is none."""
+        return shared_value(self.values)
+
+
+def shared_value(values: Sequence[Value]) -> Value | None:
+    """Return the values that several fixed or free values have in common; None without any."""
+    first = values[0]
+    if all(value == first for value in values):
+        return first
+    listed = [set(value.values) for value in values if isinstance(value, Free) and value.values]
+    ends = [ends_of(value) for value in values]
+    lower, upper = max(low for low, _ in ends), min(high for _, high in ends)
+    if listed:
+        common = sorted(each for each in set.intersection(*listed) if lower <= each <= upper)
+        return None if not common else common[0] if len(common) == 1 else Free.among(common)
+    return None if lower > upper else lower if lower == upper else Free(lower, upper)
+
+
 class StatedRange(Protocol):
     """Table of a range in a case file, in the file's units; it may have a ``start``."""
 
@@ -88,6 +128,32 @@ class StatedValues(Protocol):
     """Table of catalogue values in a case file, in the file's units."""
 
     values: list[float]
+
+
+@runtime_checkable
+class StatedTasks(Protocol):
+    """Table of the values of each task in a case file, in the file's units."""
+
+    tasks: list[Any]
+
+
+def internal_dimension(written: Any, units: Units, dimension: Dimension) -> Value | PerTask:  # noqa: ANN401 - a table
+    """Return the value of a dimension in a case file in internal units, or its value for each task."""
+    if isinstance(written, StatedTasks):
+        return PerTask(tuple(internal_value(each, units, dimension) for each in written.tasks))
+    value = internal_value(written, units, dimension)
+    return PerTask((value,)) if getattr(written, "per", None) else value
+
+
+def written_dimension(value: Value | PerTask, units: Units, dimension: Dimension) -> TomlValue:
+    """Return the value of a dimension as TOML, the inverse of :func:`internal_dimension`."""
+    if not isinstance(value, PerTask):
+        return written_value(value, units, dimension)
+    written = [written_value(each, units, dimension) for each in value.values]
+    first = written[0]
+    if isinstance(first, dict) and all(each == first for each in written):
+        return {**first, "per": "task"}
+    return {"tasks": written}
 
 
 def internal_value(written: float | StatedRange | StatedValues, units: Units, dimension: Dimension) -> Value:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from pydantic import ValidationError
 
 from ...models import Dimension, FloatArray, Model, unit_vector
 from ...models.fileversions import CASE_FILES
-from ..errors import CaseError
+from ..errors import CaseError, nearest
 from ..system.reading import check_version
 from ..units import Units
 from .case import Case
@@ -24,23 +24,38 @@ from .limits.limits import Limits
 from .overrides import Settings, override_number
 from .pose import (
     OverPoses,
+    PerTask,
     Pose,
     Rotation,
     RotationForm,
     Value,
     ends_of,
+    internal_dimension,
     internal_value,
     rotation_from_matrix,
     rotation_from_quaternion,
     rotation_from_rpy,
 )
 from .robots import insert_robot_file, model_of_table
-from .schema import Document, ExpectTable, Listed, PoseTable, PublishedTable, RotationTable, TaskTable
+from .schema import (
+    DimensionRange,
+    Document,
+    ExpectTable,
+    Listed,
+    PoseTable,
+    PublishedTable,
+    RotationTable,
+    TaskTable,
+    TaskValues,
+)
 from .settings import Expectation, ExpectedValue, Published, Search
 from .source import find_case, inputs_of, named_files, read_text, source_name, tables_of
-from .table import Range, case_error
+from .table import case_error
 from .task import Method, Sense, Task, unit_twist
 from .toml import toml_document
+
+#: Value of a dimension in a case file.
+Dimensional: TypeAlias = float | DimensionRange | Listed | TaskValues
 
 #: Tables of robot files; each robot file has at least one of these.
 _OF_ROBOT_FILES = frozenset(("limb", "links", "joint"))
@@ -242,7 +257,9 @@ def _case_of(
     tasks = [_task(task, index) for index, task in enumerate(written.task)]
     keys = _pose_keys(written)
     steps = [read_displacements(pose, tasks, units, key) for pose, key in zip(poses, keys, strict=True)]
-    method, over_poses = _combination(written, sum(map(len, steps)))
+    of_tasks = _poses_of_tasks(written)
+    share = len(tasks) if of_tasks and len(poses) > 1 else 1
+    method, over_poses = _combination(written, sum(map(len, steps)) // share)
     first, *further = [
         Pose(
             [internal_value(part, units, Dimension.LENGTH) for part in pose.position],
@@ -262,6 +279,7 @@ def _case_of(
         rotation=first.rotation,
         displacements=first.displacements,
         further=further,
+        pose_per_task=of_tasks,
         over_poses=over_poses,
         worst_everywhere=written.read_worst_everywhere(),
         limits=Limits.from_table(written.limits, model, units),
@@ -286,6 +304,36 @@ def _case_of(
 def _pose_keys(written: Document) -> list[str]:
     """Return the dotted key of each stated pose."""
     return [f"pose[{k}]" for k in range(len(written.pose))] if isinstance(written.pose, list) else ["pose"]
+
+
+def _poses_of_tasks(written: Document) -> bool:
+    """Return whether every task has its own pose.
+
+    Raises:
+        CaseError: the poses name tasks in another order than the tasks, or not all poses name a task.
+    """
+    poses, keys = (written.pose if isinstance(written.pose, list) else [written.pose]), _pose_keys(written)
+    for pose, key in zip(poses, keys, strict=True):
+        if pose.per is not None and (len(poses) > 1 or pose.task is not None):
+            raise CaseError(
+                f"{key}.per", 'needs a single [pose]; write task = "NAME" in each [[pose]] instead', pose.per
+            )
+    if all(pose.task is None for pose in poses):
+        return any(pose.per is not None for pose in poses)
+    names = [task.name or f"task {k + 1}" for k, task in enumerate(written.task)]
+    for pose, key in zip(poses, keys, strict=True):
+        if pose.task is None:
+            raise CaseError(f"{key}.task", "is missing: another [[pose]] names its task, so each must")
+        if pose.task not in names:
+            raise CaseError(f"{key}.task", f"no such task; {nearest(pose.task, names)}", pose.task)
+    if len(names) == 1:
+        raise CaseError(f"{keys[0]}.task", "has no effect with one task; remove it", poses[0].task)
+    count = max(len(poses) // len(names), 1)
+    for k, (pose, key) in enumerate(zip(poses, keys, strict=True)):
+        if len(poses) % len(names) or pose.task != names[k // count]:
+            fault = "is out of order: give the poses in the order of the tasks, the same number for each task"
+            raise CaseError(f"{key}.task", fault, pose.task)
+    return True
 
 
 def _combination(written: Document, poses: int) -> tuple[Method, OverPoses]:
@@ -317,8 +365,8 @@ def _expectation(written: ExpectTable) -> Expectation:
 
 
 def _parameter_value(
-    key: str, given: float | Range | Listed | list[float | Range | Listed], units: Units, dimension: Dimension
-) -> Value | list[Value]:
+    key: str, given: Dimensional | list[Dimensional], units: Units, dimension: Dimension
+) -> Value | PerTask | list[Value | PerTask]:
     """Return the value of a parameter, angles in radians.
 
     Args:
@@ -331,10 +379,10 @@ def _parameter_value(
         CaseError: the value is a list of a single number.
     """
     if not isinstance(given, list):
-        return internal_value(given, units, dimension)
+        return internal_dimension(given, units, dimension)
     if len(given) == 1:
         raise CaseError(f"robot.parameters.{key}", "must be a number or { min, max }, without brackets")
-    return [internal_value(part, units, dimension) for part in given]
+    return [internal_dimension(part, units, dimension) for part in given]
 
 
 def _rotation(written: RotationTable | None, units: Units, pose: str) -> Rotation:

@@ -45,11 +45,26 @@ _FIXED = ("rpy", "matrix", "quaternion")
 Label = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=20)]
 
 
+#: Kinds of change of a dimension or pose.
+Per = Literal["task"]
+
+
+class DimensionRange(Range):
+    """Range of a free dimension."""
+
+    per: Per | None = Field(
+        default=None, description="task: the dimension is set anew for every task; the same for all tasks if left out"
+    )
+
+
 class Listed(Table):
     """Dimension with catalogue values, of which a solve chooses one."""
 
     values: Annotated[list[FiniteFloat], Field(min_length=1)] = Field(
         description="allowed values of the dimension, two or more"
+    )
+    per: Per | None = Field(
+        default=None, description="task: a value is chosen for every task; one value for all tasks if left out"
     )
 
 
@@ -60,6 +75,13 @@ def _tag_of_value(value: object) -> str:
 
 def _tag_of_dimension(value: object) -> str:
     """Return the branch of a union for a number, a range or catalogue values."""
+    if isinstance(value, TaskValues) or (isinstance(value, dict) and "tasks" in value):
+        return "<tasks>"
+    return _tag_of_one(value)
+
+
+def _tag_of_one(value: object) -> str:
+    """Return the branch of a union for a number, a range or catalogue values of one task."""
     is_listed = isinstance(value, Listed) or (isinstance(value, dict) and "values" in value)
     return "<values>" if is_listed else tag_of_number(value)
 
@@ -68,14 +90,32 @@ Numbers = Annotated[
     Annotated[FiniteFloat, Tag("<number>")] | Annotated[list[FiniteFloat], Tag("<list>")],
     Discriminator(lambda value: "<list>" if isinstance(value, list) else "<number>"),
 ]
-DimensionValue = Annotated[
+TaskValue = Annotated[
     Annotated[FiniteFloat, Tag("<number>")] | Annotated[Range, Tag("<range>")] | Annotated[Listed, Tag("<values>")],
+    Discriminator(_tag_of_one),
+]
+
+
+class TaskValues(Table):
+    """Dimension with a value or range of its own for every task."""
+
+    tasks: Annotated[list[TaskValue], Field(min_length=1)] = Field(
+        description="value for each task, in the order of the tasks: a number, { min, max } or { values }"
+    )
+
+
+DimensionValue = Annotated[
+    Annotated[FiniteFloat, Tag("<number>")]
+    | Annotated[DimensionRange, Tag("<range>")]
+    | Annotated[Listed, Tag("<values>")]
+    | Annotated[TaskValues, Tag("<tasks>")],
     Discriminator(_tag_of_dimension),
 ]
 VectorOrValue = Annotated[
     Annotated[FiniteFloat, Tag("<number>")]
-    | Annotated[Range, Tag("<range>")]
+    | Annotated[DimensionRange, Tag("<range>")]
     | Annotated[Listed, Tag("<values>")]
+    | Annotated[TaskValues, Tag("<tasks>")]
     | Annotated[list[DimensionValue], Tag("<list>")],
     Discriminator(_tag_of_value),
 ]
@@ -112,8 +152,8 @@ class RobotTable(Table):
     definition: dict[str, Any] | None = Field(default=None, description="content of a robot file, instead of model")
     parameters: dict[str, VectorOrValue] = Field(
         default_factory=dict,
-        description="value of each parameter by name: a number, a range { min, max } or catalogue values { values }; "
-        "three of these for a point or direction",
+        description="value of each parameter by name: a number, a range { min, max }, catalogue values { values }, or "
+        "a value for each task { tasks }; three of these for a point or direction",
     )
     characteristic_length: FiniteFloat = Field(
         default=Case.characteristic_length,
@@ -226,6 +266,12 @@ class PoseTable(Table):
     )
     rotation: RotationTable | None = Field(
         default=None, description="rotation of the platform; if left out, no rotation"
+    )
+    per: Per | None = Field(
+        default=None, description="task: every task has its own pose, within these ranges; one pose if left out"
+    )
+    task: str | None = Field(
+        default=None, description="name of the only task at this pose; if left out, every task is taken at this pose"
     )
     along_task: AlongTable | None = Field(
         default=None, description="several poses along a task's screw motion, starting from this pose"

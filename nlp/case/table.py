@@ -104,7 +104,19 @@ class Later:
 #: Similarity from which a key is taken for a misspelled one: "rotation" is no misspelled "position".
 _TYPO = 0.8
 #: Parts of a pydantic location that are branches of a union, or mark a key of a table, and not keys of the file.
-_TAGS = ("<number>", "<range>", "<values>", "<list>", "<pose>", "<poses>", "<word>", "<lists>", "<set>", "[key]")
+_TAGS = (
+    "<number>",
+    "<range>",
+    "<values>",
+    "<tasks>",
+    "<list>",
+    "<pose>",
+    "<poses>",
+    "<word>",
+    "<lists>",
+    "<set>",
+    "[key]",
+)
 
 
 def fault_of(key: str, fault: str) -> PydanticCustomError:

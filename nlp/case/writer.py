@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -25,7 +25,7 @@ from .checks import check_real, check_reals
 from .displacements import written_displacements
 from .loads import Loading
 from .overrides import fields_of
-from .pose import Free, Pose, Rotation, written_value
+from .pose import Free, Pose, Rotation, written_dimension, written_value
 from .reader import case_from_tables, case_with_settings
 from .settings import Expectation, Search
 from .task import Task, unit_twist
@@ -116,13 +116,14 @@ def _lines(case: Case) -> Iterator[str]:
     )
     parameters: dict[str, TomlValue] = {}
     for item in model.parameters:
-        values = case.components(item.name)
-        numbers = [written_value(value, units, item.dimension) for value in values]
+        values, given = case.components(item.name), case.parameters[item.name]
+        stated = given if isinstance(given, Sequence) else [given]
+        numbers = [written_dimension(value, units, item.dimension) for value in stated]
         parameters[item.name] = numbers[0] if len(numbers) == 1 else numbers
         if item.is_direction and not any(isinstance(value, Free) for value in values):
             parameters[item.name] = _direction(np.array(values, dtype=np.float64))
     yield from toml_table("[robot.parameters]", parameters)
-    yield from toml_tables("[[pose]]" if case.further else "[pose]", (_pose(case, pose) for pose in case.poses))
+    yield from _poses(case)
     for task in case.tasks:
         if task.is_stated:
             yield from toml_table("[[task]]", _task(task))
@@ -203,6 +204,19 @@ def _direction(unit: FloatArray) -> list[float]:
     return [float(part) for part in unit]
 
 
+def _poses(case: Case) -> Iterator[str]:
+    """Yield the lines of the stated poses; equal ranges of all tasks are written once."""
+    tables = [_pose(case, pose) for pose in case.poses]
+    if not case.pose_per_task:
+        yield from toml_tables("[[pose]]" if case.further else "[pose]", tables)
+    elif len(tables) == len(case.tasks) and all(table == tables[0] for table in tables):
+        yield from toml_table("[pose]", {**tables[0], "per": "task"})
+    else:
+        count = len(tables) // len(case.tasks)
+        named = ({**table, "task": case.tasks[k // count].name} for k, table in enumerate(tables))
+        yield from toml_tables("[[pose]]", named)
+
+
 def _pose(case: Case, pose: Pose) -> dict[str, TomlValue | None]:
     """Return the table of a stated pose."""
     axis, angle = pose.rotation.axis, pose.rotation.angle
@@ -239,7 +253,7 @@ def _task(task: Task) -> dict[str, TomlValue | None]:
 def _combination(case: Case) -> dict[str, TomlValue | None]:
     """Return the table of the combination of tasks and poses, with only the keys that the file may have."""
     method = case.method.value if len(case.tasks) > 1 else None
-    return {"method": method, "over_poses": case.over_poses.value if case.pose_count > 1 else None}
+    return {"method": method, "over_poses": case.over_poses.value if case.poses_per_task > 1 else None}
 
 
 def _limits(case: Case) -> dict[str, TomlValue | None]:

@@ -57,17 +57,17 @@ def export(
     fixed = fixed_point(loaded, joints)
     if fixed is None:
         solution = solve_with_progress(loaded, jobs).solution
-        nlp, x = solution.outcomes[0].own.nlp, solution.x
+        nlp, x, index = solution.at_pose(pose - 1)
         fault = "" if solution.status.is_answer else f"the solve is {solution.status.value}"
     else:
-        nlp, x = fixed
+        (nlp, x), index = fixed, pose - 1
         fault = "" if loops_are_closed(nlp, x) else "the loops of the robot do not close at this point"
         if jacobian is not None and not fault:
             check_same_robot(nlp, x, jacobian)
     if fault:
         print_notice(f"screwsynth: {one_line(case)}: {fault}: nothing is exported")
         raise SystemExit(1)
-    files = files_at(nlp, x, chosen, pose)
+    files = files_at(nlp, x, chosen, index + 1)
     for name in files if Path(out).is_dir() else ():
         check_outputs(inputs, {"--out": str(Path(out) / name)})
     write_folder(out, files, force=force)

@@ -120,7 +120,11 @@ def solve_with_progress(
         certified = certify_with_progress(rounded, jobs=jobs, gap=gap)
         return SolveOutcome(certified.solution, certified, certified.is_proved)
     if certify:
-        certified = certify_with_progress(case, jobs=jobs, gap=gap)
+        found: Case | Solution = case
+        if case.changes:  # the answer also says what each change is worth
+            solution = solve_with_progress(case, jobs).solution
+            found = solution if solution.status.is_answer else case
+        certified = certify_with_progress(found, jobs=jobs, gap=gap)
         return SolveOutcome(certified.solution, certified, certified.is_proved)
     if not sys.stderr.isatty():
         solution = solve(case, jobs=jobs)

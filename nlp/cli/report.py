@@ -59,7 +59,7 @@ def report(
     check = check_case(case, {case: result}) if is_checked else None
     page = report_of(text, solution, result, check, refusal)
     if page.is_enclosed:
-        chosen = chosen_settings(loaded, solution.outcomes[0].own.nlp.case)
+        chosen = chosen_settings(loaded, solution.chosen_case)
         curves = limit_curves(
             solution, result, lambda name, value: load_case(case, {**fixed, **chosen, name: value}), jobs
         )

@@ -52,10 +52,10 @@ def solve(
         from ..solver.rounding import check_rounding
 
         check_rounding(loaded, step)
-    if pose > loaded.pose_count:
-        raise InputError(
-            f"--pose {pose}: no such pose; the case has {loaded.pose_count} pose{'s' * (loaded.pose_count > 1)}"
-        )
+    poses = loaded.poses_per_task  # each picture shows its task
+    if pose > poses:
+        whose = "every task" if loaded.changes else "the case"
+        raise InputError(f"--pose {pose}: no such pose; {whose} has {poses} pose{'s' * (poses > 1)}")
     solution, found, is_proved = solve_with_progress(loaded, jobs, certify=certify, gap=gap, step=step)
     result = result_of(found)
     files.deliver(

@@ -344,6 +344,5 @@ def _movable(nlp: Nlp) -> list[list[int]]:
     unknowns = unknowns if len(unknowns[0]) < len(unknowns[1]) else unknowns[:1]
     if not unknowns[-1]:
         return [every]
-    count = sum(len(item.typical) for item in nlp.program.model.parameters)
-    dimensions = {place.index for place in places.numbers[:count] if place.vector == "x"}
+    dimensions = {place.index for place in places.numbers[: places.dimensions] if place.vector == "x"}
     return [*unknowns, [index for index in every if index not in dimensions], every]

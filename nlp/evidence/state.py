@@ -238,7 +238,7 @@ def _stated_axis_angle(nlp: Nlp, x: FloatArray, stated: int, rotation: FloatArra
 
 def _pose_displacements(case: Case) -> list[tuple[int, Displacement]]:
     """Return the index of the stated pose and the displacement from it, for each pose of the robot."""
-    return [(index, step) for index, pose in enumerate(case.poses) for step in pose.displacements]
+    return [(station.pose, station.step) for station in case.stations]
 
 
 def _rank_and_free_twists(jacobian: FloatArray, centre: FloatArray) -> tuple[int, FloatArray, FloatArray]:

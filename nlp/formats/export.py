@@ -57,7 +57,8 @@ def export_robot(solution: Solution, formats: Collection[str] = ("all",), *, pos
     if not solution.status.is_answer:
         fault = f"the solve of {solution.case.name!r} ended as {solution.status.value}"
         raise InputError(f"{fault}, without a design to export; only a feasible result can be exported")
-    return files_at(solution.outcomes[0].own.nlp, solution.x, formats, pose)
+    nlp, x, index = solution.at_pose(pose - 1)
+    return files_at(nlp, x, formats, index + 1)
 
 
 def files_at(nlp: Nlp, x: FloatArray, formats: Collection[str], pose: int) -> dict[str, str]:
@@ -88,7 +89,7 @@ def fixed_point(case: Case, joints: Mapping[str, float]) -> tuple[Nlp, FloatArra
     """
     values = [value for name in case.parameters for value in case.components(name)]
     values += [value for pose in case.poses for value in (*pose.position, pose.rotation.angle)]
-    if any(isinstance(value, Free) for value in values) or (case.model.free_joints and not joints):
+    if case.changes or any(isinstance(value, Free) for value in values) or (case.model.free_joints and not joints):
         return None
     nlp = begun_at(formulate(case), joints)
     return nlp, closed_start(nlp)

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from ...models import Dimension, FloatArray, Model, component_names
 from ..case.case import Case
-from ..case.choices import catalogue_dimensions, within_ranges
+from ..case.choices import catalogue_dimensions, values_of_component, within_ranges
 from ..case.limits.limits import Limits
 from ..case.pose import NO_DISPLACEMENT, Free, Value
 from ..errors import CaseError, EvaluationError, InputError
@@ -136,8 +136,8 @@ def _case_words(case: Case) -> Iterable[Line | TextTable]:
         yield from task_lines(task_data(case, index), case.units)
     rows = []
     for item in case.model.parameters:
-        values = zip(case.component_names(item), case.components(item.name), strict=True)
-        rows += [_row(case, name, value, item.dimension) for name, value in values]
+        for k in range(len(item.components)):
+            rows += [_row(case, each.name, each.value, item.dimension) for each in values_of_component(case, item, k)]
     for prefix, pose in zip(case.pose_prefixes, case.poses, strict=True):
         names = component_names(f"{prefix}p", 3)
         rows += [_row(case, *each, Dimension.LENGTH) for each in zip(names, pose.position, strict=True)]
@@ -168,12 +168,19 @@ def _drawings_at_start(case: Case) -> list[Drawing]:
     # Limits and further poses do not change the drawing, but take time.
     numbers = catalogue_dimensions(case)
     case = within_ranges(case, numbers, tuple((0, 1) for _ in numbers))
-    plain = replace(case, limits=Limits(), displacements=(NO_DISPLACEMENT,), further=(), joint_centre_tolerance=None)
+    parts = [case.of_task(k) for k in range(len(case.tasks))] if case.changes else [case]
+    steps = (NO_DISPLACEMENT,)
+    plain = [
+        replace(part, limits=Limits(), displacements=steps, further=(), joint_centre_tolerance=None) for part in parts
+    ]
     try:
-        nlps = formulate_each(plain)
+        nlps = [nlp for part in plain for nlp in formulate_each(part)]
     except CaseError as error:
         raise EvaluationError(str(error)) from None
-    return [_drawing_at(nlp, nlp.start, "first starting point", task) for task, nlp in enumerate(nlps)]
+    return [
+        _drawing_at(nlp, nlp.start, "first starting point", min(task, len(nlp.case.tasks) - 1))
+        for task, nlp in enumerate(nlps)
+    ]
 
 
 def _drawing_at(nlp: Nlp, x: FloatArray, where: str, task: int = 0) -> Drawing:

@@ -156,6 +156,10 @@ def _terms(nlp: Nlp) -> list[SX]:
     if program.objective_call is None:
         return []
     weights = ca.vertcat(*([program.p[k] for k in program.places.weights] or [SX(1)]))
+    if tasks := program.places.tasks:
+        count = len(program.robots) // (max(tasks) + 1)
+        part = 1 / count if nlp.case.over_poses is OverPoses.MEAN else 1.0
+        return [part * weights[task] * robot.F[0] for task, robot in zip(tasks, program.robots, strict=True)]
     part = 1 / len(program.robots) if nlp.case.over_poses is OverPoses.MEAN else 1.0
     return [part * ca.dot(weights, robot.F) for robot in program.robots]
 

@@ -104,6 +104,16 @@ def level_constraint(nlp: Nlp, F: SX, name: str) -> BoundedConstraint | None:
     return BoundedConstraint(replace(first, name=name, expression=call.value, call=call), 0.0, math.inf)
 
 
+def F_of_tasks(layout: Layout) -> SX:  # noqa: N802 - the objective's name
+    """Return F of each task at each of its poses, (tasks, poses)."""
+    tasks = layout.places.tasks
+    if not tasks:
+        return ca.horzcat(*[robot.F for robot in layout.robots])
+    pairs = list(zip(tasks, layout.robots, strict=True))
+    rows = [ca.horzcat(*[robot.F for own, robot in pairs if own == task]) for task in dict.fromkeys(tasks)]
+    return ca.vertcat(*rows)
+
+
 def formulate_worst(case: Case, weights: Sequence[float], best: Sequence[float], ceiling: float) -> Nlp:
     """Return the program of the worst of several tasks.
 
@@ -117,7 +127,7 @@ def formulate_worst(case: Case, weights: Sequence[float], best: Sequence[float],
         CaseError: a limb has zero length at every point of the box, or fixed parameters contradict each other.
     """
     layout = lay_out(case, case.tasks)
-    F = ca.horzcat(*[robot.F for robot in layout.robots])
+    F = F_of_tasks(layout)
     is_mean = case.over_poses is OverPoses.MEAN
     senses = {task.sense for task in case.tasks}
     epigraph = EpigraphBuilder(layout, Free(-0.1 * ceiling, 1.1 * ceiling, 0.5 * ceiling), ceiling)
@@ -157,14 +167,14 @@ def level_of_tasks(case: Case, values: Sequence[float], weights: Sequence[float]
 
 
 def with_exact_level(nlp: Nlp, x: FloatArray) -> FloatArray:
-    """Return a point with the level of a one-task worst case set to its best value; other points unchanged.
+    """Return a point with the best level of a worst case of one task or of no other variables; other points unchanged.
 
     Args:
         nlp: the program.
         x: (n,) point.
     """
     epigraph = nlp.program.places.epigraph
-    if epigraph is None or len(nlp.program.places.twists) > 1:
+    if epigraph is None or (len(nlp.program.places.twists) > 1 and not nlp.is_fixed):
         return x
     moved = np.array(x)
     moved[epigraph.level] = exact_levels(nlp, moved[:, None])[0]

@@ -22,7 +22,7 @@ from ..case.limits.constraint import Call, Form
 from ..case.pose import OverPoses
 from ..case.task import Sense
 from .actuators import formulate_actuators
-from .epigraph import formulate_worst_pose, weighted_total
+from .epigraph import F_of_tasks, formulate_worst_pose, weighted_total
 from .layout import Layout, assemble, lay_out
 from .nlp import Nlp
 from .places import Scalar
@@ -78,6 +78,19 @@ def formulate_each(case: Case) -> list[Nlp]:
     return programs
 
 
+def formulate_tasks(case: Case) -> list[Nlp]:
+    """Return the programs of all tasks of a case, also if dimensions or the pose change from task to task.
+
+    The programs of such a case have variables of their own: those that all tasks share, and those of the task.
+
+    Raises:
+        CaseError: a limb has zero length at every point of the box, or fixed parameters contradict each other.
+    """
+    if not case.changes:
+        return formulate_each(case)
+    return [formulate(case.of_task(task)) for task in range(len(case.tasks))]
+
+
 def scaled_weights(case: Case) -> list[float]:
     """Return the tasks' weights scaled to sum to the number of tasks, as in equation 15."""
     given = [task.weight for task in case.tasks]
@@ -113,7 +126,7 @@ def formulate_weighted(case: Case, weights: Sequence[float]) -> Nlp:
 def _weighted_call(layout: Layout, weights: Sequence[SX]) -> Call:
     """Return the weighted sum of the tasks' objectives over all poses, with weights (1, 1)."""
     form = Form(weighted_total, (len(weights), layout.case.over_poses is OverPoses.MEAN))
-    return Call(form, ca.vertcat(*weights, *[robot.F for robot in layout.robots]))
+    return Call(form, ca.vertcat(*weights, ca.vec(F_of_tasks(layout))))
 
 
 def proximity_program(program: Program) -> Program:

@@ -10,6 +10,9 @@ The variables are the free components of the parameters, of the position ``p``, 
 A direction parameter has three components as variables and its unit length as an equation, so that the coordinates have
 no poles. Its components have bounds beyond -1 and 1, so that these are never active together with the equation.
 
+Dimensions and poses that change from task to task are variables of one task: the robot at a pose of the task has these
+values and only the twist of the task.
+
 Several poses share the robot's dimensions. Each stated pose has its own position and rotation; the poses of a
 trajectory or a grid follow from it by fixed displacements.
 """
@@ -41,14 +44,15 @@ from ...models import (
 )
 from ...models.instance import length_of, sizes_at
 from ...models.values import dataclass
-from ..case.case import Case
+from ..case.case import Case, Station
 from ..case.choices import check_no_catalogue
 from ..case.limits.constraint import BoundedConstraint, Call, Constraint, PairFamily, Reading, squared
+from ..case.names import name_of_task
 from ..case.pose import Free, Pose, Value, sizes_of_turn
 from ..case.task import Sense, Task
 from ..errors import CaseError
 from .free_joints import set_ranges
-from .limits import limit_constraints
+from .limits import NamedSymbols, limit_constraints
 from .loops import needed_equations
 from .nlp import Nlp
 from .places import Epigraph, FreeRotation, HeldRotation, Place, Places, RotationPlaces, SymbolTable
@@ -142,19 +146,29 @@ def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) 
         CaseError: an equation of fixed parameters is violated, or a dimension has a list of values to choose from.
     """
     check_no_catalogue(case)
+    if case.changes and len(tasks) < len(case.tasks):
+        fault = "changes from task to task, but this command takes one robot and pose for all tasks"
+        key = case.changing_key
+        raise CaseError(
+            key, f"{fault}; use solve, report, certify or export, or a case for each task", source=case.source
+        )
     table, model = SymbolTable(), case.model
-    parameters = [
-        table.add_each(case.component_names(item), item.dimension, _component_values(case, item))
-        for item in model.parameters
-    ]
+    owners = _Owners(table)
+    parameters = [_add_parameter(case, item, owners) for item in model.parameters]
     add = _add_pose if add_pose is None else add_pose
-    stated = [add(pose, prefix, table) for prefix, pose in zip(case.pose_prefixes, case.poses, strict=True)]
+    stated = []
+    task_of_stated = {station.pose: station.task for station in case.stations} if case.pose_per_task else {}
+    for k, (prefix, pose) in enumerate(zip(case.pose_prefixes, case.poses, strict=True)):
+        stated.append(add(pose, prefix, table))
+        owners.belong(task_of_stated.get(k))
     reference = reference_of(case)
     ranges = _ranges_of_unknowns(model, reference)
-    unknowns = [
-        [table.add(_name_of(item, pose), item.dimension, own) for item, own in zip(model.unknowns, ranges, strict=True)]
-        for pose in ([0] if case.pose_count == 1 else range(1, case.pose_count + 1))
-    ]
+    unknowns = []
+    for k, station in enumerate(case.stations):
+        number = 0 if case.pose_count == 1 else k + 1
+        pairs = zip(model.unknowns, ranges, strict=True)
+        unknowns.append([table.add(_name_of(item, number), item.dimension, own) for item, own in pairs])
+        owners.belong(station.task)
     joints = [
         [each.places[0].index for each, item in zip(at_pose, model.unknowns, strict=True) if item.is_free]
         for at_pose in unknowns
@@ -168,21 +182,25 @@ def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) 
     ]
     constraints = [item for pose in stated for item in pose.constraints]
     constraints += [
-        _unit_length(item.name, placed.symbols)
+        _unit_length(item.name, placed.of_task[0])
         for item, placed in zip(model.parameters, parameters, strict=True)
         if item.is_direction
     ]
-    values = ca.vertcat(SX(0, 1), *[placed.symbols for placed in parameters])
+    values = [
+        ca.vertcat(SX(0, 1), *[placed.of_task[k] for placed in parameters])
+        for k in range(len(case.tasks) if case.changes else 1)
+    ]
     robots: list[RobotInstance] = []
     loops: list[BoundedConstraint] = []
     following: list[BoundedConstraint] = []
-    poses = [_displace(pose.rotation, pose.position, step) for pose in stated for step in pose.displacements]
-    for k, (rotation, position) in enumerate(poses):
+    for k, (task, at, step) in enumerate(_stations(case, stated)):
+        rotation, position = _displace(stated[at].rotation, stated[at].position, step)
         own_unknowns = ca.vertcat(SX(0, 1), *[each.symbols for each in unknowns[k]])
-        substitution = Substitution(values, own_unknowns, rotation, position, reference)
-        robot = instantiate(model, substitution, length, [twist.symbols for twist in twists])
+        substitution = Substitution(values[task or 0], own_unknowns, rotation, position, reference)
+        own_twists = twists if task is None else [twists[task]]
+        robot = instantiate(model, substitution, length, [twist.symbols for twist in own_twists])
         robots.append(robot)
-        where = f" pose {k + 1}" if len(poses) > 1 else ""
+        where = f" pose {k + 1}" if len(unknowns) > 1 else ""
         loops += [
             BoundedConstraint(
                 Constraint(f"{equation.name}{where}", robot.closure[i], Reading(Dimension.NUMBER)), 0.0, 0.0
@@ -195,8 +213,7 @@ def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) 
         following = [item for k, item in enumerate(loops) if k not in needed]
         loops = [loops[k] for k in needed]
     varying, fixed = _divided(case, [*constraints, *loops], table)
-    numbers = ca.vertsplit(ca.vertcat(values, *[pose.symbols for pose in stated]))
-    limits = limit_constraints(case, robots, dict(zip(case.scalars, numbers, strict=True)), table)
+    limits = limit_constraints(case, robots, _named(case, values, [pose.symbols for pose in stated]), table)
     set_ranges(table, [index for at_pose in joints for index in at_pose], limits.varying)
     places = Places(
         numbers=(
@@ -207,6 +224,9 @@ def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) 
         unknowns=tuple(tuple(each.places[0].index for each in at_pose) for at_pose in unknowns),
         joints=tuple(map(tuple, joints)),
         twists=tuple(range(placed.places[0].index, placed.places[-1].index + 1) for placed in twists),
+        dimensions=sum(len(placed.places) for placed in parameters),
+        owners=tuple(owners.found) if case.changes else (),
+        tasks=tuple(station.task for station in case.stations if station.task is not None),
         directions=tuple(
             (x.index, y.index, z.index)
             for item, placed in zip(model.parameters, parameters, strict=True)
@@ -225,6 +245,74 @@ def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) 
         (*following, *fixed),
         limits.fixed_families,
     )
+
+
+class _Parameter(NamedTuple):
+    """Symbols (n, 1) of a parameter, one vector for each task if dimensions change with it, and all their places."""
+
+    of_task: tuple[SX, ...]
+    places: tuple[Place, ...]
+
+
+class _Owners:
+    """Task of each variable of a symbol table under construction; None for variables of all tasks."""
+
+    def __init__(self, table: SymbolTable) -> None:
+        self.table = table
+        self.found: list[int | None] = []
+
+    def belong(self, task: int | None) -> None:
+        """Record the task of the variables that were added last."""
+        self.found += [task] * (len(self.table.x) - len(self.found))
+
+
+def _add_parameter(case: Case, item: Parameter, owners: _Owners) -> _Parameter:
+    """Add the components of a parameter, those that change from task to task once for each task."""
+    names, values, own = case.component_names(item), _component_values(case, item), case.dimensions_per_task
+    if not case.changes:
+        placed = owners.table.add_each(names, item.dimension, values)
+        owners.belong(None)
+        return _Parameter((placed.symbols,), placed.places)
+    symbols: list[list[SX]] = [[] for _ in case.tasks]
+    places: list[Place] = []
+    for key, name, value in zip(item.components, names, values, strict=True):
+        given = own[key].values if key in own else [value]
+        for task, each in enumerate(given):
+            shown = name_of_task(name, task) if key in own else name
+            placed = owners.table.add(shown, item.dimension, each)
+            owners.belong(task if key in own else None)
+            places += placed.places
+            for column in [symbols[task]] if key in own else symbols:
+                column.append(placed.symbols)
+    return _Parameter(tuple(ca.vertcat(SX(0, 1), *column) for column in symbols), tuple(places))
+
+
+def _stations(case: Case, stated: Sequence[StatedPoseSymbols]) -> list[Station]:
+    """Return the poses of the robot; their displacements are those of the poses as they were added."""
+    if case.changes:
+        return list(case.stations)
+    return [Station(None, k, step) for k, pose in enumerate(stated) for step in pose.displacements]
+
+
+def _named(case: Case, values: Sequence[SX], poses: Sequence[SX]) -> list[NamedSymbols]:
+    """Return the symbols of the case's parameters by name: for each task its own, if these change with the task.
+
+    Args:
+        case: the case.
+        values: symbols of the robot's parameters, for each task.
+        poses: symbols of each stated pose.
+    """
+    if not case.changes:
+        numbers = ca.vertsplit(ca.vertcat(values[0], *poses))
+        return [NamedSymbols(case, dict(zip(case.scalars, numbers, strict=True)), range(case.pose_count))]
+    found, stations = [], case.stations
+    for task in range(len(case.tasks)):
+        own = [k for k, station in enumerate(stations) if station.task == task]
+        stated = dict.fromkeys(stations[k].pose for k in own)
+        numbers = ca.vertsplit(ca.vertcat(values[task], *[poses[k] for k in stated]))
+        alone = case.of_task(task)
+        found.append(NamedSymbols(alone, dict(zip(alone.scalars, numbers, strict=True)), own, case.tasks[task].name))
+    return found
 
 
 def reference_of(case: Case) -> tuple[float, ...]:

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from operator import attrgetter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -17,7 +17,7 @@ from ...models import Dimension, RobotInstance
 from ...models.instance import length_of
 from ..case.case import Case
 from ..case.limits.constraint import BoundedConstraint, PairFamily
-from ..case.limits.limit import Design, Plate, PlateJoint, PosedRobot
+from ..case.limits.limit import Design, Limit, Plate, PlateJoint, PosedRobot
 from ..errors import CaseError
 from .places import SymbolTable
 from .repeated import without_repeated
@@ -30,6 +30,22 @@ _ALL_PAIRS = 3
 _ROUNDING = 1e-10
 #: Absolute tolerance on such a limit near 0, relative to the robot's size: parameters are written with a dozen digits.
 _WRITTEN = 1e-11
+
+
+class NamedSymbols(NamedTuple):
+    """Parameters of a case by name, for limits: of the whole case, or of one task whose values are its own.
+
+    Attributes:
+        case: the case, or the case of the task.
+        symbols: symbols of its parameters by name, radians for angles.
+        poses: indices of its poses.
+        task: name of the task; empty for the whole case.
+    """
+
+    case: Case
+    symbols: Mapping[str, SX]
+    poses: Sequence[int]
+    task: str = ""
 
 
 class LimitConstraints(NamedTuple):
@@ -49,14 +65,14 @@ class LimitConstraints(NamedTuple):
 
 
 def limit_constraints(
-    case: Case, robots: Sequence[RobotInstance], named: Mapping[str, SX], table: SymbolTable
+    case: Case, robots: Sequence[RobotInstance], named: Sequence[NamedSymbols], table: SymbolTable
 ) -> LimitConstraints:
     """Return the limits of a case as constraints, without repetitions.
 
     Args:
         case: the case.
         robots: the robot at each pose.
-        named: symbols of the case's parameters by name, radians for angles.
+        named: symbols of the case's parameters by name; for each task, if these change from task to task.
         table: symbols of the variables and arguments.
 
     Raises:
@@ -66,7 +82,7 @@ def limit_constraints(
         return LimitConstraints((), ())
     case.require_motion()
     x, p = table.variables_vector, table.arguments_vector
-    few, deferred, fixed = _sorted_families(list(_families(case, robots, named)), table)
+    few, deferred, fixed = _sorted_families(list(_families(case, robots, named[0].symbols)), table)
     limits = without_repeated(list(_constraints(case, robots, named, few)), x, p)
     if not limits:
         return LimitConstraints((), (), deferred, fixed)
@@ -140,25 +156,50 @@ def _families(case: Case, robots: Sequence[RobotInstance], named: Mapping[str, S
 def _constraints(
     case: Case,
     robots: Sequence[RobotInstance],
-    named: Mapping[str, SX],
+    named: Sequence[NamedSymbols],
     pairs: Sequence[tuple[BoundedConstraint, ...]],
 ) -> Iterator[BoundedConstraint]:
     """Yield the constraints of every limit: on both plates, on the whole design, on few pairs, then on each pose."""
     limits = sorted(case.limits, key=attrgetter("order"))
-    legs, model = robots[0].legs, case.model
+    for part in named:
+        for item in _of_design(part, robots, limits):
+            if part.task and _is_of_task(item, part, named):
+                yield replace(
+                    item, constraint=replace(item.constraint, name=f"{item.constraint.name} task {part.task}")
+                )
+            elif part is named[0]:
+                yield item
+    for pair in pairs:
+        yield from pair
+    for part in named:
+        for k in part.poses:
+            robot = robots[k]
+            tasks = tuple(task.name for task in part.case.tasks[: robot.rates.shape[1]])
+            pose = PosedRobot(case.model, robot, tasks, f" pose {k + 1}" if len(robots) > 1 else "", case.loading)
+            for limit in limits:
+                for item in limit.at_pose(pose):
+                    yield replace(item, constraint=replace(item.constraint, pose=k))
+
+
+def _of_design(
+    part: NamedSymbols, robots: Sequence[RobotInstance], limits: Sequence[Limit[Any]]
+) -> Iterator[BoundedConstraint]:
+    """Yield the constraints on both plates, then on the whole design, with the parameters of a case or of a task."""
+    own = [robots[k] for k in part.poses]
+    others = [robot for k, robot in enumerate(robots) if k not in part.poses]
+    legs = own[0].legs
     base = Plate("base", tuple(PlateJoint(leg.name, leg.base) for leg in legs))
     platform = Plate("platform", tuple(PlateJoint(leg.name, leg.platform) for leg in legs))
-    design = Design(case.as_limited, tuple(robots), named)
+    design = Design(part.case.as_limited, (*own, *others), part.symbols)
     for plate in (base, platform):
         for limit in limits:
             yield from limit.on_plate(plate)
     for limit in limits:
         yield from limit.of_design(design)
-    for pair in pairs:
-        yield from pair
-    for k, robot in enumerate(robots):
-        tasks = tuple(task.name for task in case.tasks[: robot.rates.shape[1]])
-        pose = PosedRobot(model, robot, tasks, f" pose {k + 1}" if len(robots) > 1 else "", case.loading)
-        for limit in limits:
-            for item in limit.at_pose(pose):
-                yield replace(item, constraint=replace(item.constraint, pose=k))
+
+
+def _is_of_task(item: BoundedConstraint, part: NamedSymbols, named: Sequence[NamedSymbols]) -> bool:
+    """Return whether a constraint depends on a parameter that other tasks do not share."""
+    shared = {symbol.element_hash() for other in named if other is not part for symbol in other.symbols.values()}
+    own = [symbol for symbol in part.symbols.values() if symbol.element_hash() not in shared]
+    return bool(own) and bool(ca.depends_on(item.constraint.expression, ca.vertcat(*own)))

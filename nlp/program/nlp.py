@@ -277,7 +277,10 @@ class Nlp(Whole):
             return self.size
         around = (self._spread(k) for k in range(1, 9))
         for x in (self.start, *(self.centre + self.scale * each for each in around)):
-            size = float(np.max(self.program.kernels.robot_state(x, self.arguments).magnitude))
+            kernels, tasks = self.program.kernels, self.program.places.tasks
+            # The first pose of all tasks, or of each task.
+            firsts = [tasks.index(task) for task in dict.fromkeys(tasks)] or [0]
+            size = float(np.max([kernels.robot_states[k](x, self.arguments).magnitude for k in firsts]))
             if np.isfinite(size) and size > 0:
                 return size
         return 1.0

@@ -94,12 +94,16 @@ class Places:
         numbers: places of the case's parameters, in the order of :attr:`screwsynth.nlp.case.case.Case.scalars`.
         rotations: places of the rotation of each stated pose.
         unknowns: indices in ``x`` of the robot's unknowns, at each pose.
-        joints: indices in ``x`` of the free actuator coordinates among the unknowns, at each pose.
         twists: indices in ``p`` of the six numbers of each task's twist.
         directions: indices in ``x`` of the three components of each unit vector with three free components.
         epigraph: places of the epigraph of a worst case; None if the objective consists of F.
         weights: indices in ``p`` of the tasks' weights; empty for one task.
         further: indices in ``x`` of unknowns and dependent coordinates at workspace poses that are constraints.
+        joints: indices in ``x`` of the free actuator coordinates among the unknowns, at each pose.
+        dimensions: number of the first entries of ``numbers`` that are components of the robot's parameters.
+        owners: index of the task of each variable of a case whose dimensions or pose change from task to task, None for
+            a variable of all tasks; empty for other cases. A level is not counted.
+        tasks: index of the task of each pose in such a case; otherwise empty.
     """
 
     numbers: tuple[Place, ...]
@@ -111,12 +115,24 @@ class Places:
     weights: tuple[int, ...] = ()
     further: tuple[int, ...] = ()
     joints: tuple[tuple[int, ...], ...] = ()
+    dimensions: int = 0
+    owners: tuple[int | None, ...] = ()
+    tasks: tuple[int, ...] = ()
 
     @property
     def determined(self) -> tuple[int, ...]:
         """Indices in ``x`` of the unknowns that closed loops determine at the poses of the case."""
         free = {index for at_pose in self.joints for index in at_pose}
         return tuple(index for at_pose in self.unknowns for index in at_pose if index not in free)
+
+    def of_task(self, task: int, count: int) -> list[int]:
+        """Return the indices in ``x`` of the variables of one task's own program, in its order.
+
+        Args:
+            task: index of the task.
+            count: number of variables, without a level.
+        """
+        return [k for k in range(count) if not self.owners or self.owners[k] in (None, task)]
 
     @property
     def inner(self) -> tuple[int, ...]:

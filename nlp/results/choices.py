@@ -64,7 +64,7 @@ def choice_data(solution: "Solution") -> ChoiceData | None:
     case, choice = solution.case, solution.choice
     if choice is None:
         return None
-    chosen = chosen_settings(case, solution.outcomes[0].own.nlp.case)
+    chosen = chosen_settings(case, solution.chosen_case)
     numbers = tuple(
         ChosenDimension.of(
             each, case.units, value=chosen[each.name], unit=case.units.label(each.dimension), before=None

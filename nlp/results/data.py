@@ -183,6 +183,25 @@ class OutcomeData(JsonObject):
     rates: Vector | None
 
 
+class ChangeData(JsonObject):
+    """Gain by a dimension, or the pose, that changes from task to task.
+
+    Attributes:
+        name: name of the dimension; ``pose`` for the pose.
+        gain: relative gain of the combined objective, compared with the same problem with the dimension or pose shared;
+            null for an average, and without an answer.
+        value_shared: combined objective with it shared; null for an average, and without an answer.
+        F_shared: F of each task with it shared; null without an answer.
+        reason: reason why this problem has no answer; otherwise absent.
+    """
+
+    name: str
+    gain: float | None
+    value_shared: float | None
+    F_shared: Vector | None
+    reason: Absent[str]
+
+
 class CombinedPointData(JsonObject):
     """Combined point of several tasks.
 
@@ -211,6 +230,9 @@ class CombinedData(JsonObject):
         optimality: evidence of optimality for the combined program; null without such a program.
         starts: outcomes of the starts of the combined program; null without such a program.
         certificate: proved bound of the combined program; null if no proof was requested.
+        settings: robot of each task, at the dimensions and the pose of the task; absent if nothing changes from task to
+            task, and then the robot of the point is that of all tasks.
+        changes: gain by each dimension or pose that changes from task to task; absent if nothing does.
     """
 
     method: Method
@@ -223,6 +245,8 @@ class CombinedData(JsonObject):
     optimality: Evidence | None
     starts: StartsData | None
     certificate: CertificateData | None
+    settings: Absent[tuple[RobotData, ...]]
+    changes: Absent[tuple[ChangeData, ...]]
 
     @property
     def point(self) -> CombinedPointData | None:

@@ -96,7 +96,7 @@ class CertifiedResult(JsonObject):
 
 def certified_of(certified: "Certified") -> CertifiedResult:
     """Return the proved bounds of every task and, if tasks are combined, of the combined program."""
-    case = certified.tasks[0].nlp.case
+    case = certified.solution.chosen_case
     return CertifiedResult(
         head=head_data(case),
         certificate=certificate_data(certified.certificate),

@@ -12,12 +12,13 @@ from ..evidence.sensitivity import Sensitivity, sensitivities
 from ..program.relaxation import RelaxedLimit
 from ..proof.certificate.certificate import Certificate
 from ..solver.multistart import ProgramSolution
-from ..solver.solution import Combination, Solution, TaskOutcome
+from ..solver.solution import Combination, SharedInstead, Solution, TaskOutcome
 from ..solver.starts import Optimum, StartStatus
 from ..system.jsonvalues import finite_or_none, vector
 from .choices import ChoiceData, RoundingData, choice_data, rounding_data
 from .data import (
     CaseResult,
+    ChangeData,
     CombinedData,
     CombinedPointData,
     CombinedResult,
@@ -30,6 +31,7 @@ from .data import (
 from .design import limits_data, margins_data, tolerance_loss_of
 from .evidence import certificate_data, optimality_of
 from .objective import objective_data, over_workspace
+from .parts import RobotData
 from .point import head_data, objective, robot_data, versions, violations
 
 if TYPE_CHECKING:
@@ -142,7 +144,11 @@ def combined_result(
         head=head_data(solution.case),
         status=solution.status,
         tasks=tuple(
-            task_result(outcome.exchanged or outcome.own, j, certificates[j] if certificates else None)
+            task_result(
+                outcome.exchanged or outcome.own,
+                0 if solution.case.changes else j,
+                certificates[j] if certificates else None,
+            )
             for j, outcome in enumerate(solution.outcomes)
         ),
         combined=CombinedData.of(
@@ -154,6 +160,8 @@ def combined_result(
             optimality=None if combined is None else optimality_of(combined.nlp, combined.evidence),
             starts=None if combined is None else starts_data(combined),
             certificate=certificate_data(combined_certificate),
+            settings=_settings(solution) or None,
+            changes=tuple(map(_change, solution.changes)) or None,
         ),
         choice=choice_data(solution),
         rounding=rounding_data(solution),
@@ -170,10 +178,35 @@ def _point(solution: Solution, combination: Combination) -> CombinedPointData:
     if own.state is None:
         return CombinedPointData(robot=None, margins=None, limits=None)
     # Only a combined program has derivatives of its value with respect to the limits.
-    nlp, x = (own.own.nlp, solution.x) if combined is None else (combined.nlp, combined.x)
+    nlp, x = (combination.whole, solution.x) if combined is None else (combined.nlp, combined.x)
     margins = margins_data(nlp, x, optimal=combined is not None and solution.all_solved)
-    robot = robot_data(own.own.nlp, solution.x, own.state, None)
+    robot = robot_data(own.own.nlp, own.at, own.state, None)
     return CombinedPointData(robot=robot, margins=margins, limits=limits_data(margins))
+
+
+def _settings(solution: Solution) -> tuple[RobotData, ...]:
+    """Return the robot of each task, if dimensions or the pose change from task to task and all robots exist."""
+    states = [outcome.state for outcome in solution.outcomes]
+    if not solution.case.changes or any(state is None for state in states):
+        return ()
+    return tuple(
+        robot_data(outcome.own.nlp, outcome.at, outcome.state, 0)
+        for outcome in solution.outcomes
+        if outcome.state is not None
+    )
+
+
+def _change(shared: SharedInstead) -> ChangeData:
+    """Return the gain by a change from task to task."""
+    answer = shared.solution if shared.solution is not None and shared.solution.all_solved else None
+    combination = None if answer is None else answer.combination
+    return ChangeData(
+        name=shared.name,
+        gain=shared.gain,
+        value_shared=None if combination is None else combination.value,
+        F_shared=None if answer is None else tuple(outcome.F for outcome in answer.outcomes),
+        reason=shared.reason or None,
+    )
 
 
 def _outcome(outcome: TaskOutcome, *, is_answer: bool) -> OutcomeData:

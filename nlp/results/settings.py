@@ -52,6 +52,9 @@ def robot_of(result: Answer, source: str, case: Case, *, of_any_case: bool = Fal
     Raises:
         InputError: the result belongs to another case, has other units, or is no answer.
     """
+    if case.changes or (isinstance(result, CombinedResult) and result.combined.settings):
+        fault = "dimensions or the pose change from task to task, so there is no single robot"
+        raise InputError(f"{source}: {fault}; set the values with --set")
     name, model = result.head.case, result.head.model
     if model != case.model.name or (name != case.name and not of_any_case):
         fault = f"is a result of the case {name!r} with the robot {model!r}"

@@ -16,7 +16,7 @@ from ..case.choices import catalogue_dimensions
 from ..case.task import Method, Sense
 from ..errors import InputError, check_seconds
 from ..interruption import is_requested, one_call, reason_of, seconds_left, within
-from ..program.formulation import formulate_each
+from ..program.formulation import formulate_tasks
 from ..proof.boxes.engine import search_tape
 from ..proof.boxes.tree import TreeRecord
 from ..proof.certificate.branch_and_bound import GAP, CertifyProgress, certify_program
@@ -157,7 +157,7 @@ def certify(
     with within(time_limit):
         if isinstance(found, Solution) and is_rounded:
             # The rounded design is proved as it is; bounds do not cover what rounding lost.
-            own = prove(replace(found, case=found.outcomes[0].own.nlp.case, choice=None, rounding=None), options)
+            own = prove(replace(found, case=found.chosen_case, choice=None, rounding=None), options)
             solution = replace(own.solution, case=case, choice=found.choice, rounding=found.rounding)
             tasks = tuple(replace(each, scope=_ROUNDED) for each in own.tasks)
             combined = None if own.combined is None else replace(own.combined, scope=_ROUNDED)
@@ -221,7 +221,7 @@ def _certify(
         raise OptionError(
             "proof: no optimum can be proved for averaged tasks: set combine.method to 'weighted-sum' or 'worst-case'"
         )
-    nlps = formulate_each(case) if given is None else [outcome.own.nlp for outcome in given.outcomes]
+    nlps = formulate_tasks(case) if given is None else [outcome.own.nlp for outcome in given.outcomes]
     with_mode = not all_assemblies and has_modes(case.model)
     if given is None and nlps[0].n:
         # Refuse a missing kernel, or an operation without a rule, before a solve.
@@ -268,7 +268,8 @@ def _certify(
         solution = solution_of_one_task(case, own)
         statement = replace(statement, in_home_mode=certificate.nlp.in_home_mode)
         return Certified(solution, (certificate,), None, statement, _complete_tree(writer, certificate))
-    solution = given or _in_half(lambda: solve_programs(case, nlps, search, jobs=jobs))
+    may_be_fixed = bool(case.changes)
+    solution = given or _in_half(lambda: solve_programs(case, nlps, search, jobs=jobs, may_be_fixed=may_be_fixed))
     count = len(solution.outcomes) + 1  # tasks and the combined program
     separate = tuple(
         certify_one(outcome.own, outcome.task.name, None, count - k) for k, outcome in enumerate(solution.outcomes)
@@ -311,7 +312,7 @@ def _certify_choices(
     def solve_fixed(one: Case) -> Solution:
         if case.is_optimised_everywhere:
             return solve(one, starts=starts, seed=seed, jobs=options.jobs)
-        return solve_programs(one, formulate_each(one), search, jobs=options.jobs)
+        return solve_programs(one, formulate_tasks(one), search, jobs=options.jobs, may_be_fixed=bool(one.changes))
 
     choice = found.choice if isinstance(found, Solution) else None
     choice = choice or _in_half(lambda: solve_choices(case, solve_fixed).choice)
@@ -324,7 +325,8 @@ def _certify_choices(
         options.gap,
         is_each=options.above is not None,
     )
-    chosen = replace(best.solution, case=case, choice=replace(choice, chosen=values))
+    changes = found.changes if isinstance(found, Solution) else ()
+    chosen = replace(best.solution, case=case, choice=replace(choice, chosen=values), changes=changes)
     closed = (CertificateStatus.PROVED, CertificateStatus.INFEASIBLE)
     if not choice.is_complete and (together is None or together.status not in closed):
         chosen = interrupted(chosen)  # neither the solve nor the proof covers all combinations

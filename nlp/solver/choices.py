@@ -229,7 +229,7 @@ def combinations_of(ranges: Ranges) -> Iterator[Ranges]:
 
 def _value_of(solution: Solution | None, number: CatalogueDimension) -> float:
     """Return the value of a listed parameter at a solution; without a robot, the middle of the listed values."""
-    state = None if solution is None else solution.outcomes[0].state
+    state = None if solution is None else solution.outcomes[number.task or 0].state
     if state is None:
         return (number.values[0] + number.values[-1]) / 2
     return float(np.ravel(state.parameters[number.parameter])[number.component])

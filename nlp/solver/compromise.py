@@ -8,6 +8,9 @@ Every task is first solved by itself. Then the tasks are combined:
   only the bounds of the variables are guaranteed there, because a box is convex.
 * ``weighted-sum`` and ``worst-case``: one program each; see :mod:`screwsynth.nlp.program.formulation`.
 
+If dimensions or the pose change from task to task, the program of a task has only its own variables. The combined
+program has those that all tasks share, and those of every task; an average is of the shared ones.
+
 Each method reports its cost: F, rates and verdict of every task at the combined point, the loss against the optimum of
 the task, and every violated limit.
 
@@ -69,12 +72,17 @@ class Polish(Protocol):
 def solution_of_one_task(case: Case, own: ProgramSolution) -> Solution:
     """Return the solution of a case with only one task, from the solution of the task's program."""
     F = own.nlp.evaluate(own.x)[0]
-    outcome = TaskOutcome(case.tasks[0], own, _is_unique(own), own.x, own.state, F, own.evidence, 0.0)
+    outcome = TaskOutcome(case.tasks[0], own, _is_unique(own), own.x, own.state, F, own.evidence, 0.0, own.x)
     return Solution(case, own.status, own.x, (outcome,), None, own.seconds)
 
 
 def combine(
-    case: Case, nlps: Sequence[Nlp], own: Sequence[ProgramSolution], solve_one: SolveOne, polish: Polish
+    case: Case,
+    nlps: Sequence[Nlp],
+    own: Sequence[ProgramSolution],
+    solve_one: SolveOne,
+    polish: Polish,
+    beside: Sequence[Sequence[FloatArray]] = (),
 ) -> Solution:
     """Combine several separately solved tasks by the method of the case.
 
@@ -84,23 +92,28 @@ def combine(
         own: solution of each task's program.
         solve_one: function that solves the combined program.
         polish: function that searches the nearest optimum of a set.
+        beside: further points at which the combined search starts, each as the point of every task's program.
 
     Returns:
         The solution; its time is not set.
     """
     weights = scaled_weights(case)
-    points, unique, notices = _choose_members(nlps, own, polish)
+    whole = formulate_weighted(case, weights) if case.changes else nlps[0]
+    points, unique, notices = _choose_members(case, whole, nlps, own, polish)
+    joined = _joined(whole, points)
     notices = [*_scaling_notices(case, weights), *notices]
     combined: ProgramSolution | None = None
     if not all(solution.status.is_answer for solution in own):
-        x, status, value = own[0].x, next(s.status for s in own if not s.status.is_answer), None
+        x, status, value = joined[0], next(s.status for s in own if not s.status.is_answer), None
+        x = x if case.changes else own[0].x
         notices.append("the tasks cannot be combined: a task has no optimum by itself")
     elif case.method is Method.AVERAGE:
-        x, status, value = _average(nlps[0], points, weights), Status.AVERAGED, None
+        x, status, value = _average(whole, joined, weights), Status.AVERAGED, None
     else:
-        combined = _solve_combined(case, nlps, own, points, weights, solve_one)
-        x, status, value = combined.x[: nlps[0].n], combined.status, combined.nlp.evaluate(combined.x)[0]
-    paired = with_pairs_at(nlps[0], [x])
+        joined += [_joined(whole, each)[0] for each in beside if _fits(nlps, each)]
+        combined = _solve_combined(case, whole, nlps, own, joined, weights, solve_one)
+        x, status, value = combined.x[: whole.n], combined.status, combined.nlp.evaluate(combined.x)[0]
+    paired = with_pairs_at(whole, [x])
     at = linearise(paired, x)
     outside = np.flatnonzero(~(measured_slack(paired, x, at) >= -FEASIBLE))
     violated = tuple(dict.fromkeys(at.sides[j].name for j in outside))
@@ -109,14 +122,14 @@ def combine(
     return Solution(
         case=case,
         status=status,
-        x=frozen_array(x, (nlps[0].n,)),
+        x=frozen_array(x, (whole.n,)),
         outcomes=tuple(
-            _outcome(nlp, replace(task, weight=weight), solution, is_unique, point, x)
-            for nlp, task, weight, solution, is_unique, point in zip(
-                nlps, case.tasks, weights, own, unique, points, strict=True
+            _outcome(nlp, replace(task, weight=weight), solution, is_unique, point, _at_task(whole, x, j))
+            for j, (nlp, task, weight, solution, is_unique, point) in enumerate(
+                zip(nlps, case.tasks, weights, own, unique, points, strict=True)
             )
         ),
-        combination=Combination(case.method, value, tuple(weights), violated, tuple(notices), combined),
+        combination=Combination(case.method, value, tuple(weights), violated, tuple(notices), combined, whole),
         seconds=0.0,
     )
 
@@ -136,11 +149,39 @@ def _outcome(nlp: Nlp, task: Task, own: ProgramSolution, unique: bool, point: Fl
     F = float("nan") if state is None else nlp.evaluate(x)[0]
     best = nlp.evaluate(own.x)[0]
     loss = best - F if task.sense is Sense.MAX else F - best
-    return TaskOutcome(task, own, unique, frozen_array(point, (nlp.n,)), state, F, examine(nlp, x), loss)
+    at = frozen_array(x, (nlp.n,))
+    return TaskOutcome(task, own, unique, frozen_array(point, (nlp.n,)), state, F, examine(nlp, x), loss, at)
+
+
+def _at_task(whole: Nlp, x: FloatArray, task: int) -> FloatArray:
+    """Return the variables of one task's program at a point (n,) of the whole program."""
+    return x[whole.program.places.of_task(task, len(x))]
+
+
+def _fits(nlps: Sequence[Nlp], points: Sequence[FloatArray]) -> bool:
+    """Return whether each of several points has as many components as the program of its task has variables."""
+    return all(nlp.n == len(point) for nlp, point in zip(nlps, points, strict=True))
+
+
+def _joined(whole: Nlp, points: Sequence[FloatArray]) -> list[FloatArray]:
+    """Return a point (n,) of the whole program for each task's point.
+
+    The variables that all tasks share are those of the task; the others are those of their own task's point.
+    """
+    places = [whole.program.places.of_task(task, whole.n) for task in range(len(points))]
+    joined = []
+    for task, own in enumerate(points):
+        x = np.zeros(whole.n)
+        for at, point in zip(places, points, strict=True):
+            x[at] = point
+        x[places[task]] = own
+        joined.append(x)
+    return joined
 
 
 def _solve_combined(
     case: Case,
+    whole: Nlp,
     nlps: Sequence[Nlp],
     own: Sequence[ProgramSolution],
     points: Sequence[FloatArray],
@@ -148,11 +189,12 @@ def _solve_combined(
     solve_one: SolveOne,
 ) -> ProgramSolution:
     """Solve the combined program from the optima of the tasks, their average, and sampled starting points."""
-    first = [*points, _average(nlps[0], points, weights)]
+    first = [*points, _average(whole, points[: len(nlps)], weights)]
     if case.method is Method.WEIGHTED_SUM:
-        return solve_one(case.method.value, formulate_weighted(case, weights), first)
+        return solve_one(case.method.value, whole if case.changes else formulate_weighted(case, weights), first)
     best = [nlp.evaluate(solution.x)[0] for nlp, solution in zip(nlps, own, strict=True)]
-    levels = [level_of_tasks(case, [nlp.evaluate(x)[0] for nlp in nlps], weights, best) for x in first]
+    each = [[nlp.evaluate(_at_task(whole, x, j))[0] for j, nlp in enumerate(nlps)] for x in first]
+    levels = [level_of_tasks(case, values, weights, best) for values in each]
     # The level cannot exceed the smallest maximum of a task, nor be worse than at the best of the first points.
     senses = {task.sense for task in case.tasks}
     ceiling = min(b / w for b, w in zip(best, weights, strict=True)) if senses == {Sense.MAX} else min(levels)
@@ -164,7 +206,7 @@ def _solve_combined(
 
 
 def _choose_members(
-    nlps: Sequence[Nlp], own: Sequence[ProgramSolution], polish: Polish
+    case: Case, whole: Nlp, nlps: Sequence[Nlp], own: Sequence[ProgramSolution], polish: Polish
 ) -> tuple[list[FloatArray], list[bool], list[str]]:
     """Choose the point of each task's optimal set that is nearest to the other tasks' points.
 
@@ -175,23 +217,35 @@ def _choose_members(
     members = [_known_members(solution) for solution in own]
     unique = [_is_unique(solution) for solution in own]
     notices = [
-        f"the optimum of {solution.nlp.case.tasks[j].name!r} is not unique: "
-        "the optimum nearest to the other tasks' optima was used"
+        f"the optimum of {case.tasks[j].name!r} is not unique: the optimum nearest to the other tasks' optima was used"
         for j, solution in enumerate(own)
         if not unique[j] and solution.status.is_answer
     ]
-    extended = proximity_program(nlps[0].program)  # one program for all tasks: only their arguments differ
+    # One program serves all tasks with the same variables: only their arguments differ.
+    extended = [proximity_program(nlp.program) for nlp in (nlps if case.changes else nlps[:1])]
     for _ in range(_ROUNDS if notices else 0):
         following = list(points)
         for j in range(len(own)):
             if not unique[j]:
-                target = np.mean([point for k, point in enumerate(points) if k != j], axis=0)
-                following[j] = _nearest_member(nlps[j], own[j], members[j], target, extended, polish)
-        moved = max(float(np.max(np.abs(a - b) / nlps[0].scale)) for a, b in zip(following, points, strict=True))
+                target = np.mean([point for k, point in enumerate(_towards(whole, points, j)) if k != j], axis=0)
+                program = extended[j if case.changes else 0]
+                following[j] = _nearest_member(nlps[j], own[j], members[j], target, program, polish)
+        pairs = zip(nlps, following, points, strict=True)
+        moved = max(float(np.max(np.abs(a - b) / nlp.scale)) for nlp, a, b in pairs)
         points = following
         if moved <= _STILL:
             break
     return points, unique, notices
+
+
+def _towards(whole: Nlp, points: Sequence[FloatArray], task: int) -> list[FloatArray]:
+    """Return the points of all tasks in the variables of one task's program, with its own variables unchanged."""
+    own, places = whole.program.places.of_task(task, whole.n), whole.program.places
+    joined = np.array(_joined(whole, points))
+    if places.owners:
+        kept = [k for k in own if places.owners[k] == task]
+        joined[:, kept] = joined[task, kept]
+    return list(joined[:, own])
 
 
 def _may_be_connected(solution: ProgramSolution) -> bool:

@@ -117,6 +117,9 @@ def check_rounding(case: Case, step: float) -> None:
     option = f"--round {step:g}"
     if not 0 < step < math.inf:
         raise InputError(f"{option}: must be positive and finite")
+    if case.dimensions_per_task:
+        fault = f"rounds one robot, but {case.changes[0]} changes from task to task"
+        raise InputError(f"{option}: {fault}; list its values with values = [...] instead")
     if len(case.tasks) > 1 and case.method is Method.AVERAGE:
         raise InputError(
             f"{option}: combine.method must be weighted-sum or worst-case: an average has no best rounding"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -12,7 +12,8 @@ from ...models.shown import Shown
 from ...models.values import dataclass
 from ...models.whole import Whole
 from ..case.case import Case
-from ..case.choices import ChosenDimension, Ranges
+from ..case.choices import ChosenDimension, Ranges, catalogue_dimensions, within_ranges
+from ..case.names import name_of_task, pose_names
 from ..case.task import Method, Task
 from ..errors import EvaluationError, InputError, nearest
 from ..evidence.evaluation import shown_parameters, shown_values
@@ -102,6 +103,8 @@ class TaskOutcome:
         evidence: evidence of optimality at the solution for this task only; None without free variables.
         loss: loss of F compared with the task's separate optimum; negative if the combined search reached a better
             optimum; 0 for a case with one task.
+        at: (m,) point of the solution in the variables of the task's program; these are only a part of the solution's
+            variables if dimensions or the pose change from task to task.
         exchanged: solution of the task's separate program with constraints at the poses that the exchange added; only
             for several tasks with limits over a workspace or along a path, otherwise None. The program of ``own`` has
             no such constraints.
@@ -115,6 +118,7 @@ class TaskOutcome:
     F: float
     evidence: Evidence | None
     loss: float
+    at: FloatArray
     exchanged: ProgramSolution | None = None
 
 
@@ -129,6 +133,8 @@ class Combination:
         violated: names of the bounds and constraints that the combined point violates.
         notices: sentences about scaled weights and optima that are not unique.
         combined: solution of the combined program; None for an average, or if a task has no separate optimum.
+        whole: program with the variables and limits of the solution: that of the first task, or a program of all tasks
+            if dimensions or the pose change from task to task.
     """
 
     method: Method
@@ -137,6 +143,32 @@ class Combination:
     violated: tuple[str, ...]
     notices: tuple[str, ...]
     combined: ProgramSolution | None
+    whole: Nlp
+
+
+@dataclass(frozen=True, eq=False)
+class SharedInstead:
+    """Answer to the same problem with one change fewer: a dimension or the pose is the same for every task.
+
+    Attributes:
+        name: name of the dimension; ``pose`` for the pose.
+        solution: answer to this problem; None if no value is allowed for every task.
+        gain: relative gain of the combined objective by the change; None for an average and without an answer.
+        reason: reason why there is no answer; empty with an answer.
+    """
+
+    name: str
+    solution: Solution | None
+    gain: float | None
+    reason: str = ""
+
+
+class PointAtPose(NamedTuple):
+    """Program of a task, a point (n,) in its variables, and the index of one of its poses."""
+
+    nlp: Nlp
+    x: FloatArray
+    pose: int
 
 
 class ChoicePart(NamedTuple):
@@ -219,6 +251,7 @@ class Solution(Whole, Shown, Answer):
             program has no answer.
         choice: search over listed parameter values; None without listed values.
         rounding: rounding of dimensions; None without rounding.
+        changes: for each dimension or pose that changes from task to task, the answer with it shared.
     """
 
     case: Case
@@ -231,6 +264,7 @@ class Solution(Whole, Shown, Answer):
     path: ExchangeProof | None = None
     choice: Choice | None = None
     rounding: Rounding | None = None
+    changes: tuple[SharedInstead, ...] = ()
 
     def __repr__(self) -> str:
         if self.combination is None:
@@ -254,7 +288,9 @@ class Solution(Whole, Shown, Answer):
             InputError: the case has no value of this name.
             EvaluationError: the robot's loops cannot be closed at the point.
         """
-        numbers = shown_values(self.outcomes[0].own.nlp, self.x, self._state())
+        numbers = shown_values(self.outcomes[0].own.nlp, self.outcomes[0].at, self._state())
+        if self.case.changes:
+            numbers = values_of_tasks(self.case, self.settings)
         if name not in numbers:
             raise InputError(f"{name}: no such value; {nearest(str(name), numbers)}")
         return numbers[name]
@@ -269,6 +305,20 @@ class Solution(Whole, Shown, Answer):
         return shown_parameters(self.case, self._state())
 
     @property
+    def settings(self) -> tuple[Mapping[str, float | Vector], ...]:
+        """Parameters and pose coordinates of each task at the point, in the case's units, by their names for ``--set``.
+
+        Raises:
+            EvaluationError: the robot's loops cannot be closed at the point.
+        """
+        self._state()
+        return tuple(
+            shown_values(outcome.own.nlp, outcome.at, outcome.state)
+            for outcome in self.outcomes
+            if outcome.state is not None
+        )
+
+    @property
     def jacobian(self) -> FloatArray:
         """Jacobian (m, 6) at the first pose: unit wrenches, force, then moment about the world origin.
 
@@ -278,6 +328,27 @@ class Solution(Whole, Shown, Answer):
             EvaluationError: the robot's loops cannot be closed at the point.
         """
         return self._state().jacobian
+
+    def at_pose(self, pose: int) -> PointAtPose:
+        """Return the program of the task of a pose, the point in its variables, and the pose's index in the program.
+
+        Args:
+            pose: index of the pose in the case.
+        """
+        stations = self.case.stations
+        task = stations[pose].task or 0
+        before = sum(station.task == stations[pose].task for station in stations[:pose])
+        outcome = self.outcomes[task]
+        return PointAtPose(outcome.own.nlp, outcome.at, before)
+
+    @property
+    def chosen_case(self) -> Case:
+        """Case with the chosen catalogue values; the case itself if it has none."""
+        if not self.case.changes:
+            return self.outcomes[0].own.nlp.case
+        if self.choice is None:
+            return self.case
+        return within_ranges(self.case, catalogue_dimensions(self.case), self.choice.chosen)
 
     @property
     def keeps_limits(self) -> bool:
@@ -366,6 +437,25 @@ class Solution(Whole, Shown, Answer):
             fault = "an average of tasks has no combined program; solution.outcomes has the program of each task"
             raise EvaluationError(fault)
         return self.decided_by
+
+
+def values_of_tasks(case: Case, settings: Sequence[Mapping[str, float | Vector]]) -> Mapping[str, float | Vector]:
+    """Return the values of a case whose dimensions or pose change from task to task, by their names for ``--set``.
+
+    Args:
+        case: the case.
+        settings: values of each task by their names in the case of the task.
+    """
+    changing = {case.parameter_name(name) for name in case.dimensions_per_task}
+    poses = set(pose_names(len(case.poses) // len(case.tasks))) if case.pose_per_task else set[str]()
+    found = {name: value for name, value in settings[0].items() if name not in changing | poses}
+    for task, values in enumerate(settings):
+        found |= {name_of_task(name, task): value for name, value in values.items() if name in changing}
+    if case.pose_per_task:
+        stated = [values[name] for values in settings for name in values if name in poses]
+        parts = [f"{prefix}{part}" for prefix in case.pose_prefixes for part in ("p_x", "p_y", "p_z", "angle", "axis")]
+        found |= dict(zip(parts, stated, strict=True))
+    return found
 
 
 def interrupted(solution: Solution) -> Solution:

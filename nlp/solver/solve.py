@@ -13,7 +13,7 @@ from ..case.case import Case
 from ..case.choices import catalogue_dimensions
 from ..case.settings import Search
 from ..errors import CaseError
-from ..program.formulation import formulate_each, formulate_everywhere
+from ..program.formulation import formulate_everywhere, formulate_tasks
 from ..program.nlp import Nlp
 from ..program.pairs import with_shared_pairs
 from .compromise import combine, solution_of_one_task
@@ -46,7 +46,8 @@ def solve(
 ) -> Solution:
     """Solve a case: its task, or each of several tasks and then their combination by the method of the case.
 
-    For listed parameter values, the solve chooses the best combination: see :mod:`.choices`.
+    For listed parameter values, the solve chooses the best combination: see :mod:`.choices`. If dimensions or the pose
+    change from task to task, the same problem with each of them shared is solved too: see :mod:`.changes`.
 
     Args:
         case: the case.
@@ -64,11 +65,45 @@ def solve(
             workspace or along a path, and the C kernel for their proof was not built; or the path cannot be read.
     """
     began = time.perf_counter()
+    solve_once = partial(
+        _solve, starts=starts, seed=seed, jobs=jobs, compiled=compiled, progress=progress, solver=solver, phase=phase
+    )
+    if not case.changes:
+        return solve_once(case)
+    from .changes import with_each_shared  # noqa: PLC0415 - few cases have changes
+
+    solution = with_each_shared(case, partial(solve_once, may_be_fixed=True))
+    return replace(solution, seconds=time.perf_counter() - began)
+
+
+def _solve(
+    case: Case,
+    *,
+    starts: int | None,
+    seed: int | None,
+    jobs: int | None,
+    compiled: bool,
+    progress: SolveProgress | None,
+    solver: Solver,
+    phase: PhaseProgress,
+    beside: Sequence[Sequence[FloatArray]] = (),
+    may_be_fixed: bool = False,
+) -> Solution:
+    """Solve a case, without the answers to the same problem with one change fewer; see :func:`solve`."""
+    began = time.perf_counter()
     if catalogue_dimensions(case):
         from .choices import solve_choices  # noqa: PLC0415 - few cases have listed values
 
         solve_fixed = partial(
-            solve, starts=starts, seed=seed, jobs=jobs, compiled=compiled, progress=progress, solver=solver, phase=phase
+            _solve,
+            starts=starts,
+            seed=seed,
+            jobs=jobs,
+            compiled=compiled,
+            progress=progress,
+            solver=solver,
+            phase=phase,
+            may_be_fixed=True,
         )
         return replace(solve_choices(case, solve_fixed), seconds=time.perf_counter() - began)
     search = case.search.but(starts, seed, compiled=compiled)
@@ -83,13 +118,15 @@ def solve(
         everywhere = over_path if case.limits_over == "path" else over_workspace
     solution = solve_programs(
         case,
-        [formulate_everywhere(case)] if case.worst_everywhere else formulate_each(case),
+        [formulate_everywhere(case)] if case.worst_everywhere else formulate_tasks(case),
         search,
         jobs=jobs,
         progress=progress,
         solver=solver,
         phase=phase,
         everywhere=everywhere,
+        beside=beside,
+        may_be_fixed=may_be_fixed,
     )
     return replace(solution, seconds=time.perf_counter() - began)
 
@@ -104,6 +141,8 @@ def solve_programs(
     solver: Solver = ipopt,
     phase: PhaseProgress = no_phase,
     everywhere: Everywhere | None = None,
+    beside: Sequence[Sequence[FloatArray]] = (),
+    may_be_fixed: bool = False,
 ) -> Solution:
     """Solve a case from the formulated program of each of its tasks.
 
@@ -117,6 +156,8 @@ def solve_programs(
         phase: function to call with the phase of the solve and its progress.
         everywhere: function that adds limits over a workspace or along a path to a program with limits at the stated
             poses; None without such limits.
+        beside: further starting points of several tasks; see :func:`.combine`.
+        may_be_fixed: If true, several tasks without a free variable are combined too, as for a choice of all values.
 
     Raises:
         CaseError: the case has several tasks and nothing free.
@@ -138,23 +179,27 @@ def solve_programs(
         found, proof[case.limits_over] = exchanged(everywhere(case, nlp), partial(solve_one, name), first)
         return found
 
-    if len(nlps) > 1 and nlps[0].is_fixed:
+    if len(nlps) > 1 and not may_be_fixed and all(nlp.is_fixed for nlp in nlps):
         raise CaseError("robot", "has no free variable, so several tasks cannot be combined", source=case.source)
     if len(nlps) == 1:
         found = solve_everywhere(case, case.tasks[0].name, nlps[0])
         return replace(solution_of_one_task(case, found), **proof)
     own: list[ProgramSolution] = []
     notices: list[str] = []
-    for nlp, task in zip(nlps, case.tasks, strict=True):
-        own.append(solve_everywhere(replace(case, tasks=(task,)), task.name, nlp))
+    for j, (nlp, task) in enumerate(zip(nlps, case.tasks, strict=True)):
+        alone = case.of_task(j) if case.changes else replace(case, tasks=(task,))
+        own.append(solve_everywhere(alone, task.name, nlp))
         if any(each is not None and not each.is_proved for each in proof.values()):
             notices.append(f"the optimum of {task.name!r} by itself is not proved {case.limits_where}")
     proof.clear()  # only the proof of the combined design counts
-    nlps = with_shared_pairs(nlps, [place for solution in own for place in solution.nlp.pairs])
+    if case.changes:
+        nlps = [solution.nlp for solution in own]  # each with the pairs of its own poses
+    else:
+        nlps = with_shared_pairs(nlps, [place for solution in own for place in solution.nlp.pairs])
     polish = partial(solve_program, search=replace(search, starts=1), jobs=1, solver=solver)
     solve_combined = partial(solve_everywhere, case)
     if everywhere is None:
-        solution = combine(case, nlps, own, solve_combined, polish)
+        solution = combine(case, nlps, own, solve_combined, polish, beside)
     else:
         stated = [_at_stated_poses(solution, nlp) for solution, nlp in zip(own, nlps, strict=True)]
         solution = _with_exchanged(combine(case, nlps, stated, solve_combined, polish), own, notices)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..evidence.optimality import Evidence
     from ..evidence.tolerance import ToleranceLoss
     from ..results.choices import ChoiceData, RoundingData
-    from ..results.data import CertificateData, CombinedData, CombinedResult, SolveResult, StartsData
+    from ..results.data import CertificateData, ChangeData, CombinedData, CombinedResult, SolveResult, StartsData
     from ..results.parts import LimitData, RobotData, TaskData, ViolationData
 
 #: Largest number of violated limits, and of optima, that are shown.
@@ -31,6 +31,8 @@ _VIOLATIONS, _OPTIMA = 8, 5
 _DIGITS = 6
 #: Relative difference of the objective between two solves of one nonlinear program; below it, solver error.
 _UNCHANGED = 1e-9
+#: Relative gain of an objective by a change from task to task, below which there is no gain.
+_NO_GAIN = 1e-6
 #: Rank of J of a robot that is not singular.
 _FULL_RANK = 6
 #: Share of searches that converged, of which there are many, up to which the result has a caution.
@@ -433,3 +435,22 @@ def combined_value_lines(combined: CombinedData) -> Iterator[Line]:
     yield Line(number(combined.value), label=f"{combined.method.value} objective")
     if combined.optimality is not None:
         yield optimality_line(combined.optimality)
+
+
+def change_lines(combined: CombinedData) -> Iterator[Line]:
+    """Yield the gain by each dimension or pose that changes from task to task."""
+    for change in combined.changes or ():
+        yield Line(_gain_words(change, combined), label=f"{change.name} per task")
+
+
+def _gain_words(change: ChangeData, combined: CombinedData) -> str:
+    """Return the gain by a change from task to task in words."""
+    if change.F_shared is None:
+        return f"not compared: {change.reason}"
+    if change.gain is None or change.value_shared is None:
+        pairs = zip(combined.tasks, change.F_shared, strict=True)
+        return f"F with {change.name} shared: {', '.join(f'{task.name} {number(F)}' for task, F in pairs)}"
+    beside = f"{number(change.value_shared)} with {change.name} shared"
+    if abs(change.gain) < _NO_GAIN:
+        return f"no gain: the {combined.method.value} objective is {beside}"
+    return f"{100 * change.gain:+.3g} % of the {combined.method.value} objective: {beside}"

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...models import Dimension, Model, WrenchKind, component_names
 from ..case.case import Case
+from ..case.names import name_of_task
 from ..case.pose import Free, RotationForm, Value, sizes_of_turn
 from ..case.task import Method, Sense
 from ..results.poses import rotation_numbers
@@ -164,6 +165,7 @@ def design_table(
     sensitivity: Sequence[Sensitivity] = (),
     F: float | None = None,
     combined: bool = False,
+    settings: Sequence[RobotData] = (),
 ) -> TextTable:
     """Return every dimension and the pose: value, unit, bounds, status, and derivative of the optimal objective.
 
@@ -175,6 +177,7 @@ def design_table(
         sensitivity: derivatives of the optimal F with respect to the fixed values.
         F: objective; None if F is unknown.
         combined: If true, the objective combines several tasks.
+        settings: robot of each task, if dimensions or the pose change from task to task.
     """
     reasons = _Rows(case.units, robot_size(robot), size_of_F(robot, F or 0.0), active, sensitivity, _sense(case))
     rows: list[_Row] = []
@@ -184,7 +187,10 @@ def design_table(
         names, largest = case.component_names(parameter), max(map(abs, values))
         for name, value, given in zip(names, values, case.components(parameter.name), strict=True):
             rows.append(reasons.row(name, value, given, parameter.dimension, largest))
-    stated = (robot.pose,) if robot.several is None else robot.several.stated_poses
+    stated = stated_poses_of(robot)
+    if settings:
+        rows = list(_rows_of_tasks(case, settings, reasons))
+        stated = tuple(pose for each in settings for pose in stated_poses_of(each))[: len(case.poses)]
     for k, found in enumerate(stated):
         rows += _pose_rows(case, k, found, reasons)
     joints = _free_joint_rows(case, robot.free_joints or (), reasons)
@@ -205,6 +211,27 @@ def design_table(
     columns = len(headers) if any(row.cells[4] for row in rows) else 4
     cells = tuple(row.cells[:columns] for row in rows)
     return TextTable(headers[:columns], cells, "design", folded=folded, folded_words=words, named=named)
+
+
+def stated_poses_of(robot: RobotData) -> tuple[PlatformPose, ...]:
+    """Return the stated poses of a robot."""
+    return (robot.pose,) if robot.several is None else robot.several.stated_poses
+
+
+def _rows_of_tasks(case: Case, settings: Sequence[RobotData], reasons: _Rows) -> Iterator[_Row]:
+    """Yield the rows of the dimensions; of those that change from task to task, one row for each task."""
+    for parameter in case.model.parameters:
+        shown = [each.parameters[parameter.name] for each in settings]
+        values = [each if isinstance(each, tuple) else (each,) for each in shown]
+        largest = max(abs(part) for each in values for part in each)
+        names, ranges = case.component_names(parameter), case.components(parameter.name)
+        for k, (key, name, given) in enumerate(zip(parameter.components, names, ranges, strict=True)):
+            own = case.dimensions_per_task.get(key)
+            if own is None:
+                yield reasons.row(name, values[0][k], given, parameter.dimension, largest)
+                continue
+            for task, value in enumerate(own.values):
+                yield reasons.row(name_of_task(name, task), values[task][k], value, parameter.dimension, largest)
 
 
 def _pose_rows(case: Case, k: int, found: PlatformPose, reasons: _Rows) -> list[_Row]:
@@ -264,7 +291,8 @@ def combined_design_table(case: Case, combined: CombinedData, robot: RobotData) 
     """Return the design of a combined solve of several tasks."""
     reached = combined.method_point is None
     active = () if reached or combined.optimality is None else combined.optimality.active
-    return design_table(case, robot, reached=reached, active=active, F=combined.value, combined=True)
+    settings = combined.settings or ()
+    return design_table(case, robot, reached=reached, active=active, F=combined.value, combined=True, settings=settings)
 
 
 #: Largest relative difference from the worst F at which a pose also counts as worst.

@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, TypeAlias
 
 from ..case.case import Case
+from ..case.names import name_of_task
 from ..evidence.state import ZERO_F
 from ..results.data import CombinedResult
 from ..results.rounding import robot_size, size_of_F
@@ -18,6 +19,7 @@ from .joints import limb_part_table
 from .lines import (
     active_limit_lines,
     certificate_lines,
+    change_lines,
     check_lines,
     choice_lines,
     combined_lines,
@@ -57,6 +59,9 @@ if TYPE_CHECKING:
     from ..results.evaluation import EvaluationResult
     from ..results.evidence import CertifiedResult
     from ..results.parts import RobotData
+
+#: Tables of a whole solve, which a robot at its poses lacks.
+_OF_DESIGN = ("design", "limits", "margins", "actuation")
 
 Summary: TypeAlias = Iterator[Line | TextTable]
 
@@ -156,6 +161,7 @@ def _combined_summary(case: Case, result: CombinedResult) -> Summary:
         yield caution
     yield from _proof_lines(case, result)
     yield from combined_value_lines(combined)
+    yield from change_lines(combined)
     for task in result.tasks:
         name = task.robot.task.name if task.robot is not None and task.robot.task is not None else None
         yield from _named(certificate_lines(task.certificate), name)
@@ -166,10 +172,13 @@ def _combined_summary(case: Case, result: CombinedResult) -> Summary:
     if point is not None:
         yield from active_limit_lines(point.limits or (), limits_title(case, result.workspace or result.path))
     yield from in_part("notes", (Line(notice, label="note") for notice in combined.notices))
-    if robot is not None:
-        part = "" if is_unasked_singularity(robot, case) else "rank"
-        yield from in_part(part, singularity_lines(robot, case.units))
-        yield from exclusion_lines(case, robot)
+    advice: dict[str, Line] = {}
+    for each in combined.settings or ([] if robot is None else [robot]):
+        part = "" if is_unasked_singularity(each, case) else "rank"
+        name = each.task.name if each.task is not None and combined.settings else None
+        yield from in_part(part, _named(singularity_lines(each, case.units), name))
+        advice |= {line.text: line for line in exclusion_lines(case, each)}
+    yield from advice.values()
     if point is not None and point.limits:
         title = limits_title(case, result.workspace or result.path)
         yield from in_part("limits", [limit_table(point.limits, combined.value or 0.0, title)])
@@ -252,8 +261,13 @@ def table_names(case: Case, *, at_point: bool) -> tuple[str, ...]:
         case: the case.
         at_point: If true, the case is evaluated at a point, not solved.
     """
+    if case.changes:
+        several = range(len(case.tasks))
+        own = [name for name in table_names(case.of_task(0), at_point=False) if name not in _OF_DESIGN]
+        shared = ["limits", "margins"] if case.limits else []
+        return ("design", *(name_of_task(name, k) for k in several for name in own), *shared, "tasks")
     names = ["design"]
-    if case.pose_count == 1:
+    if case.poses_per_task == 1:
         names.append("limbs")
     else:
         names += ["poses", *(["rates"] if at_point or len(case.tasks) == 1 else [])]
@@ -284,7 +298,11 @@ def case_tables(case: Case, result: CaseResult) -> Iterator[TextTable]:
         if result.combined.method_point is None:
             # The summary shows no design without an answer.
             yield combined_design_table(case, result.combined, result.robot)
-        yield from robot_tables(case, result.robot)
+        if not case.changes:
+            yield from robot_tables(case, result.robot)
+        for k, each in enumerate(result.combined.settings or ()):
+            tables = robot_tables(case.of_task(k), each)
+            yield from (replace(table, name=name_of_task(table.name, k)) for table in tables)
     yield from _margins(result.margins)
 
 

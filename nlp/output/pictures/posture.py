@@ -47,7 +47,7 @@ def pose_index(nlp: Nlp, pose: int) -> int:
 
 def states_at_poses(outcome: TaskOutcome) -> list[RobotState | None]:
     """Return the robot's state at every pose, for the outcome of a task; None where the robot does not exist."""
-    nlp, x = outcome.own.nlp, outcome.x
+    nlp, x = outcome.own.nlp, outcome.at
     return [outcome.state, *(state_at_pose(nlp, x, k) for k in range(1, len(nlp.program.robots)))]
 
 

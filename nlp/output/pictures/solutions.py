@@ -27,9 +27,9 @@ def drawings_of(solution: Solution, pose: int = 1) -> list[Drawing]:
     return [
         drawing_of(
             outcome.own.nlp,
-            outcome.x,
+            outcome.at,
             states_at_poses(outcome)[index],
-            task,
+            0 if solution.case.changes else task,
             pose=index,
             headline=_headline_of(solution, outcome) + _pose_words(outcome, index),
             is_answer=solution.status.is_answer,

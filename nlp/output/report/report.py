@@ -122,7 +122,7 @@ def report_of(
     is_answer = solution.status.is_answer
     combined = None if solution.combination is None else solution.combination.combined
     parts = tuple(
-        _part(outcome, solution.x, j, len(solution.outcomes), is_answer=is_answer)
+        _part(outcome, outcome.at, j, len(solution.outcomes), is_answer=is_answer)
         for j, outcome in enumerate(solution.outcomes)
     )
     return Report(solution.case, text, result, parts, combined, check, is_answer, refusal)
@@ -131,16 +131,18 @@ def report_of(
 def _part(outcome: TaskOutcome, x: FloatArray, task: int, tasks: int, *, is_answer: bool) -> Part:
     """Return the content of one task at a point (n,)."""
     nlp, state, own = outcome.own.nlp, outcome.state, outcome.own
+    # The program of a task with its own dimensions or pose is that of a case with this task only.
+    index = min(task, len(nlp.case.tasks) - 1)
     states = states_at_poses(outcome)
-    values = _measured(nlp, outcome.x, states) if outcome.task.measure else []
+    values = _measured(nlp, x, states) if outcome.task.measure else []
     worst, count = worst_pose(states, outcome.task.sense), len(states)
     if values:
         worst = None if count == 1 or len(values) < count else _first_largest(values)
-    unit = unit_of_objective(nlp.case, task)
+    unit = unit_of_objective(nlp.case, index)
     drawings, views = [], []
     for k, each in enumerate(states):
         if each is not None:
-            drawing = drawing_of(nlp, outcome.x, each, task, pose=k, is_answer=is_answer)
+            drawing = drawing_of(nlp, x, each, index, pose=k, is_answer=is_answer)
             drawings.append(drawing)
             words = f"{values[k]:.7g} {unit}" if len(values) == count else ""
             shown = PoseView(task, k, count, k == worst, count * tasks, nlp.objective_size, words)
@@ -150,8 +152,8 @@ def _part(outcome: TaskOutcome, x: FloatArray, task: int, tasks: int, *, is_answ
     planes: Sequence[Plane] = planes_of(nlp, x, _PLANES // tasks) if can_move else []
     count = len(slices)
     return Part(
-        name=nlp.case.tasks[task].name,
-        label=objective_label(nlp.case, task),
+        name=nlp.case.tasks[index].name,
+        label=objective_label(nlp.case, index),
         unit=unit,
         nlp=nlp,
         x=x,

@@ -70,7 +70,7 @@ def robot_section(report: Report) -> Markup:
         head.append(
             tag("p", tag("label", "Task: ", for_="task"), tag("select", *options, id="task"), class_="controls script")
         )
-    controls = pose_controls(views, report.case.pose_count)
+    controls = pose_controls(views, report.case.poses_per_task)
     if controls is not None:
         head.append(controls)
     last = len(first["frames"]) - 1

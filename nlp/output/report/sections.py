@@ -15,6 +15,7 @@ from ...words.checks import published_table
 from ...words.joints import limb_part_table
 from ...words.lines import (
     certificate_lines,
+    change_lines,
     choice_lines,
     costliest_words,
     counted,
@@ -216,7 +217,7 @@ def _poses_line(case: Case) -> str:
     is_measured = bool(case.tasks[0].measure)
     over = "largest" if is_measured else case.over_poses.value
     shown = "The picture begins" if is_measured else "The picture and its rates begin"
-    return f"Poses: {case.pose_count}; F is their {over}. {shown} with the first pose; a slider selects the others."
+    return f"Poses: {case.poses_per_task}; F is their {over}. {shown} with the first pose; a slider selects the others."
 
 
 def _case(report: Report) -> Markup:
@@ -243,7 +244,9 @@ def _case(report: Report) -> Markup:
             lines.append("q is the vector part of the unit quaternion of the platform's rotation.")
     else:
         lines.append("No variables: the robot is evaluated at the stated dimensions and pose.")
-    if case.pose_count > 1:
+    if case.changes:
+        lines.append(f"Set for each task: {', '.join(case.changes)}.")
+    if case.poses_per_task > 1:
         lines.append(_poses_line(case))
     limits = report.result.limits
     if limits:
@@ -273,15 +276,16 @@ def _combined_result(report: Report, result: CombinedResult) -> Markup:
     if robot is not None:
         words = "Dimensions and pose" if report.is_answer else "Final point of the search, not an optimum"
         parts.append(html_table(combined_design_table(case, combined, robot), words, id="design"))
-        parts.append(paragraphs(singularity_lines(robot, case.units)))
+        parts += [paragraphs(singularity_lines(each, case.units)) for each in combined.settings or [robot]]
     if combined.tasks:
         parts.append(html_table(outcome_table(combined, result.tasks), "F of each task", id="outcomes"))
+    parts.append(paragraphs(change_lines(combined)))
     parts += [tag("p", f"Note: {notice}.") for notice in combined.notices]
     parts += [tag("p", f"Violated: {name}", class_="warning") for name in combined.violated]
     for k, own in enumerate(result.tasks):
         parts.append(tag("h3", f"Separate optimum of “{report.parts[k].name}”"))
         parts.append(paragraphs([headline(own, case)]))
-        parts += _task_tables(case, own, f"design-{k + 1}")
+        parts += _task_tables(case.of_task(k) if case.changes else case, own, f"design-{k + 1}")
     return join_markup(parts)
 
 

@@ -223,7 +223,9 @@ def _objective_words(case: Case, statement: Statement) -> str:
 def _pose_words(case: Case) -> str:
     """Return in words how F is combined over the poses of a case; empty for one pose."""
     over = {OverPoses.SUM: "summed over", OverPoses.MEAN: "in the mean over", OverPoses.WORST: "at the worst of"}
-    return f", {over[case.over_poses]} {case.pose_count} poses" if case.pose_count > 1 else ""
+    count, changes = case.poses_per_task, " and ".join(case.changes)
+    words = f", with {changes} set for each task" if changes else ""
+    return f"{words}, {over[case.over_poses]} {count} poses" if count > 1 else words
 
 
 def outward(value: float, *, up: bool) -> str:
