@@ -18,9 +18,9 @@ def view(
     jobs: options.Jobs = None,
     _time: options.Time = None,
 ) -> None:
-    """Write a page with the robot, its sliders, and the solver, and open it.
+    """Open a page with the robot, its sliders, and the solver.
 
-    The page is one file, which solves again while a slider moves, without a network.
+    The page is one file. It solves again while a slider moves, and needs no network.
     """
     import tempfile
     from dataclasses import replace
