@@ -391,7 +391,7 @@ COMMANDS = {
     "workspace": (), "path": (), "verify-proof": (), "tradeoff": ("--over", "x1=1:2:2"),
     "sweep": ("--over", "x1=1:2:2", "--out", "table.csv"), "pareto": ("--goal", "max F", "--goal", "min limits.a.max"),
     "compare": ("case", "delta"), "export": ("--format", "csv", "--out", "robot"), "codegen": ("--out", "c"),
-    "check": (),
+    "check": (), "view": ("--out", "page.html", "--no-open"),
 }  # fmt: skip
 
 

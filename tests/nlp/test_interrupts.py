@@ -249,6 +249,7 @@ FIXED = SMALL.replace("{ min = 10, max = 14 }", "12").replace("{ min = 5, max = 
 COMMANDS: dict[str, tuple[str, ...]] = {
     "solve": ("small.toml", "--json", "out.json", "--csv", "out.csv"),
     "report": ("small.toml", "--out", "out.html"),
+    "view": ("small.toml", "--out", "out.html", "--no-open"),
     "tradeoff": ("small.toml", "--over", "x2=7:9:3", "--starts", "1", "--json", "out.json", "--csv", "out.csv"),
     "sweep": (
         *("small.toml", "--over", "x2=7,8", "--engine", "ipopt", "--starts", "1", "--jobs", "1", "--out", "out.csv"),
@@ -409,7 +410,7 @@ def test_an_interrupted_front_has_no_gap(monkeypatch: pytest.MonkeyPatch) -> Non
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_command_says_that_it_is_interrupted(name: str, press: Press, folder: Path) -> None:
-    press_at_moments(name, press, folder, 1 if name in ("report", "path") else 2)  # a page takes seconds
+    press_at_moments(name, press, folder, 1 if name in ("report", "path", "view") else 2)  # a page takes seconds
 
 
 CASE = "paper-4.3"
