@@ -30,10 +30,10 @@ def evaluate(
     Nothing is optimised. A variable has its start value, or else the middle of its bounds. Actuator coordinates that
     the pose does not determine are 0 (home), or those of the result of --of.
     """
-    from ..evidence import state
-    from ..evidence.evaluation import starting_point, without_speeds
-    from ..program.formulation import formulate_each
-    from ..results.evaluation import evaluation_of
+    from functools import partial
+
+    from ..evidence.evaluation import without_speeds
+    from ..results.evaluation import evaluation_at
 
     given = options.read_changed_case(case, settings, of, at_pose=True, claim=claim).file
     loaded = given.case
@@ -44,14 +44,14 @@ def evaluate(
     files = options.Outputs(json=json_file, csv=csv_file)
     files.check(given.inputs)
     options.check_csv(csv_file, table, loaded, at_point=True)
-    nlps = formulate_each(loaded)
     if of is not None and loaded.model.free_joints:
         from ..program.free_joints import begun_at
-        from ..results.settings import joints_of, load_answer, robot_of
+        from ..results.settings import joints_of, load_answer, robots_of
 
-        nlps[0] = begun_at(nlps[0], joints_of(robot_of(load_answer(of), f"--of {of}", loaded), loaded))
-    x = starting_point(nlps[0])
-    result = evaluation_of(nlps, x, [state.evaluate(nlp, x) for nlp in nlps])
+        joints = joints_of(robots_of(load_answer(of), f"--of {of}", loaded), loaded)
+        result = evaluation_at(loaded, partial(begun_at, joints=joints))
+    else:
+        result = evaluation_at(loaded)
     files.deliver(
         lambda: contents.evaluation_summary(loaded, result),
         whole=whole,

@@ -46,12 +46,12 @@ def export(
     if of is not None:
         import numpy as np
 
-        from ..results.settings import joints_of, load_answer, robot_of, settings_of
+        from ..results.settings import joints_of, load_answer, robots_of, settings_of
 
-        robot = robot_of(load_answer(of), f"--of {of}", loaded)
-        jacobian = np.array(robot.jacobian)
-        joints |= joints_of(robot, loaded)
-        loaded, _, inputs = read_case(case, {**fixings, **settings_of(robot, loaded)})
+        robots = robots_of(load_answer(of), f"--of {of}", loaded)
+        jacobian = np.array(robots[0].jacobian)
+        joints |= joints_of(robots, loaded)
+        loaded, _, inputs = read_case(case, {**fixings, **settings_of(robots, loaded)})
     loaded = replace(loaded, search=loaded.search.but(starts, seed))
     check_pose(loaded, pose)
     fixed = fixed_point(loaded, joints)

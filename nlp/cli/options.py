@@ -262,14 +262,14 @@ def read_changed_case(
     if of is None:
         return ChangedCase(read_case(name, settings), settings)
     from ..errors import one_line
-    from ..results.settings import dimensions_of, load_answer, place_of, robot_of, settings_of
+    from ..results.settings import dimensions_of, load_answer, place_of, robots_of, settings_of
 
     case, result = read_case(name, settings).case, load_answer(of)
-    robot, is_same = robot_of(result, f"--of {of}", case, of_any_case=True), result.head.case == case.name
+    robots, is_same = robots_of(result, f"--of {of}", case, of_any_case=True), result.head.case == case.name
     # A workspace about the pose moves with it.
-    moves = case.workspace is not None and case.workspace.about_pose and robot.several is None
+    moves = case.workspace is not None and case.workspace.about_pose and robots[0].several is None
     has_pose = (at_pose and is_same) or moves
-    numbers = settings_of(robot, case) if has_pose else dimensions_of(robot, case)
+    numbers = settings_of(robots, case) if has_pose else dimensions_of(robots, case)
     chosen = {**numbers, **place_of(result, case), **settings}
     if not is_same:
         what = "dimensions and the pose" if has_pose else "dimensions"

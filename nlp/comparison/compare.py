@@ -213,7 +213,7 @@ def _with_fits(entry: Entry) -> Entry:
         tasks=tuple(fits),
         freedoms=degrees_of_freedom,
         singularities=tuple(dict.fromkeys(singularities)),
-        final_size=size_at(nlp, solution.outcomes[0].x),
+        final_size=size_at(nlp, solution.outcomes[0].at),
         strokes=strokes_over_poses(contender, solution.outcomes[0], _measures(contender)),
     )
 

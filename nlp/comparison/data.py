@@ -10,6 +10,8 @@ import numpy as np
 
 from ...models import Dimension, frozen_array
 from ..case.case import Case
+from ..case.choices import values_of_component
+from ..case.names import name_of_task
 from ..case.pose import Free
 from ..errors import CaseError, listing
 from ..program.program import design_names
@@ -32,7 +34,7 @@ from ..solver.status import Status
 from ..system.jsonvalues import finite_or_none
 from ..units import rate_unit
 from ..words.comparison import comparison_columns, comparison_lines
-from ..words.designs import DesignDetails, Designs, DrawnDesign, Join, PageWords, design_values
+from ..words.designs import DesignDetails, Designs, DrawnDesign, Join, PageWords, design_values, drawn_task
 from ..words.text import Line, TextTable, Tone
 from .compare import Comparison, part_of
 from .entry import Entry, TaskFit, driven_wrenches
@@ -149,6 +151,9 @@ def _rules(comparison: Comparison) -> list[str]:
         lines.append("Dimensions are fixed at the typical values.")
     if any(each.contender.is_of_case for each in comparison.entries):
         lines.append("The robot of the case keeps its dimensions and ranges.")
+    if case.dimensions_per_task and not all(each.contender.is_of_case for each in comparison.entries):
+        own = listing(name for name in case.changes if name != "pose")
+        lines.append(f"Only the robot of the case changes {own} from task to task; every other robot is the same.")
     return lines
 
 
@@ -280,8 +285,9 @@ def _drawn(case: Case, entry: Entry, solution: Solution) -> DrawnDesign:
     elif not entry.keeps_limits:
         words += ", does not satisfy all limits"
     outcome, nlp = solution.outcomes[0], solution.outcomes[0].own.nlp
-    numbers, active = design_values(nlp, outcome.x), _active(entry)
-    return DrawnDesign(entry.contender.label, words, numbers, active, nlp, outcome.x, outcome.state)
+    numbers, active = design_values(solution.whole, solution.x), _active(entry)
+    words += drawn_task(solution.case)
+    return DrawnDesign(entry.contender.label, words, numbers, active, nlp, outcome.at, outcome.state)
 
 
 def _robot(case: Case, entry: Entry) -> ComparedRobotData:
@@ -342,9 +348,16 @@ def _dimensions(entry: Entry) -> tuple[ComparedDimensionData, ...]:
         return ()
     case, rows = entry.placed.case, []
     for item in case.model.parameters:
-        values = np.atleast_1d(entry.solution.state.parameters[item.name])
-        for name, allowed, value in zip(item.components, case.components(item.name), values, strict=True):
-            ends = None
+        of_task = [
+            np.atleast_1d(outcome.state.parameters[item.name]) for outcome in entry.solution.outcomes if outcome.state
+        ]
+        shown = [
+            (k, item.components[k] if task is None else name_of_task(item.components[k], task), allowed, task or 0)
+            for k in range(len(item.components))
+            for task, _, allowed in values_of_component(case, item, k)
+        ]
+        for k, name, allowed, task in shown:
+            value, ends = of_task[task][k], None
             if isinstance(allowed, Free):
                 ends = tuple(case.units.shown(end, item.dimension) for end in (allowed.lower, allowed.upper))
             rows.append(

@@ -175,7 +175,7 @@ def task_fit(contender: Contender, outcome: TaskOutcome) -> tuple[TaskFit, Mobil
         contender: robot of the comparison.
         outcome: outcome of the task, with a robot that exists at the design.
     """
-    nlp, x, state = outcome.own.nlp, outcome.x, outcome.state
+    nlp, x, state = outcome.own.nlp, outcome.at, outcome.state
     if state is None:
         return TaskFit(outcome.task.name, None, None, None, ()), None
     found = mobility_of(nlp, x, state)
@@ -217,7 +217,7 @@ def strokes_over_poses(contender: Contender, outcome: TaskOutcome, quantities: t
     count = len(nlp.program.robots)
     if count == 1:
         return {}
-    states = [evaluate(nlp, outcome.x, pose) for pose in range(count)]
+    states = [evaluate(nlp, outcome.at, pose) for pose in range(count)]
     dimensions = {each.name: each.dimension for each in contender.model.quantities}
     return {
         name: Stroke(float(np.ptp([state.quantities[name] for state in states], axis=0).max()), dimensions[name])

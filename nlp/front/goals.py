@@ -22,7 +22,7 @@ from ..case.limits.constraint import BoundedConstraint, Constraint, Reading, in_
 from ..case.pose import Free, OverPoses
 from ..case.task import Sense
 from ..errors import InputError, listing, nearest
-from ..program.epigraph import total_over_poses
+from ..program.epigraph import F_of_tasks, total_over_poses
 from ..program.formulation import formulate
 from ..program.layout import Layout, assemble, lay_out
 from ..program.nlp import Nlp
@@ -128,9 +128,9 @@ def loosest_numbers(case: Case, goals: Sequence[Goal]) -> FloatArray:
     Raises:
         InputError: a limit is not in the case or cannot be a goal, or the case has the worst F of several poses.
     """
-    if case.over_poses is OverPoses.WORST and case.pose_count > 1:
+    if case.over_poses is OverPoses.WORST and case.poses_per_task > 1:
         raise InputError("pareto: combine.over_poses = 'worst' is not supported; use 'sum' or 'mean'")
-    layout = lay_out(case, [case.tasks[0]])
+    layout = lay_out(case, case.tasks)
     found = []
     for goal in goals:
         least, most = (math.nan, math.nan) if goal.task is not None else _range(layout, goal)
@@ -154,7 +154,7 @@ def program_of(case: Case, goals: tuple[Goal, ...], optimised: int, bounds: Sequ
     best = goals[optimised]
     # Without a goal F, one task remains, because a layout needs the rates of a task.
     tasks = [goal.task for goal in (best, *goals) if goal.task is not None] or [0]
-    tasks = list(dict.fromkeys(tasks))
+    tasks = list(range(len(case.tasks))) if case.changes else list(dict.fromkeys(tasks))
     layout = lay_out(case, [case.tasks[task] for task in tasks])
     added: list[BoundedConstraint] = []
     for goal, bound in zip(goals, bounds, strict=True):
@@ -188,7 +188,7 @@ def program_of(case: Case, goals: tuple[Goal, ...], optimised: int, bounds: Sequ
 
 def _total(layout: Layout, task: int) -> SX:
     """Return F of a task of a layout over all poses."""
-    return total_over_poses([robot.F[task] for robot in layout.robots], layout.case.over_poses)
+    return total_over_poses(ca.horzsplit(F_of_tasks(layout)[task, :]), layout.case.over_poses)
 
 
 def _raw(layout: Layout, goal: Goal, tasks: Sequence[int]) -> tuple[SX, tuple[Reading, ...]]:

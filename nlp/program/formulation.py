@@ -32,6 +32,8 @@ from .program import Program
 def formulate(case: Case, task: int = 0) -> Nlp:
     """Return the nonlinear program of one task of a case.
 
+    If dimensions or the pose change from task to task, the program has those of this task.
+
     Args:
         case: the case.
         task: index of the task.
@@ -39,6 +41,8 @@ def formulate(case: Case, task: int = 0) -> Nlp:
     Raises:
         CaseError: a limb has zero length at every point of the box, or fixed parameters contradict each other.
     """
+    if case.changes:
+        return formulate(case.of_task(task))
     layout = lay_out(case, [case.tasks[task]])
     sense = case.tasks[task].sense
     if case.tasks[task].measure:
@@ -88,7 +92,7 @@ def formulate_tasks(case: Case) -> list[Nlp]:
     """
     if not case.changes:
         return formulate_each(case)
-    return [formulate(case.of_task(task)) for task in range(len(case.tasks))]
+    return [formulate(case, task) for task in range(len(case.tasks))]
 
 
 def scaled_weights(case: Case) -> list[float]:
@@ -121,6 +125,17 @@ def formulate_weighted(case: Case, weights: Sequence[float]) -> Nlp:
     ]
     call = _weighted_call(layout, [each.symbols for each in added])
     return assemble(layout, call, sense, weights=tuple(each.places[0].index for each in added))
+
+
+def formulate_whole(case: Case) -> Nlp:
+    """Return a program with the variables of all tasks of a case.
+
+    It is the program of the first task, unless dimensions or the pose change from task to task.
+
+    Raises:
+        CaseError: a limb has zero length at every point of the box, or fixed parameters contradict each other.
+    """
+    return formulate_weighted(case, scaled_weights(case)) if case.changes else formulate(case)
 
 
 def _weighted_call(layout: Layout, weights: Sequence[SX]) -> Call:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
 from ...models import Dimension
 from ..case.case import Case
+from ..case.choices import values_of_component
+from ..case.names import name_of_task
 from ..case.overrides import ENDS, Settings
 from ..case.pose import Free, Pose, RotationForm
 from ..errors import InputError
@@ -40,8 +42,8 @@ def load_answer(file: str) -> Answer:
     return result
 
 
-def robot_of(result: Answer, source: str, case: Case, *, of_any_case: bool = False) -> RobotData:
-    """Return the robot of a result of a case.
+def robots_of(result: Answer, source: str, case: Case, *, of_any_case: bool = False) -> tuple[RobotData, ...]:
+    """Return the robot of a result of a case; the robot of each task, if dimensions or the pose change with the task.
 
     Args:
         result: the result.
@@ -50,11 +52,8 @@ def robot_of(result: Answer, source: str, case: Case, *, of_any_case: bool = Fal
         of_any_case: If true, the result may belong to another case with the same robot and units.
 
     Raises:
-        InputError: the result belongs to another case, has other units, or is no answer.
+        InputError: the result belongs to another case, has other units or tasks, or is no answer.
     """
-    if case.changes or (isinstance(result, CombinedResult) and result.combined.settings):
-        fault = "dimensions or the pose change from task to task, so there is no single robot"
-        raise InputError(f"{source}: {fault}; set the values with --set")
     name, model = result.head.case, result.head.model
     if model != case.model.name or (name != case.name and not of_any_case):
         fault = f"is a result of the case {name!r} with the robot {model!r}"
@@ -63,17 +62,39 @@ def robot_of(result: Answer, source: str, case: Case, *, of_any_case: bool = Fal
     if (units.length, units.angle) != (case.units.length, case.units.angle):
         own = f"{case.units.length!r} and {case.units.angle!r}"
         raise InputError(f"{source}: has the units {units.length!r} and {units.angle!r}, but the case has {own}")
-    robot = result.robot
-    if robot is None or (not isinstance(result, EvaluationResult) and not result.status.is_answer):
-        raise InputError(f"{source}: contains no answer: the solve failed{_reached_words(robot, case)}")
-    return robot
+    settings = _robots(result)
+    if not settings or (not isinstance(result, EvaluationResult) and not result.status.is_answer):
+        raise InputError(f"{source}: contains no answer: the solve failed{_reached_words(settings, case)}")
+    if len(settings) > 1 and not case.changes:
+        fault = f"has a robot for each of {len(settings)} tasks, but {case.name!r} has one robot for all tasks"
+        raise InputError(f"{source}: {fault}; set the values with --set")
+    if len(settings) > 1 and len(settings) != len(case.tasks):
+        fault = f"has a robot for each of {len(settings)} tasks, but {case.name!r} has {len(case.tasks)} tasks"
+        raise InputError(f"{source}: {fault}")
+    return settings
 
 
-def _reached_words(robot: RobotData | None, case: Case) -> str:
+def _robots(result: Answer) -> tuple[RobotData, ...]:
+    """Return the robots of a result: one, or one for each task; empty without a robot."""
+    if isinstance(result, CombinedResult) and result.combined.settings:
+        return result.combined.settings
+    if isinstance(result, EvaluationResult) and result.settings:
+        return result.settings
+    return () if result.robot is None else (result.robot,)
+
+
+def _reached_words(robots: Sequence[RobotData], case: Case) -> str:
     """Return the options that set the free values of a failed solve to those that it reached; empty without any."""
-    if robot is None:
+    if not robots or (len(robots) > 1 and len(robots) != len(case.tasks)):
         return ""
     free = {
+        name
+        for item in case.model.parameters
+        for k in range(len(item.components))
+        for _, name, value in values_of_component(case, item, k)
+        if isinstance(value, Free)
+    }
+    free |= {
         case.parameter_name(item.name)
         for item in case.model.parameters
         if any(isinstance(value, Free) for value in case.components(item.name))
@@ -83,7 +104,7 @@ def _reached_words(robot: RobotData | None, case: Case) -> str:
             f"{prefix}p_{axis}" for axis, value in zip("xyz", pose.position, strict=True) if isinstance(value, Free)
         }
         free |= {f"{prefix}angle", f"{prefix}axis"}  # settings have these names only if the rotation is free
-    reached = {name: value for name, value in settings_of(robot, case).items() if name in free}
+    reached = {name: value for name, value in settings_of(robots, case).items() if name in free}
     texts = [
         f" --set {name}={','.join(f'{each:.{_DIGITS}g}' for each in (value if isinstance(value, list) else [value]))}"
         for name, value in reached.items()
@@ -131,18 +152,34 @@ def claim_settings(given: str, case: Case) -> Settings:
     return numbers | {f"{prefix}{key}": each if len(each) > 1 else each[0] for key, each in turn.items()}
 
 
-def settings_of(robot: RobotData, case: Case) -> Settings:
-    """Return the values of a robot by their names in its case, in the case's units."""
-    found = dict(dimensions_of(robot, case))
-    stated = (robot.pose,) if robot.several is None else robot.several.stated_poses
+def settings_of(robots: Sequence[RobotData], case: Case) -> Settings:
+    """Return the values of a robot, or of the robot of each task, by their names in the case, in the case's units."""
+    found = dict(dimensions_of(robots, case))
+    own = robots if case.pose_per_task else robots[:1]
+    stated = [pose for each in own for pose in ((each.pose,) if each.several is None else each.several.stated_poses)]
+    if len(stated) < len(case.poses):  # the poses of one robot, which are those of every task
+        stated *= len(case.tasks)
     for prefix, pose, data in zip(case.pose_prefixes, case.poses, stated, strict=True):
         found |= _pose_settings(prefix, pose, data)
     return found
 
 
-def dimensions_of(robot: RobotData, case: Case) -> Settings:
-    """Return the dimensions of a robot by their names in its case, in the case's units."""
-    return {case.parameter_name(name): _setting(value) for name, value in robot.parameters.items()}
+def dimensions_of(robots: Sequence[RobotData], case: Case) -> Settings:
+    """Return the dimensions of a robot, or of the robot of each task, by their names in the case, in its units."""
+    found: dict[str, float | list[float]] = {}
+    changing = case.dimensions_per_task
+    for item in case.model.parameters:
+        of_task = [_setting(robot.parameters[item.name]) for robot in robots]
+        if not changing.keys() & set(item.components):
+            found[case.parameter_name(item.name)] = of_task[0]
+            continue
+        parts = [each if isinstance(each, list) else [each] for each in of_task]
+        for k, (key, name) in enumerate(zip(item.components, case.component_names(item), strict=True)):
+            if key in changing:
+                found |= {name_of_task(name, j): parts[j % len(parts)][k] for j in range(len(case.tasks))}
+            else:
+                found[name] = parts[0][k]
+    return found
 
 
 def _without_end(name: str) -> str:
@@ -155,8 +192,16 @@ def _setting(value: float | Vector) -> float | list[float]:
     return list(value) if isinstance(value, tuple) else value
 
 
-def joints_of(robot: RobotData, case: Case) -> Mapping[str, float]:
-    """Return the free actuator coordinates by the names of their variables, length or radians."""
+def joints_of(robots: Sequence[RobotData], case: Case) -> Mapping[str, float]:
+    """Return the free actuator coordinates by the names of their variables, length or radians.
+
+    Raises:
+        InputError: every task has its own coordinates.
+    """
+    robot = robots[0]
+    if case.changes and robot.free_joints:
+        fault = f"each task has its own coordinates of the actuated joints {', '.join(case.model.free_joints)}"
+        raise InputError(f"--of: is not supported for this robot: {fault}; set the other values with --set")
     return {each.name: case.units.to_internal(each.value, Dimension(each.kind)) for each in robot.free_joints or ()}
 
 

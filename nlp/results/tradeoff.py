@@ -2,13 +2,15 @@
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 
 from ..case.case import Case
+from ..case.names import name_of_task
 from ..case.task import Sense
 from ..errors import CaseError
-from ..evidence.state import PlatformPose
+from ..evidence.state import PlatformPose, stated_poses
 from ..interruption import is_requested
 from ..solver.solution import Solution
 from ..solver.status import Status
@@ -17,7 +19,7 @@ from ..system.jsonvalues import Absent, Inline, JsonObject, Vector, finite_or_no
 from .data import CaseResult, CertificateData, SolveResult
 from .evidence import certificate_data
 from .parts import HeadData, LimitData, VersionsData
-from .point import head_data, stated_pose_notice, versions
+from .point import head_data, pose_data, stated_pose_notice, versions
 from .result import result_of
 from .rounding import ordered
 
@@ -37,6 +39,7 @@ class TradeoffPointData(JsonObject):
         active: active bounds and limits.
         parameters: dimensions by name; null without an answer.
         pose: first stated pose of the platform; null without an answer.
+        poses: stated poses of all tasks in turn, if every task has its own pose; otherwise absent.
         certificate: proved bound; absent if no proof was requested.
     """
 
@@ -48,6 +51,7 @@ class TradeoffPointData(JsonObject):
     active: tuple[str, ...]
     parameters: Mapping[str, float | Vector] | None
     pose: PlatformPose | None
+    poses: Absent[tuple[PlatformPose, ...]]
     certificate: Absent[CertificateData]
 
 
@@ -129,10 +133,33 @@ def _point(name: str, point: TradeoffPoint, result: CaseResult) -> TradeoffPoint
         slope=_slope(name, result) if is_answer else None,
         tasks=tuple(finite_or_none(each.F) if is_answer else None for each in point.solution.outcomes),
         active=_active(point.solution, result) if is_answer else (),
-        parameters=None if robot is None else robot.parameters,
+        parameters=_dimensions(point.solution) if robot is not None else None,
         pose=None if robot is None else robot.pose,
+        poses=_poses(point.solution) if robot is not None else None,
         certificate=None if point.certified is None else certificate_data(point.certified.certificate),
     )
+
+
+def _dimensions(solution: Solution) -> Mapping[str, float | Vector]:
+    """Return the dimensions of a design by name; those that change from task to task by component and task."""
+    changing, found = solution.case.dimensions_per_task, dict[str, float | Vector]()
+    for item in solution.case.model.parameters:
+        if not changing.keys() & set(item.components):
+            found[item.name] = solution.parameters[item.name]
+            continue
+        for key, name in zip(item.components, solution.case.component_names(item), strict=True):
+            of_tasks = range(len(solution.outcomes)) if key in changing else ()
+            names = [name_of_task(name, task) for task in of_tasks] or [name]
+            found |= {each: solution[each] for each in names}
+    return MappingProxyType(found)
+
+
+def _poses(solution: Solution) -> tuple[PlatformPose, ...] | None:
+    """Return the stated poses of all tasks, if every task has its own pose."""
+    if not solution.case.pose_per_task:
+        return None
+    at = [(outcome.own.nlp, outcome.at) for outcome in solution.outcomes]
+    return tuple(pose_data(nlp.case, pose) for nlp, x in at for pose in stated_poses(nlp, x))
 
 
 def _unsolved(value: float, tasks: int) -> TradeoffPointData:
@@ -146,6 +173,7 @@ def _unsolved(value: float, tasks: int) -> TradeoffPointData:
         active=(),
         parameters=None,
         pose=None,
+        poses=None,
         certificate=None,
     )
 

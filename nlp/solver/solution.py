@@ -342,6 +342,11 @@ class Solution(Whole, Shown, Answer):
         return PointAtPose(outcome.own.nlp, outcome.at, before)
 
     @property
+    def whole(self) -> Nlp:
+        """Program with the variables of the solution: that of the first task, or of all tasks if a robot changes."""
+        return self.outcomes[0].own.nlp if self.combination is None else self.combination.whole
+
+    @property
     def chosen_case(self) -> Case:
         """Case with the chosen catalogue values; the case itself if it has none."""
         if not self.case.changes:

@@ -20,7 +20,7 @@ from ..case.varied import Over, axes_of
 from ..case.writer import with_settings
 from ..errors import InputError, listing
 from ..interruption import Milestone, is_requested, reached, seconds_left, why_stopped, within
-from ..program.formulation import formulate_each
+from ..program.formulation import formulate_tasks
 from ..proof.enclosure.engine import kernel
 from ..system.deprecated import warn_deprecated
 from .certified import Certified, certify
@@ -215,9 +215,9 @@ def _whole(solve: Callable[[], Solution]) -> Solution | None:
 
 def _solve(case: Case, search: Search, first: Sequence[FloatArray], jobs: int | None) -> Solution:
     """Solve a case; with a single task, start also from the first points that fit its program."""
-    nlps = formulate_each(case)
+    nlps = formulate_tasks(case)
     if len(nlps) > 1:
-        return solve_programs(case, nlps, search, jobs=jobs)
+        return solve_programs(case, nlps, search, jobs=jobs, may_be_fixed=bool(case.changes))
     fitting = [x for x in first if x.size == nlps[0].n]
     return solution_of_one_task(case, solve_program(nlps[0], search, first=fitting, jobs=jobs))
 

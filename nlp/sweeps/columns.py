@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...models import FloatArray, frozen_array
 from ..case.case import Case
 from ..errors import InputError
-from ..program.formulation import formulate_each
+from ..program.formulation import formulate_whole
 from ..program.nlp import Nlp
 from ..results.design import limits_data, margins_data
 from ..results.explorations import Numbers, SweepResult
@@ -162,7 +162,7 @@ def sweep_columns(sweep: Sweep, case: Case | None = None) -> Iterator[Column[Row
         sweep: sweep of the table.
         case: case at one of the points, for labels and units; None for a table without labels and units.
     """
-    nlp = None if case is None else formulate_each(case)[0]
+    nlp = None if case is None else formulate_whole(case)
     yield Column("index", lambda row: row.point, holds=int, label="point", text=lambda row: str(row.point))
     for j, name in enumerate(sweep.points.names):
         yield _varied(sweep, j, name, "" if nlp is None else _unit_of(nlp, name))

@@ -91,8 +91,7 @@ def _with_certificate(row: Row, certified: Certified) -> Row:
 
 def row_of_solution(solution: Solution, index: int, seconds: float) -> Row:
     """Return the row of a solution."""
-    units, own = solution.case.units, solution.outcomes[0].own
-    program = own.nlp.program
+    units, program = solution.case.units, solution.whole.program
     decided = solution.decided_by
     evidence: Evidence | None = solution.evidence
     note = "" if solution.keeps_limits else f"not proved {solution.case.limits_where}"

@@ -17,7 +17,7 @@ import numpy as np
 from .. import __version__
 from ..case.case import Case
 from ..interruption import is_interrupted, is_requested, one_call, seconds_left
-from ..program.formulation import formulate
+from ..program.formulation import formulate_whole
 from ..program.program import design_indices
 from .engines import EngineKind, Job, answer, choose_engine, compiled_engine
 from .journal import ENDING, Journal, Row
@@ -71,7 +71,7 @@ class Sweep:
         Raises:
             CaseError: a name is unknown in the case, or the values of the first point are not allowed.
         """
-        program = formulate(source.case_at(points.settings(0))).program
+        program = formulate_whole(source.case_at(points.settings(0))).program
         names = tuple(program.variables[k].name for k in design_indices(program))
         return cls(source, points, names, STARTS if starts is None else starts, seed, certified)
 

@@ -219,6 +219,11 @@ def certificate_columns(certificate_of: Callable[[Row], CertificateData | None])
     yield Column("gap", number_of("gap"), ColumnKind.PROOF)
 
 
+def drawn_task(case: Case) -> str:
+    """Return a clause with the task whose robot is drawn, if dimensions or the pose change from task to task."""
+    return f", robot of {case.tasks[0].name}" if case.changes else ""
+
+
 def design_values(nlp: Nlp, x: FloatArray) -> tuple[str, ...]:
     """Return the free dimensions and pose coordinates of a design, each as a text with name, value and unit."""
     units, variables = nlp.case.units, nlp.program.variables

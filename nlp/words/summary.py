@@ -55,6 +55,7 @@ from .text import Line, TextTable, Tone, in_part
 
 if TYPE_CHECKING:
     from ..evidence.margins import Margin
+    from ..evidence.principal_motions import TaskAnalysis
     from ..results.data import CaseResult, SolveResult
     from ..results.evaluation import EvaluationResult
     from ..results.evidence import CertifiedResult
@@ -225,19 +226,42 @@ def evaluation_summary(case: Case, result: EvaluationResult) -> Summary:
         where = f"; {limits_title(case)}" if limits_title(case) else ""
         tone = Tone.HOLDS if kept == len(result.limits) else Tone.FAULT
         yield Line(f"{kept} of {len(result.limits)} satisfied", label="limits", tone=tone, after=where)
-    yield from singularity_lines(robot, case.units)
+    settings = result.settings or (robot,)
+    for each in settings:
+        name = each.task.name if each.task is not None and result.settings else None
+        yield from _named(singularity_lines(each, case.units), name)
     yield from _remark_lines(case)
-    yield from in_part("design", [design_table(case, robot)])
+    yield from in_part("design", [design_table(case, robot, settings=result.settings or ())])
+    limits = [limit_table(result.limits, size_of_F(robot), limits_title(case))] if result.limits else []
+    if not result.settings:
+        yield from _evaluated_robot(case, robot, result.principal_motions, limits)
+        return
+    yield from in_part("limits", limits)
+    for k, (each, task) in enumerate(zip(settings, result.tasks, strict=True)):
+        if task.principal_motions is not None:
+            parts = _evaluated_robot(case.of_task(k), each, task.principal_motions)
+            yield from (_of_task(item, k, each) for item in parts)
+
+
+def _of_task(item: Line | TextTable, task: int, robot: RobotData) -> Line | TextTable:
+    """Return a line or table of one task's robot, with the name of the task."""
+    name = "" if robot.task is None else robot.task.name
+    if isinstance(item, Line):
+        return replace(item, text=f"{name}: {item.text}")
+    return replace(item, name=name_of_task(item.name, task), title=f"{item.title}, {name}" if item.title else name)
+
+
+def _evaluated_robot(case: Case, robot: RobotData, motions: TaskAnalysis, limits: Sequence[TextTable] = ()) -> Summary:
+    """Yield the sections of a robot at one point, with the table of limits among them."""
     yield from in_part("limbs" if robot.several is None else "poses", [robot_table(case, robot)])
     yield from in_part("poses by limb", robot_tables_by_limb(case, robot))
     yield from in_part("forces", loading_tables(case, robot))
-    if result.limits:
-        yield from in_part("limits", [limit_table(result.limits, size_of_F(robot), limits_title(case))])
+    yield from in_part("limits", limits)
     yield from in_part("J", [jacobian_table(case, robot)])
     # Singular values beyond the rank are 0: their computed values are rounding error.
     values = (value if k < robot.rank else 0.0 for k, value in enumerate(robot.singular_values))
     yield from in_part("singular values", [Line(listed(values), label="singular values")])
-    yield from in_part("motions", [principal_table(result.principal_motions, case.units, robot_size(robot))])
+    yield from in_part("motions", [principal_table(motions, case.units, robot_size(robot))])
     yield from in_part("actuation", _limb_parts(case, robot))
 
 
@@ -263,9 +287,15 @@ def table_names(case: Case, *, at_point: bool) -> tuple[str, ...]:
     """
     if case.changes:
         several = range(len(case.tasks))
-        own = [name for name in table_names(case.of_task(0), at_point=False) if name not in _OF_DESIGN]
+        own = [name for name in table_names(case.of_task(0), at_point=at_point) if name not in _OF_DESIGN]
+        own += ["actuation"] if at_point and case.model.generic is not None else []
         shared = ["limits", "margins"] if case.limits else []
-        return ("design", *(name_of_task(name, k) for k in several for name in own), *shared, "tasks")
+        return (
+            "design",
+            *(name_of_task(name, k) for k in several for name in own),
+            *shared,
+            *([] if at_point else ["tasks"]),
+        )
     names = ["design"]
     if case.poses_per_task == 1:
         names.append("limbs")
@@ -309,7 +339,11 @@ def case_tables(case: Case, result: CaseResult) -> Iterator[TextTable]:
 def evaluation_tables(case: Case, result: EvaluationResult) -> Iterator[TextTable]:
     """Yield the tables of an evaluation: the tables of its summary, then every margin."""
     yield from _tables(evaluation_summary(case, result))
-    yield from _limb_parts_left_out(case, result.robot, is_shown=True)
+    if not result.settings:
+        yield from _limb_parts_left_out(case, result.robot, is_shown=True)
+    for k, robot in enumerate(result.settings or ()):
+        parts = _limb_parts_left_out(case.of_task(k), robot, is_shown=True)
+        yield from (replace(table, name=name_of_task(table.name, k)) for table in parts)
     yield from _margins(result.margins)
 
 

@@ -9,7 +9,17 @@ from ..case.case import Case
 from ..results.tradeoff import LIMITS, TradeoffPointData, TradeoffResult
 from ..solver.status import Status
 from ..solver.tradeoff import Tradeoff
-from .designs import Column, ColumnKind, Designs, DrawnDesign, Join, PageWords, certificate_columns, design_values
+from .designs import (
+    Column,
+    ColumnKind,
+    Designs,
+    DrawnDesign,
+    Join,
+    PageWords,
+    certificate_columns,
+    design_values,
+    drawn_task,
+)
 from .lines import title_line
 from .numbers import number, per_words
 from .text import Line, Tone
@@ -124,11 +134,11 @@ def _drawn(result: TradeoffResult, found: Tradeoff) -> list[DrawnDesign]:
             designs.append(
                 DrawnDesign(
                     f"{result.over} = {row.value:.5g} {result.unit}".rstrip(),
-                    F or ", ".join(of_each),
-                    design_values(outcome.own.nlp, outcome.x),
+                    (F or ", ".join(of_each)) + drawn_task(point.solution.case),
+                    design_values(point.solution.whole, point.solution.x),
                     tuple(each.removeprefix(LIMITS) for each in row.active),
                     outcome.own.nlp,
-                    outcome.x,
+                    outcome.at,
                     outcome.state,
                 )
             )
@@ -188,4 +198,9 @@ def _design(point: TradeoffPointData) -> dict[str, float]:
         return dict(zip(component_names(name, len(value)), value, strict=True))
 
     found = {key: part for name, value in point.parameters.items() for key, part in parts(name, value).items()}
+    if point.poses is not None:
+        for k, pose in enumerate(point.poses):
+            found |= parts(f"pose{k + 1}_p", pose.position) | parts(f"pose{k + 1}_axis", pose.axis)
+            found[f"pose{k + 1}_angle"] = pose.angle
+        return found
     return {**found, **parts("p", point.pose.position), **parts("axis", point.pose.axis), "angle": point.pose.angle}
