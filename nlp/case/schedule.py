@@ -2,18 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
+from typing import Protocol
 
+from ...models import Model
 from ..errors import CaseError, listing
-from .pose import Free, OverPoses
-from .task import FOLLOWS
+from .pathfile import PathFile
+from .pose import Free, OverPoses, Rotation, Value
+from .task import FOLLOWS, Task
+from .workspace import Workspace
 
-if TYPE_CHECKING:
-    from .case import Case
+
+class ScheduledCase(Protocol):
+    """Parts of a case that its settings concern; see :class:`screwsynth.nlp.case.case.Case`."""
+
+    @property
+    def model(self) -> Model: ...  # noqa: D102 - the attributes are those of a case
+    @property
+    def tasks(self) -> Sequence[Task]: ...  # noqa: D102
+    @property
+    def path(self) -> PathFile | None: ...  # noqa: D102
+    @property
+    def over_path(self) -> OverPoses | None: ...  # noqa: D102
+    @property
+    def limits_over(self) -> str: ...  # noqa: D102
+    @property
+    def workspace(self) -> Workspace | None: ...  # noqa: D102
+    @property
+    def pose_count(self) -> int: ...  # noqa: D102
+    @property
+    def position(self) -> Sequence[Value]: ...  # noqa: D102
+    @property
+    def rotation(self) -> Rotation: ...  # noqa: D102
+    @property
+    def joint_centre_tolerance(self) -> float | None: ...  # noqa: D102
+    def components(self, name: str) -> tuple[Value, ...]: ...  # noqa: D102
 
 
-def check_settings(case: Case) -> None:
+def check_settings(case: ScheduledCase) -> None:
     """Refuse settings, and tasks along a path, where these have no meaning or are not supported.
 
     Raises:
@@ -32,7 +58,7 @@ def check_settings(case: Case) -> None:
         _check_over_path(case)
 
 
-def _keys(case: Case) -> Iterator[str]:
+def _keys(case: ScheduledCase) -> Iterator[str]:
     """Yield the dotted key of each setting."""
     for item in case.model.parameters:
         values = case.components(item.name)
@@ -45,7 +71,7 @@ def _keys(case: Case) -> Iterator[str]:
         yield "path.tool.turn"
 
 
-def _check_follows(case: Case, key: str, follows: str) -> None:
+def _check_follows(case: ScheduledCase, key: str, follows: str) -> None:
     """Refuse a motion that moves with a path without this path, its objective or its tool."""
     if follows not in FOLLOWS:
         raise CaseError(key, f"must be one of {listing(FOLLOWS)}", follows)
@@ -57,7 +83,7 @@ def _check_follows(case: Case, key: str, follows: str) -> None:
         raise CaseError(key, "needs path.tool with the tool's axis", follows)
 
 
-def _check_over_path(case: Case) -> None:
+def _check_over_path(case: ScheduledCase) -> None:
     """Refuse an objective along the path together with what it does not support."""
     key, over = "objective.over", "path"
     if case.over_path not in (OverPoses.MEAN, OverPoses.WORST):
