@@ -29,11 +29,12 @@ from .limits.limits import Limits
 from .loads import NO_LOADING, Loading
 from .names import name_of_task, parameter_name, pose_prefixes
 from .parameters import check_choices, check_parameters
-from .pathfile import PathFile
+from .pathfile import TURN, PathFile
 from .pertask import Station, check_poses, common_poses, common_value, stations, task_value
 from .pose import LARGEST, NO_DISPLACEMENT, Free, OverPoses, PerTask, Pose, Rotation, Value
 from .posechecks import check_displacements, check_further_poses, check_position, check_rotation
 from .radians import angles_of, check_radians, with_radians
+from .schedule import check_settings
 from .settings import Expectation, Published, Search
 from .task import MEASURES, Method, Task
 from .taskchecks import check_loading, check_tasks
@@ -64,6 +65,8 @@ class Case(Whole, Shown):
             each task. A single stated pose gives the ranges of all tasks.
         over_poses: combination of F over several poses.
         worst_everywhere: If true, the worst F over the workspace or path is optimised, not F at the stated poses only.
+        over_path: combination of F over the points of the path, mean or worst, while values with a rate change along
+            it; None if F is not optimised along the path.
         joint_centre_tolerance: largest manufacturing error of each joint centre, length; None for no tolerance.
         workspace: box of poses over which the robot is verified; None for no workspace.
         path: tool path along which the robot is verified; None for no path.
@@ -95,6 +98,7 @@ class Case(Whole, Shown):
     pose_per_task: bool = False
     over_poses: OverPoses = OverPoses.SUM
     worst_everywhere: bool = False
+    over_path: OverPoses | None = None
     joint_centre_tolerance: float | None = None
     workspace: Workspace | None = None
     path: PathFile | None = None
@@ -142,6 +146,7 @@ class Case(Whole, Shown):
         check_displacements(self.poses, self.over_poses, len(self.tasks))
         store(self, "tasks", check_tasks(self.tasks, self.model, self.loading))
         _check_changes(self)
+        check_settings(self)
         check_choices(checked, self.model, self.tasks, self.method)
         _check_worst_everywhere(self)
         check_loading(self.loading, self.model, self.units)
@@ -222,6 +227,18 @@ class Case(Whole, Shown):
     def changes(self) -> tuple[str, ...]:
         """Names of what changes from task to task: components of parameters, then ``pose``; empty if nothing does."""
         return (*map(self.parameter_name, self.dimensions_per_task), *(["pose"] if self.pose_per_task else []))
+
+    @property
+    def settings(self) -> Mapping[str, Free]:
+        """Values that change along the path, by name: dimensions as in the case, then ``turn`` about the tool."""
+        found = {
+            name: value
+            for item in self.model.parameters
+            for name, value in zip(self.component_names(item), self.components(item.name), strict=True)
+            if isinstance(value, Free) and value.rate is not None
+        }
+        turn = None if self.path is None or self.path.tool is None else self.path.tool.turn
+        return {**found, TURN: turn} if isinstance(turn, Free) else found
 
     @property
     def changing_key(self) -> str:
@@ -400,7 +417,7 @@ class Case(Whole, Shown):
     def uses_forces(self) -> bool:
         """True if actuator forces under loads are limited or minimised."""
         return any(each.needs_loads for each in self.limits) or any(
-            task.measure and MEASURES[task.measure][0] for task in self.tasks
+            task.measure in MEASURES and MEASURES[task.measure][0] for task in self.tasks
         )
 
     @property

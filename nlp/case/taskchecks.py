@@ -15,7 +15,7 @@ from ..units import Units
 from .checks import check_real, check_reals, check_statics, check_vector
 from .loads import Loading
 from .pose import LARGEST
-from .task import MEASURES, Sense, Task
+from .task import LEG_LENGTH, MEASURES, Sense, Task
 
 
 def check_tasks(given: Sequence[Task], model: Model, loading: Loading) -> tuple[Task, ...]:
@@ -66,8 +66,10 @@ def _check_measure(task: Task, tasks: int, model: Model, loading: Loading) -> No
     if not task.measure:
         return
     key = "objective.minimise"
+    if task.measure == LEG_LENGTH:
+        return  # an objective along a path, checked with it
     if task.measure not in MEASURES:
-        raise CaseError(key, f"must be one of {listing(MEASURES)}", task.measure)
+        raise CaseError(key, f"must be one of {listing([*MEASURES, LEG_LENGTH])}", task.measure)
     if tasks > 1:
         fault = "must be given at most once with objective.minimise, which does not optimise the F of tasks"
         raise CaseError("task", f"{fault}, got {tasks}")
