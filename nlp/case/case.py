@@ -39,7 +39,8 @@ from .loads import NO_LOADING, Loading
 from .names import name_of_task, parameter_name, pose_prefixes
 from .pathfile import TURN, PathFile
 from .pertask import check_poses, common_poses, common_value, task_value
-from .pose import LARGEST, MAX_FREE_ROTATION, NO_DISPLACEMENT, Free, OverPoses, PerTask, Pose, Rotation, Value
+from .pose import LARGEST, MAX_FREE_ROTATION, NO_DISPLACEMENT, Free, OverPoses, PerPose, PerTask, Pose, Rotation, Value
+from .posesettings import with_settings_resolved
 from .radians import angles_of, check_radians, with_radians
 from .schedule import check_settings
 from .settings import Expectation, Published, Search
@@ -70,8 +71,9 @@ class Case(Whole, Shown):
 
     Attributes:
         model: robot of the case.
-        parameters: value of each parameter of the robot by name: a number, :class:`Free` or :class:`PerTask`, or a
-            sequence of three for a point or direction; stored as tuples of components.
+        parameters: value of each parameter of the robot by name: a number, :class:`Free`, :class:`PerTask` or
+            :class:`PerPose`, or a sequence of three for a point or direction; stored as tuples of components. A
+            :class:`PerPose` becomes its range, or a robot that follows it.
         position: (3,) origin of the platform frame in the world frame, length; each coordinate fixed or free.
         rotation: orientation of the platform.
         tasks: tasks of the platform, one or more.
@@ -106,7 +108,7 @@ class Case(Whole, Shown):
     """
 
     model: Model
-    parameters: Mapping[str, Value | PerTask | Sequence[Value | PerTask]]
+    parameters: Mapping[str, Value | PerTask | PerPose | Sequence[Value | PerTask | PerPose]]
     position: Sequence[Value]
     tasks: Sequence[Task]
     rotation: Rotation = field(default_factory=Rotation)
@@ -153,6 +155,17 @@ class Case(Whole, Shown):
             CaseError: a value is not allowed.
         """
         store = object.__setattr__
+        resolved = with_settings_resolved(
+            self.model,
+            self.parameters,
+            self.limits,
+            self.workspace,
+            self.loading,
+            self.joint_centre_tolerance,
+            self.units,
+        )
+        for name, value in resolved._asdict().items():
+            store(self, name, value)
         store(self, "parameters", MappingProxyType(_check_parameters(self)))
         known = {} if self.dimensions_per_task else self.parameters
         if fault := assembly_fault(self.model, known, self.units):  # type: ignore[arg-type]
