@@ -59,6 +59,9 @@ def workspace(
     record = proof_record(proof, json_file)
     answer_after(Milestone.BOUND)
     (loaded, text, inputs), chosen = options.read_changed_case(case, settings, of)
+    if loaded.has_any_settings:
+        options_of_search = {"--scale": scale, "--quantity": quantities, "--leg-error": leg_error}
+        _existence(case, loaded, chosen, time, options_of_search, record, inputs, json_file, csv_file, whole=whole)
     workspace_of_case(loaded)
     tell_workspace(loaded)
     files = options.Outputs(json=json_file, csv=csv_file, plot=plot, plot_pose=plot_pose, html=html, proof=proof)
