@@ -117,6 +117,29 @@ def with_settings_resolved(
     return Resolved(model, {**_replaced(parameters, at, model), **slopes}, Limits(*others, *ranges), workspace)
 
 
+def check_pose_settings(model: Model, workspace: Workspace | None, changes: int, *, has_path: bool) -> None:
+    """Refuse settings for every pose together with a path, or with values that change from task to task.
+
+    Args:
+        model: robot of the case.
+        workspace: workspace of the case, with its settings.
+        changes: number of values that change from task to task.
+        has_path: If true, the case has a tool path.
+
+    Raises:
+        CaseError: a combination is not supported.
+    """
+    if not model.settings and (workspace is None or not workspace.setting_names):
+        return
+    if has_path:
+        raise CaseError("path", "conflicts with per = 'pose': settings move along a path with per = 'path'")
+    if changes:
+        raise CaseError("workspace.settings", "conflicts with per = 'task'")
+    if workspace is not None and workspace.settings is PoseSettings.ANY and workspace.has_limits:
+        fault = "must be 'affine' with limits over the workspace: a solve finds affine settings only"
+        raise CaseError("workspace.settings", fault, "any")
+
+
 def stated_setting(model: Model, name: str, at: Value, slope: Sequence[Value]) -> PerPose:
     """Return an affine setting as a case states it.
 
@@ -176,6 +199,9 @@ def _check_conflicts(limits: Limits, loading: Loading, tolerance: float | None, 
         fault = "is not supported with settings = 'affine': speeds of actuators assume settings at a standstill"
         raise CaseError("motion", fault)
     for limit in limits:
+        if limit.needs_motion:
+            fault = "is not supported with settings = 'affine': speeds assume settings at a standstill"
+            raise CaseError(f"limits.{limit.name}", fault)
         if limit.name in _WITHOUT_POSE:
             raise CaseError(f"limits.{limit.name}", "is not supported with settings = 'affine': it holds at one pose")
         if limit.name in _ABOUT_HOME and getattr(limit, "reference", "") == "home":

@@ -44,10 +44,11 @@ from ...models import (
 )
 from ...models.instance import length_of, sizes_at
 from ...models.values import dataclass
-from ..case.case import Case, Station
+from ..case.case import Case
 from ..case.choices import check_no_catalogue
 from ..case.limits.constraint import BoundedConstraint, Call, Constraint, PairFamily, Reading, squared
 from ..case.names import name_of_task
+from ..case.pertask import Station
 from ..case.pose import Free, Pose, Value, sizes_of_turn
 from ..case.task import Sense, Task
 from ..errors import CaseError

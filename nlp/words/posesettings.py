@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..proof.workspace.verdict import Outcome
 from ..results.posesettings import policy_of
-from .lines import counted, title_line
+from .lines import title_line
 from .numbers import number
 from .poses import pose_words
 from .text import Line, TextTable, Tone, in_part
@@ -43,7 +43,7 @@ def pose_settings_summary(
     elif result.outcome is Outcome.REFUTED:
         answer = f"NOT PROVED: one pose has no value of {names} that satisfies all limits"
     else:
-        answer = f"NOT PROVED: {counted(result.open, 'box', 'boxes')} undecided"
+        answer = f"NOT PROVED: {_boxes(result.open)} undecided"
     yield Line(answer, label="verdict", tone=Tone.ANSWER if result.proved else Tone.NO_ANSWER)
     yield Line(ranges, label="settings", after=", reset at a standstill")
     if result.pose is not None:
@@ -53,12 +53,17 @@ def pose_settings_summary(
         if result.outcome is Outcome.REFUTED:
             yield Line(command(result.pose), label="see it with", is_command=True)
     proved, examined = len(result.setting_boxes), result.examined
-    words = f"{counted(proved, 'box', 'boxes')} of poses proved, each with one setting; {examined} examined"
+    words = f"{_boxes(proved)} of poses proved, each with one setting; {examined} examined"
     yield Line(words, label="boxes")
     if result.reason is not None:
         yield Line(result.reason, label="search")
     if proved:
         yield from in_part("settings", [_table(result)])
+
+
+def _boxes(count: int) -> str:
+    """Return a number of boxes in words."""
+    return "1 box" if count == 1 else f"{count:,} boxes"
 
 
 def _range_words(each: SettingRangeData) -> str:
